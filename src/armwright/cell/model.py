@@ -1,0 +1,81 @@
+"""The cell as its file tells it: arms on their bases, frames, what the camera will see, devices, obstacles."""
+
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD, FrameTree, Node
+from armwright.kinematics.forward import forward
+from armwright.spatial.poses import one_pose
+
+
+def base_name(arm: str) -> str:
+    """Return the name of the frame that the base of an arm is; no program can write it."""
+    return f"{arm}.BASE"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class CellArm:
+    """One arm of a cell.
+
+    Attributes:
+        arm: the model.
+        base: (4, 4) pose of its base frame in the world.
+        start: (n,) joint positions at the start.
+        open_time: how long the fingers take to open [s].
+        grasp_time: how long they take to close [s].
+    """
+
+    arm: Arm
+    base: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    start: Array
+    open_time: float = 0.3
+    grasp_time: float = 0.3
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Cell:
+    """A cell.
+
+    Attributes:
+        name: as shown to people.
+        arms: by name, such as ``ARM_1``.
+        frames: by name, in upper case: (parent, pose (4, 4) in the world).
+        visions: by frame name, what the camera will report, one answer after the other, (4, 4) seen from the camera.
+        camera: (4, 4) pose of the camera in the world.
+        devices: names of the tools that can be operated; None when the cell does not say, and any will do.
+        contact_height: height of a plane that stops whatever comes down on it [m]; None where there is none.
+        vision_time: how long the camera takes for an answer [s].
+        deviation: allowed distance from straight lines [m].
+        period: of the servo [s].
+    """
+
+    name: str
+    arms: Mapping[str, CellArm]
+    frames: Mapping[str, tuple[str, Array]] = attrs.field(factory=dict)
+    visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
+    camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    devices: frozenset[str] | None = None
+    contact_height: float | None = None
+    vision_time: float = 0.1
+    deviation: float = 1e-3
+    period: float = 1e-3
+
+    def tree(self) -> FrameTree:
+        """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.
+
+        Between WORLD and the hand of an arm stands its base, so that a robot that is moved changes one line.
+        """
+        nodes = {}
+        for name, arm in self.arms.items():
+            nodes[base_name(name)] = Node(parent=WORLD, relation=arm.base)
+            nodes[name] = Node(parent=base_name(name), relation=forward(arm.arm, arm.start))
+        tree = FrameTree(nodes).place("STATION", np.eye(4))
+        for name, (_, X_WF) in self.frames.items():
+            tree = tree.place(name, X_WF)
+        for name, (parent, _) in self.frames.items():
+            tree = tree if parent == WORLD else tree.affix(name, parent)
+        return tree

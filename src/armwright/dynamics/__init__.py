@@ -1,0 +1,1 @@
+"""What it takes to move an arm: the efforts at its joints."""

@@ -1,0 +1,155 @@
+"""Newton-Euler inverse dynamics: the joint efforts that a motion takes."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armwright.arm.model import Arm, Joint, Motor
+from armwright.arrays import Array, ArrayLike, joint_array, of_shape
+from armwright.errors import ShapeError
+from armwright.kinematics.forward import link_frames, link_transform, per_joint, stack
+from armwright.tracing.scalar import Scalar, select
+from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
+
+_NO_WRENCH = (0.0,) * 6
+
+
+def newton_euler(
+    arm: Arm,
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    wrench: Sequence[Scalar] = _NO_WRENCH,
+) -> list[Scalar]:
+    """Return the efforts that the links alone ask of the joints, over abstract scalars.
+
+    Outward, from the base: speeds and accelerations of the links, each in its own frame. Gravity enters as an
+    acceleration of the base the other way. Inward, from the hand: forces and moments, and of them the part
+    along or about each joint.
+
+    Args:
+        arm: the arm, with n joints.
+        q: n joint positions.
+        qd: n joint speeds.
+        qdd: n joint accelerations.
+        wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
+
+    Source:
+        Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25). The report prints the base acceleration with
+        gravity pointing up; here gravity is a vector of the arm.
+    """
+    R_base = arm.base[:3, :3]
+    v_dot: Vector = (-R_base.T @ arm.gravity).tolist()
+    w: Vector = [0.0, 0.0, 0.0]
+    w_dot: Vector = [0.0, 0.0, 0.0]
+    turns: list[Matrix] = []
+    levers: list[Vector] = []
+    forces: list[Vector] = []
+    moments: list[Vector] = []
+    for joint, link, position, speed, acceleration in zip(arm.joints, arm.links, q, qd, qdd, strict=True):
+        R, p = link_transform(joint, position)
+        Rt = transpose(R)
+        lever = apply(Rt, p)  # from the origin of frame i-1 to that of frame i, seen from frame i
+        w, w_dot, v_dot = _next_link(joint, Rt, lever, (w, w_dot, v_dot), (speed, acceleration))
+        com, inertia = link.com.tolist(), link.inertia.tolist()
+        com_acceleration = add(v_dot, cross(w_dot, com), cross(w, cross(w, com)))
+        force = scale(link.mass, com_acceleration)
+        turns.append(R)
+        levers.append(lever)
+        forces.append(force)
+        spin = add(apply(inertia, w_dot), cross(w, apply(inertia, w)))
+        moments.append(add(spin, cross(add(lever, com), force)))
+    f, n = _reaction_at_hand(arm, q, wrench)
+    efforts: list[Scalar] = []
+    for i in reversed(range(arm.n)):
+        # f and n act from link i on what comes after it, at the origin of frame i, seen from frame i.
+        n = add(n, cross(levers[i], f), moments[i])
+        f = add(f, forces[i])
+        axis = turns[i][2]  # z of frame i-1 seen from frame i
+        efforts.append(dot(n if arm.joints[i].revolute else f, axis))
+        f, n = apply(turns[i], f), apply(turns[i], n)
+    return efforts[::-1]
+
+
+def _next_link(
+    joint: Joint, Rt: Matrix, lever: Vector, motion: tuple[Vector, Vector, Vector], rates: tuple[Scalar, Scalar]
+) -> tuple[Vector, Vector, Vector]:
+    """Carry angular speed, angular acceleration and acceleration of the origin from frame i-1 to frame i."""
+    w, w_dot, v_dot = motion
+    speed, acceleration = rates
+    if joint.revolute:
+        z_speed = [0.0, 0.0, speed]
+        w_dot = apply(Rt, add(w_dot, [0.0, 0.0, acceleration], cross(w, z_speed)))
+        w = apply(Rt, add(w, z_speed))
+        v_dot = apply(Rt, v_dot)
+    else:
+        w, w_dot = apply(Rt, w), apply(Rt, w_dot)
+        slide = apply(Rt, [0.0, 0.0, speed])
+        v_dot = add(apply(Rt, add(v_dot, [0.0, 0.0, acceleration])), scale(2.0, cross(w, slide)))
+    v_dot = add(v_dot, cross(w_dot, lever), cross(w, cross(w, lever)))
+    return w, w_dot, v_dot
+
+
+def _reaction_at_hand(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) -> tuple[Vector, Vector]:
+    """Return force and moment that the last link must give to the surroundings, at its origin, in its frame."""
+    if wrench is _NO_WRENCH:
+        return [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    R, _ = link_frames(arm, q)[-1]
+    Rt = transpose(R)
+    force, moment = apply(Rt, wrench[:3]), apply(Rt, wrench[3:])
+    f = subtract([0.0, 0.0, 0.0], force)
+    n = subtract(cross(arm.tool[:3, 3].tolist(), f), moment)
+    return f, n
+
+
+def drive_effort(motor: Motor, qd: Scalar, qdd: Scalar) -> Scalar:
+    """Return what the drive itself takes: rotor inertia, viscous and dry friction, over abstract scalars."""
+    dry = select(qd > 0, motor.coulomb_forward, select(qd < 0, -motor.coulomb_backward, 0.0))
+    return motor.inertia * qdd + motor.viscous * qd + dry
+
+
+def inverse_dynamics(
+    arm: Arm,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    drives: bool = True,
+) -> Array:
+    """Return the joint efforts of a motion.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint speeds.
+        qdd: (..., n) joint accelerations.
+        wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
+            base axes; none when left out.
+        drives: whether rotor inertia and friction of the drives count.
+
+    Returns:
+        tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
+
+    Raises:
+        ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+
+    Source:
+        Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25).
+    """
+    arrays = [joint_array(value, arm.n, name) for value, name in ((q, "q"), (qd, "qd"), (qdd, "qdd"))]
+    outside = None if wrench is None else of_shape(wrench, (6,), "wrench")
+    try:
+        lead = np.broadcast_shapes(*(a.shape[:-1] for a in arrays), () if outside is None else outside.shape[:-1])
+    except ValueError as error:
+        shapes = ", ".join(str(a.shape) for a in arrays)
+        raise ShapeError(f"q, qd, qdd: leading axes must fit together, got {shapes}") from error
+    q_, qd_, qdd_ = (per_joint(np.broadcast_to(a, (*lead, arm.n))) for a in arrays)
+    push = _NO_WRENCH if outside is None else per_joint(np.broadcast_to(outside, (*lead, 6)))
+    efforts = newton_euler(arm, q_, qd_, qdd_, push)
+    if drives:
+        efforts = [
+            effort + drive_effort(motor, speed, acceleration)
+            for effort, motor, speed, acceleration in zip(efforts, arm.motors, qd_, qdd_, strict=True)
+        ]
+    return stack(efforts, lead)

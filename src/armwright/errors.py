@@ -1,0 +1,98 @@
+"""What can go wrong for a caller: one tree of errors, each also the built-in error it resembles.
+
+A message says what, what was got, what was expected and, where there is one, the nearest valid choice.
+"""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+# Glyphs that a scan, a listing or a tired eye takes for one another.
+_CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "B": "8"})
+
+
+class ArmwrightError(Exception):
+    """The caller asked for something that cannot be; the text says what and what to do."""
+
+
+class ShapeError(ArmwrightError, ValueError):
+    """An array has the wrong shape."""
+
+
+class InvalidValueError(ArmwrightError, ValueError):
+    """A value is of the right kind but has no meaning here."""
+
+
+class UnknownNameError(ArmwrightError, LookupError):
+    """A name stands for nothing; the text lists what there is."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        """Say that no ``kind`` is called ``name``, and what is known instead."""
+        choices = sorted(known)
+        near = closest(name, choices)
+        hint = f" Did you mean '{near}'?" if near else ""
+        listing = f" Known: {', '.join(choices)}." if choices else " There is none."
+        super().__init__(f"no {kind} '{name}'.{hint}{listing}")
+
+
+class FileFormatError(ArmwrightError, ValueError):
+    """A file does not say what it should; the text names file, line and key."""
+
+    def __init__(self, path: Path | str, line: int | None, key: str, message: str) -> None:
+        """Point at ``key`` in ``line`` of ``path`` and say what is wrong there."""
+        self.path, self.line, self.key = Path(path), line, key
+        place = f"{path}:{line}" if line else f"{path}"
+        super().__init__(f"{place}: {key}: {message}" if key else f"{place}: {message}")
+
+
+class UnsupportedArmError(ArmwrightError, ValueError):
+    """The method does not fit this arm."""
+
+
+class OutputError(ArmwrightError, OSError):
+    """A result could not be written; nothing half-written was left behind."""
+
+
+def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
+    """Return the known name that ``name`` was most likely meant to be.
+
+    Letters of either case count as equal. Names that differ only in glyphs easily confused (l, 1, I; O, 0;
+    - and _) come before all others; then the smallest edit distance wins, a swap of neighbours counting one.
+
+    Args:
+        name: what was written.
+        known: what could have been meant.
+        limit: the largest edit distance still taken for a slip.
+
+    Returns:
+        The nearest name, or None when none is near.
+    """
+    word = name.upper()
+    best: tuple[int, str] | None = None
+    for choice in known:
+        other = choice.upper()
+        if word.translate(_CONFUSABLE) == other.translate(_CONFUSABLE):
+            return choice
+        distance = edit_distance(word, other)
+        # A slip changes less than half of a word: "A" is not a misspelt "B".
+        if distance <= limit and 2 * distance < max(len(word), len(other)) and (best is None or distance < best[0]):
+            best = (distance, choice)
+    return best[1] if best else None
+
+
+def edit_distance(a: Sequence[str], b: Sequence[str]) -> int:
+    """Count the insertions, deletions, changes and neighbour swaps that turn ``a`` into ``b``.
+
+    Source:
+        Damerau (1964), restricted form: no part is edited twice.
+    """
+    before_last: list[int] = []
+    last = list(range(len(b) + 1))
+    for i, x in enumerate(a, 1):
+        row = [i]
+        for j, y in enumerate(b, 1):
+            cost = min(last[j] + 1, row[j - 1] + 1, last[j - 1] + (x != y))
+            if i > 1 and j > 1 and x == b[j - 2] and a[i - 2] == y:
+                cost = min(cost, before_last[j - 2] + 1)
+            row.append(cost)
+        before_last, last = last, row
+    return last[-1]

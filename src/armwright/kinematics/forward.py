@@ -1,0 +1,108 @@
+"""Forward kinematics: the pose of every link and of the tool."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armwright.arm.model import Arm, Joint
+from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.spatial.poses import pose
+from armwright.tracing.scalar import Scalar, cos, sin
+from armwright.tracing.vectors import Matrix, Vector, add, apply, product
+
+
+def link_transform(joint: Joint, q: Scalar) -> tuple[Matrix, Vector]:
+    """Return rotation and place of frame i seen from frame i-1, over abstract scalars.
+
+    Source:
+        Denavit & Hartenberg (1955); TR-83-008 eq. (3), whose fourth column strayed into the rotation.
+    """
+    if joint.revolute:
+        c, s, d = cos(joint.theta + q), sin(joint.theta + q), joint.d
+    else:
+        c, s, d = joint.cos_theta, joint.sin_theta, joint.d + q
+    ca, sa = joint.cos_alpha, joint.sin_alpha
+    R = [
+        [c, -s * ca, s * sa],
+        [s, c * ca, -c * sa],
+        [0.0, sa, ca],
+    ]
+    return R, [joint.a * c, joint.a * s, d]
+
+
+def link_frames(arm: Arm, q: Sequence[Scalar]) -> list[tuple[Matrix, Vector]]:
+    """Return rotation and place of frames 0 to n seen from the base, over abstract scalars.
+
+    Args:
+        arm: the arm, with n joints.
+        q: joint positions, at most n; the frames of the first ``len(q)`` links come back.
+    """
+    R: Matrix = arm.base[:3, :3].tolist()
+    p: Vector = arm.base[:3, 3].tolist()
+    frames = [(R, p)]
+    for joint, position in zip(arm.joints[: len(q)], q, strict=True):
+        R_link, p_link = link_transform(joint, position)
+        p = add(p, apply(R, p_link))
+        R = product(R, R_link)
+        frames.append((R, p))
+    return frames
+
+
+def tool_frame(arm: Arm, frame: tuple[Matrix, Vector]) -> tuple[Matrix, Vector]:
+    """Return rotation and place of the tool, given those of the last link, over abstract scalars."""
+    R, p = frame
+    return product(R, arm.tool[:3, :3].tolist()), add(p, apply(R, arm.tool[:3, 3].tolist()))
+
+
+def forward(arm: Arm, q: ArrayLike) -> Array:
+    """Return the tool pose in the base frame.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+
+    Returns:
+        X_BT: (..., 4, 4) homogeneous poses, translations in [m].
+
+    Raises:
+        ShapeError: the last axis of ``q`` is not n long.
+
+    Source:
+        Denavit & Hartenberg (1955); TR-83-008 eq. (2).
+    """
+    q = joint_array(q, arm.n)
+    return _stack_pose(tool_frame(arm, link_frames(arm, per_joint(q))[-1]), q.shape[:-1])
+
+
+def link_poses(arm: Arm, q: ArrayLike) -> Array:
+    """Return the poses of frames 0 to n, and last of the tool, in the base frame.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+
+    Returns:
+        (..., n + 2, 4, 4) homogeneous poses, translations in [m].
+
+    Raises:
+        ShapeError: the last axis of ``q`` is not n long.
+    """
+    q = joint_array(q, arm.n)
+    frames = link_frames(arm, per_joint(q))
+    frames.append(tool_frame(arm, frames[-1]))
+    return np.stack([_stack_pose(frame, q.shape[:-1]) for frame in frames], axis=-3)
+
+
+def per_joint(q: Array) -> list[Scalar]:
+    """Take (..., n) apart into n scalars: floats for one configuration, arrays of shape (...) for many."""
+    return q.tolist() if q.ndim == 1 else list(np.moveaxis(q, -1, 0))
+
+
+def stack(scalars: Sequence[Scalar], lead: tuple[int, ...]) -> Array:
+    """Put k scalars back together to (..., k)."""
+    return np.stack([np.broadcast_to(np.asarray(x, dtype=np.float64), lead) for x in scalars], axis=-1)
+
+
+def _stack_pose(frame: tuple[Matrix, Vector], lead: tuple[int, ...]) -> Array:
+    R, p = frame
+    return pose(stack([x for row in R for x in row], lead).reshape(*lead, 3, 3), stack(p, lead))

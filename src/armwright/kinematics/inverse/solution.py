@@ -1,0 +1,161 @@
+"""What inverse kinematics answers: branches with labels and violations, and one word on the whole."""
+
+import enum
+import math
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.errors import ArmwrightError
+
+# A position this close to its limit, relative to the range of the joint, is at the limit and not beyond it.
+_AT_LIMIT = 1e-9
+
+
+class Answer(enum.StrEnum):
+    """One word on a pose.
+
+    ``SOLVED``: at least one posture inside the limits. ``SINGULAR``: the same, but a joint is free there.
+    ``OUT_OF_LIMITS``: postures exist, none inside the limits. ``OUT_OF_REACH``: no posture exists.
+    """
+
+    SOLVED = "solved"
+    SINGULAR = "singular"
+    OUT_OF_LIMITS = "out of limits"
+    OUT_OF_REACH = "out of reach"
+
+
+@attrs.frozen(kw_only=True)
+class Violation:
+    """One joint outside its limits.
+
+    Attributes:
+        joint: number of the joint, from 1.
+        value: where it would stand [rad] or [m].
+        limit: the limit it passes.
+        revolute: whether ``value`` is an angle.
+    """
+
+    joint: int
+    value: float
+    limit: float
+    revolute: bool
+
+    @property
+    def excess(self) -> float:
+        """How far beyond the limit [rad] or [m]."""
+        return abs(self.value - self.limit)
+
+    def __str__(self) -> str:
+        """Say it in degrees or millimetres."""
+        unit, scale = ("deg", math.degrees(1.0)) if self.revolute else ("mm", 1e3)
+        return (
+            f"joint {self.joint} would stand at {self.value * scale:.1f} {unit}, "
+            f"{self.excess * scale:.1f} {unit} beyond its limit {self.limit * scale:.1f} {unit}"
+        )
+
+
+@attrs.frozen(kw_only=True)
+class Branch:
+    """One posture.
+
+    Attributes:
+        q: (n,) joint positions [rad] or [m].
+        label: such as ``right, up, no-flip``.
+        violations: joints outside their limits; empty when the posture can be taken.
+        free: numbers of the joints that may turn together without moving the hand, from 1; empty unless singular.
+        position_error: distance of the hand from the asked place [m].
+        rotation_error: angle of the hand from the asked orientation [rad].
+    """
+
+    q: Array = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
+    label: str
+    violations: tuple[Violation, ...] = ()
+    free: tuple[int, ...] = ()
+    position_error: float = 0.0
+    rotation_error: float = 0.0
+
+    @property
+    def allowed(self) -> bool:
+        """Whether every joint is inside its limits."""
+        return not self.violations
+
+
+@attrs.frozen(kw_only=True)
+class InverseSolution:
+    """All postures for one pose.
+
+    Attributes:
+        arm: the arm.
+        answer: one word on the whole.
+        branches: the postures, those inside the limits first, each nearest to the asked starting point first.
+        distance: how far the pose is out of reach [m]; 0 where it is in reach.
+        nearest_pose: (4, 4) the pose in reach nearest to the asked one, same orientation.
+    """
+
+    arm: Arm
+    answer: Answer
+    branches: tuple[Branch, ...]
+    distance: float
+    nearest_pose: Array = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
+
+    def __iter__(self) -> Iterator[Branch]:
+        """Walk through the branches, nearest first."""
+        return iter(self.branches)
+
+    @property
+    def allowed(self) -> tuple[Branch, ...]:
+        """The branches inside the limits, nearest first; none when the pose is out of reach."""
+        if self.answer is Answer.OUT_OF_REACH:
+            return ()
+        return tuple(branch for branch in self.branches if branch.allowed)
+
+    @property
+    def best(self) -> Branch:
+        """The nearest branch inside the limits.
+
+        Raises:
+            NoPostureError: there is none; the text says why and how far out.
+        """
+        for branch in self.allowed:
+            return branch
+        raise NoPostureError(self)
+
+    def explain(self) -> str:
+        """Say in one sentence why no posture can be taken."""
+        if self.answer is Answer.OUT_OF_REACH:
+            x, y, z = self.nearest_pose[:3, 3] * 1e3
+            return (
+                f"the pose is {self.distance * 1e3:.1f} mm out of reach of '{self.arm.name}'; "
+                f"the nearest in reach has its origin at ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
+            )
+        least = min(self.branches, key=_worst_violation)
+        faults = "; ".join(str(violation) for violation in least.violations)
+        return f"no posture of '{self.arm.name}' is inside the joint limits; in the closest, {faults}"
+
+
+class NoPostureError(ArmwrightError, ValueError):
+    """No posture inside the limits puts the hand at the pose; ``solution`` holds what was found."""
+
+    def __init__(self, solution: InverseSolution) -> None:
+        """Keep the solution; its explanation is the text."""
+        self.solution = solution
+        super().__init__(solution.explain())
+
+
+def violations(arm: Arm, q: ArrayLike) -> tuple[Violation, ...]:
+    """Return the joints that one configuration (n,) puts outside their limits, in order."""
+    q = joint_array(q, arm.n)
+    found = []
+    for i, (joint, value) in enumerate(zip(arm.joints, q.tolist(), strict=True), 1):
+        limit = min(max(value, joint.limits.lower), joint.limits.upper)
+        if abs(value - limit) > _AT_LIMIT * max(1.0, abs(limit)):
+            found.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute))
+    return tuple(found)
+
+
+def _worst_violation(branch: Branch) -> float:
+    return max((violation.excess for violation in branch.violations), default=0.0)

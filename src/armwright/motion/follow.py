@@ -1,0 +1,192 @@
+"""Following a path: joints solved at knots, joined by X-splines, and held against path and limits."""
+
+from typing import Literal, NoReturn, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike
+from armwright.errors import ArmwrightError
+from armwright.kinematics.forward import forward
+from armwright.kinematics.inverse.closed_form import inverse, inverse_branches, travel
+from armwright.kinematics.inverse.solution import Answer, violations
+from armwright.motion.path import Knots, Path, place_knots
+from armwright.motion.trajectory import Trajectory, hold
+from armwright.motion.xspline import xspline
+from armwright.spatial.rotations import angle_between
+
+Cause: TypeAlias = Literal["reach", "limits", "singular"]
+
+# How often the path is looked at between two knots.
+_LOOKS = 8
+# The rule's knots are halved at most this often before the path is given up: 1/64 of the rule's step.
+_HALVINGS = 6
+# Turning the hand by this much is allowed where the place may be off by one metre's thousandth: 5 mrad per mm.
+TURN_PER_METRE = 5.0
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Followed:
+    """A path that the joints can follow.
+
+    Attributes:
+        trajectory: of the joints, at rest at both ends.
+        knots: number of knots solved.
+        deviation: largest distance of the hand from the path that was found [m].
+        turn_deviation: largest angle from the orientation of the path that was found [rad].
+        slowed: why it runs slower than the rule says, or empty.
+    """
+
+    trajectory: Trajectory
+    knots: int
+    deviation: float
+    turn_deviation: float
+    slowed: str
+
+
+class PathError(ArmwrightError, ValueError):
+    """A path cannot be followed.
+
+    Attributes:
+        cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` posture.
+        segment: which way of the path, from 0.
+        fraction: how far along that way.
+    """
+
+    def __init__(self, cause: Cause, segment: int, fraction: float, message: str) -> None:
+        """Say what stops the arm, and where."""
+        self.cause, self.segment, self.fraction = cause, segment, fraction
+        super().__init__(message)
+
+
+def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed: float) -> Followed:
+    """Return the joint motion along a path, from rest to rest, passing the poses between without a stop.
+
+    Args:
+        arm: a PUMA-like or Stanford-like arm.
+        path: begins where the hand is at ``q_start``.
+        q_start: (n,) present joint positions.
+        deviation: allowed distance of the hand from the path [m]; its orientation may be off by
+            ``TURN_PER_METRE`` times as many radians.
+        speed: 1 to 120, 100 is normal.
+
+    Raises:
+        PathError: a pose on the way is out of reach, a joint passes a limit, or a singularity keeps the hand from
+            staying within the deviation.
+        InvalidValueError: deviation or speed are out of range.
+
+    Source:
+        TR-83-008, "straight line motion" and "continuous motion"; the knots of its rule are halved until the
+        deviation between them, which the rule only estimates, really is within the bound.
+    """
+    if not path.lengths().any():
+        return Followed(trajectory=hold(q_start, 0.0), knots=1, deviation=0.0, turn_deviation=0.0, slowed="")
+    for halving in range(_HALVINGS + 1):
+        knots = place_knots(arm, path, deviation=deviation, speed=speed, finer=2**halving)
+        q = _solve(arm, path, knots, np.asarray(q_start, dtype=np.float64))
+        trajectory = xspline(knots.times, q)
+        off, turned = _deviations(arm, path, knots, trajectory)
+        if off.max() <= deviation and turned.max() <= TURN_PER_METRE * deviation:
+            break
+    else:
+        _give_up(arm, path, knots, q, off / deviation + turned / (TURN_PER_METRE * deviation))
+    _check_between(arm, knots, trajectory)
+    factor, slowed = _slowing(arm, trajectory)
+    return Followed(
+        trajectory=trajectory.slowed(factor),
+        knots=len(q),
+        deviation=float(off.max()),
+        turn_deviation=float(turned.max()),
+        slowed=slowed,
+    )
+
+
+def _solve(arm: Arm, path: Path, knots: Knots, q_start: Array) -> Array:
+    """Solve every knot by the posture nearest to the one before it."""
+    X = knots.poses(path)
+    candidates, singular = inverse_branches(arm, X, q_start)
+    q = np.empty((len(X), arm.n))
+    q[0] = q_start
+    for k in range(1, len(X)):
+        if singular[k].any():
+            # A free joint stays where it was at the last knot, not where it was at the start.
+            candidates[k], _ = inverse_branches(arm, X[k], q[k - 1])
+        revolute = np.array([joint.revolute for joint in arm.joints])
+        turns = np.where(revolute, np.round((q[k - 1] - candidates[k]) / (2 * np.pi)), 0.0)
+        near = candidates[k] + 2 * np.pi * turns
+        q[k] = min(near, key=lambda posture: travel(arm, q[k - 1], posture))
+        _check_knot(arm, X[k], q[k], knots, k)
+    return q
+
+
+def _check_knot(arm: Arm, X: Array, q: Array, knots: Knots, k: int) -> None:
+    place = knots.segments[k], knots.fractions[k]
+    if np.abs(forward(arm, q)[:3, 3] - X[:3, 3]).max() > 1e-9:
+        solution = inverse(arm, X)
+        if solution.answer is Answer.OUT_OF_REACH:
+            raise PathError("reach", *place, solution.explain())
+    for fault in violations(arm, q):
+        raise PathError("limits", *place, str(fault))
+
+
+def _deviations(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return the largest deviation in place and turn between every two knots, (m-1,) each."""
+    fine = (np.arange(_LOOKS) + 0.5) / _LOOKS
+    h = np.diff(knots.times)
+    t = knots.times[:-1, None] + fine * h[:, None]
+    X = forward(arm, trajectory(t))
+    segments = np.array(knots.segments[1:])
+    A, B = path.poses[segments], path.poses[segments + 1]
+    way = B[:, :3, 3] - A[:, :3, 3]
+    square = np.maximum(np.sum(way**2, axis=-1), 1e-300)
+    relative = X[..., :3, 3] - A[:, None, :3, 3]
+    s = np.clip(np.sum(relative * way[:, None], axis=-1) / square[:, None], 0.0, 1.0)
+    off = np.linalg.norm(relative - s[..., None] * way[:, None], axis=-1)
+    turned = np.empty_like(off)
+    for i, segment in enumerate(segments):
+        # A way without length turns on the spot, where progress is read from the clock.
+        fraction = s[i] if way[i].any() else _fractions_at(knots, i, fine)
+        turned[i] = angle_between(path.at(segment, fraction)[:, :3, :3], X[i, :, :3, :3])
+    return off.max(axis=-1), turned.max(axis=-1)
+
+
+def _fractions_at(knots: Knots, i: int, fine: Array) -> Array:
+    before = knots.fractions[i] if knots.segments[i] == knots.segments[i + 1] else 0.0
+    return before + fine * (knots.fractions[i + 1] - before)
+
+
+def _check_between(arm: Arm, knots: Knots, trajectory: Trajectory) -> None:
+    """Refuse a spline that swings over a joint limit between knots which keep it."""
+    at_knots = trajectory(knots.times)
+    for q in trajectory.extremes(0):
+        for fault in violations(arm, q):
+            nearest = int(np.abs(at_knots[:, fault.joint - 1] - fault.value).argmin())
+            raise PathError("limits", knots.segments[nearest], knots.fractions[nearest], str(fault))
+
+
+def _slowing(arm: Arm, trajectory: Trajectory) -> tuple[float, str]:
+    """Return the factor of time that brings speeds and accelerations inside the limits, and its reason."""
+    by_speed = trajectory.peaks(1) / arm.limit("speed")
+    by_acceleration = np.sqrt(trajectory.peaks(2) / arm.limit("acceleration"))
+    factor = max(float(by_speed.max()), float(by_acceleration.max()))
+    if factor <= 1:
+        return 1.0, ""
+    what, ratios = ("speed", by_speed) if by_speed.max() >= by_acceleration.max() else ("acceleration", by_acceleration)
+    return factor, f"{factor:.2f} times slower, for the {what} of joint {int(ratios.argmax()) + 1}"
+
+
+def _give_up(arm: Arm, path: Path, knots: Knots, q: Array, badness: Array) -> NoReturn:
+    worst = int(badness.argmax())
+    jump = np.abs(q[worst + 1] - q[worst]) / np.where(np.isfinite(arm.limit("speed")), arm.limit("speed"), 1.0)
+    joint = int(jump.argmax())
+    amount = abs(q[worst + 1, joint] - q[worst, joint])
+    unit, scale = ("deg", 180 / np.pi) if arm.joints[joint].revolute else ("mm", 1e3)
+    x, y, z = path.at(knots.segments[worst + 1], knots.fractions[worst + 1])[:3, 3] * 1e3
+    raise PathError(
+        "singular",
+        knots.segments[worst + 1],
+        knots.fractions[worst + 1],
+        f"the hand cannot stay on the path near ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base: the arm is singular "
+        f"there and joint {joint + 1} would have to turn {amount * scale:.1f} {unit} at once",
+    )

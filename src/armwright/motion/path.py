@@ -1,0 +1,152 @@
+"""A path of the hand through poses, and the report's rule for how densely and how fast to run it."""
+
+import math
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, of_shape
+from armwright.errors import InvalidValueError
+from armwright.motion.quintic import TOP_SPEED, check_speed
+from armwright.spatial.poses import between
+from armwright.spatial.rotations import angle_between
+
+# A turn on the spot has no length; it is timed as if a tool this long swept the way [m].
+TURN_RADIUS = 0.2
+# The report's rule lets speed and step vanish for a line over the base axis; they stop falling at this part of the
+# reach, which for the arms of the catalogue lies inside the space that the arm cannot enter anyway.
+_CLOSEST = 0.1
+
+
+def _poses(value: ArrayLike) -> Array:
+    X = of_shape(value, (4, 4), "poses")
+    if X.ndim != 3 or len(X) < 2:
+        raise InvalidValueError(f"path: expected at least two poses, got shape {X.shape}")
+    return X
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Path:
+    """Straight ways from pose to pose.
+
+    Attributes:
+        poses: (k, 4, 4) tool poses in the base frame of the arm.
+    """
+
+    poses: Array = attrs.field(converter=_poses)
+
+    def lengths(self) -> Array:
+        """Return the length of every way (k-1,) [m]; a turn counts with ``TURN_RADIUS``."""
+        shift = np.linalg.norm(np.diff(self.poses[:, :3, 3], axis=0), axis=-1)
+        turn = angle_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3])
+        return np.asarray(np.maximum(shift, TURN_RADIUS * turn))
+
+    def at(self, segment: int, fraction: ArrayLike) -> Array:
+        """Return poses (..., 4, 4) at fractions (...) of one way."""
+        return between(self.poses[segment], self.poses[segment + 1], fraction)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Knots:
+    """Where on a path the joints are solved for, and when they pass.
+
+    Attributes:
+        times: (m,) [s], from 0.
+        segments: (m,) which way of the path each knot is on.
+        fractions: (m,) how far along that way.
+    """
+
+    times: Array
+    segments: tuple[int, ...]
+    fractions: tuple[float, ...]
+
+    def poses(self, path: Path) -> Array:
+        """Return the poses of the knots, (m, 4, 4)."""
+        return np.stack([path.at(i, s) for i, s in zip(self.segments, self.fractions, strict=True)])
+
+
+def closest_to_axis(A: ArrayLike, B: ArrayLike) -> float:
+    """Return the shortest distance from the base axis to the way between two places (3,) [m]."""
+    a, b = np.asarray(A, dtype=np.float64)[:2], np.asarray(B, dtype=np.float64)[:2]
+    way = b - a
+    square = float(way @ way)
+    s = min(max(float(-(a @ way) / square), 0.0), 1.0) if square else 0.0
+    return float(np.linalg.norm(a + s * way))
+
+
+def report_step(arm: Arm, A: ArrayLike, B: ArrayLike, deviation: float) -> float:
+    """Return the distance of knots on a line that the report's rule gives [m].
+
+    An arm that swings about its base with half-radius R/2 leaves a chord of length dy by dx where
+    dy² = 8 R dx; R/2 is the shortest distance from the base axis to the line.
+
+    Source:
+        TR-83-008, "straight line motion", step 1.
+    """
+    R = 2 * max(closest_to_axis(A, B), _CLOSEST * arm.reach)
+    return math.sqrt(8 * R * deviation)
+
+
+def report_speed(arm: Arm, A: ArrayLike, B: ArrayLike, speed: float) -> float:
+    """Return the speed of the hand on a line that the report's rule gives [m/s].
+
+    V = (speed / 120) (r_min / R_MAX) V_MAX: an arm held in moves its hand more slowly.
+
+    Source:
+        TR-83-008, "straight line motion", steps 2 and 3, with alpha = 100/120.
+    """
+    r_min = max(closest_to_axis(A, B), _CLOSEST * arm.reach)
+    return check_speed(speed) / TOP_SPEED * min(r_min / arm.reach, 1.0) * arm.tool_speed
+
+
+def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: int = 1) -> Knots:
+    """Place knots on a path by the report's rule.
+
+    The first and the last step are half as long as the others and take as much time: so the hand gathers speed
+    and loses it.
+
+    Args:
+        arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
+        path: the way.
+        deviation: allowed distance of the hand from the path [m].
+        speed: 1 to 120, 100 is normal.
+        finer: how many times more steps than the rule asks.
+
+    Raises:
+        InvalidValueError: deviation or speed are out of range, or the arm has no reach or tool speed.
+
+    Source:
+        TR-83-008, "straight line motion" step 5 and "continuous motion".
+    """
+    if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
+        raise InvalidValueError(
+            f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
+        )
+    if not deviation > 0:
+        raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation}")
+    times, segments, fractions = [0.0], [0], [0.0]
+    lengths = path.lengths()
+    last = len(lengths) - 1
+    for i, length in enumerate(lengths):
+        A, B = path.poses[i, :3, 3], path.poses[i + 1, :3, 3]
+        steps = _steps(math.ceil(length / report_step(arm, A, B, deviation) - 1e-9) * finer, i == 0, i == last)
+        per_step = length / sum(steps) / report_speed(arm, A, B, speed)
+        for k in range(1, len(steps) + 1):
+            times.append(times[-1] + per_step)
+            segments.append(i)
+            fractions.append(sum(steps[:k]) / sum(steps))
+    return Knots(times=np.array(times), segments=tuple(segments), fractions=tuple(fractions))
+
+
+def _steps(count: int, first: bool, last: bool) -> Sequence[float]:  # noqa: FBT001
+    """Return the relative lengths of the steps on one way."""
+    count = max(count, 1)
+    if first and last:
+        return [0.5, *[1.0] * (count - 1), 0.5]
+    if first:
+        return [0.5, *[1.0] * count]
+    if last:
+        return [*[1.0] * count, 0.5]
+    return [1.0] * count

@@ -1,0 +1,82 @@
+"""Point to point: the quintic that rests at both ends."""
+
+import math
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.errors import InvalidValueError
+from armwright.motion.trajectory import Trajectory, hold
+
+# RLO and VAL count speed in percent of normal; 120 is all the arm allows.
+TOP_SPEED = 120.0
+LOWEST_SPEED = 1.0
+# Peaks of 10 u³ - 15 u⁴ + 6 u⁵ on [0, 1]: of its first and of its second derivative.
+PEAK_SPEED = 15 / 8
+PEAK_ACCELERATION = 10 / math.sqrt(3)
+
+
+def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajectory:
+    """Return the motion 10u³ - 15u⁴ + 6u⁵, with speed and acceleration 0 at both ends.
+
+    Args:
+        q_start: (n,) joint positions [rad] or [m].
+        q_goal: (n,) joint positions.
+        duration: [s], above 0.
+
+    Source:
+        Mujtaba (1980); TR-83-008, "point to point motion".
+    """
+    if not duration > 0:
+        raise InvalidValueError(f"duration: expected more than 0 s, got {duration}")
+    start = np.asarray(q_start, dtype=np.float64)
+    way = np.asarray(q_goal, dtype=np.float64) - start
+    powers = np.array((0.0, 0.0, 0.0, 10 / duration**3, -15 / duration**4, 6 / duration**5))
+    coefficients = powers[:, None] * way
+    coefficients[0] += start
+    return Trajectory(times=(0.0, duration), coefficients=coefficients[None])
+
+
+def shortest_duration(arm: Arm, way: ArrayLike) -> float:
+    """Return the shortest time of a quintic over ``way`` (n,) inside the speed and acceleration limits [s]."""
+    way = np.abs(joint_array(way, arm.n, "way"))
+    by_speed: Array = PEAK_SPEED * way / arm.limit("speed")
+    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * way / arm.limit("acceleration"))
+    return float(max(by_speed.max(), by_acceleration.max()))
+
+
+def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float = 100.0) -> Trajectory:
+    """Return the quintic from one posture to another, timed by the joint limits.
+
+    Args:
+        arm: the arm, with n joints.
+        q_start: (n,) joint positions [rad] or [m].
+        q_goal: (n,) joint positions.
+        speed: 1 to 120; 120 is the fastest the limits allow, all else in proportion.
+
+    Raises:
+        InvalidValueError: the speed is out of range, or the arm has neither speed nor acceleration limits.
+
+    Source:
+        TR-83-008, "point to point motion"; the meaning of 120 from its section on MOVE.
+    """
+    speed = check_speed(speed)
+    way = joint_array(q_goal, arm.n, "q_goal") - joint_array(q_start, arm.n, "q_start")
+    if not way.any():
+        return hold(q_start, 0.0)
+    shortest = shortest_duration(arm, way)
+    if shortest == 0:
+        raise InvalidValueError(f"arm '{arm.name}' has no speed and no acceleration limit, so a move has no duration")
+    return quintic(q_start, q_goal, shortest * TOP_SPEED / speed)
+
+
+def check_speed(speed: float) -> float:
+    """Return ``speed`` if it is one.
+
+    Raises:
+        InvalidValueError: it is outside 1..120.
+    """
+    if not LOWEST_SPEED <= speed <= TOP_SPEED:
+        raise InvalidValueError(f"speed {speed:g} is outside {LOWEST_SPEED:g}..{TOP_SPEED:g}")
+    return speed

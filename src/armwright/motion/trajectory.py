@@ -1,0 +1,156 @@
+"""A motion of all joints in time: piecewise polynomials, known exactly between samples too."""
+
+import math
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, ArrayLike, floats
+from armwright.errors import InvalidValueError, ShapeError
+
+
+def _times(value: ArrayLike) -> Array:
+    times = floats(value, "times")
+    if times.ndim != 1 or len(times) < 2:
+        raise ShapeError(f"times: expected at least two, got shape {times.shape}")
+    if times[0] != 0 or (np.diff(times) < 0).any():
+        raise InvalidValueError(f"times: expected to begin at 0 and never to fall, got {times.tolist()}")
+    times.setflags(write=False)
+    return times
+
+
+def _coefficients(value: ArrayLike) -> Array:
+    coefficients = floats(value, "coefficients")
+    if coefficients.ndim != 3:
+        raise ShapeError(f"coefficients: expected (segments, powers, joints), got shape {coefficients.shape}")
+    coefficients.setflags(write=False)
+    return coefficients
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Trajectory:
+    """Joint positions as a function of time, a polynomial on each of m segments.
+
+    Attributes:
+        times: (m + 1,) where segments begin and the last one ends [s], from 0.
+        coefficients: (m, k, n) of the powers 0 to k-1 of the time since the segment began.
+    """
+
+    times: Array = attrs.field(converter=_times)
+    coefficients: Array = attrs.field(converter=_coefficients)
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse a number of segments that does not fit the times."""
+        if len(self.coefficients) != len(self.times) - 1:
+            raise ShapeError(f"trajectory: {len(self.times)} times but {len(self.coefficients)} segments")
+
+    @property
+    def duration(self) -> float:
+        """Time from start to end [s]."""
+        return float(self.times[-1])
+
+    def __call__(self, t: ArrayLike, order: int = 0) -> Array:
+        """Return positions, or a derivative of them.
+
+        Args:
+            t: (...) times [s]; before the start and after the end the arm stands at the ends.
+            order: 0 position, 1 speed, 2 acceleration, 3 jerk.
+
+        Returns:
+            (..., n). At a knot where the derivative jumps, the value just after it.
+        """
+        t = floats(t, "t")
+        inside = np.clip(t, 0.0, self.duration)
+        segment = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.coefficients) - 1)
+        local = (inside - self.times[segment])[..., None]
+        terms = self._derivative(order)[segment]
+        value = np.zeros((*t.shape, self.coefficients.shape[2]))
+        for power in reversed(range(terms.shape[-2])):
+            value = value * local + terms[..., power, :]
+        if order > 0:
+            value[(t < 0) | (t > self.duration)] = 0.0
+        return value
+
+    def extremes(self, order: int = 0) -> tuple[Array, Array]:
+        """Return the smallest and largest value of every joint, (n,) each, exactly and not by sampling.
+
+        Args:
+            order: 0 position, 1 speed, 2 acceleration.
+        """
+        terms, slopes = self._derivative(order), self._derivative(order + 1)
+        lengths = np.diff(self.times)
+        lowest, highest = np.full(terms.shape[2], np.inf), np.full(terms.shape[2], -np.inf)
+        candidates = [
+            np.zeros((len(terms), terms.shape[2])),
+            np.broadcast_to(lengths[:, None], (len(terms), terms.shape[2])),
+        ]
+        candidates += _roots(slopes, lengths)
+        for local in candidates:
+            value = np.zeros_like(local)
+            for power in reversed(range(terms.shape[1])):
+                value = value * local + terms[:, power, :]
+            lowest, highest = np.minimum(lowest, value.min(axis=0)), np.maximum(highest, value.max(axis=0))
+        return lowest, highest
+
+    def peaks(self, order: int) -> Array:
+        """Return the largest magnitude of a derivative for every joint, (n,), exactly and not by sampling."""
+        lowest, highest = self.extremes(order)
+        return np.maximum(np.abs(lowest), np.abs(highest))
+
+    def slowed(self, factor: float) -> "Trajectory":
+        """Return the same path run ``factor`` times slower."""
+        powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
+        return Trajectory(times=self.times * factor, coefficients=self.coefficients * powers[:, None])
+
+    def _derivative(self, order: int) -> Array:
+        terms = self.coefficients
+        for _ in range(order):
+            powers = np.arange(1, terms.shape[1], dtype=np.float64)
+            terms = terms[:, 1:, :] * powers[:, None] if terms.shape[1] > 1 else np.zeros_like(terms[:, :1, :])
+        return terms
+
+
+def _roots(terms: Array, lengths: Array) -> list[Array]:
+    """Return times (m, n) inside each segment among which are all roots of the polynomials (m, k, n)."""
+    segments, count, joints = terms.shape
+    if count == 1:
+        return []
+    if count == 2:
+        c, b = terms[:, 0], terms[:, 1]
+        return [np.clip(np.where(b != 0, -c / np.where(b != 0, b, 1.0), 0.0), 0.0, lengths[:, None])]
+    found = np.zeros((count - 1, segments, joints))
+    for i in range(segments):
+        for j in range(joints):
+            roots = np.roots(np.trim_zeros(terms[i, ::-1, j], "f"))
+            real = roots.real[np.abs(roots.imag) <= 1e-6 * (1 + np.abs(roots))]
+            found[: len(real), i, j] = np.clip(real, 0.0, lengths[i])
+    return list(found)
+
+
+def hold(q: ArrayLike, duration: float) -> Trajectory:
+    """Return the motion of standing still at q (n,) for a time [s]."""
+    return Trajectory(times=(0.0, duration), coefficients=floats(q, "q")[None, None, :])
+
+
+def join(parts: Sequence[Trajectory]) -> Trajectory:
+    """Return trajectories run one after the other."""
+    powers = max(part.coefficients.shape[1] for part in parts)
+    padded = [np.pad(p.coefficients, ((0, 0), (0, powers - p.coefficients.shape[1]), (0, 0))) for p in parts]
+    starts = np.cumsum([0.0, *(part.duration for part in parts)])
+    times = np.concatenate([[0.0], *(part.times[1:] + start for part, start in zip(parts, starts[:-1], strict=True))])
+    return Trajectory(times=times, coefficients=np.concatenate(padded))
+
+
+def whole_ticks(trajectory: Trajectory, period: float) -> Trajectory:
+    """Return the trajectory slowed by less than one servo period so that it ends on a tick.
+
+    Args:
+        trajectory: what to run.
+        period: of the servo [s].
+    """
+    if trajectory.duration == 0:
+        return trajectory
+    # The hair's breadth keeps a duration that is a whole number of ticks but for rounding from gaining one.
+    ticks = max(1, math.ceil(trajectory.duration / period - 1e-9))
+    return trajectory.slowed(ticks * period / trajectory.duration)

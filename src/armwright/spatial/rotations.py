@@ -1,0 +1,103 @@
+"""Rotations: how far from one a matrix is, the nearest one, the turn between two, the way from one to another."""
+
+import numpy as np
+
+from armwright.arrays import Array, ArrayLike, of_shape
+
+# Below this angle sin(angle)/angle is 1 to the last bit, so the axis needs no division by the angle.
+_TINY_ANGLE = 1e-12
+
+
+def orthonormality_error(R: ArrayLike) -> Array:
+    """Return how far R is from a rotation.
+
+    Args:
+        R: (..., 3, 3).
+
+    Returns:
+        (...) the largest entry of |Rᵀ R - 1|; plus 2 where the determinant is negative (a mirror image).
+    """
+    R = of_shape(R, (3, 3), "rotation")
+    error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-2, -1))
+    mirrored: Array = np.where(np.linalg.det(R) < 0, 2.0, 0.0)
+    return np.asarray(error + mirrored)
+
+
+def nearest_rotation(R: ArrayLike) -> Array:
+    """Return the rotation closest to R in the Frobenius norm.
+
+    Args:
+        R: (..., 3, 3) nearly a rotation, such as one typed with few digits.
+
+    Returns:
+        (..., 3, 3).
+
+    Source:
+        Higham (1986): the polar factor, with the last singular direction turned where the determinant is negative.
+    """
+    U, _, Vt = np.linalg.svd(of_shape(R, (3, 3), "rotation"))
+    turn = np.ones(U.shape[:-1])
+    turn[..., 2] = np.sign(np.linalg.det(U @ Vt))
+    return np.asarray((U * turn[..., None, :]) @ Vt)
+
+
+def rotation_vector(R: ArrayLike) -> Array:
+    """Return axis times angle of R.
+
+    Args:
+        R: (..., 3, 3) rotations.
+
+    Returns:
+        (..., 3) rotation vectors [rad], of length at most pi.
+    """
+    R = of_shape(R, (3, 3), "rotation")
+    skew = (
+        np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1) / 2
+    )
+    sine = np.linalg.norm(skew, axis=-1)
+    cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    small = sine < _TINY_ANGLE
+    factor = np.where(small, 1.0, angle / np.where(small, 1.0, sine))
+    vector = skew * factor[..., None]
+    # Near half a turn the skew part vanishes, and the axis is the largest column of the symmetric part.
+    half = cosine < -0.99
+    if np.any(half):
+        symmetric = (R + np.swapaxes(R, -1, -2)) / 2 - cosine[..., None, None] * np.eye(3)
+        column = np.argmax(np.diagonal(symmetric, axis1=-2, axis2=-1), axis=-1)
+        axis = np.take_along_axis(symmetric, column[..., None, None], axis=-1)[..., 0]
+        axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
+        facing = np.where(np.sum(axis * skew, axis=-1) < 0, -1.0, 1.0)
+        vector = np.where(half[..., None], axis * (facing * angle)[..., None], vector)
+    return np.asarray(vector)
+
+
+def rotation_from_vector(w: ArrayLike) -> Array:
+    """Return the turn by |w| about w.
+
+    Args:
+        w: (..., 3) rotation vectors [rad].
+
+    Returns:
+        (..., 3, 3).
+
+    Source:
+        Rodrigues (1840).
+    """
+    w = of_shape(w, (3,), "rotation vector")
+    angle = np.linalg.norm(w, axis=-1)[..., None, None]
+    small = angle < _TINY_ANGLE
+    safe = np.where(small, 1.0, angle)
+    zero = np.zeros(w.shape[:-1])
+    x, y, z = w[..., 0], w[..., 1], w[..., 2]
+    W = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*w.shape[:-1], 3, 3)
+    first = np.where(small, 1.0, np.sin(angle) / safe)
+    # 1 - cos loses all digits for small angles; half-angle sines keep them.
+    second = np.where(small, 0.5, 2 * (np.sin(angle / 2) / safe) ** 2)
+    return np.asarray(np.eye(3) + first * W + second * (W @ W))
+
+
+def angle_between(R_A: ArrayLike, R_B: ArrayLike) -> Array:
+    """Return the angle of the turn from R_A to R_B, (...) [rad]."""
+    R_AB = np.swapaxes(of_shape(R_A, (3, 3), "rotation"), -1, -2) @ of_shape(R_B, (3, 3), "rotation")
+    return np.asarray(np.linalg.norm(rotation_vector(R_AB), axis=-1))

@@ -1,0 +1,121 @@
+"""The frame tree."""
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD, FrameTree
+from armwright.errors import InvalidValueError, UnknownNameError
+from armwright.spatial.poses import pose
+from oracles.arms import random_pose
+
+ROUNDING = 1e-9  # products of a dozen poses some metres long
+
+
+def step(x: float, y: float = 0.0, z: float = 0.0) -> Array:
+    return pose(np.eye(3), (x, y, z))
+
+
+@pytest.fixture
+def bench() -> FrameTree:
+    """A bench one metre away with a cup on it, and a lid on the cup."""
+    tree = FrameTree().place("BENCH", step(1)).place("CUP", step(1, 0, 0.8)).affix("CUP", "BENCH")
+    return tree.declare("LID").affix("LID", "CUP", step(0, 0, 0.1))
+
+
+def test_what_hangs_follows(bench: FrameTree) -> None:
+    """Moving the bench moves the cup and the lid."""
+    moved = bench.place("BENCH", step(2))
+
+    np.testing.assert_allclose(moved.world("LID"), step(2, 0, 0.9), atol=ROUNDING)
+
+
+def test_unfix_leaves_things_where_they_are(bench: FrameTree) -> None:
+    """A cup that is cut loose stays in its place and no longer follows the bench."""
+    loose = bench.unfix("CUP").place("BENCH", step(5))
+
+    np.testing.assert_allclose(loose.world("CUP"), step(1, 0, 0.8), atol=ROUNDING)
+    assert loose.parent("CUP") == WORLD
+
+
+def test_placing_keeps_hanging(bench: FrameTree) -> None:
+    """A cup set to a new place on the bench goes on following the bench from there."""
+    moved = bench.place("CUP", step(1, 0.3, 0.8)).place("BENCH", step(2))
+
+    np.testing.assert_allclose(moved.world("CUP"), step(2, 0.3, 0.8), atol=ROUNDING)
+
+
+def test_no_ring(bench: FrameTree) -> None:
+    """The bench cannot hang on the lid of the cup that stands on it, nor anything on itself."""
+    with pytest.raises(InvalidValueError, match="BENCH cannot hang on LID"):
+        bench.affix("BENCH", "LID")
+    with pytest.raises(InvalidValueError, match="CUP cannot hang on CUP"):
+        bench.affix("CUP", "CUP")
+
+
+def test_frames_without_a_value() -> None:
+    """A declared frame has no place until it gets one, and neither has what hangs on it."""
+    tree = FrameTree().declare("A")
+
+    assert not tree.has_value("A")
+    with pytest.raises(InvalidValueError, match="frame A has no value yet"):
+        tree.world("A")
+    with pytest.raises(InvalidValueError, match="no value yet"):
+        tree.declare("B").affix("B", "A", step(1))
+
+
+def test_unknown_frame(bench: FrameTree) -> None:
+    """A misspelt frame gets the nearest name."""
+    with pytest.raises(UnknownNameError, match="Did you mean 'BENCH'"):
+        bench.world("BENSH")
+
+
+def test_world_is_fixed() -> None:
+    """The root of the tree cannot be placed."""
+    with pytest.raises(InvalidValueError, match="WORLD is the root"):
+        FrameTree().place("WORLD", step(1))
+
+
+names = st.sampled_from("ABCDEF")
+changes = st.lists(
+    st.tuples(st.sampled_from(["place", "affix", "at", "unfix"]), names, names, st.integers(0, 99)), max_size=25
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(changes)
+def test_any_history(history: list[tuple[str, str, str, int]]) -> None:
+    """Whatever is done to a tree: there is no ring, unfix keeps places, affix keeps places, parents carry children."""
+    tree = FrameTree()
+    for name in "ABCDEF":
+        tree = tree.place(name, random_pose(np.random.default_rng(ord(name))))
+    for kind, name, other, seed in history:
+        X = random_pose(np.random.default_rng(seed))
+        before = {frame: tree.world(frame) for frame in tree}
+        below = {frame for frame in tree if name in tree.ancestors(frame)}
+        if kind == "place":
+            tree = tree.place(name, X)
+            np.testing.assert_allclose(tree.world(name), X, atol=ROUNDING)
+            for frame in set(before) - below - {name}:
+                np.testing.assert_allclose(tree.world(frame), before[frame], atol=ROUNDING)
+            continue
+        if kind == "unfix":
+            tree = tree.unfix(name)
+        elif name == other or other in below:
+            with pytest.raises(InvalidValueError, match="cannot hang on"):
+                tree.affix(name, other)
+        elif kind == "affix":
+            tree = tree.affix(name, other)
+        else:
+            tree = tree.affix(name, other, X)
+            np.testing.assert_allclose(tree.world(name), tree.world(other) @ X, atol=ROUNDING)
+            continue
+        for frame, place in before.items():
+            np.testing.assert_allclose(tree.world(frame), place, atol=ROUNDING)
+    for frame in tree:
+        chain = [frame, *tree.ancestors(frame)]
+        assert len(chain) == len(set(chain))
+        assert chain[-1] == WORLD
+        np.testing.assert_allclose(tree.relation(frame, WORLD), tree.world(frame), atol=ROUNDING)

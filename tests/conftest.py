@@ -1,0 +1,10 @@
+"""What all tests share: chance that can be repeated."""
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Random numbers, the same in every run."""
+    return np.random.default_rng(83008)

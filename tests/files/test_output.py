@@ -1,0 +1,90 @@
+"""Results are written whole or not at all."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from armwright.errors import OutputError
+from armwright.files.output import write_folder
+
+
+def test_writes_and_replaces(tmp_path: Path) -> None:
+    """A second run replaces the files of the first and leaves others alone."""
+    folder = tmp_path / "a" / "b"
+    write_folder(folder, {"x.txt": "one", "y.txt": ["t", "wo"]})
+    (folder / "mine.txt").write_text("keep")
+
+    write_folder(folder, {"x.txt": "three"})
+
+    assert {p.name: p.read_text() for p in folder.iterdir()} == {"x.txt": "three", "y.txt": "two", "mine.txt": "keep"}
+    assert [p.name for p in (tmp_path / "a").iterdir()] == ["b"]
+
+
+def test_an_error_half_way_leaves_nothing(tmp_path: Path) -> None:
+    """When the second file fails, the first is not there either, nor the folders made for it."""
+
+    def full_disk() -> Iterator[str]:
+        yield "some"
+        raise OSError(28, os.strerror(28))
+
+    with pytest.raises(OutputError, match="No space left on device; nothing was written"):
+        write_folder(tmp_path / "new" / "run", {"x.txt": "one", "y.txt": full_disk()})
+
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_device() -> None:
+    """A device that takes no byte is reported as full, and nothing is left on it."""
+    if not os.access("/dev/full", os.W_OK):
+        pytest.skip("no /dev/full on this machine")
+    with pytest.raises(OutputError, match="Not a directory"):
+        write_folder(Path("/dev/full/run"), {"x.txt": "one"})
+
+
+def test_interruption_leaves_the_old_result(tmp_path: Path) -> None:
+    """Ctrl-C while writing keeps the last run whole."""
+    folder = tmp_path / "run"
+    write_folder(folder, {"x.txt": "old"})
+
+    def interrupted() -> Iterator[str]:
+        yield "new"
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_folder(folder, {"x.txt": interrupted()})
+
+    assert (folder / "x.txt").read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_file_in_the_way(tmp_path: Path) -> None:
+    """A file where the folder should be is refused, and stays."""
+    (tmp_path / "run").write_text("a file")
+
+    with pytest.raises(OutputError, match=r"cannot write to '.*run': File exists"):
+        write_folder(tmp_path / "run", {"x.txt": "one"})
+    with pytest.raises(OutputError, match="cannot make"):
+        write_folder(tmp_path / "run" / "deeper", {"x.txt": "one"})
+
+    assert (tmp_path / "run").read_text() == "a file"
+
+
+def test_a_folder_in_the_way_of_a_file(tmp_path: Path) -> None:
+    """A folder named as one of the results stops the writing before any file is replaced."""
+    (tmp_path / "run" / "y.txt").mkdir(parents=True)
+
+    with pytest.raises(OutputError, match="'y.txt' in it is a folder"):
+        write_folder(tmp_path / "run", {"x.txt": "one", "y.txt": "two"})
+
+    assert [p.name for p in (tmp_path / "run").iterdir()] == ["y.txt"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_no_permission(tmp_path: Path) -> None:
+    """A folder that may not be written is reported."""
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="nothing was written"):
+        write_folder(tmp_path / "run", {"x.txt": "one"})
+    tmp_path.chmod(0o700)

@@ -1,0 +1,218 @@
+"""Paths in space and the stages of a move."""
+
+import numpy as np
+import pytest
+from armwright.arm.load import load_arm
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError
+from armwright.kinematics.forward import forward
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.motion.follow import TURN_PER_METRE, PathError, follow
+from armwright.motion.path import Path, closest_to_axis, place_knots, report_speed, report_step
+from armwright.motion.plan import Manner, StageError, StageGoal, plan
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import angle_between, rotation_from_vector
+from oracles.arms import random_postures
+
+DOWN = np.diag((1.0, -1.0, -1.0))
+POSE = 1e-9  # how well a knot is met, in m and rad
+
+
+def at(x: float, y: float, z: float, turn: float = 0.0) -> Array:
+    return pose(rotation_from_vector([0, 0, turn]) @ DOWN, (x, y, z))
+
+
+@pytest.fixture
+def stanford() -> Arm:
+    return load_arm("stanford")
+
+
+def start(arm: Arm, X: Array) -> Array:
+    return inverse(arm, X).best.q
+
+
+def distance_from_line(p: Array, a: Array, b: Array) -> Array:
+    u = (b - a) / np.linalg.norm(b - a)
+    return np.linalg.norm(np.cross(p - a, u), axis=-1)
+
+
+def test_step_of_the_report(stanford: Arm) -> None:
+    """A line that passes the axis at half a metre has R = 1 m: for 1 mm the step is sqrt(8 mm m) = 89.4 mm."""
+    A, B = (0.5, -0.2, 0.1), (0.5, 0.2, 0.4)
+
+    assert closest_to_axis(A, B) == pytest.approx(0.5)
+    assert report_step(stanford, A, B, 1e-3) == pytest.approx(np.sqrt(8e-3))
+
+
+def test_speed_of_the_report(stanford: Arm) -> None:
+    """Speed 120 gives (r_min / R_MAX) V_MAX, 100 gives 100/120 of it."""
+    A, B = (0.5, -0.2, 0.1), (0.5, 0.2, 0.4)
+
+    assert report_speed(stanford, A, B, 120) == pytest.approx(0.5 / stanford.reach * stanford.tool_speed)
+    assert report_speed(stanford, A, B, 100) == pytest.approx(report_speed(stanford, A, B, 120) * 100 / 120)
+
+
+def test_half_steps_at_both_ends(stanford: Arm) -> None:
+    """First and last step are half as long as the others; all take the same time."""
+    path = Path(poses=[at(0.5, -0.2, 0.1), at(0.5, 0.2, 0.1)])
+
+    knots = place_knots(stanford, path, deviation=1e-3, speed=100)
+
+    steps = np.diff(knots.poses(path)[:, 1, 3])
+    np.testing.assert_allclose(steps / steps[1], [0.5, *[1.0] * (len(steps) - 2), 0.5])
+    np.testing.assert_allclose(np.diff(knots.times), knots.times[1])
+    assert steps[1] / knots.times[1] == pytest.approx(
+        report_speed(stanford, path.poses[0, :3, 3], path.poses[1, :3, 3], 100)
+    )
+
+
+@pytest.mark.parametrize("name", ["stanford", "puma560"])
+@pytest.mark.parametrize("deviation", [2e-3, 1e-4])
+def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.random.Generator) -> None:
+    """On random lines of both arms 40 times denser looks find the hand within the asked deviation and orientation.
+
+    The planner looks eight times between knots, so its own figure may be exceeded by what lies between its looks.
+    """
+    arm = load_arm(name)
+    done = 0
+    for q in random_postures(arm, rng, 60):
+        A = forward(arm, q)
+        B = A @ pose(rotation_from_vector(rng.normal(scale=0.3, size=3)), rng.normal(scale=0.1, size=3))
+        try:
+            found = follow(arm, Path(poses=[A, B]), q, deviation=deviation, speed=100)
+        except PathError:
+            continue
+        done += 1
+        X = forward(arm, found.trajectory(np.linspace(0, found.trajectory.duration, found.knots * 320)))
+        off = distance_from_line(X[:, :3, 3], A[:3, 3], B[:3, 3])
+        assert off.max() <= 1.02 * found.deviation + POSE
+        assert found.deviation <= deviation
+        assert found.turn_deviation <= TURN_PER_METRE * deviation
+        assert (found.trajectory.peaks(1) <= arm.limit("speed") * (1 + 1e-9)).all()
+        assert (found.trajectory.peaks(2) <= arm.limit("acceleration") * (1 + 1e-9)).all()
+        np.testing.assert_allclose(X[0], A, atol=POSE)
+        np.testing.assert_allclose(X[-1], B, atol=POSE)
+    assert done > 20
+
+
+def test_turn_on_the_spot(stanford: Arm) -> None:
+    """A path without length turns the hand where it is, evenly about one axis."""
+    A, B = at(0.5, 0.1, 0.2), at(0.5, 0.1, 0.2, turn=1.0)
+
+    found = follow(stanford, Path(poses=[A, B]), start(stanford, A), deviation=1e-3, speed=100)
+
+    X = forward(stanford, found.trajectory(np.linspace(0, found.trajectory.duration, 400)))
+    assert np.linalg.norm(X[:, :3, 3] - A[:3, 3], axis=-1).max() <= 1e-3
+    assert angle_between(X[-1, :3, :3], B[:3, :3]) < POSE
+
+
+def test_through_frames_without_a_stop(stanford: Arm) -> None:
+    """The hand passes every frame of a SPLINE exactly, moving, and rests only at the ends."""
+    poses = [at(0.45, 0.15, 0.06), at(0.5, 0.05, 0.16), at(0.5, -0.05, 0.16), at(0.45, -0.15, 0.02)]
+    path = Path(poses=poses)
+
+    found = follow(stanford, path, start(stanford, poses[0]), deviation=1e-3, speed=100)
+
+    t = np.linspace(0, found.trajectory.duration, 20001)
+    p = forward(stanford, found.trajectory(t))[:, :3, 3]
+    speed = np.linalg.norm(np.gradient(p, t, axis=0), axis=-1)
+    for frame in poses[1:-1]:
+        k = np.linalg.norm(p - frame[:3, 3], axis=-1).argmin()
+        assert np.linalg.norm(p[k] - frame[:3, 3]) < 1e-4
+        assert speed[k] > 0.05
+    np.testing.assert_allclose(found.trajectory([0, found.trajectory.duration], 1), 0, atol=1e-12)
+
+
+def test_limit_on_the_way(stanford: Arm) -> None:
+    """A line pulled straight towards the base folds the boom to its lower limit; joint 3 and the place are named."""
+    A = pose(rotation_from_vector([0, np.pi / 2, 0]), (0.9, 0.15367, 0.4125))
+    B = pose(A[:3, :3], (0.35, 0.15367, 0.4125))
+
+    with pytest.raises(PathError, match=r"joint 3 would stand at .* mm beyond its limit 140\.0 mm") as caught:
+        follow(stanford, Path(poses=[A, B]), start(stanford, A), deviation=1e-3, speed=100)
+
+    assert caught.value.cause == "limits"
+    assert 0.8 < caught.value.fraction < 1
+
+
+def test_line_through_a_singularity() -> None:
+    """A line of the PUMA that passes over its own shoulder axis cannot be kept: the cause and the place are named."""
+    arm = load_arm("puma560")
+    height = 0.75
+    A, B = at(0.2, 0.149, height), at(-0.2, 0.149, height)
+
+    with pytest.raises(PathError) as caught:
+        follow(arm, Path(poses=[A, B]), start(arm, A), deviation=1e-4, speed=100)
+
+    assert caught.value.cause in ("singular", "limits")
+    assert 0.3 < caught.value.fraction < 0.9
+
+
+def test_stages_join(stanford: Arm) -> None:
+    """Every stage of a move begins in the posture where the last one ended, and lasts whole servo periods."""
+    q = start(stanford, at(0.45, 0, 0.25))
+    goals = [
+        StageGoal(kind="PTP", poses=np.array([at(0.4, 0.15, 0.15)])),
+        StageGoal(kind="LINE", poses=np.array([at(0.4, 0.15, 0.05)])),
+        StageGoal(kind="SPLINE", poses=np.array([at(0.5, 0.05, 0.16), at(0.45, -0.15, 0.1)])),
+    ]
+
+    stages = plan(stanford, q, goals, Manner(period=4e-3))
+
+    for stage, goal in zip(stages, goals, strict=True):
+        np.testing.assert_allclose(stage.trajectory(0.0), q, atol=1e-12)
+        q = stage.trajectory(stage.trajectory.duration)
+        np.testing.assert_allclose(forward(stanford, q), goal.poses[-1], atol=POSE)
+        assert stage.trajectory.duration / 4e-3 == pytest.approx(round(stage.trajectory.duration / 4e-3), abs=1e-9)
+    assert [stage.kind for stage in stages] == ["PTP", "LINE", "SPLINE"]
+    assert stages[1].length == pytest.approx(0.1, abs=1e-9)
+
+
+def test_another_posture_is_tried(rng: np.random.Generator) -> None:
+    """Where a line cannot go on from the nearest posture, the move ends its first stage in another one.
+
+    The case is searched for: a posture whose line fails, with another posture of the same pose whose line works.
+    """
+    arm = load_arm("puma560")
+    for q in random_postures(arm, rng, 400):
+        A = forward(arm, q)
+        B = A @ pose(np.eye(3), (0.0, 0.0, -0.25))
+        path = Path(poses=[A, B])
+        outcomes = []
+        for branch in inverse(arm, A, q).allowed:
+            try:
+                follow(arm, path, branch.q, deviation=1e-3, speed=100)
+                outcomes.append(True)
+            except PathError:
+                outcomes.append(False)
+        if outcomes and not outcomes[0] and any(outcomes):
+            break
+    else:
+        pytest.fail("no such case among the random postures")
+
+    goals = [StageGoal(kind="PTP", poses=A[None]), StageGoal(kind="LINE", poses=B[None])]
+    _, line = plan(arm, q, goals, Manner())
+
+    np.testing.assert_allclose(forward(arm, line.trajectory(line.trajectory.duration)), B, atol=POSE)
+
+
+def test_unreachable_stage_is_named(stanford: Arm) -> None:
+    """The error of a move says which stage and which of its poses cannot be had, and why."""
+    q = start(stanford, at(0.45, 0, 0.25))
+    goals = [
+        StageGoal(kind="PTP", poses=np.array([at(0.4, 0.15, 0.15)])),
+        StageGoal(kind="SPLINE", poses=np.array([at(0.5, 0.05, 0.16), at(3.0, 0.0, 0.1)])),
+    ]
+
+    with pytest.raises(StageError, match="beyond its limit 1117.6 mm") as caught:
+        plan(stanford, q, goals, Manner())
+
+    assert (caught.value.stage, caught.value.pose, caught.value.cause) == (1, 1, "limits")
+
+
+def test_deviation_must_be_positive(stanford: Arm) -> None:
+    """A line cannot be kept to nothing."""
+    with pytest.raises(InvalidValueError, match="more than 0 m, got 0"):
+        place_knots(stanford, Path(poses=[at(0.5, 0, 0.1), at(0.5, 0.1, 0.1)]), deviation=0, speed=100)

@@ -1,0 +1,1 @@
+"""Oracles that nobody here wrote, set up from our models."""

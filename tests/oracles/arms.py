@@ -1,0 +1,52 @@
+"""Arms to test with: random ones of every kind of joint."""
+
+import numpy as np
+
+from armwright.arm.model import Arm, Joint, Limits, Link, Motor
+from armwright.arrays import Array
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector
+
+
+def random_pose(rng: np.random.Generator) -> Array:
+    return pose(rotation_from_vector(rng.normal(size=3)), rng.normal(size=3))
+
+
+def random_link(rng: np.random.Generator) -> Link:
+    """A body made of a dozen point masses, so that its tensor is one that a body can have."""
+    points, masses = rng.normal(scale=0.2, size=(12, 3)), rng.uniform(0.05, 0.4, size=12)
+    com = masses @ points / masses.sum()
+    r = points - com
+    inertia = np.einsum(
+        "k,kij->ij", masses, np.einsum("kl,kl,ij->kij", r, r, np.eye(3)) - np.einsum("ki,kj->kij", r, r)
+    )
+    return Link(mass=masses.sum(), com=com, inertia=inertia)
+
+
+def random_arm(rng: np.random.Generator, joints: int) -> Arm:
+    """An arm with joints of both kinds, skew axes, any base, tool and gravity."""
+    limits = Limits(lower=-3, upper=3, speed=2, acceleration=5, effort=100)
+    return Arm(
+        name="random",
+        joints=[
+            Joint(
+                kind="revolute" if rng.random() < 0.6 else "prismatic",
+                theta=rng.normal(),
+                d=rng.normal(),
+                a=rng.normal(),
+                alpha=rng.normal(),
+                limits=limits,
+            )
+            for _ in range(joints)
+        ],
+        links=[random_link(rng) for _ in range(joints)],
+        motors=[Motor(inertia=rng.uniform(0, 0.5)) for _ in range(joints)],
+        base=random_pose(rng),
+        tool=random_pose(rng),
+        gravity=rng.normal(scale=9, size=3),
+    )
+
+
+def random_postures(arm: Arm, rng: np.random.Generator, count: int) -> Array:
+    """Postures spread evenly over the limits, (count, n)."""
+    return rng.uniform(arm.limit("lower"), arm.limit("upper"), size=(count, arm.n))
