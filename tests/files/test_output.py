@@ -35,14 +35,6 @@ def test_an_error_half_way_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_device() -> None:
-    """A device that takes no byte is reported as full, and nothing is left on it."""
-    if not os.access("/dev/full", os.W_OK):
-        pytest.skip("no /dev/full on this machine")
-    with pytest.raises(OutputError, match="Not a directory"):
-        write_folder(Path("/dev/full/run"), {"x.txt": "one"})
-
-
 def test_interruption_leaves_the_old_result(tmp_path: Path) -> None:
     """Ctrl-C while writing keeps the last run whole."""
     folder = tmp_path / "run"

@@ -8,13 +8,17 @@ from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import forward, link_poses
+from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.jacobian import jacobian
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import nearest_rotation
 from oracles.arms import random_arm, random_postures
 from oracles.with_pinocchio import pinocchio_model
 
 ROUNDING = 1e-10  # agreement with an oracle that multiplies the same matrices in another order
-SEED_DIGITS = 5.1e-3  # the seed prints rotations with two digits
-SEED_CENTIMETRE = 5e-4  # its places in whole centimetres come from joint angles with four digits
+# The seed's rotations are typed with two digits and off a rotation by 1e-2 (R Rᵀ); its angles solve for them so.
+SEED_DIGITS = 1e-2
+SEED_PLACE = 1e-5  # its whole centimetres, from angles with four digits of a degree [m]
 
 # Seed 002, test poses A, B, C: joint angles [deg], rotation, place [cm].
 SEED_POSES = {
@@ -58,7 +62,18 @@ def test_poses_of_the_seed(name: str) -> None:
     X = forward(load_arm("puma560"), np.radians(q))
 
     np.testing.assert_allclose(X[:3, :3], R, atol=SEED_DIGITS)
-    np.testing.assert_allclose(X[:3, 3] * 100, p, atol=SEED_CENTIMETRE * 100)
+    np.testing.assert_allclose(X[:3, 3] * 100, p, atol=100 * SEED_PLACE)
+
+
+@pytest.mark.parametrize("name", SEED_POSES)
+def test_angles_of_the_seed(name: str) -> None:
+    """The printed pose, its rotation made one, is solved by the printed angles to the digits it was typed with."""
+    q, R, p = SEED_POSES[name]
+    X = pose(nearest_rotation(R), np.array(p) / 100)
+
+    best = inverse(load_arm("puma560"), X, near=np.radians(q)).best
+
+    np.testing.assert_allclose(np.degrees(best.q), q, atol=1.0)
 
 
 def test_a_slide_moves_along_its_axis() -> None:

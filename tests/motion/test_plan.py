@@ -1,5 +1,6 @@
 """Paths in space and the stages of a move."""
 
+import attrs
 import numpy as np
 import pytest
 from armwright.arm.load import load_arm
@@ -71,10 +72,7 @@ def test_half_steps_at_both_ends(stanford: Arm) -> None:
 @pytest.mark.parametrize("name", ["stanford", "puma560"])
 @pytest.mark.parametrize("deviation", [2e-3, 1e-4])
 def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.random.Generator) -> None:
-    """On random lines of both arms 40 times denser looks find the hand within the asked deviation and orientation.
-
-    The planner looks eight times between knots, so its own figure may be exceeded by what lies between its looks.
-    """
+    """On random lines of both arms 20 times denser looks find nothing worse than the planner says, or than was asked."""
     arm = load_arm(name)
     done = 0
     for q in random_postures(arm, rng, 60):
@@ -87,7 +85,7 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
         done += 1
         X = forward(arm, found.trajectory(np.linspace(0, found.trajectory.duration, found.knots * 320)))
         off = distance_from_line(X[:, :3, 3], A[:3, 3], B[:3, 3])
-        assert off.max() <= 1.02 * found.deviation + POSE
+        assert off.max() <= found.deviation + POSE
         assert found.deviation <= deviation
         assert found.turn_deviation <= TURN_PER_METRE * deviation
         assert (found.trajectory.peaks(1) <= arm.limit("speed") * (1 + 1e-9)).all()
@@ -137,17 +135,25 @@ def test_limit_on_the_way(stanford: Arm) -> None:
     assert 0.8 < caught.value.fraction < 1
 
 
-def test_line_through_a_singularity() -> None:
-    """A line of the PUMA that passes over its own shoulder axis cannot be kept: the cause and the place are named."""
+def test_line_past_a_singularity() -> None:
+    """A line on which the straightened wrist passes a hair's breadth from its singularity cannot be kept tightly.
+
+    Joint 4 would have to turn half round within a tenth of a millimetre; its limits are taken away here so that the
+    singularity alone stands in the way. To a millimetre the same line can be kept: the hand hardly notices.
+    """
     arm = load_arm("puma560")
-    height = 0.75
-    A, B = at(0.2, 0.149, height), at(-0.2, 0.149, height)
+    free = attrs.evolve(arm, joints=[attrs.evolve(j, limits=attrs.evolve(j.limits, lower=-7, upper=7)) for j in arm.joints])
+    q = np.array([0.1, -0.5, 0.8, 0, 1e-4, 0])
+    aside = 0.1 * np.array([-np.sin(0.1), np.cos(0.1), 0])
+    A, B = (pose(forward(free, q)[:3, :3], forward(free, q)[:3, 3] + side * aside) for side in (-1, 1))
+    start_q = inverse(free, A, q).best.q
 
-    with pytest.raises(PathError) as caught:
-        follow(arm, Path(poses=[A, B]), start(arm, A), deviation=1e-4, speed=100)
+    with pytest.raises(PathError, match=r"the arm is singular there and joint 4 would have to turn \d+") as caught:
+        follow(free, Path(poses=[A, B]), start_q, deviation=1e-5, speed=100)
 
-    assert caught.value.cause in ("singular", "limits")
-    assert 0.3 < caught.value.fraction < 0.9
+    assert caught.value.cause == "singular"
+    assert 0.4 < caught.value.fraction < 0.6
+    assert follow(free, Path(poses=[A, B]), start_q, deviation=1e-3, speed=100).deviation <= 1e-3
 
 
 def test_stages_join(stanford: Arm) -> None:
@@ -206,7 +212,7 @@ def test_unreachable_stage_is_named(stanford: Arm) -> None:
         StageGoal(kind="SPLINE", poses=np.array([at(0.5, 0.05, 0.16), at(3.0, 0.0, 0.1)])),
     ]
 
-    with pytest.raises(StageError, match="beyond its limit 1117.6 mm") as caught:
+    with pytest.raises(StageError, match=r"beyond its limit 1117\.6 mm") as caught:
         plan(stanford, q, goals, Manner())
 
     assert (caught.value.stage, caught.value.pose, caught.value.cause) == (1, 1, "limits")

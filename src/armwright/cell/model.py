@@ -43,7 +43,7 @@ class Cell:
     Attributes:
         name: as shown to people.
         arms: by name, such as ``ARM_1``.
-        frames: by name, in upper case: (parent, pose (4, 4) in the world).
+        frames: by name, in upper case.
         visions: by frame name, what the camera will report, one answer after the other, (4, 4) seen from the camera.
         camera: (4, 4) pose of the camera in the world.
         devices: names of the tools that can be operated; None when the cell does not say, and any will do.
@@ -55,7 +55,7 @@ class Cell:
 
     name: str
     arms: Mapping[str, CellArm]
-    frames: Mapping[str, tuple[str, Array]] = attrs.field(factory=dict)
+    frames: Mapping[str, Node] = attrs.field(factory=dict)
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     devices: frozenset[str] | None = None
@@ -69,13 +69,8 @@ class Cell:
 
         Between WORLD and the hand of an arm stands its base, so that a robot that is moved changes one line.
         """
-        nodes = {}
+        nodes = {"STATION": Node(parent=WORLD, relation=np.eye(4)), **self.frames}
         for name, arm in self.arms.items():
             nodes[base_name(name)] = Node(parent=WORLD, relation=arm.base)
             nodes[name] = Node(parent=base_name(name), relation=forward(arm.arm, arm.start))
-        tree = FrameTree(nodes).place("STATION", np.eye(4))
-        for name, (_, X_WF) in self.frames.items():
-            tree = tree.place(name, X_WF)
-        for name, (parent, _) in self.frames.items():
-            tree = tree if parent == WORLD else tree.affix(name, parent)
-        return tree
+        return FrameTree(nodes)

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from armwright import __version__
 from armwright.cli.arms import arms
 from armwright.cli.check import check
 from armwright.cli.run import run
 from armwright.cli.show import show
 from armwright.errors import ArmwrightError
+from armwright.version import __version__
 
 app = typer.Typer(
     name="armwright",

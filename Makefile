@@ -1,0 +1,38 @@
+# Everything runs in a virtual environment of its own; a stamp file says what is installed in it.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+
+.PHONY: help demo test lint check-format examples clean
+
+help:             ## Show this list
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
+
+$(VENV)/core: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/test: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@touch $@ $(VENV)/core
+
+demo: $(VENV)/core   ## Run the report's stacking program and write its report page
+	$(BIN)/armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out/stacking
+
+test: $(VENV)/test   ## Run lint, types, the import contracts and all tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m pytest -n auto
+
+examples: $(VENV)/core   ## Run every example into out/
+	$(BIN)/armwright run examples/bench.rlo --cell examples/stanford_cell.toml -o out/bench
+	$(BIN)/armwright run examples/twelve_moves.rlo --cell examples/stanford_cell.toml -o out/twelve_moves
+	$(BIN)/armwright run examples/portable.rlo --cell examples/stanford_cell.toml -o out/portable
+	$(BIN)/armwright run examples/gearbox.rlo --cell examples/puma_cell.toml -o out/gearbox
+
+clean:            ## Remove what was built
+	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,59 @@
+"""Modified Denavit-Hartenberg tables: an input format, turned into the one convention used inside.
+
+The modified convention (Craig) puts frame i on joint i and carries the link's twist and length in front:
+
+    T_i = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)
+
+Taken apart behind Tz(d_i) instead of in front of Rx, the same product is a standard table: the first twist and
+length become part of the base, and each row takes over those of the next. Link frames move with it.
+"""
+
+import math
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Joint, Link, exact_cosine
+from armwright.arrays import Array
+from armwright.spatial.poses import inverse, pose
+
+
+def twist(alpha: float, a: float) -> Array:
+    """Return the pose Tx(a) Rx(alpha), (4, 4); the two may be swapped."""
+    c, s = exact_cosine(alpha), exact_cosine(alpha - math.pi / 2)
+    return pose([[1, 0, 0], [0, c, -s], [0, s, c]], [a, 0, 0])
+
+
+def from_modified(joints: Sequence[Joint], links: Sequence[Link]) -> tuple[Array, list[Joint], list[Link]]:
+    """Turn a modified table, and links described in its frames, into the standard one.
+
+    Args:
+        joints: n rows; ``a`` and ``alpha`` of row i are those that stand in front of joint i.
+        links: n links in the modified frames.
+
+    Returns:
+        The pose (4, 4) to put behind the base, n standard rows, n links in the standard frames.
+
+    Source:
+        Craig (1986) ch. 3.
+    """
+    behind = [(joint.alpha, joint.a) for joint in joints[1:]] + [(0.0, 0.0)]
+    rows = [attrs.evolve(joint, alpha=alpha, a=a) for joint, (alpha, a) in zip(joints, behind, strict=True)]
+    carried = [carry(link, inverse(twist(alpha, a))) for link, (alpha, a) in zip(links, behind, strict=True)]
+    return twist(joints[0].alpha, joints[0].a), rows, carried
+
+
+def carry(link: Link, X_NM: Array) -> Link:
+    """Describe a link of frame M in frame N instead, X_NM (4, 4) being the pose of M seen from N."""
+    R, p = X_NM[:3, :3], X_NM[:3, 3]
+    return Link(mass=link.mass, com=R @ link.com + p, inertia=R @ link.inertia @ R.T)
+
+
+def about_com(inertia: Array, mass: float, com: Array) -> Array:
+    """Return the tensor (3, 3) about the centre of mass of one that is about the frame origin.
+
+    Source:
+        Parallel axis theorem (Steiner).
+    """
+    return np.asarray(inertia - mass * ((com @ com) * np.eye(3) - np.outer(com, com)))

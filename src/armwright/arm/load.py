@@ -1,0 +1,199 @@
+"""Arms from TOML files: the catalogue by name, any other by path."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from armwright.arm.dh import about_com, from_modified
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arrays import Array
+from armwright.errors import UnknownNameError
+from armwright.files.document import Document, Table
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector
+
+_CATALOGUE = Path(__file__).parent / "catalogue"
+# Keys carry their unit: factors to SI by the ending of the key.
+_ANGLE = {"deg": math.pi / 180, "rad": 1.0}
+_LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+# Published tensors are rounded and can break the triangle inequality by this part of their trace.
+_TENSOR_ROUNDING = 0.05
+
+
+def arm_names() -> tuple[str, ...]:
+    """Return the names of the catalogue, sorted."""
+    return tuple(sorted(path.stem for path in _CATALOGUE.glob("*.toml")))
+
+
+def load_arm(name: str | Path) -> Arm:
+    """Return an arm by its name in the catalogue, or from a file.
+
+    Args:
+        name: such as ``puma560``; something with a slash or ending in .toml is a path.
+
+    Raises:
+        UnknownNameError: the catalogue has no such arm; the nearest is named.
+        FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
+    """
+    if isinstance(name, Path) or "/" in name or name.endswith(".toml"):
+        return read_arm(Path(name))
+    if name not in arm_names():
+        raise UnknownNameError("arm", name, arm_names())
+    return read_arm(_CATALOGUE / f"{name}.toml")
+
+
+def read_arm(path: Path) -> Arm:
+    """Read an arm file.
+
+    Raises:
+        FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
+    """
+    top = Document.read(path).root
+    convention = top.choice("convention", ("standard", "modified"), default="standard")
+    tables = top.tables("joint")
+    joints, links, motors = [], [], []
+    for table in tables:
+        joints.append(_joint(table))
+        links.append(_link(table.table("link")))
+        motors.append(_motor(table.table("motor"), joints[-1].revolute))
+        table.finish()
+    base, tool = _pose(top.table("base")), _pose(top.table("tool"))
+    if convention == "modified":
+        before, joints, links = from_modified(joints, links)
+        base = base @ before
+    hand = top.table("hand")
+    gravity = top.table("gravity")
+    arm = Arm(
+        name=top.text("name", default=path.stem),
+        title=top.text("title", default=""),
+        joints=joints,
+        links=links,
+        motors=motors,
+        base=base,
+        tool=tool,
+        gravity=gravity.vector("m_per_s2", 3, default=(0.0, 0.0, -STANDARD_GRAVITY)),
+        reach=_unit(hand, "reach", _LENGTH, default=math.inf, positive=True),
+        tool_speed=_unit(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
+        source=top.text("source", default=""),
+    )
+    for table in (hand, gravity, top):
+        table.finish()
+    return arm
+
+
+def _joint(table: Table) -> Joint:
+    kind = table.choice("kind", ("revolute", "prismatic"))
+    limits = table.table("limits")
+    units = _ANGLE if kind == "revolute" else _LENGTH
+    effort = {"Nm": 1.0} if kind == "revolute" else {"N": 1.0}
+    values = {
+        "lower": _unit(limits, "lower", units, default=-math.inf),
+        "upper": _unit(limits, "upper", units, default=math.inf),
+        "speed": _unit(limits, "speed", _per(units, "per_s"), default=math.inf, positive=True),
+        "acceleration": _unit(limits, "acceleration", _per(units, "per_s2"), default=math.inf, positive=True),
+        "effort": _unit(limits, "effort", effort, default=math.inf, positive=True),
+    }
+    limits.finish()
+    if not values["lower"] < values["upper"]:
+        raise limits.error(
+            "", f"the lower limit must be below the upper, got {values['lower']:g} and {values['upper']:g} in SI"
+        )
+    return Joint(
+        kind="revolute" if kind == "revolute" else "prismatic",
+        theta=_unit(table, "theta", _ANGLE, default=0.0),
+        d=_unit(table, "d", _LENGTH, default=0.0),
+        a=_unit(table, "a", _LENGTH, default=0.0),
+        alpha=_unit(table, "alpha", _ANGLE, default=0.0),
+        limits=Limits(**values),
+    )
+
+
+def _link(table: Table) -> Link:
+    mass = table.number("mass_kg", default=0.0, lower=0.0)
+    com = _vector(table, "com", _LENGTH, default=np.zeros(3))
+    numbers = table.vector("inertia_kgm2", (3, 6), default=np.zeros(3))
+    about = table.choice("inertia_about", ("com", "frame"), default="com")
+    table.finish()
+    xx, yy, zz, xy, xz, yz = (*numbers, 0.0, 0.0, 0.0)[:6]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if about == "frame":
+        inertia = about_com(inertia, mass, com)
+    _require_possible(table, inertia)
+    return Link(mass=mass, com=com, inertia=inertia)
+
+
+def _require_possible(table: Table, inertia: Array) -> None:
+    """Refuse a tensor that no body has: a negative moment, or one larger than the other two together.
+
+    A link of which only one moment is known leaves the others 0; that is allowed, since a tensor with a single
+    moment says nothing about the others.
+    """
+    moments = np.linalg.eigvalsh(inertia)
+    slack = _TENSOR_ROUNDING * np.abs(moments).sum()
+    single = np.count_nonzero(np.abs(moments) > slack) == 1
+    if moments[0] < -slack or (not single and moments[2] > moments[0] + moments[1] + slack):
+        shown = ", ".join(f"{moment:.3g}" for moment in moments)
+        raise table.error(
+            "inertia_kgm2",
+            f"no body has the principal moments {shown} kg m² about its centre of mass; check inertia_about and com",
+        )
+
+
+def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
+    ratio = table.positive("gear_ratio", default=1.0)
+    inertia = table.number("inertia_kgm2" if revolute else "inertia_kg", default=0.0, lower=0.0)
+    if "rotor_inertia_kgm2" in table:
+        if inertia:
+            raise table.error("rotor_inertia_kgm2", "give the inertia at the load or that of the rotor, not both")
+        inertia = table.number("rotor_inertia_kgm2", lower=0.0) * ratio**2
+    force = "Nm" if revolute else "N"
+    motor = Motor(
+        inertia=inertia,
+        gear_ratio=ratio,
+        viscous=table.number("viscous_Nms" if revolute else "viscous_Ns_per_m", default=0.0, lower=0.0),
+        coulomb_forward=table.number(f"coulomb_forward_{force}", default=0.0, lower=0.0),
+        coulomb_backward=table.number(f"coulomb_backward_{force}", default=0.0, lower=0.0),
+    )
+    table.finish()
+    return motor
+
+
+def _pose(table: Table) -> Array:
+    """Read a pose: a place, and a turn as roll, pitch and yaw about fixed x, y, z."""
+    place = _vector(table, "xyz", _LENGTH, default=np.zeros(3))
+    roll, pitch, yaw = _vector(table, "rpy", _ANGLE, default=np.zeros(3))
+    table.finish()
+    turns = [
+        rotation_from_vector(angle * axis) for angle, axis in zip((yaw, pitch, roll), np.eye(3)[::-1], strict=True)
+    ]
+    return pose(turns[0] @ turns[1] @ turns[2], place)
+
+
+def _per(units: dict[str, float], time: str) -> dict[str, float]:
+    return {f"{unit}_{time}": factor for unit, factor in units.items()}
+
+
+def _given(table: Table, name: str, units: dict[str, float]) -> str | None:
+    """Return the ending with which a quantity is given; refuse two."""
+    given = [unit for unit in units if f"{name}_{unit}" in table]
+    if len(given) > 1:
+        raise table.error(f"{name}_{given[1]}", f"{name} is given twice, in {given[0]} and in {given[1]}")
+    return given[0] if given else None
+
+
+def _unit(table: Table, name: str, units: dict[str, float], *, default: float, positive: bool = False) -> float:
+    unit = _given(table, name, units)
+    if unit is None:
+        table.allow(*(f"{name}_{unit}" for unit in units))
+        return default
+    read = table.positive if positive else table.number
+    return read(f"{name}_{unit}") * units[unit]
+
+
+def _vector(table: Table, name: str, units: dict[str, float], *, default: Array) -> Array:
+    unit = _given(table, name, units)
+    if unit is None:
+        table.allow(*(f"{name}_{unit}" for unit in units))
+        return default
+    return table.vector(f"{name}_{unit}", 3) * units[unit]

@@ -1,0 +1,197 @@
+"""Cell files: TOML for people, JSON for programs; both say the same."""
+
+import math
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD, Node
+from armwright.cell.model import Cell, CellArm
+from armwright.errors import ArmwrightError, closest
+from armwright.files.document import Document, Table
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.shoulder import shoulder_of
+from armwright.kinematics.inverse.solution import violations
+from armwright.spatial.poses import from_noap, pose
+from armwright.spatial.poses import inverse as inverse_pose
+from armwright.spatial.rotations import nearest_rotation, orthonormality_error
+
+# The arm of a cell that names none: the report's.
+_REPORT_ARM = "stanford"
+_ARM_NAME = re.compile(r"ARM[-_](\d+)")
+_NAME = re.compile(r"[A-Z][A-Z0-9_]*")
+# Typed rotations are made exact up to this error; beyond it is a mistake.
+_TYPED_ROTATION = 1e-2
+# A faster servo fills a disk, a slower one controls nothing [ms].
+_SERVO_MS = (0.1, 100.0)
+# Fingers and cameras that take longer are a slip of units [s].
+_LONGEST_WAIT = 600.0
+
+
+def read_cell(path: Path) -> Cell:
+    """Read a cell from a TOML or JSON file.
+
+    Args:
+        path: the file; its format is in docs/cells.md.
+
+    Raises:
+        FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
+    """
+    top = Document.read(path).root
+    arms = _arms(top.table("arms", required=True))
+    camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
+    height = contact.number("z", default=math.nan)
+    cell = Cell(
+        name=top.text("name", default=path.name),
+        arms=arms,
+        frames=_frames(top.table("frames"), arms),
+        visions=_visions(top.table("visions")),
+        camera=_pose(camera, "pose", default=np.eye(4)),
+        vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_LONGEST_WAIT),
+        devices=_devices(top.table("devices")) if "devices" in top else None,
+        contact_height=None if math.isnan(height) else height,
+        period=motion.number("servo_ms", default=1.0, lower=_SERVO_MS[0], upper=_SERVO_MS[1]) * 1e-3,
+        deviation=motion.number("deviation_mm", default=1.0, lower=1e-3, upper=1e3) * 1e-3,
+    )
+    top.allow("devices")
+    for table in (camera, motion, contact, top):
+        table.finish()
+    return cell
+
+
+def _arms(table: Table) -> dict[str, CellArm]:
+    arms: dict[str, CellArm] = {}
+    for key in table.free_keys():
+        match = _ARM_NAME.fullmatch(key.upper())
+        if match is None:
+            raise table.error(key, "expected the name of an arm, such as ARM_1")
+        if f"ARM_{match[1]}" in arms:
+            raise table.error(key, f"ARM_{match[1]} is given twice")
+        arms[f"ARM_{match[1]}"] = _arm(table.table(key))
+    if not arms:
+        raise table.error("", "expected at least one arm, such as [arms.ARM_1]")
+    return arms
+
+
+def _arm(table: Table) -> CellArm:
+    name = table.text("model", default=_REPORT_ARM)
+    try:
+        arm = load_arm(name)
+    except ArmwrightError as error:
+        raise table.error("model", str(error)) from error
+    if shoulder_of(arm) is None:
+        raise table.error(
+            "model",
+            f"'{arm.name}' has no closed-form inverse kinematics yet; use puma560, stanford or an arm built like them",
+        )
+    if "tool" in table:
+        arm = attrs.evolve(arm, tool=_pose(table, "tool"))
+    table.allow("tool")
+    base = _pose(table, "base", default=np.eye(4))
+    start = _start(table, arm, base)
+    waits = {
+        name: table.number(key, default=0.3, lower=0.0, upper=_LONGEST_WAIT)
+        for name, key in (("open_time", "open_s"), ("grasp_time", "grasp_s"))
+    }
+    table.finish()
+    return CellArm(arm=arm, base=base, start=start, **waits)
+
+
+def _start(table: Table, arm: Arm, base: Array) -> Array:
+    """Read where an arm stands at the start: joint by joint, or by the pose of its hand in the world."""
+    if "posture" in table:
+        q = table.vector("posture", arm.n)
+        for fault in violations(arm, q):
+            raise table.error("posture", str(fault))
+        return q
+    table.allow("posture")
+    if "hand" not in table:
+        raise table.error("hand", "missing; give the pose of the hand at the start, or the joints as posture")
+    solution = inverse(arm, inverse_pose(base) @ _pose(table, "hand"))
+    if not solution.allowed:
+        raise table.error("hand", solution.explain())
+    return solution.best.q
+
+
+def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
+    frames: dict[str, Node] = {}
+    keys: dict[str, str] = {}
+    for key in table.free_keys():
+        name = _name(table, key, frames)
+        keys[name] = key
+        if table.is_table(key):
+            place = table.table(key)
+            frames[name] = Node(
+                parent=_name(place, "on", (), place.text("on", default=WORLD)), relation=_pose(place, "at")
+            )
+            place.finish()
+        else:
+            frames[name] = Node(parent=WORLD, relation=_pose(table, key))
+    known = {WORLD, "STATION", *arms, *frames}
+    for name, node in frames.items():
+        if node.parent not in known:
+            near = closest(node.parent, known)
+            hint = f"; did you mean {near}?" if near else ""
+            raise table.error(keys[name], f"it hangs on {node.parent}, which is no frame here{hint}")
+        above, seen = node.parent, {name}
+        while above in frames:
+            if above in seen:
+                raise table.error(keys[name], f"{name} hangs on itself by way of {', '.join(sorted(seen - {name}))}")
+            seen.add(above)
+            above = frames[above].parent
+    return frames
+
+
+def _visions(table: Table) -> dict[str, tuple[Array, ...]]:
+    visions: dict[str, tuple[Array, ...]] = {}
+    for key in table.free_keys():
+        name = _name(table, key, visions)
+        visions[name] = tuple(_checked(table, key, numbers) for numbers in table.vectors(key, 12))
+    return visions
+
+
+def _devices(table: Table) -> frozenset[str]:
+    devices: set[str] = set()
+    for key in table.free_keys():
+        devices.add(_name(table, key, devices))
+        table.table(key).finish()
+    return frozenset(devices)
+
+
+def _name(table: Table, key: str, taken: Iterable[str], text: str | None = None) -> str:
+    """Return a name as the language compares it: in upper case, and one that a program can write."""
+    name = (key if text is None else text).upper()
+    match = _ARM_NAME.fullmatch(name)
+    if text is not None and match:
+        return f"ARM_{match[1]}"
+    if not _NAME.fullmatch(name) or (text is None and (name == WORLD or match)):
+        raise table.error(
+            key, f"'{text or key}' cannot name a frame or device: letters, digits and _, not WORLD or an arm"
+        )
+    if name in taken:
+        raise table.error(key, f"{name} is given twice; names that differ in case only are one")
+    return name
+
+
+def _pose(table: Table, key: str, default: Array | None = None) -> Array:
+    if default is not None and key not in table:
+        table.allow(key)
+        return default
+    return _checked(table, key, table.vector(key, 12))
+
+
+def _checked(table: Table, key: str, numbers: Array) -> Array:
+    X = from_noap(numbers)
+    error = float(orthonormality_error(X[:3, :3]))
+    if error > _TYPED_ROTATION:
+        by_rows = np.linalg.norm(numbers.reshape(3, 4)[:, :3], axis=-1)
+        rows = np.allclose(by_rows, 1.0, atol=_TYPED_ROTATION)
+        hint = "; they look like rows: write the columns n, o, a, p" if rows else ""
+        raise table.error(key, f"the first nine numbers are no rotation (off by {error:.2g}){hint}")
+    return pose(nearest_rotation(X[:3, :3]), X[:3, 3])

@@ -1,0 +1,212 @@
+"""``armwright run``: a program moves an arm, and the user sees what happened."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from armwright.cell.model import Cell
+    from armwright.program.code import Code
+    from armwright.program.interpret import RunError
+    from armwright.program.recording import Recording, RunStage
+
+
+def run(  # noqa: PLR0917 - Typer reads one parameter per option
+    program: Annotated[Path, typer.Argument(help="The program, in RLO.", show_default=False)],
+    cell: Annotated[Path, typer.Option("--cell", help="The cell it runs in, TOML or JSON.", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the results; none are kept without it.")
+    ] = None,
+    servo_ms: Annotated[
+        float | None, typer.Option(help="Servo period in ms; the cell file's, or 1.", show_default=False)
+    ] = None,
+    deviation_mm: Annotated[
+        float | None,
+        typer.Option(help="Allowed deviation from straight lines; the cell file's, or 1.", show_default=False),
+    ] = None,
+    strict: Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")] = False,
+    seed: Annotated[int, typer.Option(help="Recorded in run.json; this simulator draws no random numbers.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")] = False,
+) -> None:
+    """Run an RLO program in a simulated cell.
+
+    Writes motion.csv (every servo tick, SI), events.jsonl (every effect with its source line), frames.json (the
+    final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the disk and
+    shows the arm moving.
+
+    [b]Example[/b]:  armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out
+    """
+    import json
+
+    from armwright.cli.check import compile_file, print_diagnostics
+    from armwright.files.output import write_folder
+    from armwright.program.interpret import RunError, warnings
+    from armwright.report.files import Origin, result_files, summary
+
+    place = _cell(cell, servo_ms, deviation_mm)
+    compiled = compile_file(program, place, strict=strict)
+    if compiled.code is None:
+        print_diagnostics(compiled.diagnostics, compiled.source)
+        raise typer.Exit(1)
+    code = compiled.code
+    try:
+        recording = _interpret(code, place, watched=not (quiet or as_json))
+    except RunError as error:
+        print_diagnostics([*compiled.diagnostics, error.diagnostic], code.source)
+        _print_moment(error, code)
+        raise typer.Exit(1) from error
+    diagnostics = (*compiled.diagnostics, *warnings(code, recording))
+    if output is not None:
+        options = {"servo_ms": place.period * 1e3, "deviation_mm": place.deviation * 1e3, "strict": strict}
+        origin = Origin(program=program, cell=cell, command=_command(), seed=seed, options=options)
+        write_folder(output, result_files(recording, code, diagnostics, origin))
+    if diagnostics and not as_json:
+        print_diagnostics(diagnostics, code.source)
+    if as_json:
+        where = {"output": str(output)} if output else {}
+        print(json.dumps({**summary(recording, code, diagnostics), **where}, indent=2, ensure_ascii=False))
+    elif not quiet:
+        _print_summary(recording, code, output)
+
+
+def _cell(path: Path, servo_ms: float | None, deviation_mm: float | None) -> "Cell":
+    import attrs
+
+    from armwright.cell.reader import read_cell
+
+    place = read_cell(path)
+    period = place.period if servo_ms is None else _option("--servo-ms", servo_ms) * 1e-3
+    deviation = place.deviation if deviation_mm is None else _option("--deviation-mm", deviation_mm) * 1e-3
+    return attrs.evolve(place, period=period, deviation=deviation)
+
+
+def _option(name: str, value: float) -> float:
+    if not 0.001 <= value <= 1000:
+        raise typer.BadParameter(f"expected 0.001 to 1000, got {value:g}", param_hint=name)
+    return value
+
+
+def _interpret(code: "Code", place: "Cell", *, watched: bool) -> "Recording":
+    """Run in the simulator, with a progress bar when a person watches."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    from armwright.cell.simulator import Simulator
+    from armwright.program.interpret import interpret
+
+    simulator = Simulator(place)
+    console = Console(stderr=True)
+    if not (watched and console.is_terminal):
+        return interpret(code, place, simulator)
+    columns = TextColumn("running"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=len(code.instructions))
+
+        def show(done: int, _total: int, line: int) -> None:
+            bar.update(task, completed=done, description=code.source.line_text(line).strip()[:60])
+
+        return interpret(code, place, simulator, show)
+
+
+def _command() -> str:
+    import shlex
+
+    return shlex.join(["armwright", *sys.argv[1:]])
+
+
+def _print_summary(recording: "Recording", code: "Code", output: Path | None) -> None:
+    from rich.console import Console
+
+    console = Console(soft_wrap=False)
+    console.print(_trace_table(recording, code))
+    if recording.stages:
+        console.print(_stage_table(recording, code))
+    moves = sum(effect.kind == "MOVE" for effect in recording.effects)
+    console.print(
+        f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {moves} moves, "
+        f"{len(recording.stages)} stages, {len(recording.streams[0].t) if recording.streams else 0} servo ticks",
+        highlight=False,
+    )
+    if output is not None:
+        # On a line of its own and never wrapped, so that it can be clicked or copied.
+        print(f"report: {output / 'report.html'}")
+
+
+def _trace_table(recording: "Recording", code: "Code") -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("line", justify="right", style="dim")
+    table.add_column("s", justify="right")
+    table.add_column("what happened")
+    for effect in recording.effects:
+        if effect.kind != "PLACE":
+            table.add_row(str(code.source.line(effect.span.start)), f"{effect.t0:.3f}", effect.text.replace("[", r"\["))
+    return table
+
+
+def _stage_table(recording: "Recording", code: "Code") -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in ("line", "stage"):
+        table.add_column(name, justify="right" if name == "line" else "left")
+    for name in ("s", "mm", "off mm", "peak speed", "peak effort"):
+        table.add_column(name, justify="right")
+    for stage in recording.stages:
+        off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
+        table.add_row(
+            str(code.source.line(stage.span.start)),
+            f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}"
+            + (f"\n  {stage.stage.slowed}" if stage.stage.slowed else ""),
+            f"{stage.stage.trajectory.duration:.3f}",
+            f"{stage.stage.length * 1e3:.0f}",
+            off,
+            *_peaks(stage, recording),
+        )
+    return table
+
+
+def _peaks(stage: "RunStage", recording: "Recording") -> tuple[str, str]:
+    """Say the largest share of a limit and whose it is."""
+    arm = recording.cell.arms[stage.arm].arm
+    texts = []
+    for values, limit in (
+        (stage.stage.trajectory.peaks(1), arm.limit("speed")),
+        (stage.peak_effort, arm.limit("effort")),
+    ):
+        share = values / limit
+        joint = int(share.argmax())
+        text = f"{share[joint] * 100:.0f} % j{joint + 1}"
+        texts.append(f"[bold red]{text}[/]" if share[joint] > 1 + 1e-9 else text)
+    return texts[0], texts[1]
+
+
+def _print_moment(error: "RunError", code: "Code") -> None:
+    """Show where every frame was when a program could not go on."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from armwright.cell.frames import WORLD
+
+    table = Table(title=f"frames at {error.time:.3f} s", box=box.SIMPLE_HEAD, pad_edge=False, title_justify="left")
+    table.add_column("frame")
+    table.add_column("hangs on")
+    table.add_column("x, y, z in the world, mm", justify="right")
+    for name in error.tree:
+        if name == WORLD or name.endswith(".BASE"):
+            continue
+        parent = (error.tree.parent(name) or WORLD).removesuffix(".BASE")
+        place = "no value yet"
+        if error.tree.has_value(name):
+            place = ", ".join(f"{x * 1e3:.1f}" for x in error.tree.world(name)[:3, 3])
+        table.add_row(code.spelled(name), "its base" if parent == name else code.spelled(parent), place)
+    Console(stderr=True).print(table)

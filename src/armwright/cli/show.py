@@ -1,0 +1,149 @@
+"""``armwright show``: the tables of one arm."""
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from rich.table import Table
+
+    from armwright.arm.model import Arm, Joint
+
+
+def show(
+    arm: Annotated[str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON, in SI units.")] = False,
+) -> None:
+    """Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.
+
+    Degrees and millimetres for people; --json gives SI units and radians.
+
+    [b]Example[/b]:  armwright show puma560
+    """
+    import json
+
+    from rich.console import Console
+
+    from armwright.arm.load import load_arm
+
+    model = load_arm(arm)
+    if as_json:
+        print(json.dumps(_as_data(model), indent=2, ensure_ascii=False))
+        return
+    console = Console(highlight=False)
+    console.print(f"[bold]{model.name}[/bold]  {model.title}")
+    if model.source:
+        console.print(model.source, style="dim")
+    for table in (_geometry(model), _limits(model), _links(model), _inertia(model), _motors(model)):
+        console.print()
+        console.print(table)
+    console.print()
+    for name, text in _facts(model):
+        console.print(f"{name:<9}{text}")
+
+
+def _table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[str]]") -> "Table":
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in columns:
+        table.add_column(column, justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
+def _geometry(model: "Arm") -> "Table":
+    rows = []
+    for i, joint in enumerate(model.joints, 1):
+        theta, d = _angle(joint.theta), _length(joint.d)
+        if joint.revolute:
+            theta = f"q{i}" if joint.theta == 0 else f"q{i} {math.degrees(joint.theta):+g}°"
+        else:
+            d = f"q{i}" if joint.d == 0 else f"q{i} {joint.d * 1e3:+g} mm"
+        rows.append((str(i), joint.kind, theta, d, _length(joint.a), _angle(joint.alpha)))
+    return _table("Denavit-Hartenberg, standard", ("joint", "kind", "theta", "d", "a", "alpha"), rows)
+
+
+def _limits(model: "Arm") -> "Table":
+    rows = []
+    for i, joint in enumerate(model.joints, 1):
+        limits = joint.limits
+        unit = "N m" if joint.revolute else "N"
+        effort = "-" if math.isinf(limits.effort) else f"{limits.effort:g} {unit}"
+        positions = _position(joint, limits.lower), _position(joint, limits.upper)
+        rates = _position(joint, limits.speed, "/s"), _position(joint, limits.acceleration, "/s²")
+        rows.append((str(i), *positions, *rates, effort))
+    return _table("Limits", ("joint", "from", "to", "speed", "acceleration", "effort"), rows)
+
+
+def _links(model: "Arm") -> "Table":
+    rows = []
+    for i, link in enumerate(model.links, 1):
+        rows.append((str(i), f"{link.mass:g}", *(f"{x * 1e3:.1f}" for x in link.com)))
+    return _table("Links: mass, and centre of mass in the link frame", ("link", "kg", "x mm", "y mm", "z mm"), rows)
+
+
+def _inertia(model: "Arm") -> "Table":
+    entries = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
+    rows = []
+    for i, link in enumerate(model.links, 1):
+        rows.append((str(i), *(f"{link.inertia[entry] + 0.0:.3g}" for entry in entries.values())))
+    return _table("Inertia about the centre of mass, kg m²", ("link", *entries), rows)
+
+
+def _motors(model: "Arm") -> "Table":
+    rows = []
+    for i, (motor, joint) in enumerate(zip(model.motors, model.joints, strict=True), 1):
+        unit = "kg m²" if joint.revolute else "kg"
+        dry = f"+{motor.coulomb_forward:g} / -{motor.coulomb_backward:g}" if motor.coulomb_forward else "0"
+        rows.append((str(i), f"{motor.inertia:g} {unit}", f"{motor.viscous:g}", dry, f"{motor.gear_ratio:g}"))
+    return _table("Drives, at the joint", ("joint", "inertia", "viscous", "dry friction", "gear"), rows)
+
+
+def _facts(model: "Arm") -> "list[tuple[str, str]]":
+    from armwright.spatial.poses import to_noap
+
+    def noap(X: "Any") -> str:
+        numbers = to_noap(X)
+        columns = [" ".join(f"{x + 0.0:.4g}" for x in numbers[k : k + 3]) for k in (0, 3, 6)]
+        place = " ".join(f"{x * 1e3 + 0.0:g}" for x in numbers[9:].round(9))
+        return f"n ({columns[0]})  o ({columns[1]})  a ({columns[2]})  p ({place}) mm"
+
+    facts = [("base", noap(model.base)), ("tool", noap(model.tool))]
+    facts.append(("gravity", f"({', '.join(f'{x:g}' for x in model.gravity)}) m/s²"))
+    if math.isfinite(model.reach):
+        facts.append(("reach", f"{model.reach * 1e3:g} mm"))
+    if math.isfinite(model.tool_speed):
+        facts.append(("hand", f"{model.tool_speed * 1e3:g} mm/s at full reach"))
+    return facts
+
+
+def _angle(value: float) -> str:
+    return f"{math.degrees(value):g}°"
+
+
+def _length(value: float) -> str:
+    return f"{value * 1e3:g} mm"
+
+
+def _position(joint: "Joint", value: float, per: str = "") -> str:
+    if math.isinf(value):
+        return "-"
+    return f"{math.degrees(value):.4g}°{per}" if joint.revolute else f"{value * 1e3:g} mm{per}"
+
+
+def _as_data(model: "Arm") -> "dict[str, Any]":
+    import attrs
+    import numpy as np
+
+    def plain(_owner: object, _field: object, value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            return value.tolist()
+        return None if isinstance(value, float) and math.isinf(value) else value
+
+    return attrs.asdict(model, value_serializer=plain)

@@ -1,0 +1,316 @@
+"""Reading TOML and JSON that people write: a cursor that checks what it reads and names file, line and key."""
+
+import json
+import math
+import tomllib
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.errors import FileFormatError, closest
+from armwright.files.lines import Keys, json_lines, toml_lines
+
+_MISSING: Any = object()
+
+
+class Document:
+    """A file of keys and values, with the line of every key.
+
+    Attributes:
+        path: where it was read.
+        root: the cursor at its top.
+    """
+
+    def __init__(self, path: Path, data: Mapping[str, Any], lines: Mapping[Keys, int]) -> None:
+        """Keep a parsed text; ``read`` does the parsing."""
+        self.path = path
+        self._lines = lines
+        self.root = Table(self, (), data)
+
+    @classmethod
+    def read(cls, path: Path | str) -> "Document":
+        """Read a file: JSON when it ends in .json or begins with a brace, TOML otherwise.
+
+        Raises:
+            FileFormatError: it is missing, a folder, not UTF-8, or has a slip of syntax.
+        """
+        path = Path(path)
+        text = read_text(path)
+        as_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
+        try:
+            data = json.loads(text, object_pairs_hook=_no_twins) if as_json else tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise _syntax_error(path, error) from error
+        except json.JSONDecodeError as error:
+            raise FileFormatError(
+                path, error.lineno, "", f"not valid JSON: {error.msg}, column {error.colno}"
+            ) from error
+        except _TwinError as error:
+            raise FileFormatError(
+                path, _second_line(text, str(error)), str(error), "this key is given twice"
+            ) from error
+        except RecursionError as error:
+            raise FileFormatError(path, None, "", "nested too deeply") from error
+        if not isinstance(data, dict):
+            raise FileFormatError(path, 1, "", f"expected keys and values in braces, got {_kind(data)}")
+        return cls(path, data, json_lines(text) if as_json else toml_lines(text))
+
+    def line(self, keys: Keys) -> int | None:
+        """Return the line of a key, or of the nearest table around it."""
+        for length in range(len(keys), 0, -1):
+            if keys[:length] in self._lines:
+                return self._lines[keys[:length]]
+        return None
+
+
+class Table:
+    """A cursor at one table of a document: every key is read once, with its kind, and what is left over is refused.
+
+    Tables that are not there read as empty ones, so that optional tables need no special case.
+    """
+
+    def __init__(self, document: Document, keys: Keys, data: Mapping[str, Any]) -> None:
+        """Stand at ``keys`` of a document."""
+        self._document, self.keys, self._data = document, keys, data
+        self._read: set[str] = set()
+
+    def __contains__(self, key: str) -> bool:
+        """Whether the key is given."""
+        return key in self._data
+
+    @property
+    def name(self) -> str:
+        """The last key of the way here, such as ``ARM_1`` in ``[arms.ARM_1]``."""
+        return str(self.keys[-1]) if self.keys else ""
+
+    def error(self, key: str, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of a key here, or of the table itself where ``key`` is empty."""
+        keys = (*self.keys, key) if key else self.keys
+        return FileFormatError(self._document.path, self._document.line(keys), _shown(keys), message)
+
+    def number(self, key: str, default: Any = _MISSING, *, lower: float = -math.inf, upper: float = math.inf) -> float:
+        """Return a finite number between ``lower`` and ``upper``.
+
+        Raises:
+            FileFormatError: it is missing without a default, no number, not finite, or out of range.
+        """
+        value = self._value(key, default)
+        if value is default:
+            return float(default)
+        self._require_number(key, value)
+        if not lower <= value <= upper:
+            bounds = f"{lower:g} or more" if math.isinf(upper) else f"{lower:g} to {upper:g}"
+            raise self.error(key, f"expected {bounds}, got {value:g}")
+        return float(value)
+
+    def positive(self, key: str, default: Any = _MISSING) -> float:
+        """Return a finite number above 0.
+
+        Raises:
+            FileFormatError: it is missing without a default, no number, or not above 0.
+        """
+        value = self.number(key, default)
+        if key in self and not value > 0:
+            raise self.error(key, f"expected a number above 0, got {value:g}")
+        return value
+
+    def vector(self, key: str, length: int | Collection[int], default: Any = _MISSING) -> Array:
+        """Return an array of that many finite numbers; several lengths may be allowed.
+
+        Raises:
+            FileFormatError: it is missing without a default, or not such an array.
+        """
+        value = self._value(key, default)
+        return np.asarray(default, dtype=np.float64) if value is default else self._numbers(key, value, length)
+
+    def vectors(self, key: str, length: int) -> list[Array]:
+        """Return a list of arrays of that many finite numbers each.
+
+        Raises:
+            FileFormatError: it is missing, or not such a list.
+        """
+        value = self._value(key, _MISSING)
+        if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
+            raise self.error(key, f"expected a list of lists of {length} numbers, got {_kind(value)}")
+        return [self._numbers(key, row, length) for row in value]
+
+    def text(self, key: str, default: Any = _MISSING) -> str:
+        """Return a string.
+
+        Raises:
+            FileFormatError: it is missing without a default, or no string.
+        """
+        value = self._value(key, default)
+        if value is not default and not isinstance(value, str):
+            raise self.error(key, f"expected a text in quotes, got {_kind(value)}")
+        return str(value)
+
+    def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
+        """Return a string that is one of ``choices``.
+
+        Raises:
+            FileFormatError: it is missing without a default, or none of them; the nearest is named.
+        """
+        value = self.text(key, default)
+        if value not in choices:
+            near = closest(value, choices)
+            hint = f"; did you mean '{near}'?" if near else ""
+            raise self.error(key, f"expected one of {', '.join(sorted(choices))}, got '{value}'{hint}")
+        return value
+
+    def table(self, key: str, *, required: bool = False) -> "Table":
+        """Return the cursor at a table below; an empty one when it is missing and not required.
+
+        Raises:
+            FileFormatError: it is required and missing, or no table.
+        """
+        value = self._value(key, _MISSING if required else {})
+        if not isinstance(value, dict):
+            raise self.error(key, f"expected a table, got {_kind(value)}")
+        return Table(self._document, (*self.keys, key), value)
+
+    def tables(self, key: str) -> list["Table"]:
+        """Return the cursors at the tables of an array such as ``[[joint]]``.
+
+        Raises:
+            FileFormatError: it is missing, empty, or no array of tables.
+        """
+        value = self._value(key, _MISSING)
+        if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
+            raise self.error(key, f"expected one or more tables [[{key}]], got {_kind(value)}")
+        return [Table(self._document, (*self.keys, key, i), row) for i, row in enumerate(value)]
+
+    def free_keys(self) -> Iterator[str]:
+        """Walk through the keys of a table whose names are free, such as those of frames."""
+        yield from self._data
+
+    def is_table(self, key: str) -> bool:
+        """Whether the value of a key is a table."""
+        return isinstance(self._data.get(key), dict)
+
+    def allow(self, *keys: str) -> None:
+        """Make keys known that need not be given: ``finish`` may name them as the nearest to a misspelt one."""
+        self._read.update(keys)
+
+    def finish(self) -> None:
+        """Refuse the first key that nobody has read.
+
+        Raises:
+            FileFormatError: there is one; the nearest known key is named.
+        """
+        for key in self._data:
+            if key not in self._read:
+                near = closest(key, self._read - set(self._data))
+                known = ", ".join(sorted(self._read))
+                hint = f"did you mean '{near}'?" if near else f"known here: {known}" if known else "none is known here"
+                raise self.error(key, f"unknown key; {hint}")
+
+    def _value(self, key: str, default: Any) -> Any:
+        self._read.add(key)
+        if key in self._data:
+            return self._data[key]
+        if default is _MISSING:
+            near = closest(key, set(self._data) - self._read)
+            hint = f"; did you mean it by '{near}'?" if near else ""
+            raise self.error(key, f"missing{hint}")
+        return default
+
+    def _require_number(self, key: str, value: Any) -> None:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(key, f"expected a number, got {_kind(value)}")
+        if not math.isfinite(value):
+            raise self.error(key, f"expected a finite number, got {value}")
+
+    def _numbers(self, key: str, value: Any, length: int | Collection[int]) -> Array:
+        lengths = (length,) if isinstance(length, int) else tuple(length)
+        expected = f"{' or '.join(str(count) for count in lengths)} numbers"
+        if not isinstance(value, list):
+            raise self.error(key, f"expected a list of {expected}, got {_kind(value)}")
+        for item in value:
+            self._require_number(key, item)
+        if len(value) not in lengths:
+            raise self.error(key, f"expected {expected}, got {len(value)}")
+        return np.array(value, dtype=np.float64)
+
+
+def read_text(path: Path | str) -> str:
+    """Return the text of a UTF-8 file; a mark of byte order is dropped, line ends become line feeds.
+
+    Raises:
+        FileFormatError: it is missing (the nearest name in its folder is told), a folder, or not UTF-8.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        folder = path.parent
+        near = closest(path.name, [other.name for other in folder.iterdir()]) if folder.is_dir() else None
+        hint = f"; did you mean '{folder / near}'?" if near else ""
+        raise FileFormatError(path, None, "", f"no such file{hint}") from None
+    except OSError as error:
+        raise FileFormatError(path, None, "", f"cannot be read: {error.strerror}") from error
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise FileFormatError(
+            path, line, "", f"not UTF-8 text: byte 0x{data[error.start]:02x} has no meaning"
+        ) from error
+
+
+class _TwinError(Exception):
+    """A key of a JSON object is given twice."""
+
+
+def _no_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in result:
+            raise _TwinError(key)
+        result[key] = value
+    return result
+
+
+def _second_line(text: str, key: str) -> int | None:
+    quoted = json.dumps(key, ensure_ascii=False)
+    second = text.find(quoted, text.find(quoted) + 1)
+    return text[:second].count("\n") + 1 if second >= 0 else None
+
+
+def _syntax_error(path: Path, error: tomllib.TOMLDecodeError) -> FileFormatError:
+    """Take the line out of the parser's message, where it tells one, and put it in front."""
+    message, _, place = str(error).partition(" (at ")
+    line = None
+    if place.startswith("line "):
+        line = int(place.removeprefix("line ").partition(",")[0])
+        message += f", {place.partition(', ')[2].rstrip(')')}"
+    elif place:
+        line = path.read_text(encoding="utf-8-sig").rstrip("\n").count("\n") + 1
+        message += ", at the end of the file"
+    return FileFormatError(path, line, "", f"not valid TOML: {message}")
+
+
+def _shown(keys: Keys) -> str:
+    """Write a way as people would: ``joint 3, mass_kg`` counts from 1."""
+    words: list[str] = []
+    for key in keys:
+        if isinstance(key, int):
+            words[-1] += f" {key + 1}"
+        else:
+            words.append(key)
+    return ", ".join(words)
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, bool):
+        return f"the truth value {str(value).lower()}"
+    if isinstance(value, str):
+        return f"the text '{value}'"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict):
+        return "a table"
+    return f"{value}"

@@ -1,0 +1,40 @@
+"""What is known of the cell while a program is checked: names, and what hangs on what; no numbers."""
+
+from collections.abc import Mapping
+
+import attrs
+
+from armwright.cell.frames import WORLD
+from armwright.cell.model import Cell
+
+STATION = "STATION"
+
+
+@attrs.frozen(kw_only=True)
+class KnownCell:
+    """The part of a cell that the checker asks for. Names are in upper case.
+
+    Attributes:
+        arms: such as ``ARM_1``.
+        frames: that have a value from the start, each with the frame it hangs on.
+        devices: that can be operated; None when any will do.
+        visions: frames that the camera has an answer for; None when nothing is known of the camera.
+    """
+
+    arms: frozenset[str]
+    frames: Mapping[str, str] = attrs.field(factory=dict)
+    devices: frozenset[str] | None = None
+    visions: frozenset[str] | None = None
+
+
+def known_cell(cell: Cell) -> KnownCell:
+    """Return what the checker has to know of a cell."""
+    return KnownCell(
+        arms=frozenset(cell.arms),
+        frames={name: node.parent for name, node in cell.frames.items()},
+        devices=cell.devices,
+        visions=frozenset(cell.visions),
+    )
+
+
+__all__ = ["STATION", "WORLD", "KnownCell", "known_cell"]

@@ -1,0 +1,221 @@
+// The page: heading, readouts and the controls of time.
+
+const slider = byId("time");
+
+function fillHeader() {
+  byId("status").textContent = data.status;
+  byId("status").classList.toggle("good", data.status === "finished");
+  const facts = [
+    ["Duration", `${number(data.duration, 2)} s`],
+    ["Cell", data.cell_name],
+    ["Program", data.program_name],
+    ["Command", data.command, "code"],
+  ];
+  const arms = data.arms.map((arm) => `${arm.name} (${arm.model})`).join(", ");
+  if (arms) facts.splice(1, 0, ["Arms", arms]);
+  byId("facts").append(
+    ...facts.map(([name, text, kind = ""]) =>
+      make("div", {}, make("dt", { textContent: name }), make("dd", { textContent: text, className: kind })),
+    ),
+  );
+  byId("messages").append(...data.messages.map(messageItem));
+  byId("generated").textContent = `Made by ${data.generated_by}`;
+}
+
+function messageItem(message) {
+  const item = make(
+    "li",
+    { className: message.severity },
+    make("b", { textContent: `${message.severity} ${message.code}`.trim() }),
+    message.text,
+  );
+  if (message.line !== null) {
+    const link = make("button", { type: "button", textContent: `line ${message.line}` });
+    link.addEventListener("click", () => showLine(message.line));
+    item.append(" (", link, ")");
+  }
+  return item;
+}
+
+function jointRow(joint) {
+  const [low, high] = [joint.lower, joint.upper];
+  const range = make(
+    "span",
+    { className: low === null || high === null ? "range none" : "range", title: "" },
+    make("i"),
+  );
+  if (low !== null && high !== null)
+    range.title = `${quantityText(QUANTITIES[0], joint, low)} to ${quantityText(QUANTITIES[0], joint, high)}`;
+  else range.firstChild.hidden = true;
+  return make(
+    "div",
+    { className: "joint" },
+    make("span", { className: "name", textContent: joint.name, title: joint.name }),
+    make("span", { className: "value" }),
+    range,
+  );
+}
+
+function presentRow(arm) {
+  return arm.t.length ? locate(arm.t, now.t) : null;
+}
+
+function showReadout() {
+  const arm = chosenArm();
+  const place = arm && presentRow(arm);
+  if (!place) return;
+  const q = blend(arm.q, place);
+  [...byId("joints").children].forEach((row, j) => {
+    row.children[1].textContent = quantityText(QUANTITIES[0], arm.joints[j], q[j]);
+    const part = share(QUANTITIES[0], arm.joints[j], q[j]);
+    if (part !== null) row.children[2].firstChild.style.left = `${Math.min(100, Math.max(0, 50 + 50 * part))}%`;
+  });
+  const figure = data.animation?.arms[arm.name];
+  const parts = [["hand", `${placeText(blend(arm.hand, place))} mm`]];
+  if (figure) parts.push(["gripper", gripText(figure.grip[locate(data.animation.t, now.t)[0]])]);
+  byId("hand").replaceChildren(
+    ...parts.map(([name, text]) => make("div", {}, make("span", { textContent: name }), text)),
+  );
+}
+
+function gripText(grip) {
+  return grip > 0.99 ? "open" : grip < 0.01 ? "closed" : `${number(100 * grip, 0)} % open`;
+}
+
+function showClock() {
+  slider.value = now.t;
+  const effect = data.effects[presentEffect()];
+  byId("clock").textContent = `${number(now.t, 2)} / ${number(data.duration, 2)} s`;
+  slider.setAttribute(
+    "aria-valuetext",
+    `${now.t.toFixed(2)} seconds of ${data.duration.toFixed(2)}${effect ? `, line ${effect.line}` : ""}`,
+  );
+  byId("now").replaceChildren(
+    ...(effect ? [make("b", { textContent: `line ${effect.line}` }), `  ${effect.text}`] : []),
+  );
+}
+
+function chooseArm(i) {
+  now.arm = i;
+  const arm = chosenArm();
+  for (const group of document.querySelectorAll(".arms"))
+    [...group.children].forEach((button, k) => {
+      button.ariaPressed = String(k === i);
+    });
+  byId("joints").replaceChildren(...arm.joints.map(jointRow));
+  byId("readout-name").textContent = `Joints of ${arm.name}`;
+  chooseArmInCharts();
+  changed();
+}
+
+function fillArms() {
+  byId("readout").hidden = !data.arms.length;
+  if (data.arms.length > 1) {
+    for (const group of document.querySelectorAll(".arms")) {
+      group.append(
+        ...data.arms.map((arm, i) => {
+          const button = make("button", { type: "button", textContent: arm.name });
+          button.addEventListener("click", () => chooseArm(i));
+          return button;
+        }),
+      );
+    }
+  }
+  if (data.arms.length) chooseArm(0);
+}
+
+let clock = null;
+
+function tick(time) {
+  if (!now.playing) return;
+  seek(now.t + ((time - (clock ?? time)) / 1000) * now.rate);
+  clock = time;
+  if (now.t >= data.duration) play(false);
+  else requestAnimationFrame(tick);
+}
+
+function play(wanted) {
+  if (wanted && now.t >= data.duration) seek(0);
+  now.playing = wanted && data.duration > 0;
+  clock = null;
+  byId("play").classList.toggle("playing", now.playing);
+  byId("play").ariaLabel = now.playing ? "Pause" : "Play";
+  if (now.playing) requestAnimationFrame(tick);
+}
+
+function onKey(event) {
+  const target = event.target;
+  if (
+    event.ctrlKey ||
+    event.altKey ||
+    event.metaKey ||
+    target.matches("select") ||
+    (event.key === " " && target.matches("button"))
+  )
+    return;
+  const step = event.shiftKey ? 1 : 1 / (data.animation?.fps ?? 25);
+  const actions = {
+    " ": () => play(!now.playing),
+    ArrowLeft: () => seek(now.t - step),
+    ArrowRight: () => seek(now.t + step),
+    Home: () => seek(0),
+    End: () => seek(data.duration),
+  };
+  if (!actions[event.key]) return;
+  event.preventDefault();
+  actions[event.key]();
+}
+
+function redraw() {
+  readColours();
+  drawView();
+  drawCharts();
+}
+
+function startControls() {
+  slider.max = data.duration;
+  slider.addEventListener("input", () => seek(slider.value));
+  byId("play").addEventListener("click", () => play(!now.playing));
+  byId("rate").addEventListener("change", (event) => {
+    now.rate = Number(event.target.value);
+  });
+  document.addEventListener("keydown", onKey);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  const watcher = new ResizeObserver(redraw);
+  for (const element of [canvas, byId("charts")]) watcher.observe(element);
+}
+
+function start() {
+  fillHeader();
+  fillProgram();
+  fillTrace();
+  fillStages();
+  byId("tree-card").hidden = !tree.changes.length;
+  startView();
+  startCharts();
+  listeners.push(showClock, showProgram, showStages, showReadout, drawView);
+  if (tree.changes.length) listeners.push(showTree);
+  fillArms();
+  startControls();
+  seek(0);
+}
+
+// What a test, or a curious reader at the console, may ask.
+window.armwright = {
+  seek,
+  state: () => {
+    const arm = chosenArm();
+    const place = arm && presentRow(arm);
+    return {
+      time: now.t,
+      playing: now.playing,
+      arm: arm?.name ?? null,
+      q: place ? blend(arm.q, place) : [],
+      hand: place ? blend(arm.hand, place) : null,
+      line: data.effects[presentEffect()]?.line ?? null,
+      stage: arm ? stageAt(arm.name, now.t) : -1,
+    };
+  },
+};
+
+start();

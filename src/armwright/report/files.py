@@ -1,0 +1,163 @@
+"""The files of a run: motion, events, frames, what made them, and the page."""
+
+import hashlib
+import json
+import platform
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD
+from armwright.program.code import Code
+from armwright.program.diagnostics import Diagnostic, to_json
+from armwright.program.recording import Recording, RunStage, motion_rows
+from armwright.report.page import run_page
+from armwright.report.recorded import page_of
+from armwright.spatial.poses import to_noap
+from armwright.version import __version__
+
+# Digits of the numbers in the JSON files: micrometres and microradians to a millionth.
+_DIGITS = 12
+
+
+@attrs.frozen(kw_only=True)
+class Origin:
+    """What made a run.
+
+    Attributes:
+        program: path of the program.
+        cell: path of the cell file.
+        command: the command line.
+        seed: as given.
+        options: those that shape the result, by name.
+    """
+
+    program: Path
+    cell: Path
+    command: str
+    seed: int
+    options: Mapping[str, Any]
+
+
+def result_files(
+    recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin
+) -> dict[str, str | Iterable[str]]:
+    """Return the files of a run by name, the same text for the same run.
+
+    Args:
+        recording: what happened.
+        code: the program that ran.
+        diagnostics: warnings of translation and run.
+        origin: what made it.
+    """
+    return {
+        "motion.csv": motion_rows(recording.streams),
+        "events.jsonl": _events(recording, code),
+        "frames.json": _json(frames(recording, code)),
+        "run.json": _json(_run(recording, code, diagnostics, origin)),
+        "report.html": run_page(page_of(recording, code, diagnostics, origin.command)),
+    }
+
+
+def frames(recording: Recording, code: Code) -> dict[str, Any]:
+    """Return the final frame tree: per frame its parent and its pose, seen from the world and from the parent."""
+    tree = recording.tree
+    table = {}
+    for name in tree:
+        if name == WORLD:
+            continue
+        known = tree.has_value(name)
+        parent = tree.parent(name) or WORLD
+        table[name] = {
+            "spelling": code.spelled(name),
+            "parent": parent,
+            "world": _numbers(to_noap(tree.world(name))) if known else None,
+            "relation": _numbers(to_noap(tree.relation(name, parent))) if known else None,
+        }
+    postures = {name: _numbers(q) for name, q in recording.postures.items()}
+    return {"units": "m, rad", "pose": "columns n, o, a, p", "frames": table, "postures": postures}
+
+
+def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic]) -> dict[str, Any]:
+    """Return a run in short, as plain data in SI units."""
+    return {
+        "program": code.source.name,
+        "cell": recording.cell.name,
+        "duration": recording.duration,
+        "trace": recording.trace(),
+        "stages": [_stage(stage, recording, code) for stage in recording.stages],
+        "diagnostics": [to_json(one, code.source) for one in diagnostics],
+    }
+
+
+def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
+    arm = recording.cell.arms[run.arm].arm
+    motion = run.stage.trajectory
+    return {
+        "line": code.source.line(run.span.start),
+        "arm": run.arm,
+        "kind": run.stage.kind,
+        "to": list(run.to),
+        "speed": run.speed,
+        "start": run.t0,
+        "duration": motion.duration,
+        "length": run.stage.length,
+        "knots": run.stage.knots,
+        "deviation": run.stage.deviation,
+        "slowed": run.stage.slowed,
+        "peak_speed": _numbers(motion.peaks(1)),
+        "peak_acceleration": _numbers(motion.peaks(2)),
+        "peak_effort": _numbers(run.peak_effort),
+        "speed_of_limit": _numbers(motion.peaks(1) / arm.limit("speed")),
+        "effort_of_limit": _numbers(run.peak_effort / arm.limit("effort")),
+    }
+
+
+def _events(recording: Recording, code: Code) -> Iterator[str]:
+    for effect in recording.effects:
+        source = code.source
+        event = {
+            "t0": effect.t0,
+            "t1": effect.t1,
+            "line": source.line(effect.span.start),
+            "column": source.column(effect.span.start),
+            "kind": effect.kind,
+            "arm": effect.arm,
+            "text": effect.text,
+            "source": " ".join(source.slice(effect.span).split()),
+            **effect.data,
+        }
+        yield json.dumps(event, ensure_ascii=False) + "\n"
+
+
+def _run(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
+    arms = {name: place.arm.name for name, place in recording.cell.arms.items()}
+    return {
+        "command": origin.command,
+        "inputs": {
+            "program": {"path": str(origin.program), "sha256": _hash(origin.program)},
+            "cell": {"path": str(origin.cell), "sha256": _hash(origin.cell)},
+            "arms": arms,
+        },
+        "options": dict(origin.options),
+        "seed": origin.seed,
+        "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
+        **summary(recording, code, diagnostics),
+    }
+
+
+def _hash(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _numbers(values: Array) -> list[float]:
+    rounded: list[float] = (np.round(values, _DIGITS) + 0.0).tolist()  # adding 0 turns -0 into 0
+    return rounded
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,86 @@
+"""One HTML text out of template, style, scripts and data, which no data can break out of."""
+
+import html
+import json
+import math
+from collections.abc import Mapping
+from importlib.resources import files
+from string import Template
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+
+# Five significant digits are below a pixel on any screen; instants of a long run take more.
+_DIGITS, _DIGITS_OF_SCALARS = 5, 8
+# What is smaller is rounding, and costs letters.
+_DECIMALS = 7
+# A row of a track that equals the one before it is written as this.
+_REPEATED = 0
+# In the order in which the browser reads them: each uses only what stands before it.
+_SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "lists.js", "run.js")
+
+
+def run_html(title: str, data: object) -> str:
+    """Return the page of a run, with title, style, scripts and data put in.
+
+    Args:
+        title: plain text.
+        data: what the scripts read: attrs objects, mappings, sequences, arrays, strings, numbers, None.
+
+    Returns:
+        HTML text.
+    """
+    return Template(_asset("run.html")).substitute(
+        title=html.escape(title),
+        style=_asset("run.css"),
+        script="\n".join(_asset(name) for name in _SCRIPTS),
+        data=json_text(data),
+    )
+
+
+def json_text(data: object) -> str:
+    """Return ``data`` as JSON that may stand inside a script element: ASCII, and no ``<`` in it."""
+    text = json.dumps(_plain(data), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def _asset(name: str) -> str:
+    return (files("armwright.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _plain(value: object) -> object:
+    """Turn ``value`` into what JSON knows."""
+    if isinstance(value, np.ndarray):
+        return _rows(value)
+    if isinstance(value, (int, float, np.number)) and not isinstance(value, bool):
+        return _short(float(value), _DIGITS_OF_SCALARS)
+    if attrs.has(type(value)):
+        return {name: _plain(item) for name, item in attrs.asdict(value, recurse=False).items()}  # type: ignore[arg-type]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _short(number: float, digits: int) -> float | int | None:
+    """Round to significant digits; whole numbers lose their point, and what is infinite becomes None."""
+    if not math.isfinite(number):
+        return None
+    rounded = round(float(f"{number:.{digits}g}"), _DECIMALS)
+    return int(rounded) if rounded.is_integer() else rounded
+
+
+def _rows(array: Array) -> list[object]:
+    """Write an array over time: numbers for one axis, else one flat list a row, 0 for a row that stays as it was."""
+    if array.ndim == 1:
+        return [_short(number, _DIGITS_OF_SCALARS) for number in array.tolist()]
+    rows: list[object] = []
+    last: list[object] | None = None
+    for numbers in array.reshape(len(array), math.prod(array.shape[1:])).tolist():
+        row: list[object] = [_short(number, _DIGITS) for number in numbers]
+        rows.append(_REPEATED if row == last else row)
+        last = row
+    return rows

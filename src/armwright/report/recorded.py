@@ -1,0 +1,218 @@
+"""From the recording of a run to what its page shows: thinned for a screen, with the arm as a figure of sticks."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.model import Cell, CellArm, base_name
+from armwright.kinematics.forward import link_poses
+from armwright.program.code import Code
+from armwright.program.diagnostics import Diagnostic
+from armwright.program.recording import Effect as RunEffect
+from armwright.program.recording import Recording, RunStage, Stream
+from armwright.report.page import (
+    Animation,
+    ArmFigure,
+    ArmRecord,
+    Effect,
+    FrameTrack,
+    JointInfo,
+    Message,
+    RunPage,
+    Stage,
+    TreeChange,
+)
+from armwright.spatial.poses import to_noap
+from armwright.version import __version__
+
+# Enough for a screen: rows of the charts, and instants of the animation.
+_CHART_ROWS = 1500
+_FRAMES_PER_SECOND = 30.0
+_MOST_INSTANTS = 1200
+# The thickness of a drawn arm, as part of its reach, at the base and at the hand.
+_THICK, _THIN = 0.045, 0.016
+
+
+def page_of(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], command: str) -> RunPage:
+    """Return the page of a run.
+
+    Args:
+        recording: what happened.
+        code: the program that ran.
+        diagnostics: warnings of translation and run.
+        command: the command line, as shown on the page.
+    """
+    source, cell = code.source, recording.cell
+    return RunPage(
+        title=f"{source.name} in {cell.name}",
+        program_name=source.name,
+        program_text=source.text,
+        cell_name=cell.name,
+        generated_by=f"armwright {__version__}",
+        command=command,
+        duration=recording.duration,
+        messages=[
+            Message(severity=one.severity.value, code=one.code, line=source.line(one.span.start), text=one.message)
+            for one in diagnostics
+        ],
+        effects=[
+            Effect(t0=one.t0, t1=one.t1, line=source.line(one.span.start), text=one.text) for one in recording.effects
+        ],
+        stages=[_stage(one, source.line(one.span.start)) for one in recording.stages],
+        arms=[_record(one, cell) for one in recording.streams],
+        animation=_animation(recording, code),
+    )
+
+
+def _stage(run: RunStage, line: int) -> Stage:
+    return Stage(
+        t0=run.t0,
+        t1=run.t1,
+        line=line,
+        arm=run.arm,
+        kind=run.stage.kind,
+        to=run.to,
+        speed=run.speed,
+        peak_speed=run.stage.trajectory.peaks(1).tolist(),
+        peak_effort=run.peak_effort.tolist(),
+        hand_length=run.stage.length,
+        deviation=run.stage.deviation,
+        note=run.stage.slowed,
+    )
+
+
+def _record(stream: Stream, cell: Cell) -> ArmRecord:
+    place = cell.arms[stream.arm]
+    stride = max(1, math.ceil(len(stream.t) / _CHART_ROWS))
+    rows = np.unique(np.append(np.arange(0, len(stream.t), stride), len(stream.t) - 1))
+    return ArmRecord(
+        name=stream.arm,
+        model=place.arm.name,
+        joints=[_joint(place.arm, i) for i in range(place.arm.n)],
+        t=stream.t[rows],
+        q=stream.q[rows],
+        qd=stream.qd[rows],
+        qdd=stream.qdd[rows],
+        tau=stream.tau[rows],
+        hand=_poses_in_world(place, stream.q[rows])[:, -1, :3, 3],
+    )
+
+
+def _joint(arm: Arm, i: int) -> JointInfo:
+    joint = arm.joints[i]
+    limits = joint.limits
+    return JointInfo(
+        name=f"joint {i + 1}",
+        kind=joint.kind,
+        lower=limits.lower,
+        upper=limits.upper,
+        speed=limits.speed,
+        acceleration=limits.acceleration,
+        effort=limits.effort,
+    )
+
+
+def _animation(recording: Recording, code: Code) -> Animation:
+    fps = min(_FRAMES_PER_SECOND, _MOST_INSTANTS / max(recording.duration, 1e-9))
+    t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
+    arms = recording.cell.arms
+    links = {one.arm: _poses_in_world(arms[one.arm], _sampled(one, t)) for one in recording.streams}
+    hands = {name: poses[:, -1] for name, poses in links.items()}
+    return Animation(
+        fps=fps,
+        t=t,
+        arms={name: _figure(arms[name], poses, _grip(recording.effects, name, t)) for name, poses in links.items()},
+        frames=_tracks(recording, code, t, hands),
+        tree=_tree_changes(recording, code),
+    )
+
+
+def _sampled(stream: Stream, t: Array) -> Array:
+    period = stream.t[1] - stream.t[0] if len(stream.t) > 1 else 1.0
+    return np.asarray(stream.q[np.clip(np.round(t / period).astype(int), 0, len(stream.t) - 1)])
+
+
+def _poses_in_world(place: CellArm, q: Array) -> Array:
+    return np.asarray(place.base @ link_poses(place.arm, q))
+
+
+def _figure(place: CellArm, poses: Array, grip: Array) -> ArmFigure:
+    """Draw an arm along its Denavit-Hartenberg steps: first along z, then along x, so that offsets show."""
+    origins, z_axes = poses[:, :, :3, 3], poses[:, :, :3, 2]
+    points = [_foot(origins[:, 0]), origins[:, 0]]
+    for i in range(1, place.arm.n + 1):
+        before, after, z = origins[:, i - 1], origins[:, i], z_axes[:, i - 1]
+        along = np.sum((after - before) * z, axis=-1, keepdims=True)
+        points += [before + along * z, after]
+    points.append(origins[:, -1])
+    reach = place.arm.reach if math.isfinite(place.arm.reach) else float(np.ptp(origins, axis=(0, 1)).max())
+    n = place.arm.n
+    return ArmFigure(
+        points=np.stack(points, axis=1),
+        hand_axes=np.swapaxes(poses[:, -1, :3, :3], -1, -2).reshape(len(poses), 9),
+        grip=grip,
+        joint_axes=np.concatenate([origins[:, :n], z_axes[:, :n]], axis=-1),
+        radii=np.linspace(_THICK, _THIN, len(points) - 1) * reach,
+    )
+
+
+def _foot(origin: Array) -> Array:
+    """Return the point on the floor below a base that stands above it, on which it is drawn to rest."""
+    foot = origin.copy()
+    foot[:, 2] = np.minimum(origin[:, 2], 0.0)
+    return foot
+
+
+def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
+    """Return how far the fingers are open at each instant, 0 to 1; they begin closed."""
+    times, values = [0.0], [0.0]
+    for effect in effects:
+        if effect.arm == arm and effect.kind in ("OPEN", "GRASP"):
+            times += [effect.t0, effect.t1]
+            values += [values[-1], 1.0 if effect.kind == "OPEN" else 0.0]
+    return np.interp(t, times, values)
+
+
+def _tracks(recording: Recording, code: Code, t: Array, hands: dict[str, Array]) -> Iterator[FrameTrack]:
+    names = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
+    for name in names:
+        poses = np.tile(np.eye(4), (len(t), 1, 1))
+        known = np.zeros(len(t), dtype=bool)
+        for rows, tree in _reigns(recording, t):
+            if name not in tree or not tree.has_value(name):
+                continue
+            known[rows] = True
+            arm = next((above for above in tree.ancestors(name) if above in hands), None)
+            poses[rows] = hands[arm][rows] @ tree.relation(name, arm) if arm else tree.world(name)
+        if known.any():
+            yield FrameTrack(name=code.spelled(name), poses=to_noap(poses), visible_from=int(known.argmax()))
+
+
+def _reigns(recording: Recording, t: Array) -> Iterator[tuple[slice, FrameTree]]:
+    """Give the rows of ``t`` during which each frame tree holds, and the tree."""
+    starts = [time for time, _ in recording.trees]
+    rows = [int(np.searchsorted(t, time - 1e-9)) for time in starts] + [len(t)]
+    for i, (_, tree) in enumerate(recording.trees):
+        if rows[i] < rows[i + 1]:
+            yield slice(rows[i], rows[i + 1]), tree
+
+
+def _tree_changes(recording: Recording, code: Code) -> Iterator[TreeChange]:
+    last: dict[str, str] = {}
+    for time, tree in recording.trees:
+        for name in tree:
+            if name == WORLD or name.endswith(".BASE") or not tree.has_value(name):
+                continue
+            parent = tree.parent(name)
+            shown = WORLD if parent is None or parent == base_name(name) else parent
+            if last.get(name) != shown:
+                last[name] = shown
+                yield TreeChange(t=time, child=code.spelled(name), parent=code.spelled(shown))
+
+
+def _shown(name: str, cell: Cell) -> bool:
+    return name != WORLD and name not in cell.arms and not any(name == base_name(arm) for arm in cell.arms)

@@ -1,0 +1,150 @@
+"""What goes into the page, looked at without a browser."""
+
+import json
+import math
+
+import attrs
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armwright.errors import ArmwrightError, InvalidValueError, ShapeError, UnknownNameError
+from armwright.report.markup import json_text
+from armwright.report.page import Animation, ArmFigure, ArmRecord, FrameTrack, RunPage, run_page
+
+# Five significant digits: half a unit in the last of them.
+LAST_DIGIT = 0.5e-4
+MEGABYTE = 1e6
+
+
+@given(st.text())
+def test_text_survives(text: str) -> None:
+    """Any text comes back from the page letter by letter, and cannot end the script element it stands in."""
+    written = json_text([text])
+
+    assert written.isascii()
+    assert "<" not in written
+    assert json.loads(written) == [text]
+
+
+@given(st.floats(-1e6, 1e6))
+def test_numbers_keep_five_digits(number: float) -> None:
+    """A number of a track comes back to five significant digits, or to a ten-millionth where it is tiny."""
+    (row,) = json.loads(json_text(np.array([[number]])))
+
+    assert row[0] == pytest.approx(number, rel=LAST_DIGIT, abs=1e-7)
+
+
+def test_infinity_is_null() -> None:
+    """JSON knows no infinity: a missing limit is null."""
+    assert json_text({"upper": math.inf, "lower": -math.inf}) == '{"upper":null,"lower":null}'
+
+
+def test_rows_that_stay() -> None:
+    """A row equal to the one before costs one letter."""
+    rows = np.array([[1.0, 2.0], [1.0, 2.0], [1.0, 2.5], [1.0, 2.5], [0.0, 0.0]])
+
+    assert json_text(rows) == "[[1,2],0,[1,2.5],0,[0,0]]"
+
+
+def test_instants_of_a_long_run() -> None:
+    """After a day the instants of a film still differ."""
+    t = 86400 + np.arange(3) / 25
+
+    assert json.loads(json_text(t)) == pytest.approx(t, abs=1e-3)
+
+
+def test_no_address_in_the_page(bench) -> None:
+    """The page names no address that a browser could fetch."""
+    page = run_page(bench)
+
+    assert "http://" not in page
+    assert "https://" not in page
+    assert "url(" not in page
+    assert "@import" not in page
+
+
+def test_page_is_repeatable(bench) -> None:
+    """The same run gives the same page, byte by byte."""
+    assert run_page(bench) == run_page(attrs.evolve(bench))
+
+
+def test_size_of_half_a_minute(rng, bench) -> None:
+    """Thirty seconds of an arm and ten frames, everything moving all the time, stay below three megabytes."""
+    t, film = np.linspace(0, 30, 2000), np.arange(0, 30, 1 / 25)
+
+    def noise(*shape: int) -> np.ndarray:
+        return rng.normal(size=shape)
+
+    arm = bench.arms[0]
+    record = attrs.evolve(
+        arm, t=t, q=noise(2000, 6), qd=noise(2000, 6), qdd=noise(2000, 6), tau=noise(2000, 6), hand=noise(2000, 3)
+    )
+    figure = ArmFigure(points=noise(750, 8, 3), hand_axes=noise(750, 9), grip=noise(750), joint_axes=noise(750, 6, 6))
+    frames = [FrameTrack(name=f"f{i}", poses=noise(750, 12)) for i in range(10)]
+    run = attrs.evolve(
+        bench,
+        duration=30.0,
+        stages=(),
+        arms=(record,),
+        animation=Animation(fps=25, t=film, arms={arm.name: figure}, frames=frames),
+    )
+
+    assert len(run_page(run)) < 3 * MEGABYTE
+
+
+def record_with(arm: ArmRecord, **changes: object) -> ArmRecord:
+    return attrs.evolve(arm, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"q": np.zeros((901, 5))}, "record of 'ARM_1': 6 joints but 5 columns of positions"),
+        ({"tau": np.zeros((900, 6))}, "record of 'ARM_1': 901 instants but 900 rows of efforts"),
+        ({"hand": np.zeros((901, 2))}, "path: expected shape (N, 3), one row per instant, got (901, 2)"),
+        ({"qd": np.zeros(901)}, "joint quantities: expected shape (N, any), one row per instant, got (901,)"),
+        ({"t": -np.arange(901.0)}, "instants: expected each at or after the one before it"),
+    ],
+)
+def test_records_that_do_not_fit(bench, changes, message: str) -> None:
+    """A record needs one row per instant and one column per joint, and says which is wrong."""
+    with pytest.raises(ArmwrightError) as caught:
+        record_with(bench.arms[0], **changes)
+
+    assert str(caught.value) == message
+
+
+def test_stage_of_a_stranger(bench: RunPage) -> None:
+    """A stage belongs to an arm of the run."""
+    with pytest.raises(UnknownNameError, match=r"no arm 'ARM_3'. Did you mean 'ARM_[12]'\? Known: ARM_1, ARM_2\."):
+        attrs.evolve(bench, stages=(attrs.evolve(bench.stages[0], arm="ARM_3"),))
+
+
+def test_peaks_of_another_arm(bench: RunPage) -> None:
+    """A stage has one peak per joint."""
+    with pytest.raises(ShapeError, match="stage on line 8: 6 joints but 2 peak efforts"):
+        attrs.evolve(bench, stages=(attrs.evolve(bench.stages[0], peak_effort=(1.0, 2.0)),))
+
+
+@pytest.mark.parametrize("duration", [-1.0, math.nan, math.inf])
+def test_durations_that_are_none(bench: RunPage, duration: float) -> None:
+    """Time does not run backwards, nor for ever."""
+    with pytest.raises(InvalidValueError, match="run: duration must be 0 s or more"):
+        attrs.evolve(bench, duration=duration)
+
+
+def test_film_that_does_not_fit(bench: RunPage) -> None:
+    """Every figure and every frame has one row per picture, every piece of a skeleton its radius."""
+    animation = bench.animation
+    with pytest.raises(ShapeError, match="frame 'part': 226 instants but 10 rows of poses"):
+        attrs.evolve(animation, frames=[attrs.evolve(animation.frames[0], poses=np.zeros((10, 12)))])
+    with pytest.raises(ShapeError, match="figure of 'ARM_1': 226 instants but 3 rows of grip"):
+        attrs.evolve(animation, arms={"ARM_1": attrs.evolve(animation.arms["ARM_1"], grip=np.zeros(3))})
+    with pytest.raises(ShapeError, match="arm figure: 4 pieces between the points but 2 radii"):
+        attrs.evolve(animation.arms["ARM_1"], radii=[0.1, 0.1])
+    with pytest.raises(ShapeError, match="animation: expected at least one instant"):
+        Animation(fps=25, t=[])
+    with pytest.raises(InvalidValueError, match="animation: fps must be above 0, got 0"):
+        Animation(fps=0, t=[0.0])
