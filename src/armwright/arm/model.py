@@ -8,7 +8,7 @@ A revolute joint adds its position to ``theta``, a prismatic one to ``d``. All q
 """
 
 import math
-from collections.abc import Sized
+from collections.abc import Iterable, Sized
 from typing import Any, Literal, TypeAlias
 
 import attrs
@@ -166,6 +166,18 @@ class Motor:
                 raise InvalidValueError(f"motor: {name} must be 0 or more, got {getattr(self, name)}")
 
 
+def _joints(value: Iterable[Joint]) -> tuple[Joint, ...]:
+    return tuple(value)
+
+
+def _links(value: Iterable[Link]) -> tuple[Link, ...]:
+    return tuple(value)
+
+
+def _motors(value: Iterable[Motor]) -> tuple[Motor, ...]:
+    return tuple(value)
+
+
 def _same_length(arm: "Arm", attribute: "attrs.Attribute[Any]", value: Sized) -> None:
     if len(value) != len(arm.joints):
         raise ShapeError(f"arm '{arm.name}': {len(arm.joints)} joints but {len(value)} {attribute.name}")
@@ -191,15 +203,15 @@ class Arm:
 
     name: str
     title: str = ""
-    joints: tuple[Joint, ...] = attrs.field(converter=tuple)
+    joints: tuple[Joint, ...] = attrs.field(converter=_joints)
     links: tuple[Link, ...] = attrs.field(
         default=attrs.Factory(lambda self: (Link(),) * len(self.joints), takes_self=True),
-        converter=tuple,
+        converter=_links,
         validator=_same_length,
     )
     motors: tuple[Motor, ...] = attrs.field(
         default=attrs.Factory(lambda self: (Motor(),) * len(self.joints), takes_self=True),
-        converter=tuple,
+        converter=_motors,
         validator=_same_length,
     )
     base: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose, eq=attrs.cmp_using(eq=np.array_equal))

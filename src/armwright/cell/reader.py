@@ -34,7 +34,7 @@ _SERVO_MS = (0.1, 100.0)
 _LONGEST_WAIT = 600.0
 
 
-def read_cell(path: Path) -> Cell:
+def read_cell(path: Path | str) -> Cell:
     """Read a cell from a TOML or JSON file.
 
     Args:
@@ -48,7 +48,7 @@ def read_cell(path: Path) -> Cell:
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
     height = contact.number("z", default=math.nan)
     cell = Cell(
-        name=top.text("name", default=path.name),
+        name=top.text("name", default=Path(path).name),
         arms=arms,
         frames=_frames(top.table("frames"), arms),
         visions=_visions(top.table("visions")),

@@ -126,6 +126,12 @@ def _print_summary(recording: "Recording", code: "Code", output: Path | None) ->
     console.print(_trace_table(recording, code))
     if recording.stages:
         console.print(_stage_table(recording, code))
+    for stage in recording.stages:
+        if stage.stage.slowed:
+            line = code.source.line(stage.span.start)
+            console.print(
+                f"line {line}: {stage.stage.kind} to {stage.to[-1]} runs {stage.stage.slowed}", highlight=False
+            )
     moves = sum(effect.kind == "MOVE" for effect in recording.effects)
     console.print(
         f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {moves} moves, "
@@ -164,8 +170,7 @@ def _stage_table(recording: "Recording", code: "Code") -> "Table":
         off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
         table.add_row(
             str(code.source.line(stage.span.start)),
-            f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}"
-            + (f"\n  {stage.stage.slowed}" if stage.stage.slowed else ""),
+            f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}",
             f"{stage.stage.trajectory.duration:.3f}",
             f"{stage.stage.length * 1e3:.0f}",
             off,

@@ -23,6 +23,9 @@ _LOOKS = 16
 _BETWEEN_LOOKS = 1.03
 # The rule's knots are halved at most this often before the path is given up: 1/64 of the rule's step.
 _HALVINGS = 6
+# A path through several frames turns its corners without a stop, so it must round them; and it is gross motion. It
+# may leave the straight ways between its frames by this much more than a line may leave its own.
+_CORNER_ROOM = 20.0
 # Turning the hand by this much is allowed where the place may be off by one metre's thousandth: 5 mrad per mm.
 TURN_PER_METRE = 5.0
 
@@ -68,8 +71,8 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
         arm: a PUMA-like or Stanford-like arm.
         path: begins where the hand is at ``q_start``.
         q_start: (n,) present joint positions.
-        deviation: allowed distance of the hand from the path [m]; its orientation may be off by
-            ``TURN_PER_METRE`` times as many radians.
+        deviation: allowed distance of the hand from a single straight way [m]; twenty times as much is allowed on a
+            path with corners. The orientation may be off by ``TURN_PER_METRE`` times as many radians.
         speed: 1 to 120, 100 is normal.
 
     Raises:
@@ -83,15 +86,17 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     """
     if not path.lengths().any():
         return Followed(trajectory=hold(q_start, 0.0), knots=1, deviation=0.0, turn_deviation=0.0, slowed="")
+    allowed = deviation if len(path.poses) == 2 else _CORNER_ROOM * deviation
     for halving in range(_HALVINGS + 1):
         knots = place_knots(arm, path, deviation=deviation, speed=speed, finer=2**halving)
         q = _solve(arm, path, knots, np.asarray(q_start, dtype=np.float64))
         trajectory = xspline(knots.times, q)
         off, turned = _deviations(arm, path, knots, trajectory)
-        if off.max() <= deviation and turned.max() <= TURN_PER_METRE * deviation:
+        excess = np.maximum(off, turned / TURN_PER_METRE) / allowed
+        if excess.max() <= 1:
             break
     else:
-        _give_up(arm, path, knots, q, off / deviation + turned / (TURN_PER_METRE * deviation))
+        _give_up(arm, path, knots, q, excess)
     _check_between(arm, knots, trajectory)
     factor, slowed = _slowing(arm, trajectory)
     return Followed(

@@ -78,30 +78,35 @@ class Trajectory:
         Args:
             order: 0 position, 1 speed, 2 acceleration.
         """
-        terms, slopes = self._derivative(order), self._derivative(order + 1)
-        lengths = np.diff(self.times)
-        lowest, highest = np.full(terms.shape[2], np.inf), np.full(terms.shape[2], -np.inf)
-        candidates = [
-            np.zeros((len(terms), terms.shape[2])),
-            np.broadcast_to(lengths[:, None], (len(terms), terms.shape[2])),
-        ]
-        candidates += _roots(slopes, lengths)
-        for local in candidates:
-            value = np.zeros_like(local)
-            for power in reversed(range(terms.shape[1])):
-                value = value * local + terms[:, power, :]
-            lowest, highest = np.minimum(lowest, value.min(axis=0)), np.maximum(highest, value.max(axis=0))
-        return lowest, highest
+        lowest, highest = self._segment_extremes(order)
+        return lowest.min(axis=0), highest.max(axis=0)
+
+    def segment_peaks(self, order: int) -> Array:
+        """Return the largest magnitude of a derivative on every segment for every joint, (m, n), exactly."""
+        lowest, highest = self._segment_extremes(order)
+        return np.maximum(np.abs(lowest), np.abs(highest))
 
     def peaks(self, order: int) -> Array:
         """Return the largest magnitude of a derivative for every joint, (n,), exactly and not by sampling."""
-        lowest, highest = self.extremes(order)
-        return np.maximum(np.abs(lowest), np.abs(highest))
+        return np.asarray(self.segment_peaks(order).max(axis=0))
 
     def slowed(self, factor: float) -> "Trajectory":
         """Return the same path run ``factor`` times slower."""
         powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
         return Trajectory(times=self.times * factor, coefficients=self.coefficients * powers[:, None])
+
+    def _segment_extremes(self, order: int) -> tuple[Array, Array]:
+        """Return the smallest and largest value on every segment for every joint, (m, n) each."""
+        terms, slopes = self._derivative(order), self._derivative(order + 1)
+        shape = len(terms), terms.shape[2]
+        lengths = np.diff(self.times)
+        lowest, highest = np.full(shape, np.inf), np.full(shape, -np.inf)
+        for local in (np.zeros(shape), np.broadcast_to(lengths[:, None], shape), *_roots(slopes, lengths)):
+            value = np.zeros(shape)
+            for power in reversed(range(terms.shape[1])):
+                value = value * local + terms[:, power, :]
+            lowest, highest = np.minimum(lowest, value), np.maximum(highest, value)
+        return lowest, highest
 
     def _derivative(self, order: int) -> Array:
         terms = self.coefficients
