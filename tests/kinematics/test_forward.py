@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from armwright.arm.load import arm_names, load_arm
 
+from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import forward, link_poses

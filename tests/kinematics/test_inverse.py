@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from armwright.arm.load import load_arm
 
+from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward import forward

@@ -8,11 +8,12 @@ import pytest
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
-from armwright.cell.reader import known_cell, read_cell
+from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward import forward
 from armwright.program import compile as compile_program
+from armwright.program import known_cell
 from armwright.program.interpret import RunError, interpret, warnings
 from armwright.program.recording import Recording
 from armwright.program.source import Source
@@ -322,7 +323,9 @@ def test_effort_over_the_limit_is_a_warning() -> None:
 
 def test_reading_the_joints() -> None:
     """READ SYSTEM gives the hand the pose that the joints say it has."""
-    recording = run("VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,0.5,0.1,0.1) ; MOVE ARM_1 TO f ; READ SYSTEM (ARM_1) ; END.")
+    recording = run(
+        "VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,0.5,0.1,0.1) ; MOVE ARM_1 TO f ; READ SYSTEM (ARM_1) ; END."
+    )
 
     expect(recording, ARM_1=down(0.5, 0.1, 0.1))
     assert "READ SYSTEM ARM_1" in recording.trace()

@@ -26,6 +26,8 @@ _HALVINGS = 6
 # A path through several frames turns its corners without a stop, so it must round them; and it is gross motion. It
 # may leave the straight ways between its frames by this much more than a line may leave its own.
 _CORNER_ROOM = 20.0
+# A path that asks a joint for this many times its limit meets a singularity; it is refused, not crawled along.
+_SLOWEST = 20.0
 # Turning the hand by this much is allowed where the place may be off by one metre's thousandth: 5 mrad per mm.
 TURN_PER_METRE = 5.0
 
@@ -98,7 +100,7 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     else:
         _give_up(arm, path, knots, q, excess)
     _check_between(arm, knots, trajectory)
-    factor, slowed = _slowing(arm, trajectory)
+    factor, slowed = _slowing(arm, path, knots, trajectory)
     return Followed(
         trajectory=trajectory.slowed(factor),
         knots=len(q),
@@ -171,15 +173,30 @@ def _check_between(arm: Arm, knots: Knots, trajectory: Trajectory) -> None:
             raise PathError("limits", knots.segments[nearest], knots.fractions[nearest], str(fault))
 
 
-def _slowing(arm: Arm, trajectory: Trajectory) -> tuple[float, str]:
+def _slowing(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> tuple[float, str]:
     """Return the factor of time that brings speeds and accelerations inside the limits, and its reason."""
-    by_speed = trajectory.peaks(1) / arm.limit("speed")
-    by_acceleration = np.sqrt(trajectory.peaks(2) / arm.limit("acceleration"))
-    factor = max(float(by_speed.max()), float(by_acceleration.max()))
-    if factor <= 1:
-        return 1.0, ""
-    what, ratios = ("speed", by_speed) if by_speed.max() >= by_acceleration.max() else ("acceleration", by_acceleration)
-    return factor, f"{factor:.2f} times slower, for the {what} of joint {int(ratios.argmax()) + 1}"
+    needs = {
+        "speed": trajectory.segment_peaks(1) / arm.limit("speed"),
+        "acceleration": np.sqrt(trajectory.segment_peaks(2) / arm.limit("acceleration")),
+    }
+    what = max(needs, key=lambda name: float(needs[name].max()))
+    interval, joint = np.unravel_index(int(needs[what].argmax()), needs[what].shape)
+    factor = float(needs[what].max())
+    if factor > _SLOWEST:
+        k = int(interval) + 1
+        raise PathError(
+            "singular",
+            knots.segments[k],
+            knots.fractions[k],
+            f"near {_place(path, knots, k)} joint {joint + 1} would have to move {factor:.0f} times as fast as it may: "
+            "the arm is nearly singular there",
+        )
+    return (factor, f"{factor:.2f} times slower, for the {what} of joint {joint + 1}") if factor > 1 else (1.0, "")
+
+
+def _place(path: Path, knots: Knots, k: int) -> str:
+    x, y, z = path.at(knots.segments[k], knots.fractions[k])[:3, 3] * 1e3
+    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
 
 
 def _give_up(arm: Arm, path: Path, knots: Knots, q: Array, badness: Array) -> NoReturn:
@@ -188,11 +205,10 @@ def _give_up(arm: Arm, path: Path, knots: Knots, q: Array, badness: Array) -> No
     joint = int(jump.argmax())
     amount = abs(q[worst + 1, joint] - q[worst, joint])
     unit, scale = ("deg", 180 / np.pi) if arm.joints[joint].revolute else ("mm", 1e3)
-    x, y, z = path.at(knots.segments[worst + 1], knots.fractions[worst + 1])[:3, 3] * 1e3
     raise PathError(
         "singular",
         knots.segments[worst + 1],
         knots.fractions[worst + 1],
-        f"the hand cannot stay on the path near ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base: the arm is singular "
-        f"there and joint {joint + 1} would have to turn {amount * scale:.1f} {unit} at once",
+        f"the hand cannot stay on the path near {_place(path, knots, worst + 1)}: the arm is singular there "
+        f"and joint {joint + 1} would have to turn {amount * scale:.1f} {unit} at once",
     )

@@ -8,7 +8,7 @@ from armwright.program.cursor import LostError, Tokens, shown
 from armwright.program.diagnostics import Fix
 from armwright.program.source import Span
 from armwright.program.tokens import TokenKind
-from armwright.program.values import check_length, reserved_as_name
+from armwright.program.values import check_length, refuse_reserved
 from armwright.program.words import LATER_TYPES, STATEMENTS, TYPES
 
 
@@ -67,26 +67,30 @@ def _misspelt(tokens: Tokens, near: str) -> None:
 def var_part(tokens: Tokens) -> list[tree.Declaration]:
     """Read VAR and what it declares."""
     word = tokens.take()
-    if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not reserved_ahead(tokens):
+    if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not _reserved(tokens):
         tokens.report("E111", "VAR declares nothing", word.span, "expected a name after VAR")
         return []
     return _declarations(tokens)
 
 
-def reserved_ahead(tokens: Tokens) -> bool:
+def _reserved(tokens: Tokens) -> bool:
     """Whether a reserved word stands where a declared name should."""
-    return tokens.now.kind is TokenKind.KEYWORD and tokens.ahead().key in (",", ":")
+    token = tokens.now
+    outside = ("VAR", "BEGIN", "END")
+    return token.kind is TokenKind.KEYWORD and token.key not in outside and tokens.ahead().key in (",", ":")
 
 
 def _declarations(tokens: Tokens) -> list[tree.Declaration]:
     found = []
     while _goes_on(tokens):
+        at = tokens.at
         try:
             found.append(_declaration(tokens))
         except LostError:
             while not tokens.done and not tokens.sees(";", "BEGIN", "VAR", "END", *STATEMENTS):
                 tokens.take()
-            tokens.accept(";")
+            if not tokens.accept(";") and tokens.at == at:
+                tokens.take()
     return found
 
 
@@ -94,7 +98,7 @@ def _goes_on(tokens: Tokens) -> bool:
     """Whether one more declaration follows, and not BEGIN, a statement or a header of RLO-2."""
     token, after = tokens.now, tokens.ahead()
     if token.kind is TokenKind.KEYWORD:
-        return after.key in (",", ":")
+        return _reserved(tokens)
     if token.kind not in (TokenKind.NAME, TokenKind.ARM) or after.key in ("=", ":=", "(", "["):
         return False
     if after.key in (",", ":"):
@@ -142,7 +146,8 @@ def _declared(tokens: Tokens) -> tree.Name | None:
             tokens.report("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
         tokens.take()
         return None
-    if reserved_as_name(tokens):
+    if _reserved(tokens):
+        refuse_reserved(tokens)
         tokens.take()
         return None
     return tokens.lost("expected a name", f"found {shown(token)}")

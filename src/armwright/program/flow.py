@@ -100,8 +100,8 @@ def _init(course: Course, init: tree.Init) -> None:
         course.steps.add(key)
     elif kind is Kind.SCALAR:
         # What was reported before, an expression or a number with a unit, has no known value.
-        known = isinstance(init.value, tree.Number) and not math.isnan(init.value.value)
-        course.scalars[key] = (init.value.value if known else None, init.span)
+        value = init.value.value if isinstance(init.value, tree.Number) else math.nan
+        course.scalars[key] = (None if math.isnan(value) else value, init.span)
 
 
 def _affix(course: Course, affix: tree.Affix) -> None:

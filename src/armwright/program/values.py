@@ -37,25 +37,28 @@ def operand(tokens: Tokens, wants: str, where: str) -> tree.Mobile:
         return make(token.span, token.text, token.key)
     if tokens.sees("(", "-"):
         return beyond.expression(tokens, wants)
-    if reserved_as_name(tokens):
+    if _reserved_as_name(tokens):
+        refuse_reserved(tokens)
         return tree.Poison(tokens.take().span)
     return tokens.lost(f"expected {wants} {where}", f"found {shown(token)}")
 
 
-def reserved_as_name(tokens: Tokens) -> bool:
-    """Whether a reserved word stands where a name should, and was meant as one; say so if it does."""
+def _reserved_as_name(tokens: Tokens) -> bool:
+    """Whether a reserved word stands where a name should, and was meant as one."""
     token, after = tokens.now, tokens.ahead()
-    meant = (
+    return (
         token.kind is TokenKind.KEYWORD
         and token.key not in (*PLAIN_CLAUSES, "WITH", "BEGIN", "END")
         and after.key in _BEHIND_A_NAME
         and tokens.same_line()
     )
-    if meant:
-        tokens.report(
-            "E107", f"`{token.text}` is a reserved word and cannot be a name", token.span, "a word of the language"
-        )
-    return meant
+
+
+def refuse_reserved(tokens: Tokens) -> None:
+    """Say that the word that stands here cannot be a name."""
+    token = tokens.now
+    text = f"`{token.text}` is a reserved word and cannot be a name"
+    tokens.report("E107", text, token.span, "a word of the language")
 
 
 def check_length(tokens: Tokens, name: tree.Name) -> None:
