@@ -19,10 +19,18 @@ from armwright.arrays import Array
 from armwright.spatial.poses import inverse, pose
 
 
+def turn(axis: int, angle: float) -> Array:
+    """Return the turn (3, 3) about x, y or z by an angle [rad]; right angles are exact."""
+    c, s = exact_cosine(angle), exact_cosine(angle - math.pi / 2)
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[j, j], R[j, k], R[k, j], R[k, k] = c, -s, s, c
+    return R
+
+
 def twist(alpha: float, a: float) -> Array:
     """Return the pose Tx(a) Rx(alpha), (4, 4); the two may be swapped."""
-    c, s = exact_cosine(alpha), exact_cosine(alpha - math.pi / 2)
-    return pose([[1, 0, 0], [0, c, -s], [0, s, c]], [a, 0, 0])
+    return pose(turn(0, alpha), (a, 0.0, 0.0))
 
 
 def from_modified(joints: Sequence[Joint], links: Sequence[Link]) -> tuple[Array, list[Joint], list[Link]]:

@@ -18,7 +18,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+    rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command()(run)
@@ -41,7 +41,7 @@ def root(
 ) -> None:
     """A workbench for robot manipulators: model an arm, move it, program it, look at the result.
 
-    [b]Example[/b]:  armwright run examples/stacking.rlo --cell examples/stacking.toml -o out
+    **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
 
 

@@ -37,7 +37,7 @@ def check(
 
     Exit status 0: it can run (there may be warnings); 1: it cannot.
 
-    [b]Example[/b]:  armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code
+    **Example:** `armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code`
     """
     import json
 

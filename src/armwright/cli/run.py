@@ -39,7 +39,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the disk and
     shows the arm moving.
 
-    [b]Example[/b]:  armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out
+    **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
     import json
 

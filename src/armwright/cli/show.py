@@ -21,7 +21,7 @@ def show(
 
     Degrees and millimetres for people; --json gives SI units and radians.
 
-    [b]Example[/b]:  armwright show puma560
+    **Example:** `armwright show puma560`
     """
     import json
 

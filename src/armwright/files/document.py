@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, closest
-from armwright.files.lines import Keys, json_lines, toml_lines
+from armwright.files.lines import Keys, TwinKeyError, json_lines, toml_lines
 
 _MISSING: Any = object()
 
@@ -41,22 +42,23 @@ class Document:
         text = read_text(path)
         as_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
         try:
-            data = json.loads(text, object_pairs_hook=_no_twins) if as_json else tomllib.loads(text)
+            data = json.loads(text) if as_json else tomllib.loads(text)
+            lines = json_lines(text) if as_json else toml_lines(text)
         except tomllib.TOMLDecodeError as error:
-            raise _syntax_error(path, error) from error
+            raise _toml_error(path, text, error) from error
         except json.JSONDecodeError as error:
             raise FileFormatError(
                 path, error.lineno, "", f"not valid JSON: {error.msg}, column {error.colno}"
             ) from error
-        except _TwinError as error:
-            raise FileFormatError(
-                path, _second_line(text, str(error)), str(error), "this key is given twice"
-            ) from error
+        except TwinKeyError as error:
+            raise FileFormatError(path, error.line, _shown(error.keys), "this key is given twice") from error
         except RecursionError as error:
             raise FileFormatError(path, None, "", "nested too deeply") from error
+        except ValueError as error:  # what remains: Python reads no integers of many thousand digits
+            raise FileFormatError(path, None, "", "a whole number in it has too many digits") from error
         if not isinstance(data, dict):
             raise FileFormatError(path, 1, "", f"expected keys and values in braces, got {_kind(data)}")
-        return cls(path, data, json_lines(text) if as_json else toml_lines(text))
+        return cls(path, data, lines)
 
     def line(self, keys: Keys) -> int | None:
         """Return the line of a key, or of the nearest table around it."""
@@ -88,8 +90,7 @@ class Table:
 
     def error(self, key: str, message: str) -> FileFormatError:
         """Return the error that says ``message`` of a key here, or of the table itself where ``key`` is empty."""
-        keys = (*self.keys, key) if key else self.keys
-        return FileFormatError(self._document.path, self._document.line(keys), _shown(keys), message)
+        return self._error_at((key,) if key else (), message)
 
     def number(self, key: str, default: Any = _MISSING, *, lower: float = -math.inf, upper: float = math.inf) -> float:
         """Return a finite number between ``lower`` and ``upper``.
@@ -97,13 +98,14 @@ class Table:
         Raises:
             FileFormatError: it is missing without a default, no number, not finite, or out of range.
         """
-        value = self._value(key, default)
+        value = self._value(key, default, "a number")
         if value is default:
             return float(default)
-        self._require_number(key, value)
+        self._require_number((key,), value)
         if not lower <= value <= upper:
-            bounds = f"{lower:g} or more" if math.isinf(upper) else f"{lower:g} to {upper:g}"
-            raise self.error(key, f"expected {bounds}, got {value:g}")
+            above, below = f"{lower:g} or more", f"{upper:g} or less"
+            expected = above if math.isinf(upper) else below if math.isinf(lower) else f"{lower:g} to {upper:g}"
+            raise self.error(key, f"expected {expected}, got {value:g}")
         return float(value)
 
     def positive(self, key: str, default: Any = _MISSING) -> float:
@@ -123,8 +125,8 @@ class Table:
         Raises:
             FileFormatError: it is missing without a default, or not such an array.
         """
-        value = self._value(key, default)
-        return np.asarray(default, dtype=np.float64) if value is default else self._numbers(key, value, length)
+        value = self._value(key, default, f"a list of {_counted(length)}")
+        return np.asarray(default, dtype=np.float64) if value is default else self._numbers((key,), value, length)
 
     def vectors(self, key: str, length: int) -> list[Array]:
         """Return a list of arrays of that many finite numbers each.
@@ -132,10 +134,11 @@ class Table:
         Raises:
             FileFormatError: it is missing, or not such a list.
         """
-        value = self._value(key, _MISSING)
-        if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
-            raise self.error(key, f"expected a list of lists of {length} numbers, got {_kind(value)}")
-        return [self._numbers(key, row, length) for row in value]
+        expected = f"a list of lists of {length} numbers"
+        value = self._value(key, _MISSING, expected)
+        if not isinstance(value, list):
+            raise self.error(key, f"expected {expected}, got {_kind(value)}")
+        return [self._numbers((key, i), row, length) for i, row in enumerate(value)]
 
     def text(self, key: str, default: Any = _MISSING) -> str:
         """Return a string.
@@ -143,7 +146,7 @@ class Table:
         Raises:
             FileFormatError: it is missing without a default, or no string.
         """
-        value = self._value(key, default)
+        value = self._value(key, default, "a text in quotes")
         if value is not default and not isinstance(value, str):
             raise self.error(key, f"expected a text in quotes, got {_kind(value)}")
         return str(value)
@@ -154,12 +157,13 @@ class Table:
         Raises:
             FileFormatError: it is missing without a default, or none of them; the nearest is named.
         """
-        value = self.text(key, default)
+        value = self._value(key, default, f"one of {', '.join(sorted(choices))}")
+        value = value if value is default else self.text(key)
         if value not in choices:
             near = closest(value, choices)
             hint = f"; did you mean '{near}'?" if near else ""
             raise self.error(key, f"expected one of {', '.join(sorted(choices))}, got '{value}'{hint}")
-        return value
+        return str(value)
 
     def table(self, key: str, *, required: bool = False) -> "Table":
         """Return the cursor at a table below; an empty one when it is missing and not required.
@@ -167,7 +171,7 @@ class Table:
         Raises:
             FileFormatError: it is required and missing, or no table.
         """
-        value = self._value(key, _MISSING if required else {})
+        value = self._value(key, _MISSING if required else {}, "a table")
         if not isinstance(value, dict):
             raise self.error(key, f"expected a table, got {_kind(value)}")
         return Table(self._document, (*self.keys, key), value)
@@ -178,7 +182,7 @@ class Table:
         Raises:
             FileFormatError: it is missing, empty, or no array of tables.
         """
-        value = self._value(key, _MISSING)
+        value = self._value(key, _MISSING, f"one or more tables [[{key}]]")
         if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
             raise self.error(key, f"expected one or more tables [[{key}]], got {_kind(value)}")
         return [Table(self._document, (*self.keys, key, i), row) for i, row in enumerate(value)]
@@ -208,32 +212,35 @@ class Table:
                 hint = f"did you mean '{near}'?" if near else f"known here: {known}" if known else "none is known here"
                 raise self.error(key, f"unknown key; {hint}")
 
-    def _value(self, key: str, default: Any) -> Any:
+    def _value(self, key: str, default: Any, expected: str) -> Any:
         self._read.add(key)
         if key in self._data:
             return self._data[key]
         if default is _MISSING:
             near = closest(key, set(self._data) - self._read)
             hint = f"; did you mean it by '{near}'?" if near else ""
-            raise self.error(key, f"missing{hint}")
+            raise self.error(key, f"missing, expected {expected}{hint}")
         return default
 
-    def _require_number(self, key: str, value: Any) -> None:
+    def _require_number(self, keys: Keys, value: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.error(key, f"expected a number, got {_kind(value)}")
-        if not math.isfinite(value):
-            raise self.error(key, f"expected a finite number, got {value}")
+            raise self._error_at(keys, f"expected a number, got {_kind(value)}")
+        if abs(value) > sys.float_info.max or math.isnan(value):
+            got = value if isinstance(value, float) else "a whole number that is too large"
+            raise self._error_at(keys, f"expected a finite number, got {got}")
 
-    def _numbers(self, key: str, value: Any, length: int | Collection[int]) -> Array:
-        lengths = (length,) if isinstance(length, int) else tuple(length)
-        expected = f"{' or '.join(str(count) for count in lengths)} numbers"
+    def _numbers(self, keys: Keys, value: Any, length: int | Collection[int]) -> Array:
         if not isinstance(value, list):
-            raise self.error(key, f"expected a list of {expected}, got {_kind(value)}")
-        for item in value:
-            self._require_number(key, item)
-        if len(value) not in lengths:
-            raise self.error(key, f"expected {expected}, got {len(value)}")
+            raise self._error_at(keys, f"expected a list of {_counted(length)}, got {_kind(value)}")
+        for i, item in enumerate(value):
+            self._require_number((*keys, i), item)
+        if len(value) not in ((length,) if isinstance(length, int) else length):
+            raise self._error_at(keys, f"expected {_counted(length)}, got {len(value)}")
         return np.array(value, dtype=np.float64)
+
+    def _error_at(self, below: Keys, message: str) -> FileFormatError:
+        keys = (*self.keys, *below)
+        return FileFormatError(self._document.path, self._document.line(keys), _shown(keys), message)
 
 
 def read_text(path: Path | str) -> str:
@@ -246,10 +253,11 @@ def read_text(path: Path | str) -> str:
     try:
         data = path.read_bytes()
     except FileNotFoundError:
-        folder = path.parent
-        near = closest(path.name, [other.name for other in folder.iterdir()]) if folder.is_dir() else None
-        hint = f"; did you mean '{folder / near}'?" if near else ""
+        near = closest(path.name, _names_in(path.parent))
+        hint = f"; did you mean '{path.parent / near}'?" if near else ""
         raise FileFormatError(path, None, "", f"no such file{hint}") from None
+    except IsADirectoryError:
+        raise FileFormatError(path, None, "", "expected a file, got a folder") from None
     except OSError as error:
         raise FileFormatError(path, None, "", f"cannot be read: {error.strerror}") from error
     try:
@@ -261,26 +269,14 @@ def read_text(path: Path | str) -> str:
         ) from error
 
 
-class _TwinError(Exception):
-    """A key of a JSON object is given twice."""
+def _names_in(folder: Path) -> list[str]:
+    try:
+        return sorted(path.name for path in folder.iterdir())
+    except OSError:
+        return []
 
 
-def _no_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    result: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in result:
-            raise _TwinError(key)
-        result[key] = value
-    return result
-
-
-def _second_line(text: str, key: str) -> int | None:
-    quoted = json.dumps(key, ensure_ascii=False)
-    second = text.find(quoted, text.find(quoted) + 1)
-    return text[:second].count("\n") + 1 if second >= 0 else None
-
-
-def _syntax_error(path: Path, error: tomllib.TOMLDecodeError) -> FileFormatError:
+def _toml_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> FileFormatError:
     """Take the line out of the parser's message, where it tells one, and put it in front."""
     message, _, place = str(error).partition(" (at ")
     line = None
@@ -288,7 +284,7 @@ def _syntax_error(path: Path, error: tomllib.TOMLDecodeError) -> FileFormatError
         line = int(place.removeprefix("line ").partition(",")[0])
         message += f", {place.partition(', ')[2].rstrip(')')}"
     elif place:
-        line = path.read_text(encoding="utf-8-sig").rstrip("\n").count("\n") + 1
+        line = text.rstrip("\n").count("\n") + 1
         message += ", at the end of the file"
     return FileFormatError(path, line, "", f"not valid TOML: {message}")
 
@@ -302,6 +298,10 @@ def _shown(keys: Keys) -> str:
         else:
             words.append(key)
     return ", ".join(words)
+
+
+def _counted(length: int | Collection[int]) -> str:
+    return f"{length if isinstance(length, int) else ' or '.join(map(str, length))} numbers"
 
 
 def _kind(value: Any) -> str:

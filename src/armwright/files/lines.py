@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from collections.abc import Iterator
 from typing import TypeAlias
 
@@ -14,13 +15,26 @@ _SCALAR = re.compile(r"[^,\]}\n#]*")
 _STRING = re.compile(r'"""(?:[^\\]|\\.)*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'', re.DOTALL)
 
 
+class TwinKeyError(Exception):
+    """A key of a JSON object is given twice; JSON lets that pass, and the first value would be lost."""
+
+    def __init__(self, keys: Keys, line: int) -> None:
+        """Keep the way to the key, and the line of the second."""
+        super().__init__(f"{keys} is given twice, again in line {line}")
+        self.keys, self.line = keys, line
+
+
 def toml_lines(text: str) -> dict[Keys, int]:
     """Return the line, from 1, of every key and table header of a text that is valid TOML."""
     return _Scanner(text, "=").document()
 
 
 def json_lines(text: str) -> dict[Keys, int]:
-    """Return the line, from 1, of every key of a text that is valid JSON."""
+    """Return the line, from 1, of every key of a text that is valid JSON.
+
+    Raises:
+        TwinKeyError: an object has a key twice.
+    """
     scanner = _Scanner(text, ":")
     scanner.blank()
     scanner.value(())
@@ -96,6 +110,8 @@ class _Scanner:
         keys = table
         for name in self._key():
             keys = (*keys, name)
+            if self._separator == ":" and keys in self.lines:
+                raise TwinKeyError(keys, line)
             self.lines.setdefault(keys, line)
         self._at += 1  # the separator
         self.blank()
@@ -106,13 +122,17 @@ class _Scanner:
             self.blank()
             if self._text[self._at] in "\"'":
                 quoted = self._pass(_STRING)
-                yield json.loads(quoted) if quoted[0] == '"' else quoted[1:-1]
+                yield self._unquoted(quoted)
             else:
                 yield self._pass(_BARE_KEY)
             self.blank()
             if self._text[self._at] != ".":
                 return
             self._at += 1
+
+    def _unquoted(self, quoted: str) -> str:
+        # The two know different escapes, and TOML two kinds of quotes: each parser reads its own.
+        return str(json.loads(quoted)) if self._separator == ":" else next(iter(tomllib.loads(f"{quoted}=0")))
 
     def _members(self, keys: Keys) -> None:
         self._at += 1

@@ -38,6 +38,11 @@ class Tokens:
         """Return a token further on; behind the end it is always the end."""
         return self._tokens[min(self._last, self.at + steps)]
 
+    def find(self, keyword: str) -> int:
+        """Return where a keyword stands first; -1 if nowhere."""
+        places = (at for at, one in enumerate(self._tokens) if one.key == keyword and one.kind is TokenKind.KEYWORD)
+        return next(places, -1)
+
     @property
     def done(self) -> bool:
         """Whether everything has been read."""

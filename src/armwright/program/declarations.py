@@ -15,6 +15,7 @@ from armwright.program.words import LATER_TYPES, STATEMENTS, TYPES
 def head(tokens: Tokens) -> list[tree.Declaration]:
     """Read everything up to and including BEGIN; at the end of the text BEGIN may be missing."""
     found: list[tree.Declaration] = []
+    begin = tokens.find("BEGIN")
     while True:
         while tokens.accept(";"):
             pass
@@ -32,10 +33,32 @@ def head(tokens: Tokens) -> list[tree.Declaration]:
         elif token.kind is TokenKind.NAME and after.kind is TokenKind.NAME and closest(token.text, ["VAR"]):
             _misspelt(tokens, "VAR")
             found += var_part(tokens)
+        elif tokens.at < begin and not tokens.sees(*STATEMENTS) and after.key != "=":
+            found.append(_nonsense(tokens))
         else:
             break
     _begin(tokens)
     return found
+
+
+def _nonsense(tokens: Tokens) -> tree.Declaration:
+    """Pass over what is neither a declaration nor BEGIN; the names in it may have been meant to be declared."""
+    start = tokens.now
+    if not start.damaged:
+        tokens.report("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
+    return _passed_over(tokens, [])
+
+
+def _passed_over(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
+    """Pass over the rest of a declaration; return what was perhaps declared, of no known type."""
+    start = tokens.now
+    while not tokens.done and not tokens.sees(";", "BEGIN", "VAR", "END", *STATEMENTS):
+        token = tokens.take()
+        if token.kind is TokenKind.NAME:
+            names.append(tree.Name(token.span, token.text, token.key))
+    tokens.accept(";")
+    span = tokens.since(start)
+    return tree.Declaration(span, tuple(name for name in names if name), tree.TypeName(span, "", None))
 
 
 def _begin(tokens: Tokens) -> None:
@@ -67,6 +90,9 @@ def _misspelt(tokens: Tokens, near: str) -> None:
 def var_part(tokens: Tokens) -> list[tree.Declaration]:
     """Read VAR and what it declares."""
     word = tokens.take()
+    if tokens.sees(","):
+        tokens.report("E111", "expected a name after VAR", tokens.now.span, "found `,`")
+        tokens.take()
     if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not _reserved(tokens):
         tokens.report("E111", "VAR declares nothing", word.span, "expected a name after VAR")
         return []
@@ -84,13 +110,13 @@ def _declarations(tokens: Tokens) -> list[tree.Declaration]:
     found = []
     while _goes_on(tokens):
         at = tokens.at
+        names: list[tree.Name | None] = []
         try:
-            found.append(_declaration(tokens))
+            found.append(_declaration(tokens, names))
         except LostError:
-            while not tokens.done and not tokens.sees(";", "BEGIN", "VAR", "END", *STATEMENTS):
-                tokens.take()
-            if not tokens.accept(";") and tokens.at == at:
-                tokens.take()
+            found.append(_passed_over(tokens, names))
+        if tokens.at == at:
+            tokens.take()
     return found
 
 
@@ -107,9 +133,10 @@ def _goes_on(tokens: Tokens) -> bool:
 
 
 # decl = name { "," name } ":" type ";" ;
-def _declaration(tokens: Tokens) -> tree.Declaration:
+def _declaration(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
+    """Read one declaration; put its names also where they are safe if the rest makes no sense."""
     start = tokens.now
-    names = [_declared(tokens)]
+    names.append(_declared(tokens))
     while True:
         if tokens.accept(","):
             if tokens.sees(":"):
