@@ -24,7 +24,7 @@ def turn(axis: int, angle: float) -> Array:
     c, s = exact_cosine(angle), exact_cosine(angle - math.pi / 2)
     j, k = (axis + 1) % 3, (axis + 2) % 3
     R = np.eye(3)
-    R[j, j], R[j, k], R[k, j], R[k, k] = c, -s, s, c
+    R[j, j], R[j, k], R[k, j], R[k, k] = c, 0.0 - s, s, c
     return R
 
 

@@ -8,7 +8,7 @@ import typer
 def arms(as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False) -> None:
     """List the arms of the catalogue.
 
-    **Example:** `armwright arms`
+    [b]Example[/b]:  armwright arms
     """
     import json
 
@@ -20,5 +20,6 @@ def arms(as_json: Annotated[bool, typer.Option("--json", help="Print the list as
         print(json.dumps(rows, indent=2, ensure_ascii=False))
         return
     width = max(len(arm.name) for arm in found)
+    print(f"{'name':<{width}}  joints  title")
     for arm in found:
-        print(f"{arm.name:<{width}}  {arm.title}")
+        print(f"{arm.name:<{width}}  {arm.n:>6}  {arm.title}")

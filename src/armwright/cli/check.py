@@ -66,18 +66,11 @@ def compile_file(path: Path, cell: "Cell | None" = None, *, strict: bool = False
     Raises:
         FileFormatError: the file cannot be read, or is not text.
     """
-    from armwright.errors import FileFormatError
+    from armwright.files.document import read_text
     from armwright.program import Source, known_cell
     from armwright.program import compile as translate
 
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except OSError as error:
-        raise FileFormatError(path, None, "", f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
-        raise FileFormatError(path, line, "", "is not UTF-8 text; save the program as UTF-8") from error
-    return translate(Source(path.name, text), known_cell(cell) if cell else None, strict=strict)
+    return translate(Source(path.name, read_text(path)), known_cell(cell) if cell else None, strict=strict)
 
 
 def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, to_errors: bool = False) -> None:

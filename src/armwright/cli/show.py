@@ -6,11 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from rich.table import Table
 
     from armwright.arm.model import Arm, Joint
+
+# What a drive has that can be felt.
+_DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
 
 
 def show(
@@ -33,23 +36,39 @@ def show(
     if as_json:
         print(json.dumps(_as_data(model), indent=2, ensure_ascii=False))
         return
-    console = Console(highlight=False)
-    console.print(f"[bold]{model.name}[/bold]  {model.title}")
+    console = Console(highlight=False, markup=False)
+    console.print(f"{model.name}: {model.title}", style="bold")
     if model.source:
         console.print(model.source, style="dim")
-    for table in (_geometry(model), _limits(model), _links(model), _inertia(model), _motors(model)):
+    for title, table in _tables(model):
         console.print()
-        console.print(table)
+        console.print(title, style="bold")
+        if table:
+            console.print(table)
     console.print()
-    for name, text in _facts(model):
-        console.print(f"{name:<9}{text}")
+    console.print(_facts(model))
 
 
-def _table(title: str, columns: "Sequence[str]", rows: "Iterable[Sequence[str]]") -> "Table":
+def _tables(model: "Arm") -> "Iterator[tuple[str, Table | None]]":
+    """Name every table, or say that there is nothing to put into it."""
+    yield "Denavit-Hartenberg, standard", _geometry(model)
+    yield "Limits", _limits(model)
+    if any(link.mass or link.inertia.any() for link in model.links):
+        yield "Links: mass, and centre of mass in the frame of the link", _links(model)
+        yield "Inertia about the centre of mass, kg m²", _inertia(model)
+    else:
+        yield "Links: no masses or inertias are given", None
+    if any(any(getattr(motor, name) for name in _DRIVE) for motor in model.motors):
+        yield "Drives, as felt at the joint", _motors(model)
+    else:
+        yield "Drives: no inertia or friction is given", None
+
+
+def _table(columns: "Sequence[str]", rows: "Iterable[Sequence[str]]") -> "Table":
     from rich import box
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
     for column in columns:
         table.add_column(column, justify="right", no_wrap=True)
     for row in rows:
@@ -66,7 +85,7 @@ def _geometry(model: "Arm") -> "Table":
         else:
             d = f"q{i}" if joint.d == 0 else f"q{i} {joint.d * 1e3:+g} mm"
         rows.append((str(i), joint.kind, theta, d, _length(joint.a), _angle(joint.alpha)))
-    return _table("Denavit-Hartenberg, standard", ("joint", "kind", "theta", "d", "a", "alpha"), rows)
+    return _table(("joint", "kind", "theta", "d", "a", "alpha"), rows)
 
 
 def _limits(model: "Arm") -> "Table":
@@ -78,49 +97,56 @@ def _limits(model: "Arm") -> "Table":
         positions = _position(joint, limits.lower), _position(joint, limits.upper)
         rates = _position(joint, limits.speed, "/s"), _position(joint, limits.acceleration, "/s²")
         rows.append((str(i), *positions, *rates, effort))
-    return _table("Limits", ("joint", "from", "to", "speed", "acceleration", "effort"), rows)
+    return _table(("joint", "from", "to", "speed", "acceleration", "effort"), rows)
 
 
 def _links(model: "Arm") -> "Table":
     rows = []
     for i, link in enumerate(model.links, 1):
-        rows.append((str(i), f"{link.mass:g}", *(f"{x * 1e3:.1f}" for x in link.com)))
-    return _table("Links: mass, and centre of mass in the link frame", ("link", "kg", "x mm", "y mm", "z mm"), rows)
+        rows.append((str(i), f"{link.mass:g}", *(f"{x * 1e3 + 0.0:.6g}" for x in link.com)))
+    return _table(("link", "kg", "x mm", "y mm", "z mm"), rows)
 
 
 def _inertia(model: "Arm") -> "Table":
     entries = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
     rows = []
     for i, link in enumerate(model.links, 1):
-        rows.append((str(i), *(f"{link.inertia[entry] + 0.0:.3g}" for entry in entries.values())))
-    return _table("Inertia about the centre of mass, kg m²", ("link", *entries), rows)
+        rows.append((str(i), *(f"{link.inertia[entry] + 0.0:.4g}" for entry in entries.values())))
+    return _table(("link", *entries), rows)
 
 
 def _motors(model: "Arm") -> "Table":
     rows = []
     for i, (motor, joint) in enumerate(zip(model.motors, model.joints, strict=True), 1):
-        unit = "kg m²" if joint.revolute else "kg"
-        dry = f"+{motor.coulomb_forward:g} / -{motor.coulomb_backward:g}" if motor.coulomb_forward else "0"
-        rows.append((str(i), f"{motor.inertia:g} {unit}", f"{motor.viscous:g}", dry, f"{motor.gear_ratio:g}"))
-    return _table("Drives, at the joint", ("joint", "inertia", "viscous", "dry friction", "gear"), rows)
+        inertia, viscous, dry = ("kg m²", "N m s", "N m") if joint.revolute else ("kg", "N s/m", "N")
+        forward, backward = motor.coulomb_forward, motor.coulomb_backward
+        coulomb = f"{forward:g} {dry}" if forward == backward else f"+{forward:g} / -{backward:g} {dry}"
+        felt = f"{motor.inertia:g} {inertia}", f"{motor.viscous:g} {viscous}", coulomb
+        rows.append((str(i), *felt, f"{motor.gear_ratio:g}"))
+    return _table(("joint", "inertia", "viscous", "dry friction", "gear ratio"), rows)
 
 
-def _facts(model: "Arm") -> "list[tuple[str, str]]":
+def _facts(model: "Arm") -> "Table":
+    from rich.table import Table
+
     from armwright.spatial.poses import to_noap
 
     def noap(X: "Any") -> str:
-        numbers = to_noap(X)
-        columns = [" ".join(f"{x + 0.0:.4g}" for x in numbers[k : k + 3]) for k in (0, 3, 6)]
-        place = " ".join(f"{x * 1e3 + 0.0:g}" for x in numbers[9:].round(9))
+        numbers = to_noap(X) + 0.0
+        columns = ["  ".join(f"{x:.6g}" for x in numbers[k : k + 3].round(12)) for k in (0, 3, 6)]
+        place = "  ".join(f"{x * 1e3:.6g}" for x in numbers[9:].round(12))
         return f"n ({columns[0]})  o ({columns[1]})  a ({columns[2]})  p ({place}) mm"
 
     facts = [("base", noap(model.base)), ("tool", noap(model.tool))]
     facts.append(("gravity", f"({', '.join(f'{x:g}' for x in model.gravity)}) m/s²"))
     if math.isfinite(model.reach):
-        facts.append(("reach", f"{model.reach * 1e3:g} mm"))
+        facts.append(("reach", _length(model.reach)))
     if math.isfinite(model.tool_speed):
-        facts.append(("hand", f"{model.tool_speed * 1e3:g} mm/s at full reach"))
-    return facts
+        facts.append(("hand", f"{_length(model.tool_speed)}/s at full reach"))
+    grid = Table.grid(padding=(0, 2))
+    for fact in facts:
+        grid.add_row(*fact)
+    return grid
 
 
 def _angle(value: float) -> str:

@@ -1,0 +1,304 @@
+"""The command ``armwright run``, as a user calls it."""
+
+import csv
+import hashlib
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.dynamics.newton_euler import inverse_dynamics
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+STACKING = EXAMPLES / "stacking.rlo"
+STANFORD = EXAMPLES / "stanford_cell.toml"
+FILES = {"motion.csv", "events.jsonl", "frames.json", "run.json", "report.html"}
+
+
+def armwright(
+    *arguments: str | Path, cwd: Path | None = None, before: Callable[[], None] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Call the command line in a terminal of 100 columns that nobody watches."""
+    return subprocess.run(
+        [sys.executable, "-m", "armwright", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+        preexec_fn=before,
+        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
+        timeout=120,
+    )
+
+
+def fails(*arguments: str | Path, **keywords: object) -> str:
+    """Call it with a mistake: exit status 1, no traceback; return what it says."""
+    done = armwright(*arguments, **keywords)  # type: ignore[arg-type]
+    assert done.returncode == 1, done
+    assert "Traceback" not in done.stderr + done.stdout
+    return done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def stacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a finished run of the report's program."""
+    folder = tmp_path_factory.mktemp("run") / "out"
+    done = armwright("run", STACKING, "--cell", STANFORD, "-o", folder)
+    assert done.returncode == 0, done
+    assert done.stdout.rstrip().endswith(f"report: {folder / 'report.html'}")
+    return folder
+
+
+def test_the_five_files(stacked: Path) -> None:
+    """A run leaves its five files and nothing else, beside it neither."""
+    assert {path.name for path in stacked.iterdir()} == FILES
+    assert list(stacked.parent.iterdir()) == [stacked]
+
+
+def test_motion_file(stacked: Path) -> None:
+    """One row per millisecond, and in every row the efforts are the inverse dynamics of its motion."""
+    with (stacked / "motion.csv").open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == ["t", "arm", *(f"{name}{i}" for name in ("q", "qd", "qdd", "tau") for i in range(1, 7))]
+    assert {row[1] for row in rows} == {"ARM_1"}
+    table = np.array([[row[0], *row[2:]] for row in rows], dtype=float)
+    t, q, qd, qdd, tau = table[:, 0], table[:, 1:7], table[:, 7:13], table[:, 13:19], table[:, 19:]
+
+    np.testing.assert_allclose(np.diff(t), 1e-3, atol=1e-12)
+    np.testing.assert_allclose(tau, inverse_dynamics(load_arm("stanford"), q, qd, qdd), rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(np.diff(q, axis=0) / 1e-3, (qd[1:] + qd[:-1]) / 2, atol=1e-4)
+    np.testing.assert_allclose(qd[[0, -1]], 0, atol=1e-12)
+
+
+def test_events_file(stacked: Path) -> None:
+    """Every effect has its time and its line; the MOVE in line 9 carries OBJ1."""
+    events = [json.loads(line) for line in (stacked / "events.jsonl").read_text().splitlines()]
+
+    assert [event["line"] for event in events] == list(range(3, 14))
+    assert events[6]["text"] == "ARM_1 [OBJ1] MOVE: PTP OBJ2 @100"
+    assert events[6]["source"] == "MOVE OBJ1 TO OBJ2"
+    assert all(a["t1"] <= b["t0"] + 1e-9 for a, b in zip(events, events[1:], strict=False))
+
+
+def test_frames_file(stacked: Path) -> None:
+    """At the end both objects are in the place where the second was seen, and hang on nothing."""
+    frames = json.loads((stacked / "frames.json").read_text())["frames"]
+
+    for name in ("OBJ1", "OBJ2"):
+        assert frames[name]["parent"] == "WORLD"
+        np.testing.assert_allclose(frames[name]["world"], [1, 0, 0, 0, -1, 0, 0, 0, -1, 0.4, -0.15, 0.05], atol=1e-9)
+    assert frames["ARM_1"]["parent"] == "ARM_1.BASE"
+
+
+def test_run_file(stacked: Path) -> None:
+    """What made the run can be found again: inputs by hash, versions, options, seed, command."""
+    run = json.loads((stacked / "run.json").read_text())
+
+    assert run["inputs"]["program"]["sha256"] == hashlib.sha256(STACKING.read_bytes()).hexdigest()
+    assert run["inputs"]["cell"]["sha256"] == hashlib.sha256(STANFORD.read_bytes()).hexdigest()
+    assert run["options"] == {"servo_ms": 1.0, "deviation_mm": 1.0, "strict": False}
+    assert run["seed"] == 0
+    assert run["command"].startswith("armwright run ")
+    assert [stage["kind"] for stage in run["stages"]] == ["PTP"] * 3
+    assert run["diagnostics"][0]["code"] == "L301"
+
+
+def test_same_input_same_files(stacked: Path, tmp_path: Path) -> None:
+    """A second run writes the same bytes, but for the command and the folder in it."""
+    armwright("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "again")
+
+    for name in ("motion.csv", "events.jsonl", "frames.json"):
+        assert (tmp_path / "again" / name).read_bytes() == (stacked / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", ["bench", "twelve_moves", "portable", "gearbox"])
+def test_examples(name: str, tmp_path: Path) -> None:
+    """Every example runs to its end."""
+    cell = EXAMPLES / "puma_cell.toml" if name == "gearbox" else STANFORD
+
+    done = armwright("run", EXAMPLES / f"{name}.rlo", "--cell", cell, "-o", tmp_path / name, "--servo-ms", "4")
+
+    assert done.returncode == 0, done
+    assert {path.name for path in (tmp_path / name).iterdir()} == FILES
+
+
+def test_json_summary() -> None:
+    """--json prints the summary and nothing else, in SI units."""
+    done = armwright("run", EXAMPLES / "bench.rlo", "--cell", STANFORD, "--json")
+
+    summary = json.loads(done.stdout)
+    assert [stage["kind"] for stage in summary["stages"]] == ["PTP", "LINE", "PTP"]
+    assert summary["stages"][1]["length"] == pytest.approx(0.1)
+    assert {one["code"] for one in summary["diagnostics"]} == {"W201", "W203"}
+
+
+def test_quiet() -> None:
+    """With -q a program without warnings prints nothing."""
+    done = armwright("run", EXAMPLES / "twelve_moves.rlo", "--cell", STANFORD, "-q", "--servo-ms", "8")
+
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_servo_period_and_deviation(tmp_path: Path) -> None:
+    """A finer deviation takes more knots; a longer period fewer rows."""
+
+    def knots(*options: str) -> list[int]:
+        done = armwright("run", EXAMPLES / "bench.rlo", "--cell", STANFORD, "--json", *options)
+        return [stage["knots"] for stage in json.loads(done.stdout)["stages"]]
+
+    assert knots("--deviation-mm", "0.01")[1] > knots()[1]
+    armwright("run", EXAMPLES / "bench.rlo", "--cell", STANFORD, "--servo-ms", "10", "-o", tmp_path / "slow")
+    times = [line.split(",")[0] for line in (tmp_path / "slow" / "motion.csv").read_text().splitlines()[1:4]]
+    assert times == ["0", "0.01", "0.02"]
+
+
+def test_option_out_of_range() -> None:
+    """A servo period of nothing is a usage error: exit status 2."""
+    done = armwright("run", STACKING, "--cell", STANFORD, "--servo-ms", "0")
+
+    assert done.returncode == 2
+    assert "expected 0.001 to 1000, got 0" in done.stderr
+
+
+def test_missing_files(tmp_path: Path) -> None:
+    """A missing program or cell is one line that names it, and the file that was probably meant."""
+    assert "nope.rlo: no such file" in fails("run", tmp_path / "nope.rlo", "--cell", STANFORD)
+    said = fails("run", STACKING, "--cell", EXAMPLES / "stanfrd_cell.toml")
+    assert "no such file; did you mean" in said
+    assert "stanford_cell.toml" in said
+    assert said.count("\n") == 1
+
+
+def test_broken_cell(tmp_path: Path) -> None:
+    """Broken TOML and an unknown arm are told with file and line."""
+    cell = tmp_path / "cell.toml"
+    cell.write_text("[arms.ARM_1\nmodel = 3\n")
+    assert f"{cell}:1: not valid TOML" in fails("run", STACKING, "--cell", cell)
+    cell.write_text('# a cell\n[arms.ARM_1]\nmodel = "stanfort"\nhand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]\n')
+    said = fails("run", STACKING, "--cell", cell)
+    assert f"{cell}:3: arms, ARM_1, model: no arm 'stanfort'. Did you mean 'stanford'?" in said
+
+
+def test_wrong_program(tmp_path: Path) -> None:
+    """A program with errors is not run: diagnostics, status 1, no folder."""
+    program = tmp_path / "p.rlo"
+    program.write_text("VAR f : FRAME ; BEGIN MOVE ARM_1 TO f ; MOVE ARM_7 TO f ; END.")
+
+    said = fails("run", program, "--cell", STANFORD, "-o", tmp_path / "out")
+
+    assert "E304" in said
+    assert "ARM_7" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_unreachable_goal(tmp_path: Path) -> None:
+    """A goal too far away: which frame, how far out in mm, where the frames were; nothing is written."""
+    program = tmp_path / "far.rlo"
+    program.write_text("VAR far : FRAME ;\nBEGIN\n  far = (1,0,0,0,-1,0,0,0,-1,3,0,0.2) ;\n  MOVE ARM_1 TO far ;\nEND.\n")
+
+    said = fails("run", program, "--cell", STANFORD, "-o", tmp_path / "out")
+
+    assert "error[E402]: `far` cannot be reached by ARM_1" in said
+    assert "--> far.rlo:4:" in said
+    assert "joint 3 would stand at 2996.5 mm, 1878.9 mm beyond its limit 1117.6 mm" in said
+    assert "frames at 0.000 s" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_effort_over_the_limit(tmp_path: Path) -> None:
+    """An arm that is too weak still runs; the warning names joint, amount and time."""
+    arm = (ROOT / "src/armwright/arm/catalogue/stanford.toml").read_text().replace("effort_Nm = 303", "effort_Nm = 5")
+    (tmp_path / "weak.toml").write_text(arm)
+    cell = STANFORD.read_text().replace('model = "stanford"', f'model = "{tmp_path / "weak.toml"}"')
+    (tmp_path / "cell.toml").write_text(cell)
+
+    done = armwright("run", STACKING, "--cell", tmp_path / "cell.toml")
+
+    assert done.returncode == 0
+    assert "warning[W401]: joint 2 of ARM_1 would need" in done.stdout
+    assert "more than its 5 N m" in done.stdout
+
+
+def test_full_disk(tmp_path: Path) -> None:
+    """When the disk takes no more, the run says so and leaves no file: here files may not grow past 100 kB."""
+
+    def small_files() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+    said = fails("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "deep" / "out", before=small_files)
+
+    assert "File too large; nothing was written" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_output_in_the_way(tmp_path: Path) -> None:
+    """An output folder that is a file is refused, and the file stays."""
+    (tmp_path / "out").write_text("mine")
+
+    said = fails("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "out")
+
+    assert "cannot write to" in said
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_help_has_an_example() -> None:
+    """The help of the command and of every subcommand shows how it is called."""
+    assert "Example" in armwright("--help").stdout
+    for command in ("run", "check", "arms", "show"):
+        assert "Example" in armwright(command, "--help").stdout
+
+
+def test_nothing_heavy_before_it_is_needed() -> None:
+    """The help comes up without loading NumPy, and importing the package loads none of its parts."""
+    code = "import sys, armwright; print(sorted(m for m in sys.modules if m.startswith(('armwright.', 'numpy'))))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['armwright.version']"
+    code = "import sys; from armwright.cli import app; print('numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+@pytest.mark.browser
+def test_report_in_a_browser(stacked: Path) -> None:
+    """The page of a real run opens from the disk: no error, no request, and the slider moves the arm."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no chromium on this machine: the report page is not looked at")
+    from playwright.sync_api import sync_playwright
+
+    page_file = stacked / "report.html"
+    complaints: list[str] = []
+    requests: list[str] = []
+    with sync_playwright() as play:
+        chromium = play.chromium.launch(executable_path=browser, args=["--no-sandbox", "--disable-gpu"])
+        page = chromium.new_page(viewport={"width": 1280, "height": 800})
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(page_file.as_uri())
+        before = page.screenshot()
+        start = page.evaluate("armwright.state()")
+        page.locator("#time").fill("2.2")
+        page.wait_for_timeout(200)
+        later = page.evaluate("armwright.state()")
+        after = page.screenshot()
+        chromium.close()
+
+    assert complaints == []
+    assert requests == [page_file.as_uri()]
+    assert later["t"] if "t" in later else later["time"] == pytest.approx(2.2, abs=0.05)
+    assert before != after
+    hand = np.array([float(x) for x in later["hand"]]) - np.array([float(x) for x in start["hand"]])
+    assert np.linalg.norm(hand) > 0.05
+    with (stacked / "motion.csv").open(newline="") as file:
+        rows = list(csv.reader(file))[1:]
+    np.testing.assert_allclose(later["q"], [float(x) for x in rows[2200][2:8]], atol=0.02)
