@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +87,7 @@ def test_events_file(stacked: Path) -> None:
     assert [event["line"] for event in events] == list(range(3, 14))
     assert events[6]["text"] == "ARM_1 [OBJ1] MOVE: PTP OBJ2 @100"
     assert events[6]["source"] == "MOVE OBJ1 TO OBJ2"
-    assert all(a["t1"] <= b["t0"] + 1e-9 for a, b in zip(events, events[1:], strict=False))
+    assert all(a["t1"] <= b["t0"] + 1e-9 for a, b in pairwise(events))
 
 
 def test_frames_file(stacked: Path) -> None:
@@ -203,7 +204,8 @@ def test_wrong_program(tmp_path: Path) -> None:
 def test_unreachable_goal(tmp_path: Path) -> None:
     """A goal too far away: which frame, how far out in mm, where the frames were; nothing is written."""
     program = tmp_path / "far.rlo"
-    program.write_text("VAR far : FRAME ;\nBEGIN\n  far = (1,0,0,0,-1,0,0,0,-1,3,0,0.2) ;\n  MOVE ARM_1 TO far ;\nEND.\n")
+    lines = ["VAR far : FRAME ;", "BEGIN", "  far = (1,0,0,0,-1,0,0,0,-1,3,0,0.2) ;", "  MOVE ARM_1 TO far ;", "END."]
+    program.write_text("\n".join(lines))
 
     said = fails("run", program, "--cell", STANFORD, "-o", tmp_path / "out")
 

@@ -67,7 +67,7 @@ def test_a_folder_in_the_way_of_a_file(tmp_path: Path) -> None:
     """A folder named as one of the results stops the writing before any file is replaced."""
     (tmp_path / "run" / "y.txt").mkdir(parents=True)
 
-    with pytest.raises(OutputError, match="'y.txt' in it is a folder"):
+    with pytest.raises(OutputError, match=r"'y\.txt' in it is a folder"):
         write_folder(tmp_path / "run", {"x.txt": "one", "y.txt": "two"})
 
     assert [p.name for p in (tmp_path / "run").iterdir()] == ["y.txt"]

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from armwright.arm.load import load_arm
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
+from armwright.arm.load import load_arm
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.motion.quintic import point_to_point, quintic
 from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks

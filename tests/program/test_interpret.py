@@ -221,7 +221,8 @@ def test_speed_in_proportion() -> None:
 
 def test_speed_from_a_scalar() -> None:
     """A speed may be the value of a scalar."""
-    text = "VAR n : SCALAR ; f : FRAME ; BEGIN n = 40 ; f = (1,0,0,0,-1,0,0,0,-1,0.5,0.1,0.1) ; MOVE ARM_1 TO f WITH SPEED = n ; END."
+    text = """VAR n : SCALAR ; f : FRAME ; BEGIN
+      n = 40 ; f = (1,0,0, 0,-1,0, 0,0,-1, 0.5, 0.1, 0.1) ; MOVE ARM_1 TO f WITH SPEED = n ; END."""
 
     assert run(text).stages[0].speed == 40
 
@@ -313,7 +314,7 @@ def test_effort_over_the_limit_is_a_warning() -> None:
     compiled = compile_program(Source("t.rlo", (EXAMPLES / "stacking.rlo").read_text()), known_cell(weak))
     assert compiled.code is not None
 
-    found = warnings(compiled.code, interpret(compiled.code, weak, Simulator(weak)))
+    found = warnings(interpret(compiled.code, weak, Simulator(weak)))
 
     assert [one.code for one in found] == ["W401"] * 3
     assert "joint 2 of ARM_1 would need" in found[0].message
@@ -323,9 +324,8 @@ def test_effort_over_the_limit_is_a_warning() -> None:
 
 def test_reading_the_joints() -> None:
     """READ SYSTEM gives the hand the pose that the joints say it has."""
-    recording = run(
-        "VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,0.5,0.1,0.1) ; MOVE ARM_1 TO f ; READ SYSTEM (ARM_1) ; END."
-    )
+    text = "VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,0.5,0.1,0.1) ; MOVE ARM_1 TO f ; READ SYSTEM (ARM_1) ; END."
+    recording = run(text)
 
     expect(recording, ARM_1=down(0.5, 0.1, 0.1))
     assert "READ SYSTEM ARM_1" in recording.trace()

@@ -20,8 +20,8 @@ _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 # Published tensors are measured and rounded: the triangle inequality may be broken by this part of the trace. The worst
 # of the catalogue is link 3 of the PUMA 560, 0.066 + 0.0125 against 0.086 kg m², which is 0.046 of its trace.
 _TENSOR_ROUNDING = 0.05
-# Rotations typed with two digits are off by about this much; they are made exact. More is a mistake.
-_TYPED_ROTATION = 1e-2
+# Rotations typed with two digits are off by up to 0.018; they are made exact. More is a mistake.
+_TYPED_ROTATION = 2e-2
 
 
 def arm_names() -> tuple[str, ...]:
@@ -33,17 +33,22 @@ def load_arm(name: str | Path) -> Arm:
     """Return an arm by its name in the catalogue, or from a file.
 
     Args:
-        name: such as ``puma560``; something with a slash or ending in .toml is a path.
+        name: such as ``puma560``; something with a slash or ending in .toml or .json is a path.
 
     Raises:
         UnknownNameError: the catalogue has no such arm; the nearest is named.
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
     """
-    if isinstance(name, Path) or "/" in name or name.endswith(".toml"):
-        return read_arm(Path(name))
+    if is_path(name):
+        return read_arm(name)
     if name not in arm_names():
-        raise UnknownNameError("arm", name, arm_names())
+        raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")
+
+
+def is_path(name: str | Path) -> bool:
+    """Whether a name means a file and not an arm of the catalogue."""
+    return isinstance(name, Path) or "/" in name or name.lower().endswith((".toml", ".json"))
 
 
 def read_arm(path: Path | str) -> Arm:
@@ -104,7 +109,7 @@ def _joint(table: Table) -> Joint:
     limits.finish()
     if not values["lower"] < values["upper"]:
         lower, upper = (_written(kind, values[name]) for name in ("lower", "upper"))
-        raise limits.error("", f"the lower limit must be below the upper, got {lower} and {upper}")
+        raise limits.error(None, f"the lower limit must be below the upper, got {lower} and {upper}")
     return Joint(
         kind="revolute" if kind == "revolute" else "prismatic",
         theta=_unit(table, "theta", _ANGLE, default=0.0),

@@ -9,7 +9,7 @@ A revolute joint adds its position to ``theta``, a prismatic one to ``d``. All q
 
 import math
 from collections.abc import Iterable, Sized
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import attrs
 import numpy as np
@@ -93,6 +93,14 @@ class Joint:
     alpha: float = 0.0
     limits: Limits = Limits()
 
+    def __attrs_post_init__(self) -> None:
+        """Refuse a kind of joint that there is not, and geometry that is no number."""
+        if self.kind not in get_args(JointKind):
+            raise InvalidValueError(f"joint: expected kind revolute or prismatic, got {self.kind!r}")
+        for name in ("theta", "d", "a", "alpha"):
+            if not math.isfinite(getattr(self, name)):
+                raise InvalidValueError(f"joint: {name} must be finite, got {getattr(self, name)}")
+
     @property
     def revolute(self) -> bool:
         """Whether the joint turns."""
@@ -137,7 +145,7 @@ class Link:
 
     def __attrs_post_init__(self) -> None:
         """Refuse a negative mass."""
-        if not self.mass >= 0:
+        if not 0 <= self.mass < math.inf:
             raise InvalidValueError(f"link: mass must be 0 or more, got {self.mass}")
 
 
@@ -162,7 +170,7 @@ class Motor:
     def __attrs_post_init__(self) -> None:
         """Refuse drives that give energy for nothing."""
         for name in ("inertia", "viscous", "coulomb_forward", "coulomb_backward"):
-            if not getattr(self, name) >= 0:
+            if not 0 <= getattr(self, name) < math.inf:
                 raise InvalidValueError(f"motor: {name} must be 0 or more, got {getattr(self, name)}")
 
 

@@ -6,10 +6,17 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, ArrayLike, floats
 from armwright.cell.frames import WORLD, FrameTree, Node
+from armwright.errors import ShapeError
 from armwright.kinematics.forward import forward
 from armwright.spatial.poses import one_pose
+
+
+def _posture(value: ArrayLike) -> Array:
+    q = floats(value, "start")
+    q.setflags(write=False)
+    return q
 
 
 def base_name(arm: str) -> str:
@@ -31,9 +38,14 @@ class CellArm:
 
     arm: Arm
     base: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
-    start: Array
+    start: Array = attrs.field(converter=_posture)
     open_time: float = 0.3
     grasp_time: float = 0.3
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse a start that does not fit the arm."""
+        if self.start.shape != (self.arm.n,):
+            raise ShapeError(f"start: expected {self.arm.n} numbers, one per joint, got shape {self.start.shape}")
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -2,13 +2,13 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import attrs
 import numpy as np
 
-from armwright.arm.load import load_arm
+from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, Node
@@ -24,10 +24,10 @@ from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # The arm of a cell that names none: the report's.
 _REPORT_ARM = "stanford"
-_ARM_NAME = re.compile(r"ARM[-_](\d+)")
-_NAME = re.compile(r"[A-Z][A-Z0-9_]*")
-# Typed rotations are made exact up to this error; beyond it is a mistake.
-_TYPED_ROTATION = 1e-2
+_ARM_NAME = re.compile(r"ARM[-_]([0-9]+)", re.IGNORECASE | re.ASCII)
+_NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
+# Rotations typed with two digits are off by up to 0.018; they are made exact. More is a mistake.
+_TYPED_ROTATION = 2e-2
 # A faster servo fills a disk, a slower one controls nothing [ms].
 _SERVO_MS = (0.1, 100.0)
 # Fingers and cameras that take longer are a slip of units [s].
@@ -43,12 +43,13 @@ def read_cell(path: Path | str) -> Cell:
     Raises:
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
     """
+    path = Path(path)
     top = Document.read(path).root
-    arms = _arms(top.table("arms", required=True))
+    arms = _arms(top.table("arms", required=True), path.parent)
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
     height = contact.number("z", default=math.nan)
     cell = Cell(
-        name=top.text("name", default=Path(path).name),
+        name=top.text("name", default=path.name),
         arms=arms,
         frames=_frames(top.table("frames"), arms),
         visions=_visions(top.table("visions")),
@@ -65,24 +66,25 @@ def read_cell(path: Path | str) -> Cell:
     return cell
 
 
-def _arms(table: Table) -> dict[str, CellArm]:
+def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
     arms: dict[str, CellArm] = {}
     for key in table.free_keys():
-        match = _ARM_NAME.fullmatch(key.upper())
+        match = _ARM_NAME.fullmatch(key)
         if match is None:
             raise table.error(key, "expected the name of an arm, such as ARM_1")
         if f"ARM_{match[1]}" in arms:
             raise table.error(key, f"ARM_{match[1]} is given twice")
-        arms[f"ARM_{match[1]}"] = _arm(table.table(key))
+        arms[f"ARM_{match[1]}"] = _arm(table.table(key), folder)
     if not arms:
-        raise table.error("", "expected at least one arm, such as [arms.ARM_1]")
+        raise table.error(None, "expected at least one arm, such as [arms.ARM_1]")
     return arms
 
 
-def _arm(table: Table) -> CellArm:
+def _arm(table: Table, folder: Path) -> CellArm:
     name = table.text("model", default=_REPORT_ARM)
     try:
-        arm = load_arm(name)
+        # The file of an arm is looked for from the folder of the cell, wherever the command was started.
+        arm = load_arm(folder / name if is_path(name) else name)
     except ArmwrightError as error:
         raise table.error("model", str(error)) from error
     if shoulder_of(arm) is None:
@@ -106,6 +108,9 @@ def _arm(table: Table) -> CellArm:
 def _start(table: Table, arm: Arm, base: Array) -> Array:
     """Read where an arm stands at the start: joint by joint, or by the pose of its hand in the world."""
     if "posture" in table:
+        if "hand" in table:
+            raise table.error("hand", "the start is given twice, as hand and as posture")
+        table.allow("hand")
         q = table.vector("posture", arm.n)
         for fault in violations(arm, q):
             raise table.error("posture", str(fault))
@@ -136,23 +141,30 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
     known = {WORLD, "STATION", *arms, *frames}
     for name, node in frames.items():
         if node.parent not in known:
-            near = closest(node.parent, known)
+            near = closest(node.parent, known - {name})
             hint = f"; did you mean {near}?" if near else ""
-            raise table.error(keys[name], f"it hangs on {node.parent}, which is no frame here{hint}")
-        above, seen = node.parent, {name}
-        while above in frames:
-            if above in seen:
-                raise table.error(keys[name], f"{name} hangs on itself by way of {', '.join(sorted(seen - {name}))}")
-            seen.add(above)
-            above = frames[above].parent
+            raise table.table(keys[name]).error("on", f"{name} hangs on {node.parent}, which is no frame here{hint}")
+        way = _way_up(name, frames)
+        if frames[way[-1]].parent == name:
+            by = f" by way of {', '.join(way[1:])}" if len(way) > 1 else ""
+            raise table.table(keys[name]).error("on", f"{name} hangs on itself{by}")
     return frames
+
+
+def _way_up(name: str, frames: Mapping[str, Node]) -> list[str]:
+    """Return the frames of the file from ``name`` upwards, none twice."""
+    way = [name]
+    while (above := frames[way[-1]].parent) in frames and above not in way:
+        way.append(above)
+    return way
 
 
 def _visions(table: Table) -> dict[str, tuple[Array, ...]]:
     visions: dict[str, tuple[Array, ...]] = {}
     for key in table.free_keys():
         name = _name(table, key, visions)
-        visions[name] = tuple(_checked(table, key, numbers) for numbers in table.vectors(key, 12))
+        answers = enumerate(table.vectors(key, 12))
+        visions[name] = tuple(_checked(table, key, numbers, index) for index, numbers in answers)
     return visions
 
 
@@ -166,13 +178,13 @@ def _devices(table: Table) -> frozenset[str]:
 
 def _name(table: Table, key: str, taken: Iterable[str], text: str | None = None) -> str:
     """Return a name as the language compares it: in upper case, and one that a program can write."""
-    name = (key if text is None else text).upper()
-    match = _ARM_NAME.fullmatch(name)
+    written = key if text is None else text
+    name, match = written.upper(), _ARM_NAME.fullmatch(written)
     if text is not None and match:
         return f"ARM_{match[1]}"
-    if not _NAME.fullmatch(name) or (text is None and (name == WORLD or match)):
+    if not _NAME.fullmatch(written) or (text is None and (name == WORLD or match)):
         raise table.error(
-            key, f"'{text or key}' cannot name a frame or device: letters, digits and _, not WORLD or an arm"
+            key, f"{written!r} cannot name a frame or device: letters A to Z, digits and _, not WORLD or an arm"
         )
     if name in taken:
         raise table.error(key, f"{name} is given twice; names that differ in case only are one")
@@ -186,12 +198,12 @@ def _pose(table: Table, key: str, default: Array | None = None) -> Array:
     return _checked(table, key, table.vector(key, 12))
 
 
-def _checked(table: Table, key: str, numbers: Array) -> Array:
+def _checked(table: Table, key: str, numbers: Array, index: int | None = None) -> Array:
     X = from_noap(numbers)
     error = float(orthonormality_error(X[:3, :3]))
     if error > _TYPED_ROTATION:
         by_rows = np.linalg.norm(numbers.reshape(3, 4)[:, :3], axis=-1)
         rows = np.allclose(by_rows, 1.0, atol=_TYPED_ROTATION)
         hint = "; they look like rows: write the columns n, o, a, p" if rows else ""
-        raise table.error(key, f"the first nine numbers are no rotation (off by {error:.2g}){hint}")
+        raise table.error(key, f"the first nine numbers are no rotation (off by {error:.2g}){hint}", index)
     return pose(nearest_rotation(X[:3, :3]), X[:3, 3])

@@ -30,8 +30,10 @@ class Simulator:
         """Move an arm along a trajectory; return the posture (n,) it ends in."""
         gap = np.abs(trajectory(0.0) - self._postures[arm]).max()
         assert gap <= _SAME_POSTURE, f"{arm} stands {gap:.3g} away from where its trajectory begins"  # noqa: S101
-        self._postures[arm] = trajectory(trajectory.duration)
-        return self._postures[arm]
+        end = trajectory(trajectory.duration)
+        end.setflags(write=False)
+        self._postures[arm] = end
+        return end
 
     def fingers(self, arm: str, *, closed: bool) -> float:
         """Close or open the fingers of an arm; return the time it takes [s]."""

@@ -47,8 +47,8 @@ def check(
     if as_json:
         print(json.dumps(_as_data(compiled, emit), indent=2, ensure_ascii=False))
     else:
-        if emit:
-            print("\n".join(_emitted(compiled, emit)))
+        for line in _emitted(compiled, emit) if emit else ():
+            print(line)
         if not emit or compiled.diagnostics:
             print_diagnostics(compiled.diagnostics, compiled.source, to_errors=emit is not None)
     if compiled.code is None:

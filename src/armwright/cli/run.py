@@ -60,7 +60,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         print_diagnostics([*compiled.diagnostics, error.diagnostic], code.source)
         _print_moment(error, code)
         raise typer.Exit(1) from error
-    diagnostics = (*compiled.diagnostics, *warnings(code, recording))
+    diagnostics = (*compiled.diagnostics, *warnings(recording))
     if output is not None:
         options = {"servo_ms": place.period * 1e3, "deviation_mm": place.deviation * 1e3, "strict": strict}
         origin = Origin(program=program, cell=cell, command=_command(), seed=seed, options=options)

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
     from armwright.arm.model import Arm, Joint
 
+# Room for the widest table there can be, in characters.
+_WIDEST = 200
 # What a drive has that can be felt.
 _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
 
@@ -36,7 +38,7 @@ def show(
     if as_json:
         print(json.dumps(_as_data(model), indent=2, ensure_ascii=False))
         return
-    console = Console(highlight=False, markup=False)
+    console = Console(highlight=False, markup=False, emoji=False)
     console.print(f"{model.name}: {model.title}", style="bold")
     if model.source:
         console.print(model.source, style="dim")
@@ -44,7 +46,9 @@ def show(
         console.print()
         console.print(title, style="bold")
         if table:
-            console.print(table)
+            # A narrow screen wraps the line; it must not cut numbers off.
+            whole = console.measure(table, options=console.options.update(max_width=_WIDEST)).maximum
+            Console(highlight=False, width=max(whole, console.width)).print(table)
     console.print()
     console.print(_facts(model))
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -15,6 +14,10 @@ from armwright.errors import FileFormatError, closest
 from armwright.files.lines import Keys, TwinKeyError, json_lines, toml_lines
 
 _MISSING: Any = object()
+# No quantity of a robot is larger, and products of three such numbers are still numbers.
+_LARGEST = 1e100
+# Of a text that is not what was expected, a message shows this many characters.
+_SHOWN_TEXT = 60
 
 
 class Document:
@@ -83,14 +86,15 @@ class Table:
         """Whether the key is given."""
         return key in self._data
 
-    @property
-    def name(self) -> str:
-        """The last key of the way here, such as ``ARM_1`` in ``[arms.ARM_1]``."""
-        return str(self.keys[-1]) if self.keys else ""
+    def error(self, key: str | None, message: str, index: int | None = None) -> FileFormatError:
+        """Return the error that says ``message`` of a key here.
 
-    def error(self, key: str, message: str) -> FileFormatError:
-        """Return the error that says ``message`` of a key here, or of the table itself where ``key`` is empty."""
-        return self._error_at((key,) if key else (), message)
+        Args:
+            key: None for the table itself.
+            message: what is wrong.
+            index: which entry of the list under ``key`` is meant, from 0.
+        """
+        return self._error_at(() if key is None else (key,) if index is None else (key, index), message)
 
     def number(self, key: str, default: Any = _MISSING, *, lower: float = -math.inf, upper: float = math.inf) -> float:
         """Return a finite number between ``lower`` and ``upper``.
@@ -162,7 +166,7 @@ class Table:
         if value not in choices:
             near = closest(value, choices)
             hint = f"; did you mean '{near}'?" if near else ""
-            raise self.error(key, f"expected one of {', '.join(sorted(choices))}, got '{value}'{hint}")
+            raise self.error(key, f"expected one of {', '.join(sorted(choices))}, got {_kind(value)}{hint}")
         return str(value)
 
     def table(self, key: str, *, required: bool = False) -> "Table":
@@ -225,9 +229,11 @@ class Table:
     def _require_number(self, keys: Keys, value: Any) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self._error_at(keys, f"expected a number, got {_kind(value)}")
-        if abs(value) > sys.float_info.max or math.isnan(value):
-            got = value if isinstance(value, float) else "a whole number that is too large"
-            raise self._error_at(keys, f"expected a finite number, got {got}")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self._error_at(keys, f"expected a finite number, got {value}")
+        if abs(value) > _LARGEST:
+            got = f"{value:g}" if isinstance(value, float) else "a whole number of many digits"
+            raise self._error_at(keys, f"expected a number no larger than {_LARGEST:g}, got {got}")
 
     def _numbers(self, keys: Keys, value: Any, length: int | Collection[int]) -> Array:
         if not isinstance(value, list):
@@ -260,13 +266,15 @@ def read_text(path: Path | str) -> str:
         raise FileFormatError(path, None, "", "expected a file, got a folder") from None
     except OSError as error:
         raise FileFormatError(path, None, "", f"cannot be read: {error.strerror}") from error
+    except ValueError as error:  # a zero byte in the name
+        raise FileFormatError(repr(str(path)), None, "", "no such file can be") from error
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise FileFormatError(
-            path, line, "", f"not UTF-8 text: byte 0x{data[error.start]:02x} has no meaning"
-        ) from error
+        # The decoder counts behind a mark of byte order, so its own bytes are those to look at.
+        line = error.object[: error.start].count(b"\n") + 1
+        byte = error.object[error.start]
+        raise FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} has no meaning") from error
 
 
 def _names_in(folder: Path) -> list[str]:
@@ -290,13 +298,13 @@ def _toml_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> FileFo
 
 
 def _shown(keys: Keys) -> str:
-    """Write a way as people would: ``joint 3, mass_kg`` counts from 1."""
+    """Write a way as people would: ``joint 3, mass_kg`` counts from 1; a key that cannot be seen is quoted."""
     words: list[str] = []
     for key in keys:
         if isinstance(key, int):
             words[-1] += f" {key + 1}"
         else:
-            words.append(key)
+            words.append(key if key.isprintable() and key.strip() else _quoted(key))
     return ", ".join(words)
 
 
@@ -304,11 +312,18 @@ def _counted(length: int | Collection[int]) -> str:
     return f"{length if isinstance(length, int) else ' or '.join(map(str, length))} numbers"
 
 
+def _quoted(text: str) -> str:
+    """Write a text on one line, not too long."""
+    return repr(text if len(text) <= _SHOWN_TEXT else f"{text[:_SHOWN_TEXT]}...")
+
+
 def _kind(value: Any) -> str:
+    if value is None:
+        return "null"
     if isinstance(value, bool):
         return f"the truth value {str(value).lower()}"
     if isinstance(value, str):
-        return f"the text '{value}'"
+        return f"the text {_quoted(value)}"
     if isinstance(value, list):
         return f"a list of {len(value)}"
     if isinstance(value, dict):

@@ -146,6 +146,8 @@ def _operands(tokens: Tokens) -> frozenset[str]:
 def _called(tokens: Tokens, start: Token, span: Span) -> str:
     """Return how an expression is called in a message."""
     text = tokens.source.slice(span)
+    if span == start.span and start.kind is not TokenKind.STRING:
+        return f"`{text}` as a value"
     if len(text) <= _LONGEST_SHOWN and text.isprintable():
         return f"`{text}`"
     inner = tokens.source.text[start.end :].lstrip(" \t")

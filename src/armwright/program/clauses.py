@@ -61,6 +61,9 @@ def _clause(tokens: Tokens) -> tree.Clause | None:
     key = token.key
     if token.kind is TokenKind.NAME:
         key = _meant(tokens, token)
+        if not key:
+            _pass_over(tokens)
+            return None
     tokens.take()
     if key == "WITH":
         return _with(tokens, token)
@@ -79,7 +82,7 @@ def _clause(tokens: Tokens) -> tree.Clause | None:
 
 
 def _meant(tokens: Tokens, token: Token) -> str:
-    """Return the clause word that a misspelt one was meant to be."""
+    """Return the clause word that a misspelt one was meant to be; empty if there is none."""
     near = closest(token.text, CLAUSES)
     tokens.report(
         "E108",
@@ -88,8 +91,6 @@ def _meant(tokens: Tokens, token: Token) -> str:
         "not a clause of MOVE",
         helps=(f"did you mean `{near}`?" if near else f"clauses are {', '.join((*PLAIN_CLAUSES, 'WITH ...'))}",),
     )
-    if near is None:
-        _pass_over(tokens)
     return near or ""
 
 

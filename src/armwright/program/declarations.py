@@ -43,10 +43,13 @@ def head(tokens: Tokens) -> list[tree.Declaration]:
 
 def _nonsense(tokens: Tokens) -> tree.Declaration:
     """Pass over what is neither a declaration nor BEGIN; the names in it may have been meant to be declared."""
-    start = tokens.now
+    start = tokens.take()
     if not start.damaged:
         tokens.report("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
-    return _passed_over(tokens, [])
+    names: list[tree.Name | None] = []
+    if start.kind is TokenKind.NAME:
+        names.append(tree.Name(start.span, start.text, start.key))
+    return _passed_over(tokens, names)
 
 
 def _passed_over(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:

@@ -85,6 +85,8 @@ def _tool_or_sensor(course: Course, statement: tree.Statement) -> None:
             course.use_arm(arm)
         case tree.ReadVisions(target=tree.Name() as target):
             handling.read(course, target, statement.span)
+        case tree.ReadVisions(target=tree.Poison(names=names)):
+            course.table.forget(names)
         case tree.Operate(device=tree.Name() as device):
             handling.operate(course, device)
         case _:
@@ -165,7 +167,7 @@ def _late(course: Course, affix: tree.Affix, child: str, parent: str) -> None:
 def _unfix(course: Course, unfix: tree.Unfix) -> None:
     course.mention(unfix.parent)
     child, parent = course.symbols.frame(unfix.child), course.symbols.frame(unfix.parent)
-    if child is None or is_arm(child):
+    if child is None or is_arm(child) or child == WORLD:
         return
     link = course.table.links.get(child)
     if unfix.parent is None or (parent is not None and link is not None and link.parent == parent):

@@ -82,7 +82,7 @@ def interpret(code: Code, cell: Cell, hardware: Hardware, progress: Progress | N
     return run.recording()
 
 
-def warnings(code: Code, recording: Recording) -> tuple[Diagnostic, ...]:
+def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
     """Return a warning for every MOVE in which inverse dynamics asks more than a joint can give."""
     found = []
     for stage in recording.stages:
@@ -168,7 +168,7 @@ class _Run:
             effects=tuple(self._effects),
             stages=tuple(self._stages),
             streams=tuple(
-                stream(name, arm.arm, arm.start, self._runs[name], self._now, cell.period)
+                stream(name, arm.arm, arm.start, self._runs[name], duration=self._now, period=cell.period)
                 for name, arm in cell.arms.items()
             ),
             trees=tuple(self._trees),
@@ -352,7 +352,12 @@ class _Run:
         where = f"{error.fraction * 100:.0f} % of the way there: " if error.fraction < 1 else ""
         secondary = [Label(self._written[frame], f"`{spelled}` got its place here")] if frame in self._written else []
         self._fail(
-            _CODES[error.cause], message, gathered.span_of(frame), "cannot be reached", secondary, (f"{where}{error}",)
+            _CODES[error.cause],
+            message,
+            gathered.span_of(frame),
+            "cannot be reached",
+            secondary=secondary,
+            notes=(f"{where}{error}",),
         )
 
     def _fail(
@@ -361,6 +366,7 @@ class _Run:
         message: str,
         span: Span,
         label: str,
+        *,
         secondary: Sequence[Label] = (),
         notes: Sequence[str] = (),
     ) -> NoReturn:

@@ -17,7 +17,7 @@ _MIRROR = 2.0
 _ROW_WISE_12 = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
 _COLUMNS_OF_16 = (0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14)
 _ROW_WISE_16 = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
-_COLUMNS_NOTE = "the numbers are the columns n, o, a, p one after the other: n and o and a turn, p shifts in metres"
+_COLUMNS_NOTE = "the numbers are the columns n, o, a, p one after the other: n, o, a turn, p shifts, in metres"
 
 
 def check(matrix: tree.Matrix) -> Diagnostic | None:

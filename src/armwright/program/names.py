@@ -76,7 +76,7 @@ class Names:
     def unused(self) -> None:
         """Point at names that are declared and never used."""
         for key, name in self.declared.items():
-            if key not in self._used:
+            if key not in self._used and self.kinds[key] is not None:
                 self.found.append(
                     Diagnostic(
                         code="L304",

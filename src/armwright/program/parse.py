@@ -46,7 +46,7 @@ def program(tokens: Tokens) -> tree.Program:
         while not tokens.done and not _ends(tokens):
             _statements(tokens, found, declarations)
     elif not tokens.now.damaged:
-        at = tokens.gap()
+        at = tokens.gap() if declarations else Span(0, 0)
         text = "the program has no statements" if declarations else "there is no program here"
         tokens.report("E115", text, at, "expected `BEGIN ... END.`")
     return tree.Program(tokens.since(start), tuple(declarations), tuple(found), tokens.before.span)
@@ -308,6 +308,8 @@ def _read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
         if len(targets) > 1:
             rest = Span(targets[1].span.start, targets[-1].span.end)
             beyond.report(tokens, "reading several frames at once", rest, "RLO-83 reads one frame at a time")
+            names = frozenset(target.key for target in targets if not isinstance(target, tree.Poison))
+            return tree.ReadVisions(tokens.since(start), tree.Poison(rest, names))
         return tree.ReadVisions(tokens.since(start), targets[0])
     arms = parenthesised(tokens, _ARM, "after SYSTEM")
     if len(arms) > 1:

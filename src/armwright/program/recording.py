@@ -123,7 +123,7 @@ class Recording:
 
 
 def stream(
-    name: str, arm: Arm, start: Array, runs: Sequence[tuple[float, Trajectory]], duration: float, period: float
+    name: str, arm: Arm, start: Array, runs: Sequence[tuple[float, Trajectory]], *, duration: float, period: float
 ) -> Stream:
     """Sample what an arm does at every servo tick.
 

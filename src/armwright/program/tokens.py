@@ -120,6 +120,7 @@ class _Scanner:
         self._unclosed = False
         self._found: list[Diagnostic] = []
         self._strays: dict[str, list[Span]] = {}
+        self._refused: set[str] = set()
 
     def run(self) -> tuple[list[Token], list[Diagnostic]]:
         tokens = list(self._tokens())
@@ -153,7 +154,10 @@ class _Scanner:
 
     def _word(self, word: str, start: int, end: int) -> Token:
         key = word.upper()
-        if len(key) != len(word) or not word.isascii():
+        if word.isascii():
+            return Token(TokenKind.KEYWORD if key in RESERVED else TokenKind.NAME, word, key, start, end)
+        if key not in self._refused:
+            self._refused.add(key)
             odd = next(character for character in word if not character.isascii())
             self._say(
                 "E101",
@@ -161,8 +165,7 @@ class _Scanner:
                 Span(start, end),
                 "names are made of the letters A to Z, digits and `_`",
             )
-            return Token(TokenKind.NAME, word, key, start, end, damaged=True)
-        return Token(TokenKind.KEYWORD if key in RESERVED else TokenKind.NAME, word, key, start, end)
+        return Token(TokenKind.NAME, word, key, start, end, damaged=True)
 
     def _number(self, word: str, start: int, end: int) -> Token:
         if not math.isfinite(float(word)):

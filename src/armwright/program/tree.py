@@ -235,6 +235,9 @@ def dump(node: object, depth: int = 0, field: str = "") -> Iterator[str]:
     """Return a tree as lines of text, two blanks per level, leaves on the line of their parent."""
     head = "  " * depth + (f"{field}: " if field else "")
     if isinstance(node, tuple):
+        if all(isinstance(item, Number) for item in node):
+            yield head + " ".join(item.text for item in node)
+            return
         for item in node:
             yield from dump(item, depth, field)
         return

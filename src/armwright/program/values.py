@@ -143,6 +143,7 @@ def _matrix(tokens: Tokens) -> tree.Matrix | None:
         if number is None:
             if numbers and tokens.sees(")") and tokens.before.key == ",":
                 tokens.report("E111", "expected a number after `,`", tokens.now.span, "found `)`")
+                numbers.append(tree.Number(tokens.gap(), "", math.nan))
                 break
             if tokens.done or tokens.sees(";", "END", ")", ","):
                 tokens.lost("expected a number", f"found {shown(tokens.now)}")

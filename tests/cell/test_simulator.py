@@ -1,0 +1,141 @@
+"""The simulated cell does what its file says."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.cell.hardware import DeviceError, Hardware
+from armwright.cell.model import Cell, CellArm
+from armwright.cell.reader import read_cell
+from armwright.cell.simulator import Simulator
+from armwright.errors import ShapeError
+from armwright.motion.quintic import quintic
+
+BENCH = """name = "bench"
+[arms.ARM_1]
+posture = [0, 0, 0.3, 0, 0, 0]
+open_s = 0.2
+grasp_s = 0.5
+[arms.ARM_2]
+posture = [1, 0, 0.3, 0, 0, 0]
+[camera]
+pose = [0,1,0, -1,0,0, 0,0,1, 1,0,0]
+time_s = 0.25
+[visions]
+OBJ = [[1,0,0, 0,1,0, 0,0,1, 0.1,0,0], [1,0,0, 0,1,0, 0,0,1, 0.2,0,0]]
+EMPTY = []
+"""
+DEVICES = "[devices]\nPRESS = {}\nLAMP = {}\n"
+
+
+def bench(tmp_path: Path, text: str = BENCH) -> Cell:
+    (tmp_path / "bench.toml").write_text(text)
+    return read_cell(tmp_path / "bench.toml")
+
+
+def test_camera_answers_one_after_the_other(tmp_path: Path) -> None:
+    """The camera gives its answers in the order of the file, and the last one for ever after."""
+    hardware: Hardware = Simulator(bench(tmp_path))
+
+    places = [hardware.look("OBJ")[0][:3, 3] for _ in range(4)]
+
+    # The camera stands at x = 1 and is turned a quarter to the left: 0.1 m along its x is 0.1 m along y of the world.
+    np.testing.assert_allclose(places, [(1, 0.1, 0), (1, 0.2, 0), (1, 0.2, 0), (1, 0.2, 0)], atol=1e-12)
+    assert hardware.look("OBJ")[1] == 0.25
+
+
+def test_two_simulators_of_one_cell(tmp_path: Path) -> None:
+    """What one simulator has seen and switched does not change what another one finds."""
+    place = bench(tmp_path)
+    first = Simulator(place)
+    first.look("OBJ")
+    first.operate("PRESS", on=True)
+
+    second = Simulator(place)
+
+    assert second.look("OBJ")[0][1, 3] == pytest.approx(0.1)
+    assert second.running() == frozenset()
+
+
+@pytest.mark.parametrize("frame", ["EMPTY", "CUP"])
+def test_camera_that_finds_nothing(frame: str, tmp_path: Path) -> None:
+    """A frame without an answer is not found; the message lists what the camera knows."""
+    with pytest.raises(DeviceError, match=f"the camera found nothing for {frame}; in cell 'bench' it finds EMPTY, OBJ"):
+        Simulator(bench(tmp_path)).look(frame)
+
+
+def test_camera_without_any_answer(tmp_path: Path) -> None:
+    """In a cell that lists no visions the camera finds nothing at all."""
+    text = "[arms.ARM_1]\nposture = [0, 0, 0.3, 0, 0, 0]\n"
+
+    with pytest.raises(DeviceError, match=r"in cell 'bench\.toml' it finds nothing"):
+        Simulator(bench(tmp_path, text)).look("OBJ")
+
+
+def test_any_device_where_none_is_listed(tmp_path: Path) -> None:
+    """A cell that says nothing of devices has whatever a program asks for."""
+    hardware = Simulator(bench(tmp_path))
+
+    assert hardware.operate("TORCH", on=True) == 0
+    assert hardware.operate("PRESS", on=True) == 0
+    assert hardware.running() == {"TORCH", "PRESS"}
+    hardware.operate("TORCH", on=False)
+    hardware.operate("TORCH", on=False)
+    assert hardware.running() == {"PRESS"}
+
+
+def test_only_listed_devices(tmp_path: Path) -> None:
+    """A cell that lists its devices has no others, and names the nearest."""
+    hardware = Simulator(bench(tmp_path, BENCH + DEVICES))
+
+    hardware.operate("LAMP", on=True)
+    with pytest.raises(DeviceError, match=r"cell 'bench' has no device PERSS; did you mean PRESS\?"):
+        hardware.operate("PERSS", on=True)
+    assert hardware.running() == {"LAMP"}
+
+
+def test_no_devices_at_all(tmp_path: Path) -> None:
+    """An empty list of devices is not the same as none: nothing can be switched."""
+    with pytest.raises(DeviceError, match=r"cell 'bench' has no device PRESS$"):
+        Simulator(bench(tmp_path, BENCH + "[devices]\n")).operate("PRESS", on=True)
+
+
+def test_arms_move_alone(tmp_path: Path) -> None:
+    """An arm ends where its trajectory ends, the other stays, and nobody can bend a posture from outside."""
+    hardware = Simulator(bench(tmp_path))
+    goal = [0.5, -0.2, 0.4, 0.1, 0.2, 0.3]
+
+    end = hardware.run("ARM_1", quintic(hardware.posture("ARM_1"), goal, 2.0))
+
+    np.testing.assert_allclose(end, goal, atol=1e-12)
+    np.testing.assert_array_equal(hardware.posture("ARM_1"), end)
+    np.testing.assert_array_equal(hardware.posture("ARM_2"), (1, 0, 0.3, 0, 0, 0))
+    for arm in ("ARM_1", "ARM_2"):
+        with pytest.raises(ValueError, match="read-only"):
+            hardware.posture(arm)[0] = 9
+
+
+def test_a_trajectory_that_begins_elsewhere(tmp_path: Path) -> None:
+    """A trajectory that does not begin where the arm stands is a fault of the program that planned it."""
+    hardware = Simulator(bench(tmp_path))
+    start = np.array((0.1, 0, 0.3, 0, 0, 0))
+
+    with pytest.raises(AssertionError, match=r"ARM_1 stands 0\.1 away from where its trajectory begins"):
+        hardware.run("ARM_1", quintic(start, start, 1.0))
+
+
+def test_fingers_take_their_time(tmp_path: Path) -> None:
+    """Opening and closing take as long as the cell file says, and 0.3 s where it says nothing."""
+    hardware = Simulator(bench(tmp_path))
+
+    assert (hardware.fingers("ARM_1", closed=False), hardware.fingers("ARM_1", closed=True)) == (0.2, 0.5)
+    assert (hardware.fingers("ARM_2", closed=False), hardware.fingers("ARM_2", closed=True)) == (0.3, 0.3)
+
+
+def test_a_start_that_does_not_fit_the_arm(tmp_path: Path) -> None:
+    """Five joint positions for an arm of six joints are refused."""
+    arm = bench(tmp_path).arms["ARM_1"].arm
+
+    with pytest.raises(ShapeError, match=r"start: expected 6 numbers, one per joint, got shape \(5,\)"):
+        CellArm(arm=arm, start=[0, 0, 0.3, 0, 0])

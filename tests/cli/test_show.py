@@ -1,0 +1,195 @@
+"""The commands ``armwright arms`` and ``armwright show``, as a user calls them."""
+
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import arm_names, load_arm
+
+HEADINGS = ("Denavit-Hartenberg", "Limits", "Links", "Drives")
+LIFT = """
+title = "Lift [v2] [/] of 3 kg :smile:"
+source = "[red]a drawing[/blue]"
+[[joint]]
+kind = "prismatic"
+d_m = 0.123456
+theta_deg = 33.3333
+[joint.limits]
+upper_m = 0.5
+[joint.link]
+mass_kg = 3
+[joint.motor]
+coulomb_backward_N = 4
+"""
+
+
+def armwright(*arguments: str | Path, columns: int = 80) -> subprocess.CompletedProcess[str]:
+    """Call the command in a terminal that nobody watches."""
+    return subprocess.run(
+        [sys.executable, "-m", "armwright", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "COLUMNS": str(columns), "NO_COLOR": "1"},
+        timeout=60,
+    )
+
+
+def test_the_catalogue() -> None:
+    """Every arm of the catalogue is listed on a line of its own that fits 80 columns, with its title."""
+    result = armwright("arms")
+
+    head, *lines = result.stdout.splitlines()
+    assert result.returncode == 0
+    assert head.split() == ["name", "joints", "title"]
+    assert tuple(line.split()[0] for line in lines) == arm_names()
+    assert all(load_arm(line.split()[0]).title in line for line in lines)
+    assert max(map(len, lines)) <= 80
+
+
+def test_the_catalogue_for_programs() -> None:
+    """With --json the catalogue is a list of names, numbers of joints, titles and sources."""
+    rows = json.loads(armwright("arms", "--json").stdout)
+
+    assert {row["name"]: row["joints"] for row in rows} == {
+        "ntu-3r": 3,
+        "puma560": 6,
+        "stanford": 6,
+        "stanford-jpl": 6,
+        "ur5": 6,
+    }
+    assert all(row["title"] and row["source"] for row in rows)
+
+
+@pytest.mark.parametrize("name", arm_names())
+def test_tables_fit_the_screen(name: str) -> None:
+    """At 80 columns every table is whole: no number is cut off, no line is longer."""
+    result = armwright("show", name)
+
+    lines = result.stdout.splitlines()
+    assert (result.returncode, result.stderr) == (0, "")
+    assert lines[0].startswith(name)
+    assert "…" not in result.stdout
+    assert max(map(len, lines)) <= 80
+    for heading in HEADINGS:
+        assert sum(line.startswith(heading) for line in lines) == 1
+
+
+def test_numbers_of_the_puma() -> None:
+    """People read degrees and millimetres: the second joint of the PUMA, row for row."""
+    rows = [re.split(r"\s{2,}", line.strip()) for line in armwright("show", "puma560").stdout.splitlines()]
+
+    assert ["2", "revolute", "q2", "0 mm", "432 mm", "0°"] in rows
+    assert ["2", "-125°", "125°", "95°/s", "40°/s²", "186.4 N m"] in rows
+    assert ["2", "17.4", "-364", "6", "227.5"] in rows
+    assert ["2", "0.13", "0.524", "0.539", "0", "0", "0"] in rows
+    assert ["2", "4.71 kg m²", "0 N m s", "5.5 N m", "107.82"] in rows
+
+
+def test_numbers_of_a_slide() -> None:
+    """A slide shows its position under d, and its limits in millimetres and newtons."""
+    rows = [re.split(r"\s{2,}", line.strip()) for line in armwright("show", "stanford").stdout.splitlines()]
+
+    assert ["3", "prismatic", "-90°", "q3", "0 mm", "0°"] in rows
+    assert ["3", "140 mm", "1117.6 mm", "750 mm/s", "3000 mm/s²", "198 N"] in rows
+
+
+@pytest.mark.parametrize("name", arm_names())
+def test_json_is_si(name: str) -> None:
+    """The JSON of an arm has every number of the model, in SI units and radians, and null for what is not limited."""
+    data, arm = json.loads(armwright("show", name, "--json").stdout), load_arm(name)
+
+    assert len(data["joints"]) == len(data["links"]) == len(data["motors"]) == arm.n
+    for row, joint in zip(data["joints"], arm.joints, strict=True):
+        assert [row[key] for key in ("kind", "theta", "d", "a", "alpha")] == [
+            joint.kind,
+            joint.theta,
+            joint.d,
+            joint.a,
+            joint.alpha,
+        ]
+        for key, value in row["limits"].items():
+            limit = getattr(joint.limits, key)
+            assert value == (None if math.isinf(limit) else limit)
+    for row, link, motor in zip(data["links"], arm.links, data["motors"], strict=True):
+        assert row["mass"] == link.mass
+        np.testing.assert_array_equal(row["com"], link.com)
+        np.testing.assert_array_equal(row["inertia"], link.inertia)
+        assert set(motor) == {"inertia", "viscous", "coulomb_forward", "coulomb_backward", "gear_ratio"}
+    for key in ("base", "tool", "gravity"):
+        np.testing.assert_array_equal(data[key], getattr(arm, key))
+    if name == "puma560":
+        assert data["joints"][1]["limits"]["upper"] == pytest.approx(math.radians(125))
+        assert (data["joints"][1]["a"], data["reach"], data["tool_speed"]) == (0.432, 0.878, 0.5)
+
+
+def test_an_arm_file(tmp_path: Path) -> None:
+    """A file of one's own is shown as it is written: brackets and colons of its title mean nothing to the screen."""
+    (tmp_path / "lift.toml").write_text(LIFT)
+
+    result = armwright("show", tmp_path / "lift.toml")
+
+    assert result.returncode == 0, result.stderr
+    assert "lift: Lift [v2] [/] of 3 kg :smile:" in result.stdout
+    assert "[red]a drawing[/blue]" in result.stdout
+    assert "q1 +123.456 mm" in result.stdout
+    assert "+0 / -4 N" in result.stdout
+
+
+def test_a_narrow_screen() -> None:
+    """On 40 columns tables are wider than the screen, but every number is there."""
+    wide, narrow = armwright("show", "ur5").stdout, armwright("show", "ur5", columns=40).stdout
+
+    assert "…" not in narrow
+    assert narrow.split() == wide.split()
+
+
+@pytest.mark.parametrize(
+    ("argument", "message"),
+    [
+        ("pumma560", "no arm 'pumma560'. Did you mean 'puma560'? Known: ntu-3r, puma560, stanford, stanford-jpl, ur5."),
+        ("", "no arm ''. Known: ntu-3r, puma560, stanford, stanford-jpl, ur5."),
+        ("nothing.toml", "nothing.toml: no such file"),
+        ("lfit.toml", "lfit.toml: no such file; did you mean 'lift.toml'?"),
+        ("./", ".: expected a file, got a folder"),
+        ("bad.toml", "bad.toml:2: joint 1, kind: expected one of prismatic, revolute, got the text 'rotary'"),
+        ("lines.toml", r"lines.toml:1: title: expected a text in quotes, got 3"),
+        ("odd.toml", r"odd.toml:2: joint 1, kind: expected one of prismatic, revolute, got the text 'a\nb'"),
+    ],
+)
+def test_mistakes(argument: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mistake of the caller's ends with exit status 1, one line that says what to do, and no traceback."""
+    (tmp_path / "lift.toml").write_text(LIFT)
+    (tmp_path / "bad.toml").write_text('[[joint]]\nkind = "rotary"\n')
+    (tmp_path / "lines.toml").write_text('title = 3\n[[joint]]\nkind = "revolute"\n')
+    (tmp_path / "odd.toml").write_text('[[joint]]\nkind = "a\\nb"\n')
+    monkeypatch.chdir(tmp_path)
+
+    result = armwright("show", argument)
+
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == f"armwright: {message}\n"
+
+
+@pytest.mark.parametrize("command", ["arms", "show"])
+def test_help(command: str) -> None:
+    """The help has an example in it."""
+    result = armwright(command, "--help")
+
+    assert result.returncode == 0
+    assert f"armwright {command}" in result.stdout.partition("Example")[2]
+
+
+def test_show_without_an_arm() -> None:
+    """Leaving out the arm is a mistake in the call: exit status 2."""
+    result = armwright("show")
+
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr

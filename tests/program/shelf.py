@@ -1,0 +1,61 @@
+"""Programs on the shelf: the conformance programs, small ones by feature, and the cells they are meant for."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from armwright.program import Compilation, KnownCell, Source
+from armwright.program import compile as translate
+
+ONE_ARM = KnownCell(
+    arms=frozenset({"ARM_1"}),
+    frames={"STOP": "WORLD", "STATION": "WORLD"},
+    visions=frozenset({"OBJ1", "OBJ2"}),
+)
+# One arm, a camera that finds everything, and no frame with a value.
+BARE = KnownCell(arms=frozenset({"ARM_1"}))
+
+HERE = Path(__file__).parent
+CORPUS = HERE / "corpus"
+REJECTED = sorted((HERE / "rejected").rglob("*.rlo"))
+ACCEPTED = sorted((HERE / "accepted").rglob("*.rlo"))
+
+EXPECTATION = re.compile(r"// expect: ([ELRW]\d{3}) line (\d+)")
+CELL = re.compile(r"// cell: (arms|frames|devices|visions) (.*)")
+STRICT = re.compile(r"// strict$", re.MULTILINE)
+
+
+def expectations(text: str) -> list[tuple[str, int]]:
+    """Return codes and lines that the comments of a program expect."""
+    return sorted((code, int(line)) for code, line in EXPECTATION.findall(text))
+
+
+def cell_of(text: str) -> KnownCell | None:
+    """Return the cell that the comments of a program describe."""
+    told: Mapping[str, list[str]] = {what: re.split(r",\s*", names.strip()) for what, names in CELL.findall(text)}
+    if not told:
+        return None
+    hanging = (name.partition(" on ") for name in told.get("frames", ()))
+    return KnownCell(
+        arms=frozenset(told["arms"]),
+        frames={name: parent or "WORLD" for name, _, parent in hanging},
+        devices=frozenset(told["devices"]) if "devices" in told else None,
+        visions=frozenset(told["visions"]) if "visions" in told else None,
+    )
+
+
+def compile_file(path: Path) -> Compilation:
+    """Translate a program as its comments ask for."""
+    text = path.read_text(encoding="utf-8")
+    return translate(Source(path.name, text), cell_of(text), strict=bool(STRICT.search(text)))
+
+
+def said(compilation: Compilation) -> list[tuple[str, int]]:
+    """Return codes and lines of what was said."""
+    return sorted((one.code, compilation.source.line(one.span.start)) for one in compilation.diagnostics)
+
+
+def compile_program(name: str, cell: KnownCell | None = None, *, strict: bool = False) -> Compilation:
+    """Translate one of the conformance programs."""
+    text = (CORPUS / f"{name}.rlo").read_text(encoding="utf-8")
+    return translate(Source(f"{name}.rlo", text), cell, strict=strict)
