@@ -6,8 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from armwright.arm import load
 from armwright.arm.load import arm_names, load_arm, read_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Limits, Link, Motor
 from armwright.errors import FileFormatError, UnknownNameError
@@ -298,3 +301,29 @@ def test_names_are_sorted() -> None:
     """The catalogue lists its arms in the order of the alphabet, and every one of them can be read."""
     assert list(arm_names()) == sorted(arm_names())
     assert [load_arm(name).name for name in arm_names()] == list(arm_names())
+
+
+CATALOGUE = Path(load.__file__).parent / "catalogue"
+# Slips that leave most of a file as it was, so that all of the reader is reached.
+SLIPS = ("", "0", "-", '"', "[", "]", "x", "nan", "1e300", "true", "joint", "_mm", " = ", "\n", "[[joint]]", "frame")
+
+
+@given(
+    name=st.sampled_from(arm_names()),
+    at=st.floats(0, 1, exclude_max=True),
+    gone=st.integers(0, 8),
+    slip=st.sampled_from(SLIPS),
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_slip(name: str, at: float, gone: int, slip: str, tmp_path: Path) -> None:
+    """Whatever is mistyped in an arm file, it is an arm or refused as a file: nothing else goes wrong."""
+    text = (CATALOGUE / f"{name}.toml").read_text(encoding="utf-8")
+    place = int(at * len(text))
+    (tmp_path / "arm.toml").write_text(text[:place] + slip + text[place + gone :], encoding="utf-8")
+
+    try:
+        arm = read_arm(tmp_path / "arm.toml")
+    except FileFormatError as error:
+        assert "arm.toml:" in str(error)  # noqa: PT017 - either way is right
+    else:
+        assert len(arm.links) == len(arm.motors) == arm.n

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import arm_names, load_arm
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, exact_cosine
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, exact_cosine, exact_sine
 from armwright.errors import InvalidValueError, ShapeError
 from oracles.arms import random_arm
 
@@ -89,7 +89,13 @@ def test_right_angles_are_exact(turns: int) -> None:
     assert exact_cosine(turns * math.pi / 2) == (1, 0, -1, 0)[turns % 4]
     joint = Joint(kind="revolute", alpha=math.radians(90 * turns), theta=math.radians(90 * turns))
     assert {joint.cos_alpha, joint.sin_alpha, joint.cos_theta, joint.sin_theta} <= {0.0, 1.0, -1.0}
-    assert exact_cosine(1e-3) == math.cos(1e-3)
+    assert (exact_cosine(1e-3), exact_sine(1e-3)) == (math.cos(1e-3), math.sin(1e-3))
+
+
+def test_angles_of_many_turns() -> None:
+    """However large an angle is, its sine and cosine belong together."""
+    for angle in (1e6, -1e12, 1e50):
+        assert exact_cosine(angle) ** 2 + exact_sine(angle) ** 2 == pytest.approx(1, rel=1e-15)
 
 
 ONE = [Joint(kind="revolute")]

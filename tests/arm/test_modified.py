@@ -1,8 +1,6 @@
-"""The dynamics of modified Denavit-Hartenberg tables, and the PUMA 560 as it was published in one."""
+"""The kinematics and dynamics of modified Denavit-Hartenberg tables."""
 
 import math
-from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
@@ -10,7 +8,6 @@ import pinocchio as pin
 import pytest
 
 from armwright.arm.dh import from_modified
-from armwright.arm.load import load_arm, read_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward import forward
@@ -71,53 +68,3 @@ def test_right_angles_stay_exact() -> None:
     assert [(joint.a, joint.alpha) for joint in joints] == [(0.2, -math.pi / 2), (0.0, 0.0)]
     # Frame 1 moves by 0.2 along x and turns by -90 degrees about it: what was z is minus y there.
     np.testing.assert_array_equal(links[0].com, (-0.2, -0.3, 0))
-
-
-def published_rows(*, shoulder: float) -> list[tuple[Any, ...]]:
-    """Armstrong, Khatib & Burdick (1986) with the lengths of the catalogue.
-
-    Alpha [deg] and a [m] in front, d [m], mass [kg], centre of mass [m], moments about it [kg m²]. The shoulder offset
-    of 149 mm is split: d2 stands in front of link 2, the rest behind it.
-    """
-    return [
-        (0, 0, 0, 0, (0, 0, 0), (0, 0, 0.35)),
-        (-90, 0, shoulder, 17.40, (0.068, 0.006, -0.016), (0.130, 0.524, 0.539)),
-        (0, 0.432, 0.149 - shoulder, 4.80, (0, -0.070, 0.014), (0.066, 0.0125, 0.086)),
-        (90, -0.02, 0.433, 0.82, (0, 0, -0.019), (1.8e-3, 1.8e-3, 1.3e-3)),
-        (-90, 0, 0, 0.34, (0, 0, 0), (0.3e-3, 0.3e-3, 0.4e-3)),
-        (90, 0, 0, 0.09, (0, 0, 0.032), (0.15e-3, 0.15e-3, 0.04e-3)),
-    ]
-
-
-def published_puma(folder: Path, *, shoulder: float = 0.2435) -> Arm:
-    """The PUMA 560 in the frames in which its masses were published, read from an arm file."""
-    text = 'convention = "modified"\n'
-    for alpha, a, d, mass, com, inertia in published_rows(shoulder=shoulder):
-        text += f'[[joint]]\nkind = "revolute"\nalpha_deg = {alpha}\na_m = {a}\nd_m = {d}\n'
-        text += f"[joint.link]\nmass_kg = {mass}\ncom_m = {list(com)}\ninertia_kgm2 = {list(inertia)}\n"
-    (folder / "published.toml").write_text(text)
-    return read_arm(folder / "published.toml")
-
-
-def test_puma_at_rest(tmp_path: Path, rng: np.random.Generator) -> None:
-    """The catalogue's PUMA, written in standard frames by hand, weighs on its joints as the published one does."""
-    published, catalogue = published_puma(tmp_path), load_arm("puma560")
-    q = rng.uniform(-2, 2, size=(50, 6))
-
-    holding = inverse_dynamics(published, q, 0 * q, 0 * q, drives=False)
-
-    assert np.abs(holding[:, 1]).max() > 40  # N m: the shoulder carries the arm
-    np.testing.assert_allclose(forward(catalogue, q), forward(published, q), atol=ROUNDING)
-    np.testing.assert_allclose(inverse_dynamics(catalogue, q, 0 * q, 0 * q, drives=False), holding, atol=AGREEMENT * 40)
-
-
-def test_puma_in_motion(tmp_path: Path, rng: np.random.Generator) -> None:
-    """In motion, too, it takes the efforts of the published one; with the mass of link 2 elsewhere it would not."""
-    q, qd, qdd = rng.uniform(-2, 2, size=(3, 50, 6))
-
-    tau = inverse_dynamics(load_arm("puma560"), q, qd, qdd, drives=False)
-
-    expected = inverse_dynamics(published_puma(tmp_path), q, qd, qdd, drives=False)
-    np.testing.assert_allclose(tau, expected, atol=AGREEMENT * np.abs(expected).max())
-    other = inverse_dynamics(published_puma(tmp_path, shoulder=0.149), q, qd, qdd, drives=False)
-    assert np.abs(tau - other).max() > 1

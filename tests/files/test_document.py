@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from armwright.errors import FileFormatError
 from armwright.files.document import Document, Table, read_text
@@ -305,3 +307,27 @@ def test_folder_for_a_file(tmp_path: Path) -> None:
     assert refused(tmp_path, lambda: Document.read(tmp_path / "cells")) == "cells: expected a file, got a folder"
     said = refused(tmp_path, lambda: Document.read(tmp_path / "a.toml" / "b.toml"))
     assert said == "a.toml/b.toml: cannot be read: Not a directory"
+
+
+# Pieces of TOML and JSON in any order: mostly nonsense, now and then a file.
+PIECES = st.sampled_from(
+    [*"{}[]\"'=:,.#\n\r\t\\aé1", "[[", "]]", '"""', "'''", "\\u00e9", '"b"', "-0x1f", "1e5", "nan", "true", "null"]
+)
+
+
+@given(pieces=st.lists(PIECES | st.text(max_size=3), max_size=12), ending=st.sampled_from(("json", "toml", "cell")))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_text(pieces: list[str], ending: str, tmp_path: Path) -> None:
+    """Whatever is in a file, it is read or refused as a file: nothing else goes wrong."""
+    path = tmp_path / f"any.{ending}"
+    path.write_text("".join(pieces), encoding="utf-8", newline="")
+
+    try:
+        root = Document.read(path).root
+    except FileFormatError as error:
+        said = str(error)
+    else:
+        keys = list(root.free_keys())
+        said = refused(tmp_path, root.finish) if keys else f"{path}"
+
+    assert said.startswith((str(path), path.name))

@@ -8,20 +8,19 @@ Taken apart behind Tz(d_i) instead of in front of Rx, the same product is a stan
 length become part of the base, and each row takes over those of the next. Link frames move with it.
 """
 
-import math
 from collections.abc import Sequence
 
 import attrs
 import numpy as np
 
-from armwright.arm.model import Joint, Link, exact_cosine
+from armwright.arm.model import Joint, Link, exact_cosine, exact_sine
 from armwright.arrays import Array
 from armwright.spatial.poses import inverse, pose
 
 
 def turn(axis: int, angle: float) -> Array:
     """Return the turn (3, 3) about x, y or z by an angle [rad]; right angles are exact."""
-    c, s = exact_cosine(angle), exact_cosine(angle - math.pi / 2)
+    c, s = exact_cosine(angle), exact_sine(angle)
     j, k = (axis + 1) % 3, (axis + 2) % 3
     R = np.eye(3)
     R[j, j], R[j, k], R[k, j], R[k, k] = c, 0.0 - s, s, c

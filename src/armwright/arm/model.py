@@ -42,7 +42,15 @@ def exact_cosine(angle: float) -> float:
 
     Twist angles of real arms are right angles; the zeros they leave are structure, not rounding.
     """
-    value = math.cos(angle)
+    return _exact(math.cos(angle))
+
+
+def exact_sine(angle: float) -> float:
+    """Return sin(angle), exactly 0 or ±1 at the multiples of a right angle."""
+    return _exact(math.sin(angle))
+
+
+def _exact(value: float) -> float:
     return round(value) + 0.0 if abs(value - round(value)) < 1e-15 else value
 
 
@@ -114,7 +122,7 @@ class Joint:
     @property
     def sin_theta(self) -> float:
         """Sine of the fixed part of the angle, exact at right angles."""
-        return exact_cosine(self.theta - math.pi / 2)
+        return exact_sine(self.theta)
 
     @property
     def cos_alpha(self) -> float:
@@ -124,7 +132,7 @@ class Joint:
     @property
     def sin_alpha(self) -> float:
         """Sine of the twist, exact at right angles."""
-        return exact_cosine(self.alpha - math.pi / 2)
+        return exact_sine(self.alpha)
 
 
 @attrs.frozen(kw_only=True)

@@ -8,7 +8,7 @@ import typer
 def arms(as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False) -> None:
     """List the arms of the catalogue.
 
-    [b]Example[/b]:  armwright arms
+    **Example:** `armwright arms`
     """
     import json
 

@@ -41,9 +41,7 @@ def check(
     """
     import json
 
-    from armwright.cell.reader import read_cell
-
-    compiled = compile_file(program, read_cell(cell) if cell else None, strict=strict)
+    compiled = compile_file(program, _cell(cell), strict=strict)
     if as_json:
         print(json.dumps(_as_data(compiled, emit), indent=2, ensure_ascii=False))
     else:
@@ -53,6 +51,14 @@ def check(
             print_diagnostics(compiled.diagnostics, compiled.source, to_errors=emit is not None)
     if compiled.code is None:
         raise typer.Exit(1)
+
+
+def _cell(path: Path | None) -> "Cell | None":
+    if path is None:
+        return None
+    from armwright.cell.reader import read_cell
+
+    return read_cell(path)
 
 
 def compile_file(path: Path, cell: "Cell | None" = None, *, strict: bool = False) -> "Compilation":
