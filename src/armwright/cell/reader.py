@@ -16,7 +16,7 @@ from armwright.cell.model import Cell, CellArm
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
 from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.shoulder import shoulder_of
 from armwright.kinematics.inverse.solution import violations
 from armwright.spatial.poses import from_noap, pose
 from armwright.spatial.poses import inverse as inverse_pose
