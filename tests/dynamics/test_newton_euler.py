@@ -4,8 +4,8 @@ import attrs
 import numpy as np
 import pinocchio as pin
 import pytest
-from armwright.arm.load import arm_names, load_arm
 
+from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import ShapeError
