@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell, base_name
@@ -239,9 +241,9 @@ FAULTS = {
     ),
     "missing arm file": ('[arms.ARM_1]\nmodel = "no/arm.toml"\n', 2, r"no/arm.toml: no such file"),
     "model without an inverse": (
-        '[arms.ARM_1]\nmodel = "ur5"\n',
+        '[arms.ARM_1]\nmodel = "ntu-3r"\n',
         2,
-        "arms, ARM_1, model: 'ur5' has no closed-form inverse kinematics yet; use puma560, stanford",
+        "arms, ARM_1, model: 'ntu-3r' has no closed-form inverse kinematics yet; use puma560, stanford",
     ),
     "no start": ("[arms.ARM_1]\n", 1, "arms, ARM_1, hand: missing; give the pose of the hand at the start, or the jo"),
     "two starts": (ARM + "posture = [0,0,0.3,0,0,0]\n", 3, "hand: the start is given twice, as hand and as posture"),
@@ -388,3 +390,23 @@ def test_mistake_in_the_file_of_an_arm(tmp_path: Path) -> None:
 
     with pytest.raises(FileFormatError, match=r"cell.toml:2: arms, ARM_1, model: .*arm.toml:2: joint 1, kind: expect"):
         cell(tmp_path, '[arms.ARM_1]\nmodel = "arm.toml"\n')
+
+
+# Slips that leave most of a file as it was, so that all of the reader is reached.
+SLIPS = ("", "0", "-", '"', "[", "]", "x", "nan", "1e99", "-1e300", "true", "{}", "'WORLD'", " = ", "\n", "5")
+WHOLE = (EXAMPLES / "puma_cell.toml").read_text(encoding="utf-8")
+
+
+@given(at=st.floats(0, 1, exclude_max=True), gone=st.integers(0, 8), slip=st.sampled_from(SLIPS))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+def test_any_slip(at: float, gone: int, slip: str, tmp_path: Path) -> None:
+    """Whatever is mistyped in a cell file, it is a cell or refused as a file: nothing else goes wrong."""
+    place = int(at * len(WHOLE))
+    said = f"{tmp_path / 'cell.toml'}:"
+    try:
+        assert set(cell(tmp_path, WHOLE[:place] + slip + WHOLE[place + gone :]).arms)
+    except FileFormatError as error:
+        said = str(error)
+
+    assert said.startswith(f"{tmp_path / 'cell.toml'}:")
+    assert "\n" not in said

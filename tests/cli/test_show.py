@@ -184,7 +184,7 @@ def test_help(command: str) -> None:
     result = armwright(command, "--help")
 
     assert result.returncode == 0
-    assert f"armwright {command}" in result.stdout.partition("Example")[2]
+    assert re.search(rf"^ Example: armwright {command}", result.stdout, re.MULTILINE)
 
 
 def test_show_without_an_arm() -> None:

@@ -8,8 +8,12 @@ import typer
 
 from armwright.cli.arms import arms
 from armwright.cli.check import check
+from armwright.cli.forward import forward, jacobian
+from armwright.cli.inverse import inverse
+from armwright.cli.kernel import kernel
 from armwright.cli.run import run
 from armwright.cli.show import show
+from armwright.cli.torque import torque
 from armwright.errors import ArmwrightError
 from armwright.version import __version__
 
@@ -25,6 +29,11 @@ app.command()(run)
 app.command()(check)
 app.command()(arms)
 app.command()(show)
+app.command()(forward)
+app.command()(inverse)
+app.command()(jacobian)
+app.command()(torque)
+app.command()(kernel)
 
 
 def _version(wanted: bool) -> None:

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from armwright.arm.model import Arm, Joint, Motor
-from armwright.arrays import Array, ArrayLike, joint_array, of_shape
-from armwright.errors import ShapeError
-from armwright.kinematics.forward import link_frames, link_transform, per_joint, stack
+from armwright.arrays import Array, ArrayLike, exactly
+from armwright.dynamics.arguments import NO_WRENCH, batch
+from armwright.kinematics.forward import link_frames, link_transform, stack
 from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
 
-_NO_WRENCH = (0.0,) * 6
+_STILL = (0.0, 0.0, 0.0)
 
 
 def newton_euler(
@@ -19,7 +17,9 @@ def newton_euler(
     q: Sequence[Scalar],
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
-    wrench: Sequence[Scalar] = _NO_WRENCH,
+    wrench: Sequence[Scalar] = NO_WRENCH,
+    *,
+    base_acceleration: Sequence[Scalar] = _STILL,
 ) -> list[Scalar]:
     """Return the efforts that the links alone ask of the joints, over abstract scalars.
 
@@ -33,13 +33,14 @@ def newton_euler(
         qd: n joint speeds.
         qdd: n joint accelerations.
         wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
+        base_acceleration: of the base, along its own axes; the base does not turn. A base that falls freely, with
+            the acceleration ``arm.gravity``, leaves an arm without weight.
 
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25). The report prints the base acceleration with
         gravity pointing up; here gravity is a vector of the arm.
     """
-    R_base = arm.base[:3, :3]
-    v_dot: Vector = (-R_base.T @ arm.gravity).tolist()
+    v_dot = felt_acceleration(arm, base_acceleration)
     w: Vector = [0.0, 0.0, 0.0]
     w_dot: Vector = [0.0, 0.0, 0.0]
     turns: list[Matrix] = []
@@ -47,9 +48,9 @@ def newton_euler(
     forces: list[Vector] = []
     moments: list[Vector] = []
     for joint, link, position, speed, acceleration in zip(arm.joints, arm.links, q, qd, qdd, strict=True):
-        R, p = link_transform(joint, position)
+        R, _ = link_transform(joint, position)
         Rt = transpose(R)
-        lever = apply(Rt, p)  # from the origin of frame i-1 to that of frame i, seen from frame i
+        lever = lever_of(joint, position)
         w, w_dot, v_dot = _next_link(joint, Rt, lever, (w, w_dot, v_dot), (speed, acceleration))
         com, inertia = link.com.tolist(), link.inertia.tolist()
         com_acceleration = add(v_dot, cross(w_dot, com), cross(w, cross(w, com)))
@@ -59,7 +60,7 @@ def newton_euler(
         forces.append(force)
         spin = add(apply(inertia, w_dot), cross(w, apply(inertia, w)))
         moments.append(add(spin, cross(add(lever, com), force)))
-    f, n = _reaction_at_hand(arm, q, wrench)
+    f, n = reaction_at_hand(arm, q, wrench)
     efforts: list[Scalar] = []
     for i in reversed(range(arm.n)):
         # f and n act from link i on what comes after it, at the origin of frame i, seen from frame i.
@@ -69,6 +70,20 @@ def newton_euler(
         efforts.append(dot(n if arm.joints[i].revolute else f, axis))
         f, n = apply(turns[i], f), apply(turns[i], n)
     return efforts[::-1]
+
+
+def felt_acceleration(arm: Arm, base_acceleration: Sequence[Scalar] = _STILL) -> Vector:
+    """Return the acceleration of frame 0 in its own axes, with gravity as an acceleration the other way."""
+    return apply(arm.base[:3, :3].T.tolist(), subtract(base_acceleration, arm.gravity.tolist()))
+
+
+def lever_of(joint: Joint, q: Scalar) -> Vector:
+    """Return the vector from the origin of frame i-1 to that of frame i, seen from frame i.
+
+    It is Rᵀp of the link transform, in which the angle about z cancels.
+    """
+    d = joint.d if joint.revolute else joint.d + q
+    return [joint.a, joint.sin_alpha * d, joint.cos_alpha * d]
 
 
 def _next_link(
@@ -90,9 +105,15 @@ def _next_link(
     return w, w_dot, v_dot
 
 
-def _reaction_at_hand(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) -> tuple[Vector, Vector]:
-    """Return force and moment that the last link must give to the surroundings, at its origin, in its frame."""
-    if wrench is _NO_WRENCH:
+def reaction_at_hand(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) -> tuple[Vector, Vector]:
+    """Return force and moment that the last link must give to the surroundings, at its origin, in its frame.
+
+    Args:
+        arm: the arm, with n joints.
+        q: n joint positions.
+        wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
+    """
+    if wrench is NO_WRENCH:
         return [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     R, _ = link_frames(arm, q)[-1]
     Rt = transpose(R)
@@ -104,8 +125,12 @@ def _reaction_at_hand(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) -
 
 def drive_effort(motor: Motor, qd: Scalar, qdd: Scalar) -> Scalar:
     """Return what the drive itself takes: rotor inertia, viscous and dry friction, over abstract scalars."""
-    dry = select(qd > 0, motor.coulomb_forward, select(qd < 0, -motor.coulomb_backward, 0.0))
-    return motor.inertia * qdd + motor.viscous * qd + dry
+    return motor.inertia * qdd + motor.viscous * qd + dry_friction(motor, qd)
+
+
+def dry_friction(motor: Motor, qd: Scalar) -> Scalar:
+    """Return what Coulomb friction takes of a moving joint, 0 of one at rest, over abstract scalars."""
+    return select(qd > 0, motor.coulomb_forward, select(qd < 0, -motor.coulomb_backward, 0.0))
 
 
 def inverse_dynamics(
@@ -115,6 +140,7 @@ def inverse_dynamics(
     qdd: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
+    base_acceleration: ArrayLike = _STILL,
     drives: bool = True,
 ) -> Array:
     """Return the joint efforts of a motion.
@@ -126,6 +152,7 @@ def inverse_dynamics(
         qdd: (..., n) joint accelerations.
         wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
             base axes; none when left out.
+        base_acceleration: (3,) acceleration of the base along its own axes [m/s²], as on a vehicle.
         drives: whether rotor inertia and friction of the drives count.
 
     Returns:
@@ -137,16 +164,9 @@ def inverse_dynamics(
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25).
     """
-    arrays = [joint_array(value, arm.n, name) for value, name in ((q, "q"), (qd, "qd"), (qdd, "qdd"))]
-    outside = None if wrench is None else of_shape(wrench, (6,), "wrench")
-    try:
-        lead = np.broadcast_shapes(*(a.shape[:-1] for a in arrays), () if outside is None else outside.shape[:-1])
-    except ValueError as error:
-        shapes = ", ".join(str(a.shape) for a in arrays)
-        raise ShapeError(f"q, qd, qdd: leading axes must fit together, got {shapes}") from error
-    q_, qd_, qdd_ = (per_joint(np.broadcast_to(a, (*lead, arm.n))) for a in arrays)
-    push = _NO_WRENCH if outside is None else per_joint(np.broadcast_to(outside, (*lead, 6)))
-    efforts = newton_euler(arm, q_, qd_, qdd_, push)
+    lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
+    moved = exactly(base_acceleration, (3,), "base_acceleration").tolist()
+    efforts = newton_euler(arm, q_, qd_, qdd_, push, base_acceleration=moved)
     if drives:
         efforts = [
             effort + drive_effort(motor, speed, acceleration)

@@ -53,3 +53,10 @@ def product(A: Sequence[Sequence[Scalar]], B: Sequence[Sequence[Scalar]]) -> Mat
     """Return A B."""
     columns = transpose(B)
     return [[dot(row, column) for column in columns] for row in A]
+
+
+def congruence(R: Sequence[Sequence[Scalar]], S: Sequence[Sequence[Scalar]]) -> Matrix:
+    """Return R S Rᵀ of a symmetric S: its upper half, and that half mirrored."""
+    half = product(R, S)
+    upper = [[dot(half[i], R[j]) if j >= i else 0.0 for j in range(len(R))] for i in range(len(R))]
+    return [[upper[min(i, j)][max(i, j)] for j in range(len(R))] for i in range(len(R))]

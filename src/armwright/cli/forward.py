@@ -1,0 +1,80 @@
+"""``armwright forward`` and ``armwright jacobian``: where the hand is, and how it moves."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
+    from armwright.arrays import Array
+
+ArmName = Annotated[str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)]
+Posture = Annotated[
+    str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
+]
+Rows = Annotated[
+    Path | None, typer.Option("--csv", help="Rows of q1 ... qn in SI units, such as motion.csv.", show_default=False)
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
+
+
+def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Json = False) -> None:
+    """Print the tool pose for joint positions.
+
+    **Example:** `armwright forward puma560 -q 10,20,30,40,50,60`
+    """
+    import json
+
+    from armwright.arm.load import load_arm
+    from armwright.kinematics.forward import forward as tool_pose
+    from armwright.spatial.poses import to_noap
+
+    model = load_arm(arm)
+    for q in postures(model, posture, csv):
+        X = tool_pose(model, q)
+        if as_json:
+            print(json.dumps({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()}))
+            continue
+        for row in X[:3]:
+            print("  ".join(f"{x + 0.0:10.6f}" for x in row[:3]), f"  {row[3] * 1e3 + 0.0:12.3f} mm")
+
+
+def jacobian(
+    arm: ArmName,
+    posture: Posture = None,
+    csv: Rows = None,
+    frame: Annotated[str, typer.Option(help="Whose axes: base or tool.")] = "base",
+    as_json: Json = False,
+) -> None:
+    """Print the Jacobian of the tool point: three linear rows, then three angular, in SI units and radians.
+
+    **Example:** `armwright jacobian stanford -q 0,90,500,0,45,0 --frame tool`
+    """
+    import json
+
+    from armwright.arm.load import load_arm
+    from armwright.kinematics.jacobian import jacobian as tool_jacobian
+
+    model = load_arm(arm)
+    if frame not in ("base", "tool"):
+        raise typer.BadParameter(f"expected base or tool, got {frame}", param_hint="--frame")
+    for q in postures(model, posture, csv):
+        J = tool_jacobian(model, q, "tool" if frame == "tool" else "base")
+        if as_json:
+            print(json.dumps({"q": q.tolist(), "frame": frame, "jacobian": J.tolist()}))
+            continue
+        for name, row in zip(("vx", "vy", "vz", "wx", "wy", "wz"), J, strict=True):
+            print(name, "  ".join(f"{x + 0.0:10.6f}" for x in row))
+
+
+def postures(model: "Arm", posture: str | None, csv: Path | None) -> "list[Array]":
+    """Return the joint positions asked for: from the option, or one per row of a file."""
+    from armwright.cli.joints import joint_values, rows
+
+    if (posture is None) == (csv is None):
+        raise typer.BadParameter("give the joint positions, either here or as --csv FILE", param_hint="-q")
+    if csv is not None:
+        return list(rows(model, csv, ("q",))[0])
+    assert posture is not None  # noqa: S101 - one of the two is given
+    return [joint_values(model, posture, "-q")]

@@ -1,0 +1,86 @@
+"""``armwright inverse``: every posture that puts the hand at a pose."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armwright.cli.forward import ArmName, Json
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
+    from armwright.arrays import Array
+
+
+def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
+    arm: ArmName,
+    xyz: Annotated[str | None, typer.Option(help="Place of the tool in mm: 400,100,200.", show_default=False)] = None,
+    rpy: Annotated[str, typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees.")] = "0,0,0",
+    noap: Annotated[
+        str | None, typer.Option(help="The pose as twelve numbers, columns n, o, a, p in m.", show_default=False)
+    ] = None,
+    near: Annotated[
+        str | None, typer.Option(help="Present joint positions in degrees and mm; nearest first.", show_default=False)
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Print every posture that puts the tool at a pose, judged: inside the limits, out of them, out of reach, singular.
+
+    Exit status 1 when no posture is inside the limits.
+
+    **Example:** `armwright inverse puma560 --xyz 500,100,300 --rpy 0,90,0`
+    """
+    import json
+
+    from armwright.arm.load import load_arm
+    from armwright.cli.joints import joint_values
+    from armwright.kinematics.inverse.closed_form import inverse as postures
+
+    model = load_arm(arm)
+    X = _pose(xyz, rpy, noap)
+    solution = postures(model, X, None if near is None else joint_values(model, near, "--near"))
+    if as_json:
+        branches = [
+            {
+                "q": branch.q.tolist(),
+                "label": branch.label,
+                "allowed": branch.allowed,
+                "violations": [str(violation) for violation in branch.violations],
+                "free": list(branch.free),
+                "position_error": branch.position_error,
+                "rotation_error": branch.rotation_error,
+            }
+            for branch in solution
+        ]
+        print(json.dumps({"answer": solution.answer, "distance": solution.distance, "branches": branches}, indent=2))
+    else:
+        _print(model, solution)
+    if not solution.allowed:
+        raise typer.Exit(1)
+
+
+def _pose(xyz: str | None, rpy: str, noap: str | None) -> "Array":
+    import numpy as np
+
+    from armwright.cli.joints import numbers
+    from armwright.spatial.poses import from_noap, pose
+    from armwright.spatial.rotations import rotation_from_vector
+
+    if (xyz is None) == (noap is None):
+        raise typer.BadParameter("give the pose, either as --xyz and --rpy or as --noap", param_hint="--xyz")
+    if noap is not None:
+        return from_noap(numbers(noap, 12, "--noap"))
+    assert xyz is not None  # noqa: S101 - one of the two is given
+    roll, pitch, yaw = np.radians(numbers(rpy, 3, "--rpy"))
+    turns = [rotation_from_vector(np.array(w)) for w in ((0, 0, yaw), (0, pitch, 0), (roll, 0, 0))]
+    return pose(turns[0] @ turns[1] @ turns[2], np.array(numbers(xyz, 3, "--xyz")) * 1e-3)
+
+
+def _print(model: "Arm", solution) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
+    from armwright.cli.joints import units
+
+    print(f"{solution.answer}" + ("" if solution.allowed else f": {solution.explain()}"))
+    for branch in solution:
+        values = "  ".join(f"{x:9.3f}" for x in branch.q / units(model))
+        remarks = [f"joints {', '.join(map(str, branch.free))} free together"] if branch.free else []
+        remarks += [str(violation) for violation in branch.violations]
+        print(f"{values}   {branch.label}" + "".join(f"\n    {remark}" for remark in remarks))

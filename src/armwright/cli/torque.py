@@ -1,0 +1,82 @@
+"""``armwright torque``: what a motion takes, and why."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armwright.cli.forward import ArmName, Json
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
+    from armwright.arrays import Array
+    from armwright.dynamics.terms import Terms
+
+
+def torque(  # noqa: PLR0917 - Typer reads one parameter per option
+    arm: ArmName,
+    q: Annotated[
+        str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
+    ] = None,
+    qd: Annotated[str | None, typer.Option(help="Joint speeds in degrees/s and mm/s; 0 when left out.")] = None,
+    qdd: Annotated[str | None, typer.Option(help="Joint accelerations in degrees/s² and mm/s²; likewise.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option("--csv", help="Rows of q, qd and qdd in SI units, such as motion.csv.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Print the efforts of a motion, in all and by cause, as the report's main program did.
+
+    Torques in N m, forces of slides in N, positive in the direction of the joint.
+
+    **Example:** `armwright torque stanford-jpl -q 0,90,500,0,45,0 --qdd 60,0,0,0,0,0`
+    """
+    import json
+
+    from armwright.arm.load import load_arm
+    from armwright.dynamics.terms import terms
+
+    model = load_arm(arm)
+    motion = _motion(model, q, qd, qdd, csv)
+    for row in range(len(motion[0])):
+        found = terms(model, *(values[row] for values in motion))
+        if as_json:
+            print(json.dumps({"total": found.total.tolist(), **_causes(found)}))
+        else:
+            _print(model, found)
+
+
+def _motion(model: "Arm", q: str | None, qd: str | None, qdd: str | None, csv: Path | None) -> "list[Array]":
+    from armwright.cli.joints import joint_values, rows
+
+    if (q is None) == (csv is None):
+        raise typer.BadParameter("give the motion, either as -q, --qd and --qdd or as --csv FILE", param_hint="-q")
+    if csv is not None:
+        return rows(model, csv, ("q", "qd", "qdd"))
+    still = ",".join(["0"] * model.n)
+    texts = (("-q", q or still), ("--qd", qd or still), ("--qdd", qdd or still))
+    return [joint_values(model, text, option)[None] for option, text in texts]
+
+
+def _causes(found: "Terms") -> dict[str, list[float]]:
+    """Return the terms joint by joint, sums over the other joints taken."""
+    causes = {
+        "own inertia": found.own,
+        "coupling": found.coupling.sum(axis=-1),
+        "motor inertia": found.motor,
+        "centrifugal": found.centrifugal.sum(axis=-1),
+        "Coriolis": found.coriolis.sum(axis=(-2, -1)),
+        "gravity": found.gravity,
+        "viscous friction": found.viscous,
+        "dry friction": found.dry,
+    }
+    return {name: values.tolist() for name, values in causes.items()}
+
+
+def _print(model: "Arm", found: "Terms") -> None:
+    names = [f"joint {i + 1}, {'N m' if joint.revolute else 'N'}" for i, joint in enumerate(model.joints)]
+    width = max(map(len, names)) + 2
+    print(f"{'':<18}" + "".join(f"{name:>{width}}" for name in names))
+    for cause, values in _causes(found).items():
+        print(f"{cause:<18}" + "".join(f"{value + 0.0:>{width}.4f}" for value in values))
+    print(f"{'total':<18}" + "".join(f"{value:>{width}.4f}" for value in found.total))

@@ -1,0 +1,58 @@
+"""What the functions of this folder take: joint arrays with leading axes that fit together."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, joint_array, of_shape
+from armwright.errors import ShapeError
+from armwright.kinematics.forward import per_joint, stack
+from armwright.tracing.scalar import Scalar
+
+NO_WRENCH = (0.0,) * 6
+
+
+class Batch(NamedTuple):
+    """Arguments taken apart: of each one scalar per joint, and the leading axes that all of them share."""
+
+    lead: tuple[int, ...]
+    scalars: list[list[Scalar]]
+    wrench: Sequence[Scalar]
+
+
+def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> Batch:
+    """Check joint arrays and take them apart into scalars.
+
+    Args:
+        arm: the arm, with n joints.
+        wrench: (..., 6) on the tool, or None.
+        arrays: (..., n) each, by the name that a message calls it.
+
+    Returns:
+        The scalars, in the order of the arguments.
+
+    Raises:
+        ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+    """
+    checked = [joint_array(value, arm.n, name) for name, value in arrays.items()]
+    outside = None if wrench is None else of_shape(wrench, (6,), "wrench")
+    everything = [*checked, *([] if outside is None else [outside])]
+    try:
+        lead = np.broadcast_shapes(*(array.shape[:-1] for array in everything))
+    except ValueError as error:
+        names = ", ".join([*arrays, *([] if outside is None else ["wrench"])])
+        shapes = ", ".join(str(array.shape) for array in everything)
+        raise ShapeError(f"{names}: leading axes must fit together, got {shapes}") from error
+    return Batch(
+        lead=lead,
+        scalars=[per_joint(np.broadcast_to(array, (*lead, arm.n))) for array in checked],
+        wrench=NO_WRENCH if outside is None else per_joint(np.broadcast_to(outside, (*lead, 6))),
+    )
+
+
+def stack_matrix(rows: Sequence[Sequence[Scalar]], lead: tuple[int, ...]) -> Array:
+    """Put a matrix of scalars back together to (..., rows, columns)."""
+    flat = stack([x for row in rows for x in row], lead)
+    return flat.reshape(*lead, len(rows), len(rows[0]))

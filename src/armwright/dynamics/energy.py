@@ -1,0 +1,93 @@
+"""Energy of a moving arm."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike
+from armwright.dynamics.arguments import batch
+from armwright.dynamics.newton_euler import lever_of
+from armwright.kinematics.forward import link_frames, link_transform
+from armwright.tracing.scalar import Scalar
+from armwright.tracing.vectors import Vector, add, apply, cross, dot, transpose
+
+
+def motion_energy(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Scalar:
+    """Return the kinetic energy of the links alone, link by link, over abstract scalars.
+
+    Source:
+        König's theorem: that of the mass at its centre, and that of the turning about it.
+    """
+    w: Vector = [0.0, 0.0, 0.0]
+    v: Vector = [0.0, 0.0, 0.0]
+    energy: Scalar = 0.0
+    for joint, link, position, speed in zip(arm.joints, arm.links, q, qd, strict=True):
+        Rt = transpose(link_transform(joint, position)[0])
+        rate = [0.0, 0.0, speed]
+        if joint.revolute:
+            w, v = apply(Rt, add(w, rate)), apply(Rt, v)
+        else:
+            w, v = apply(Rt, w), apply(Rt, add(v, rate))
+        v = add(v, cross(w, lever_of(joint, position)))
+        v_com = add(v, cross(w, link.com.tolist()))
+        energy = energy + 0.5 * (link.mass * dot(v_com, v_com) + dot(w, apply(link.inertia.tolist(), w)))
+    return energy
+
+
+def height_energy(arm: Arm, q: Sequence[Scalar]) -> Scalar:
+    """Return the potential energy of the links, over abstract scalars; that of a mass at the base origin is 0.
+
+    Source:
+        TR-83-008 eq. (10).
+    """
+    energy: Scalar = 0.0
+    for (R, p), link in zip(link_frames(arm, q)[1:], arm.links, strict=True):
+        energy = energy - link.mass * dot(arm.gravity.tolist(), add(p, apply(R, link.com.tolist())))
+    return energy
+
+
+def kinetic_energy(arm: Arm, q: ArrayLike, qd: ArrayLike, *, drives: bool = True) -> Array:
+    """Return the kinetic energy.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint speeds.
+        drives: whether the rotors count.
+
+    Returns:
+        (...) energy [J].
+
+    Raises:
+        ShapeError: a last axis is not n long, or the leading axes do not fit together.
+
+    Source:
+        TR-83-008 eq. (8).
+    """
+    lead, (q_, qd_), _ = batch(arm, q=q, qd=qd)
+    energy = motion_energy(arm, q_, qd_)
+    if drives:
+        for motor, speed in zip(arm.motors, qd_, strict=True):
+            energy = energy + 0.5 * motor.inertia * speed * speed
+    return np.array(np.broadcast_to(energy, lead), dtype=np.float64)
+
+
+def potential_energy(arm: Arm, q: ArrayLike) -> Array:
+    """Return the potential energy in the field of gravity; that of a mass at the base origin is 0.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+
+    Returns:
+        (...) energy [J].
+
+    Raises:
+        ShapeError: the last axis of ``q`` is not n long.
+
+    Source:
+        TR-83-008 eq. (10).
+    """
+    lead, (q_,), _ = batch(arm, q=q)
+    return np.array(np.broadcast_to(height_energy(arm, q_), lead), dtype=np.float64)

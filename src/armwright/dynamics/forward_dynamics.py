@@ -1,0 +1,163 @@
+"""Forward dynamics: the joint accelerations that efforts give, by two ways that share nothing but the links."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm, Motor
+from armwright.arrays import Array, ArrayLike
+from armwright.dynamics.arguments import batch, stack_matrix
+from armwright.dynamics.articulated_body import Pivot, articulated_body
+from armwright.dynamics.newton_euler import dry_friction, newton_euler
+from armwright.errors import UnsupportedArmError
+from armwright.kinematics.forward import stack
+from armwright.tracing.scalar import Scalar
+
+# An inertia this small beside its likes is what rounding has left of zero.
+_NOTHING = 1e-12
+
+
+def forward_dynamics(
+    arm: Arm,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    drives: bool = True,
+) -> Array:
+    """Return the joint accelerations that efforts give, by the articulated-body algorithm.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint speeds.
+        tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
+        wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
+            base axes; none when left out.
+        drives: whether rotor inertia and friction of the drives count. Dry friction of a joint at rest does not:
+            whether it holds depends on all other joints; ``simulate`` finds out.
+
+    Returns:
+        qdd: (..., n) joint accelerations.
+
+    Raises:
+        ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        UnsupportedArmError: some joint moves nothing that resists an acceleration.
+
+    Source:
+        Featherstone (2008), section 7.3.
+    """
+    lead, (q_, qd_, tau_), push = batch(arm, wrench=wrench, q=q, qd=qd, tau=tau)
+    model = arm if drives else _without_drives(arm)
+    driving = _less_friction(model, qd_, tau_)
+    if not lead:
+        # A division by zero must give no error here but an acceleration that the pivots give away.
+        q_, qd_, driving = ([np.array(x) for x in scalars] for scalars in (q_, qd_, driving))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        accelerations, pivots = articulated_body(model, q_, qd_, driving, push)
+    check_pivots(model, pivots)
+    return stack(accelerations, lead)
+
+
+def toacc(
+    arm: Arm,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    drives: bool = True,
+) -> Array:
+    """Return the joint accelerations that efforts give, by n + 1 calls of Newton-Euler and a system of equations.
+
+    A unit acceleration of each joint in turn gives the columns of the mass matrix; a call without accelerations
+    gives what speeds and gravity take of the efforts.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint speeds.
+        tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
+        wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
+            base axes; none when left out.
+        drives: as in ``forward_dynamics``.
+
+    Returns:
+        qdd: (..., n) joint accelerations.
+
+    Raises:
+        ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        UnsupportedArmError: some joint moves nothing that resists an acceleration.
+
+    Source:
+        TR-83-008, appendix V, subroutine TOACC; Walker & Orin (1982), method 1.
+    """
+    lead, (q_, qd_, tau_), push = batch(arm, wrench=wrench, q=q, qd=qd, tau=tau)
+    model = arm if drives else _without_drives(arm)
+    D = stack_matrix(unit_accelerations(model, q_), lead)
+    bias = newton_euler(model, q_, qd_, [0.0] * arm.n, push)
+    left = stack([a - b for a, b in zip(_less_friction(model, qd_, tau_), bias, strict=True)], lead)
+    check_pivots(model, eliminated(model, D))
+    return np.asarray(np.linalg.solve(D, left[..., None])[..., 0], dtype=np.float64)
+
+
+def unit_accelerations(arm: Arm, q: Sequence[Scalar]) -> list[list[Scalar]]:
+    """Return the mass matrix by n calls of Newton-Euler, rotor inertia included, over abstract scalars.
+
+    Source:
+        TR-83-008, subroutine TOACC, loop 10.
+    """
+    rest = [0.0] * arm.n
+    columns = []
+    for i, motor in enumerate(arm.motors):
+        unit = [1.0 if j == i else 0.0 for j in range(arm.n)]
+        column = newton_euler(arm, q, rest, unit, base_acceleration=arm.gravity.tolist())
+        column[i] = column[i] + motor.inertia
+        columns.append(column)
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+def eliminated(arm: Arm, M: Array) -> list[Pivot]:
+    """Return the pivots of a mass matrix (..., n, n), eliminated from the hand inward.
+
+    They are the inertias that each joint feels when all joints beyond it are free.
+    """
+    M = M.copy()
+    diagonal = np.diagonal(M, axis1=-2, axis2=-1).copy()
+    turns = np.array([joint.revolute for joint in arm.joints])
+    pivots: list[Pivot] = []
+    for i in reversed(range(arm.n)):
+        # Moments of inertia are measured by moments of inertia, masses by masses.
+        size = diagonal[..., turns == turns[i]].max(axis=-1)
+        pivots.append(Pivot(inertia=M[..., i, i].copy(), size=size))
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            M[..., :i, :i] -= M[..., :i, i, None] * M[..., i, None, :i] / M[..., i, i, None, None]
+    return pivots[::-1]
+
+
+def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
+    """Refuse an arm of which a joint moves nothing that resists.
+
+    Raises:
+        UnsupportedArmError: a pivot is 0 but for rounding, or no number; the joint nearest to the hand is named.
+    """
+    for i in reversed(range(arm.n)):
+        if not np.all(np.asarray(pivots[i].inertia) > _NOTHING * np.asarray(pivots[i].size)):
+            what, amount = ("about", "moment of inertia") if arm.joints[i].revolute else ("along", "mass")
+            raise UnsupportedArmError(
+                f"arm '{arm.name}': no acceleration can be found for joint {i + 1}: nothing it moves resists {what} "
+                f"its axis while the joints beyond it are free. Give its link a {amount} or its motor an inertia."
+            )
+
+
+def _less_friction(arm: Arm, qd: Sequence[Scalar], tau: Sequence[Scalar]) -> list[Scalar]:
+    return [
+        effort - motor.viscous * speed - dry_friction(motor, speed)
+        for motor, speed, effort in zip(arm.motors, qd, tau, strict=True)
+    ]
+
+
+def _without_drives(arm: Arm) -> Arm:
+    return attrs.evolve(arm, motors=[Motor()] * arm.n)

@@ -1,0 +1,69 @@
+"""The mass matrix: what effort at one joint an acceleration of another one takes."""
+
+from collections.abc import Sequence
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike
+from armwright.dynamics.arguments import batch, stack_matrix
+from armwright.dynamics.bodies import NOTHING, body_of, seen_from_before, welded
+from armwright.kinematics.forward import link_transform
+from armwright.tracing.scalar import Scalar
+from armwright.tracing.vectors import Matrix, Vector, add, apply, cross
+
+
+def composite_rigid_body(arm: Arm, q: Sequence[Scalar]) -> Matrix:
+    """Return the n x n mass matrix of the links alone, over abstract scalars.
+
+    Inward, from the hand: the links beyond joint i, frozen together, are one body. A unit acceleration of joint i
+    gives it a change of momentum, and every joint nearer to the base bears its part of that.
+
+    Args:
+        arm: the arm, with n joints.
+        q: n joint positions.
+
+    Source:
+        Walker & Orin (1982), method 3; Featherstone (2008), section 6.2.
+    """
+    places = [link_transform(joint, position) for joint, position in zip(arm.joints, q, strict=True)]
+    M: Matrix = [[0.0] * arm.n for _ in range(arm.n)]
+    body = NOTHING
+    for i in reversed(range(arm.n)):
+        # Seen from frame i-1 the joint is the z axis through the origin.
+        body = seen_from_before(welded(body, body_of(arm.links[i])), *places[i])
+        if arm.joints[i].revolute:
+            P: Vector = [-body.moment[1], body.moment[0], 0.0]
+            L: Vector = [row[2] for row in body.tensor]
+        else:
+            P, L = [0.0, 0.0, body.mass], [body.moment[1], -body.moment[0], 0.0]
+        for j in reversed(range(i + 1)):
+            if j < i:
+                R, p = places[j]
+                P = apply(R, P)
+                L = add(apply(R, L), cross(p, P))
+            M[i][j] = M[j][i] = L[2] if arm.joints[j].revolute else P[2]
+    return M
+
+
+def mass_matrix(arm: Arm, q: ArrayLike, *, drives: bool = True) -> Array:
+    """Return the mass matrix, which makes efforts of accelerations: tau = M qdd + all else.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        drives: whether rotor inertia counts.
+
+    Returns:
+        M: (..., n, n), symmetric; [kg m²], [kg m] or [kg] by the kinds of the two joints.
+
+    Raises:
+        ShapeError: the last axis of ``q`` is not n long.
+
+    Source:
+        Walker & Orin (1982), method 3; TR-83-008 eq. (14).
+    """
+    lead, (q_,), _ = batch(arm, q=q)
+    M = composite_rigid_body(arm, q_)
+    if drives:
+        for i, motor in enumerate(arm.motors):
+            M[i][i] = M[i][i] + motor.inertia
+    return stack_matrix(M, lead)

@@ -1,0 +1,35 @@
+"""A load in the hand, as part of the last link."""
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm, Link
+from armwright.arrays import ArrayLike
+from armwright.dynamics.bodies import as_link, body_of, seen_from_before, welded
+
+_NO_TENSOR = np.zeros((3, 3))
+
+
+def payload(arm: Arm, mass: float, com: ArrayLike = (0.0, 0.0, 0.0), inertia: ArrayLike = _NO_TENSOR) -> Arm:
+    """Return the arm with a load fixed at its tool.
+
+    Args:
+        arm: the arm, with n joints.
+        mass: of the load [kg].
+        com: (3,) centre of mass of the load in the tool frame [m].
+        inertia: (3, 3) tensor of the load about its centre of mass, along the axes of the tool [kg m²].
+
+    Returns:
+        The same arm whose last link is one body with the load.
+
+    Raises:
+        InvalidValueError: the mass is negative, or the tensor is not symmetric.
+        ShapeError: ``com`` or ``inertia`` have another shape.
+
+    Source:
+        TR-83-008, appendix II (4).
+    """
+    load = Link(mass=mass, com=com, inertia=inertia)
+    R, p = arm.tool[:3, :3].tolist(), arm.tool[:3, 3].tolist()
+    last = welded(body_of(arm.links[-1]), seen_from_before(body_of(load), R, p))
+    return attrs.evolve(arm, links=(*arm.links[:-1], as_link(last)))

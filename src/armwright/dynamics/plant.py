@@ -1,0 +1,180 @@
+"""An arm as a simulation sees it: what its joints feel at one moment, and what they do between two events."""
+
+import math
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.dynamics.controllers import Controller
+from armwright.dynamics.mass_matrix import composite_rigid_body
+from armwright.dynamics.newton_euler import newton_euler
+from armwright.dynamics.settle import settle
+from armwright.dynamics.simulation import Brake, JointState
+
+Flags = npt.NDArray[np.bool_]
+
+# A speed and a distance that are nothing [rad/s, m/s, rad, m]. Events are found to within them.
+STILL = 1e-11
+TOUCH = 1e-12
+# A held joint gives way when the effort exceeds the bound by this part, more than rounding can.
+_OVER = 1e-9
+
+
+class Moment(NamedTuple):
+    """Efforts and accelerations at one moment, each (n,): M qdd + bias = tau + friction + hold."""
+
+    qdd: Array
+    tau: Array
+    friction: Array
+    hold: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Phase:
+    """What the joints do between two events.
+
+    Attributes:
+        held: (n,) which are kept at rest.
+        way: (n,) direction in which the others move, or are about to; 0 for those that are held.
+        lower: (n,) smallest effort that can hold a joint.
+        upper: (n,) largest effort that can hold a joint.
+        state: (n,) numbers of ``JointState``.
+    """
+
+    held: Flags
+    way: Array
+    lower: Array
+    upper: Array
+    state: npt.NDArray[np.int8]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Plant:
+    """An arm, its controller and its surroundings.
+
+    Attributes:
+        arm: the arm, with n joints.
+        controller: of its drives.
+        brakes: which are on, and when.
+        lower: (n,) where the lower stops are; minus infinity where there is none.
+        upper: (n,) where the upper stops are.
+        effort: (n,) largest efforts of the drives.
+    """
+
+    arm: Arm
+    controller: Controller
+    brakes: tuple[Brake, ...]
+    lower: Array
+    upper: Array
+    effort: Array
+    rotor: Array = attrs.field(init=False)
+    viscous: Array = attrs.field(init=False)
+    forward: Array = attrs.field(init=False)
+    backward: Array = attrs.field(init=False)
+
+    def __attrs_post_init__(self) -> None:
+        """Read the motors once."""
+        sources = {"rotor": "inertia", "forward": "coulomb_forward", "backward": "coulomb_backward"}
+        for name in ("rotor", "viscous", "forward", "backward"):
+            values = np.array([getattr(motor, sources.get(name, name)) for motor in self.arm.motors])
+            object.__setattr__(self, name, values)
+
+    @property
+    def dry(self) -> Flags:
+        """Which joints have dry friction, (n,)."""
+        return (self.forward > 0) | (self.backward > 0)
+
+    def inertia(self, q: Array) -> Array:
+        """Return the mass matrix, rotors included."""
+        return np.array(composite_rigid_body(self.arm, q.tolist())) + np.diag(self.rotor)
+
+    def moment(self, t: float, q: Array, qd: Array, phase: Phase) -> Moment:
+        """Return what the joints feel at one moment of a phase."""
+        M, tau, friction, left = self._pushed(t, q, qd, phase.way, phase.held)
+        qdd, hold = np.zeros_like(q), np.zeros_like(q)
+        free = ~phase.held
+        qdd[free] = np.linalg.solve(M[np.ix_(free, free)], left[free])
+        hold[phase.held] = M[phase.held] @ qdd - left[phase.held]
+        return Moment(qdd=qdd, tau=tau, friction=friction, hold=hold)
+
+    def _pushed(self, t: float, q: Array, qd: Array, way: Array, held: Flags) -> tuple[Array, Array, Array, Array]:
+        """Return mass matrix, efforts of drives, of friction, and what is left to accelerate with."""
+        bias = newton_euler(self.arm, q.tolist(), qd.tolist(), [0.0] * self.arm.n)
+        tau = np.clip(np.asarray(self.controller(t, q, qd), dtype=np.float64), -self.effort, self.effort)
+        dry = np.where(way > 0, self.forward, np.where(way < 0, -self.backward, 0.0))
+        friction = np.where(held, 0.0, -self.viscous * qd - dry)
+        return self.inertia(q), tau, friction, tau + friction - np.array(bias)
+
+    def braked(self, t: float) -> Flags:
+        """Return which joints have a brake on at a time, (n,)."""
+        flags = np.zeros(self.arm.n, dtype=bool)
+        for brake in self.brakes:
+            flags[brake.joint] |= brake.on(t)
+        return flags
+
+    def begin(self, t: float, q: Array, qd: Array) -> tuple[Array, Array, Phase, float]:
+        """Begin a phase: stops and brakes take what hits them, and it is found which joints are held.
+
+        Args:
+            t: time [s].
+            q: (n,) joint positions.
+            qd: (n,) joint speeds.
+
+        Returns:
+            Positions and speeds to go on from, the phase, and the energy that stops and brakes took [J].
+        """
+        at_lower, at_upper, braked = q <= self.lower + TOUCH, q >= self.upper - TOUCH, self.braked(t)
+        q = np.where(at_lower, self.lower, np.where(at_upper, self.upper, q))
+        qd, loss = self._collide(q, qd, at_lower | braked, at_upper | braked)
+        touched = at_lower | at_upper | braked
+        at_rest = (touched | self.dry) & (np.abs(qd) <= 10 * STILL)
+        qd = np.where(at_rest, 0.0, qd)
+        lower = np.where(at_upper | braked, -np.inf, -self.forward)
+        upper = np.where(at_lower | braked, np.inf, self.backward)
+        M, _, _, left = self._pushed(t, q, qd, np.where(at_rest, 0.0, np.sign(qd)), at_rest)
+        way = settle(M, left, at_rest, lower, upper).way
+        held = at_rest & (way == 0)
+        state = np.where(
+            braked,
+            JointState.BRAKED,
+            np.where(at_lower, JointState.LOWER_STOP, np.where(at_upper, JointState.UPPER_STOP, JointState.STICKS)),
+        )
+        phase = Phase(
+            held=held,
+            way=np.where(at_rest, way, np.sign(qd)).astype(np.float64),
+            lower=lower,
+            upper=upper,
+            state=np.where(held, state, JointState.MOVES).astype(np.int8),
+        )
+        return q, qd, phase, loss
+
+    def _collide(self, q: Array, qd: Array, from_below: Flags, from_above: Flags) -> tuple[Array, float]:
+        """Return speeds after impacts that leave no speed against a stop or under a brake, and the energy lost."""
+        if not ((from_below & (qd < -STILL)) | (from_above & (qd > STILL))).any():
+            return qd, 0.0
+        M = self.inertia(q)
+        lower, upper = np.where(from_above, -np.inf, 0.0), np.where(from_below, np.inf, 0.0)
+        after = settle(M, M @ qd, from_below | from_above, lower, upper).x
+        return after, float(qd @ M @ qd - after @ M @ after) / 2
+
+    def watch(self, t: float, q: Array, qd: Array, phase: Phase) -> float:
+        """Return how far the nearest event is, in units of what counts as nothing; below 0 behind it."""
+        moving = ~phase.held
+        slides = moving & self.dry & (phase.way != 0)
+        below, above = moving & np.isfinite(self.lower), moving & np.isfinite(self.upper)
+        distances = [
+            (phase.way * qd)[slides] / STILL + 1,
+            (q - self.lower)[below] / TOUCH + 1,
+            (self.upper - q)[above] / TOUCH + 1,
+        ]
+        if (phase.held & (phase.state != JointState.BRAKED)).any():
+            hold = self.moment(t, q, qd, phase).hold
+            for bound, side in ((phase.lower, 1.0), (phase.upper, -1.0)):
+                limited = phase.held & np.isfinite(bound)
+                spare = side * (hold - bound)[limited]
+                distances.append(spare / (_OVER * (1 + np.abs(bound[limited]))) + 1)
+        return min((float(x.min()) for x in distances if x.size), default=math.inf)

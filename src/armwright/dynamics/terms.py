@@ -1,0 +1,122 @@
+"""The terms of the efforts: how much each cause asks of each joint."""
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm, Link
+from armwright.arrays import Array, ArrayLike
+from armwright.dynamics.arguments import batch, stack_matrix
+from armwright.dynamics.lagrange_euler import (
+    gravity_coefficients,
+    inertia_coefficients,
+    pose_derivatives,
+    speed_coefficients,
+)
+from armwright.dynamics.newton_euler import dry_friction, newton_euler
+from armwright.dynamics.payload import payload
+from armwright.kinematics.forward import stack
+
+_NO_LOAD = Link()
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Terms:
+    """Efforts at n joints by their cause, [N m] or [N], positive in the direction of q.
+
+    The first n-axis is always the joint that bears the effort.
+
+    Attributes:
+        own: (..., n) links, by the acceleration of the joint itself.
+        coupling: (..., n, n) links, by the acceleration of another joint; 0 on the diagonal.
+        motor: (..., n) rotor inertia.
+        centrifugal: (..., n, n) by the squared speed of a joint.
+        coriolis: (..., n, n, n) by the product of the speeds of two joints j < k, both orders together; 0 elsewhere.
+        gravity: (..., n) weight of the links.
+        viscous: (..., n) friction that grows with speed.
+        dry: (..., n) Coulomb friction of moving joints; 0 at rest, where it depends on what there is to hold.
+        load: (..., n) all that a load in the hand adds: its inertia, its speed and its weight.
+        outside: (..., n) what a wrench on the tool adds.
+
+    Source:
+        TR-83-008, the program of appendix IV.
+    """
+
+    own: Array
+    coupling: Array
+    motor: Array
+    centrifugal: Array
+    coriolis: Array
+    gravity: Array
+    viscous: Array
+    dry: Array
+    load: Array
+    outside: Array
+
+    @property
+    def by_acceleration(self) -> Array:
+        """Efforts by accelerations, rotors included (..., n): ACCF of the report's program."""
+        return np.asarray(self.own + self.coupling.sum(axis=-1) + self.motor)
+
+    @property
+    def by_speed(self) -> Array:
+        """Centrifugal and Coriolis efforts (..., n): COR of the report's program."""
+        return np.asarray(self.centrifugal.sum(axis=-1) + self.coriolis.sum(axis=(-2, -1)))
+
+    @property
+    def friction(self) -> Array:
+        """Friction of both kinds, (..., n)."""
+        return self.viscous + self.dry
+
+    @property
+    def total(self) -> Array:
+        """All efforts, (..., n): F of the report's program, where it has the causes."""
+        return self.by_acceleration + self.by_speed + self.gravity + self.friction + self.load + self.outside
+
+
+def terms(
+    arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, load: Link = _NO_LOAD, wrench: ArrayLike | None = None
+) -> Terms:
+    """Return the efforts of one posture or of a whole motion by their cause.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint speeds.
+        qdd: (..., n) joint accelerations.
+        load: a body fixed at the tool, described in the tool frame.
+        wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
+            base axes; none when left out.
+
+    Returns:
+        The terms; their total is what ``inverse_dynamics`` gives for the arm with the load.
+
+    Raises:
+        ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+
+    Source:
+        TR-83-008 eq. (12)-(16) and subroutine GLAGRA, which adds them up as ACCF, COR and G.
+    """
+    lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
+    n = arm.n
+    rest = [0.0] * n
+    # What hangs on the hand is felt through links that weigh nothing.
+    bare = attrs.evolve(arm, links=[_NO_LOAD] * n)
+    derivatives = pose_derivatives(arm, q_)
+    D = inertia_coefficients(derivatives)
+    h = speed_coefficients(derivatives)
+    motors = list(zip(arm.motors, qd_, qdd_, strict=True))
+    pairs = [
+        [[2.0 * h[i][j][k] * (qd_[j] * qd_[k]) if j < k else 0.0 for k in range(n)] for j in range(n)] for i in range(n)
+    ]
+    return Terms(
+        own=stack([D[i][i] * qdd_[i] for i in range(n)], lead),
+        coupling=stack_matrix([[D[i][j] * qdd_[j] if j != i else 0.0 for j in range(n)] for i in range(n)], lead),
+        motor=stack([motor.inertia * acceleration for motor, _, acceleration in motors], lead),
+        centrifugal=stack_matrix([[h[i][j][j] * (qd_[j] * qd_[j]) for j in range(n)] for i in range(n)], lead),
+        coriolis=stack([x for plane in pairs for row in plane for x in row], lead).reshape(*lead, n, n, n),
+        gravity=stack(gravity_coefficients(arm, derivatives), lead),
+        viscous=stack([motor.viscous * speed for motor, speed, _ in motors], lead),
+        dry=stack([dry_friction(motor, speed) for motor, speed, _ in motors], lead),
+        load=stack(newton_euler(payload(bare, load.mass, load.com, load.inertia), q_, qd_, qdd_), lead),
+        outside=stack(newton_euler(bare, q_, rest, rest, push), lead),
+    )

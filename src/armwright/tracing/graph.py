@@ -1,0 +1,291 @@
+"""The graph that an equation leaves when it is run on traced scalars: every value once, constants folded.
+
+Nodes are hash-consed: the same operation on the same operands is the same node, so shared terms are computed once
+however the equation is written. Constants are folded, and 0·x, 1·x, x+0 and their like disappear; so the zeros of
+an arm's twists and offsets cost nothing.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+# Of each operation: how many numbers it takes. Comparisons and select work on truth values too.
+ARITY = {
+    "input": 0, "constant": 0,
+    "add": 2, "subtract": 2, "multiply": 2, "divide": 2, "negate": 1,
+    "sin": 1, "cos": 1, "sqrt": 1, "atan2": 2, "absolute": 1,
+    "less": 2, "less_equal": 2, "select": 3,
+}  # fmt: skip
+_COMMUTE = frozenset({"add", "multiply"})
+
+Key: TypeAlias = tuple[Any, ...]
+
+
+class Node(NamedTuple):
+    """One operation and the numbers of the nodes it takes; a constant has its value, an input its place."""
+
+    op: str
+    operands: tuple[int, ...]
+    value: float = 0.0
+
+
+class Graph:
+    """Nodes in an order in which each comes after its operands."""
+
+    def __init__(self) -> None:
+        """Begin empty."""
+        self.nodes: list[Node] = []
+        self._known: dict[Key, int] = {}
+
+    def inputs(self, count: int) -> list["Traced"]:
+        """Return the next ``count`` inputs."""
+        first = sum(node.op == "input" for node in self.nodes)
+        return [Traced(self, self._add(Node("input", (), float(first + i)))) for i in range(count)]
+
+    def constant(self, value: float) -> int:
+        """Return the node of a constant; -0.0 is another than 0.0."""
+        return self._add(Node("constant", (), float(value)))
+
+    def apply(self, op: str, *operands: int) -> int:
+        """Return the node of an operation, simplified where its value is known or it does nothing."""
+        if all(self.nodes[i].op == "constant" for i in operands):
+            return self.constant(_FOLD[op](*(self.nodes[i].value for i in operands)))
+        simple = _SIMPLIFY.get(op, _as_it_is)(self, *operands)
+        if simple is not None:
+            return simple
+        if op in _COMMUTE:
+            operands = tuple(sorted(operands))
+        return self._add(Node(op, operands))
+
+    def value(self, node: int) -> float | None:
+        """Return the value of a constant, None for any other node."""
+        return self.nodes[node].value if self.nodes[node].op == "constant" else None
+
+    def _add(self, node: Node) -> int:
+        key = (node.op, node.operands, node.value, math.copysign(1.0, node.value))
+        if key not in self._known:
+            self._known[key] = len(self.nodes)
+            self.nodes.append(node)
+        return self._known[key]
+
+
+class Traced:
+    """A scalar that writes down what is done with it."""
+
+    __slots__ = ("graph", "node")
+    __hash__ = None  # type: ignore[assignment]
+    # NumPy must not take a traced scalar apart when a float64 meets it.
+    __array_ufunc__ = None
+
+    def __init__(self, graph: Graph, node: int) -> None:
+        """Stand for a node of a graph."""
+        self.graph, self.node = graph, node
+
+    def __add__(self, other: Any) -> "Traced":
+        return traced("add", self, other)
+
+    def __radd__(self, other: Any) -> "Traced":
+        return traced("add", other, self)
+
+    def __sub__(self, other: Any) -> "Traced":
+        return traced("subtract", self, other)
+
+    def __rsub__(self, other: Any) -> "Traced":
+        return traced("subtract", other, self)
+
+    def __mul__(self, other: Any) -> "Traced":
+        return traced("multiply", self, other)
+
+    def __rmul__(self, other: Any) -> "Traced":
+        return traced("multiply", other, self)
+
+    def __truediv__(self, other: Any) -> "Traced":
+        return traced("divide", self, other)
+
+    def __rtruediv__(self, other: Any) -> "Traced":
+        return traced("divide", other, self)
+
+    def __neg__(self) -> "Traced":
+        return traced("negate", self)
+
+    def __pow__(self, power: int) -> "Traced":
+        if power != 2:
+            return NotImplemented
+        return self * self
+
+    def __abs__(self) -> "Traced":
+        return traced("absolute", self)
+
+    def __lt__(self, other: Any) -> "Traced":
+        return traced("less", self, other)
+
+    def __le__(self, other: Any) -> "Traced":
+        return traced("less_equal", self, other)
+
+    def __gt__(self, other: Any) -> "Traced":
+        return traced("less", other, self)
+
+    def __ge__(self, other: Any) -> "Traced":
+        return traced("less_equal", other, self)
+
+    def __bool__(self) -> bool:
+        raise TypeError("a traced scalar has no truth value yet: write select(condition, then, otherwise)")
+
+
+def traced(op: str, *operands: Any) -> Traced:
+    """Apply an operation to scalars of which at least one is traced."""
+    graph = next(x.graph for x in operands if isinstance(x, Traced))
+    nodes = [x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in operands]
+    return Traced(graph, graph.apply(op, *nodes))
+
+
+def is_traced(*scalars: Any) -> bool:
+    """Whether any of the scalars is traced."""
+    return any(isinstance(x, Traced) for x in scalars)
+
+
+def reachable(graph: Graph, outputs: Iterable[int]) -> list[int]:
+    """Return the nodes that the outputs need, in order."""
+    needed = set()
+    waiting = list(outputs)
+    while waiting:
+        node = waiting.pop()
+        if node not in needed:
+            needed.add(node)
+            waiting.extend(graph.nodes[node].operands)
+    return sorted(needed)
+
+
+def operation_count(graph: Graph, outputs: Iterable[int]) -> dict[str, int]:
+    """Count the operations that the outputs need, by kind; inputs and constants cost nothing."""
+    counts: dict[str, int] = {}
+    for i in reachable(graph, outputs):
+        op = graph.nodes[i].op
+        if ARITY[op]:
+            counts[op] = counts.get(op, 0) + 1
+    return dict(sorted(counts.items()))
+
+
+def evaluate(graph: Graph, outputs: Sequence[int], inputs: Sequence[float]) -> list[float]:
+    """Run the graph on floats, node by node: what an emitted kernel must agree with."""
+    values: dict[int, float] = {}
+    for i in reachable(graph, outputs):
+        node = graph.nodes[i]
+        if node.op == "input":
+            values[i] = inputs[int(node.value)]
+        elif node.op == "constant":
+            values[i] = node.value
+        else:
+            values[i] = _FOLD[node.op](*(values[j] for j in node.operands))
+    return [values[i] for i in outputs]
+
+
+_FOLD: dict[str, Callable[..., float]] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": lambda a, b: a / b,
+    "negate": lambda a: -a,
+    "sin": math.sin,
+    "cos": math.cos,
+    "sqrt": lambda a: math.sqrt(max(a, 0.0)),
+    "atan2": math.atan2,
+    "absolute": abs,
+    "less": lambda a, b: float(a < b),
+    "less_equal": lambda a, b: float(a <= b),
+    "select": lambda c, a, b: a if c else b,
+}
+
+
+def _as_it_is(_graph: Graph, *_operands: int) -> int | None:
+    return None
+
+
+def _simple_add(graph: Graph, a: int, b: int) -> int | None:
+    if graph.value(a) == 0:
+        return b
+    if graph.value(b) == 0:
+        return a
+    for x, y in ((a, b), (b, a)):
+        if graph.nodes[y].op == "negate":
+            return graph.apply("subtract", x, graph.nodes[y].operands[0])
+    return None
+
+
+def _simple_subtract(graph: Graph, a: int, b: int) -> int | None:
+    if graph.value(b) == 0:
+        return a
+    if a == b:
+        return graph.constant(0.0)
+    if graph.value(a) == 0:
+        return graph.apply("negate", b)
+    if graph.nodes[b].op == "negate":
+        return graph.apply("add", a, graph.nodes[b].operands[0])
+    return None
+
+
+def _simple_multiply(graph: Graph, a: int, b: int) -> int | None:
+    for x, y in ((a, b), (b, a)):
+        value = graph.value(x)
+        if value == 0:
+            return graph.constant(0.0)
+        if value == 1:
+            return y
+        if value == -1:
+            return graph.apply("negate", y)
+    signs = [graph.nodes[x].op == "negate" for x in (a, b)]
+    if any(signs):
+        bare = [graph.nodes[x].operands[0] if sign else x for x, sign in zip((a, b), signs, strict=True)]
+        product = graph.apply("multiply", *bare)
+        return product if all(signs) else graph.apply("negate", product)
+    return None
+
+
+def _simple_divide(graph: Graph, a: int, b: int) -> int | None:
+    if graph.value(a) == 0:
+        return graph.constant(0.0)
+    if graph.value(b) in (1, -1):
+        return a if graph.value(b) == 1 else graph.apply("negate", a)
+    return None
+
+
+def _simple_negate(graph: Graph, a: int) -> int | None:
+    node = graph.nodes[a]
+    if node.op == "negate":
+        return node.operands[0]
+    if node.op == "subtract":
+        return graph.apply("subtract", *reversed(node.operands))
+    return None
+
+
+def _simple_odd(op: str) -> Callable[[Graph, int], int | None]:
+    def simplify(graph: Graph, a: int) -> int | None:
+        node = graph.nodes[a]
+        if node.op != "negate":
+            return None
+        inner = graph.apply(op, node.operands[0])
+        return inner if op in ("cos", "absolute") else graph.apply("negate", inner)
+
+    return simplify
+
+
+def _simple_select(graph: Graph, condition: int, then: int, otherwise: int) -> int | None:
+    value = graph.value(condition)
+    if value is not None:
+        return then if value else otherwise
+    # Two zeros of either sign are one choice: the sign of a zero is not worth a comparison.
+    alike = then == otherwise or (graph.value(then) is not None and graph.value(then) == graph.value(otherwise))
+    return otherwise if alike else None
+
+
+_SIMPLIFY: dict[str, Callable[..., int | None]] = {
+    "add": _simple_add,
+    "subtract": _simple_subtract,
+    "multiply": _simple_multiply,
+    "divide": _simple_divide,
+    "negate": _simple_negate,
+    "sin": _simple_odd("sin"),
+    "cos": _simple_odd("cos"),
+    "absolute": _simple_odd("absolute"),
+    "select": _simple_select,
+}

@@ -1,0 +1,155 @@
+"""The commands forward, jacobian, inverse, torque and kernel."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.kinematics.forward import forward
+from armwright.kinematics.jacobian import jacobian
+
+Q_DEG = "10,20,30,40,50,60"
+Q = np.radians([10, 20, 30, 40, 50, 60])
+
+
+def armwright(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "armwright", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
+        timeout=120,
+    )
+
+
+def test_forward_in_millimetres() -> None:
+    """The pose is printed row by row, its place in millimetres; with --json in metres."""
+    X = forward(load_arm("puma560"), Q)
+
+    lines = armwright("forward", "puma560", "-q", Q_DEG).stdout.splitlines()
+    data = json.loads(armwright("forward", "puma560", "-q", Q_DEG, "--json").stdout)
+
+    printed = np.array([[float(word) for word in line.removesuffix(" mm").split()] for line in lines])
+    np.testing.assert_allclose(printed[:, 3], X[:3, 3] * 1e3, atol=5e-4)
+    np.testing.assert_allclose(printed[:, :3], X[:3, :3], atol=5e-7)
+    np.testing.assert_allclose(data["pose"], X, atol=1e-12)
+
+
+def test_slides_are_millimetres() -> None:
+    """The third number for the Stanford arm is the boom's length in mm."""
+    data = json.loads(armwright("forward", "stanford", "-q", "0,90,500,0,0,0", "--json").stdout)
+
+    np.testing.assert_allclose(data["q"], [0, np.pi / 2, 0.5, 0, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("frame", ["base", "tool"])
+def test_jacobian(frame: str) -> None:
+    """Both frames, in SI units."""
+    data = json.loads(armwright("jacobian", "puma560", "-q", Q_DEG, "--frame", frame, "--json").stdout)
+
+    expected = jacobian(load_arm("puma560"), Q, "tool" if frame == "tool" else "base")
+    np.testing.assert_allclose(data["jacobian"], expected, atol=1e-12)
+
+
+def test_inverse_finds_the_posture() -> None:
+    """The posture whose pose is asked for comes back, nearest first."""
+    noap = forward(load_arm("puma560"), Q)[:3].T.ravel()
+
+    done = armwright("inverse", "puma560", "--noap", " ".join(map(repr, map(float, noap))), "--near", Q_DEG, "--json")
+
+    data = json.loads(done.stdout)
+    assert data["answer"] == "solved"
+    np.testing.assert_allclose(data["branches"][0]["q"], Q, atol=1e-9)
+
+
+def test_inverse_out_of_reach() -> None:
+    """A pose out of reach ends with status 1 and says how far."""
+    done = armwright("inverse", "puma560", "--xyz", "5000,0,0")
+
+    assert done.returncode == 1
+    assert "mm out of reach of 'puma560'" in done.stdout
+
+
+def test_torque_by_cause() -> None:
+    """The causes sum up to the total, which is the inverse dynamics."""
+    motion = ("-q", "0,90,500,0,45,0", "--qd", "10,20,30,40,50,60", "--qdd", "60,0,100,0,0,0")
+
+    data = json.loads(armwright("torque", "stanford-jpl", *motion, "--json").stdout)
+    table = armwright("torque", "stanford-jpl", *motion).stdout
+
+    scale = np.array([np.pi / 180] * 2 + [1e-3] + [np.pi / 180] * 3)
+    q, qd, qdd = (np.array([float(x) for x in text.split(",")]) * scale for text in motion[1::2])
+    np.testing.assert_allclose(data["total"], inverse_dynamics(load_arm("stanford-jpl"), q, qd, qdd), atol=1e-9)
+    np.testing.assert_allclose(sum(np.array(v) for k, v in data.items() if k != "total"), data["total"], atol=1e-9)
+    assert f"{data['gravity'][1]:.4f}" in table
+
+
+def test_rows_of_a_file(tmp_path: Path) -> None:
+    """The rows of a CSV file with the columns of motion.csv give one answer each."""
+    names = [f"{quantity}{i}" for quantity in ("q", "qd", "qdd") for i in range(1, 7)]
+    rows = np.random.default_rng(1).uniform(0.2, 0.5, size=(3, 18))
+    lines = [",".join(["t", *names]), *(",".join(["0", *map(repr, map(float, row))]) for row in rows)]
+    (tmp_path / "rows.csv").write_text("\n".join(lines))
+
+    said = armwright("torque", "stanford", "--csv", tmp_path / "rows.csv", "--json").stdout.splitlines()
+
+    expected = inverse_dynamics(load_arm("stanford"), rows[:, :6], rows[:, 6:12], rows[:, 12:])
+    np.testing.assert_allclose([json.loads(line)["total"] for line in said], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,q1,q2\n0,1,2\n", ":1: q3: no such column; expected q1 to q6"),
+        ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,x\n", ":2: expected 6 numbers"),
+        ("q1,q2,q3,q4,q5,q6\n0,0,0\n", ":2: expected 6 numbers"),
+        ("q1,q2,q3,q4,q5,q6\n0,0,0,0,0,nan\n", ":2: every number must be finite"),
+    ],
+)
+def test_bad_files(tmp_path: Path, text: str, said: str) -> None:
+    """A file without the columns, or with a row that is no numbers, is refused with its line."""
+    (tmp_path / "rows.csv").write_text(text)
+
+    done = armwright("forward", "puma560", "--csv", tmp_path / "rows.csv")
+
+    assert done.returncode == 1
+    assert f"{tmp_path / 'rows.csv'}{said}" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("forward", "puma560"), "give the joint positions"),
+        (("forward", "puma560", "-q", "1,2,3"), "expected 6 finite numbers, got 3"),
+        (("forward", "puma560", "-q", "1,2,3,4,5,x"), "got 'x'"),
+        (("forward", "puma560", "-q", "1,2,3,4,5,inf"), "finite"),
+        (("jacobian", "puma560", "-q", Q_DEG, "--frame", "world"), "expected base or tool, got world"),
+        (("inverse", "puma560"), "give the pose"),
+        (("torque", "puma560"), "give the motion"),
+    ],
+)
+def test_usage(arguments: tuple[str, ...], said: str) -> None:
+    """A call that cannot be understood ends with status 2 and says what is missing."""
+    done = armwright(*arguments)
+
+    assert done.returncode == 2
+    assert said in " ".join(done.stderr.replace("│", " ").split())
+
+
+def test_kernel() -> None:
+    """The emitted source and the operation count are shown; a misspelt quantity gets the nearest name."""
+    data = json.loads(armwright("kernel", "stanford-jpl", "forward", "--json").stdout)
+    assert data["total"] == sum(data["operations"].values())
+    assert "def kernel(" in data["source"]
+    compile(data["source"], "kernel", "exec")
+    assert "operations per configuration" in armwright("kernel", "ur5", "jacobian", "--count").stdout
+    wrong = armwright("kernel", "ur5", "jacobain")
+    assert (wrong.returncode, "Did you mean 'jacobian'?" in wrong.stderr) == (1, True)

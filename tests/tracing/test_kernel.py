@@ -1,0 +1,203 @@
+"""Emitted kernels: accuracy of their elementary functions, agreement with the equations, same bits always."""
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
+from armwright.errors import InvalidValueError, ShapeError
+from armwright.kinematics.inverse.closed_form import BRANCHES
+from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.shoulder import first_three
+from armwright.tracing.emit import LANES, emit
+from armwright.tracing.kernel import Kernel, cache_folder, compiled
+from armwright.tracing.scalar import atan2, cos, sin
+from oracles.arms import random_arm, random_postures
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Compile into a folder of the test's own."""
+    os.environ["ARMWRIGHT_CACHE"] = str(tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(scope="module")
+def circle() -> Kernel:
+    """Sine and cosine of one input, and the angle of the point of both."""
+    return compiled(emit("circle", lambda x, y: [[sin(x[0]), cos(x[0]), atan2(y[0], x[0])]], [1, 1]))
+
+
+@pytest.fixture(scope="module")
+def stanford() -> Kernel:
+    """Inverse dynamics of the Stanford arm at JPL."""
+    arm = load_arm("stanford-jpl")
+    return compiled(emit("inverse dynamics", lambda q, qd, qdd: [newton_euler(arm, q, qd, qdd)], [6, 6, 6]))
+
+
+def _ulps(value: np.ndarray, exact: np.ndarray) -> float:
+    return float((np.abs(value - exact) / np.spacing(np.abs(exact))).max())
+
+
+@pytest.mark.parametrize("reach", [1e-9, 1.0, 7.0, 1e3, 1e5])
+def test_sine_and_cosine_to_two_units(circle: Kernel, reach: float, rng: np.random.Generator) -> None:
+    """Sine and cosine are within 2 units in the last place of the machine's library, up to 1e5 rad."""
+    x = np.concatenate([rng.uniform(-reach, reach, 100_000), reach * np.linspace(-1, 1, 1001)])
+
+    (values,) = circle(x[:, None], np.ones((len(x), 1)))
+
+    exact = np.array([(math.sin(v), math.cos(v)) for v in x])
+    assert _ulps(values[:, 0], exact[:, 0]) <= 2
+    assert _ulps(values[:, 1], exact[:, 1]) <= 2
+
+
+def test_near_the_quarter_turns(circle: Kernel) -> None:
+    """Next to the multiples of a right angle, where digits cancel, the small one of the two keeps its digits."""
+    x = np.array([k * math.pi / 2 * (1 + d) for k in range(-40, 41) for d in (-1e-12, -1e-16, 0, 1e-16, 1e-12)])
+
+    (values,) = circle(x[:, None], np.ones((len(x), 1)))
+
+    exact = np.array([(math.sin(v), math.cos(v)) for v in x])
+    np.testing.assert_allclose(values[:, :2], exact, rtol=1e-12, atol=1e-25)
+
+
+def test_arc_tangent_to_two_units(circle: Kernel, rng: np.random.Generator) -> None:
+    """The arc tangent is within 2 units in all quadrants, for lengths from 1e-150 to 1e150, and on the axes."""
+    angle, size = rng.uniform(-np.pi, np.pi, 100_000), 10 ** rng.uniform(-150, 150, 100_000)
+    y, x = size * np.sin(angle), size * np.cos(angle)
+
+    (values,) = circle(x[:, None], y[:, None])
+
+    assert _ulps(values[:, 2], np.array([math.atan2(b, a) for a, b in zip(x, y, strict=True)])) <= 2
+    axes = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 0.0)])
+    (values,) = circle(axes[:, :1], axes[:, 1:])
+    np.testing.assert_array_equal(values[:, 2], (0, math.pi / 2, math.pi, -math.pi / 2, 0))
+
+
+def test_agrees_with_the_equation(stanford: Kernel, rng: np.random.Generator) -> None:
+    """The kernel gives the efforts of the law of motion evaluated with the machine's own functions."""
+    q, qd, qdd = rng.uniform(-3, 3, size=(3, 1000, 6))
+
+    (tau,) = stanford(q, qd, qdd)
+
+    np.testing.assert_allclose(tau, inverse_dynamics(load_arm("stanford-jpl"), q, qd, qdd, drives=False), atol=1e-11)
+
+
+@pytest.mark.parametrize("rows", [1, 2, LANES - 1, LANES, LANES + 1, 20_000])
+def test_same_bits_alone_and_in_company(stanford: Kernel, rows: int, rng: np.random.Generator) -> None:
+    """A configuration has the same bits alone, at any place of any batch, and on any number of threads."""
+    q, qd, qdd = rng.uniform(-3, 3, size=(3, rows, 6))
+
+    (together,) = stanford(q, qd, qdd)
+
+    for threads in (2, 3):
+        np.testing.assert_array_equal(stanford(q, qd, qdd, threads=threads)[0], together)
+    for k in {0, rows // 2, rows - 1}:
+        np.testing.assert_array_equal(stanford(q[k], qd[k], qdd[k])[0], together[k])
+    order = rng.permutation(rows)
+    np.testing.assert_array_equal(stanford(q[order], qd[order], qdd[order])[0], together[order])
+
+
+def test_shapes(stanford: Kernel) -> None:
+    """Leading axes come back unchanged, are broadcast, and may be empty; read-only input is fine."""
+    still = np.zeros(6)
+    still.setflags(write=False)
+
+    assert stanford(np.zeros((2, 5, 6)), still, still)[0].shape == (2, 5, 6)
+    assert stanford(still, still, still)[0].shape == (6,)
+    assert stanford(np.zeros((0, 6)), still, still)[0].shape == (0, 6)
+
+
+def test_bad_input(stanford: Kernel) -> None:
+    """Wrong widths, counts, leading axes and NaN are refused as by the plain function."""
+    with pytest.raises(ShapeError, match="expected 3 arrays, got 2"):
+        stanford(np.zeros(6), np.zeros(6))
+    with pytest.raises(ShapeError, match=r"input 2: expected 6 numbers on the last axis, got shape \(5,\)"):
+        stanford(np.zeros(6), np.zeros(5), np.zeros(6))
+    with pytest.raises(ShapeError, match=r"leading axes must fit together, got \(2, 6\), \(3, 6\), \(6,\)"):
+        stanford(np.zeros((2, 6)), np.zeros((3, 6)), np.zeros(6))
+    with pytest.raises(InvalidValueError, match="finite"):
+        stanford(np.full(6, np.nan), np.zeros(6), np.zeros(6))
+
+
+def test_choices_and_arc_tangents(rng: np.random.Generator) -> None:
+    """A kernel of the PUMA's first three joints, full of arc tangents, puts the wrist where the equation does."""
+    arm = load_arm("puma560")
+    shoulder = shoulder_of(arm)
+    assert shoulder is not None
+    side, elbow, _ = BRANCHES[2]
+    kernel = compiled(emit("shoulder", lambda p: [first_three(shoulder, p, side, elbow)], [3]))
+    points = rng.uniform(-0.5, 0.5, size=(500, 3))
+
+    (found,) = kernel(points)
+
+    expected = np.array([first_three(shoulder, p.tolist(), side, elbow) for p in points])
+    difference = np.angle(np.exp(1j * (found - expected)))
+    assert np.abs(difference).max() < 1e-7  # next to the edge of the reach a root loses half of the digits
+    assert np.median(np.abs(difference)) < 1e-15
+
+
+def test_random_arm(rng: np.random.Generator) -> None:
+    """A general arm with prismatic joints compiles and agrees too."""
+    arm = random_arm(rng, 4)
+    kernel = compiled(emit("random", lambda q, qd, qdd: [newton_euler(arm, q, qd, qdd)], [4, 4, 4]))
+    q, qd, qdd = random_postures(arm, rng, 90).reshape(3, 30, 4)
+
+    np.testing.assert_allclose(kernel(q, qd, qdd)[0], inverse_dynamics(arm, q, qd, qdd, drives=False), atol=1e-11)
+
+
+_START = """
+import os, sys, time
+import numpy as np
+from armwright.tracing.emit import emit
+from armwright.tracing.kernel import compiled
+from armwright.tracing.scalar import sin
+kernel = compiled(emit("wave", lambda x: [[sin(x[0]) * 1.25]], [1]))
+print(repr(float(kernel(np.array([0.5]))[0][0])), len(kernel._function.stats.cache_hits))
+"""
+
+
+def _start(cache: Path) -> subprocess.Popen[str]:
+    environment = {**os.environ, "ARMWRIGHT_CACHE": str(cache)}
+    return subprocess.Popen([sys.executable, "-c", _START], env=environment, stdout=subprocess.PIPE, text=True)
+
+
+def test_second_start_compiles_nothing(tmp_path: Path) -> None:
+    """Another process finds the compiled kernel on the disk."""
+    first, _ = _start(tmp_path).communicate(timeout=120)
+    second, _ = _start(tmp_path).communicate(timeout=120)
+
+    assert first.split() == [repr(math.sin(0.5) * 1.25), "0"]
+    assert second.split() == [repr(math.sin(0.5) * 1.25), "1"]
+
+
+def test_processes_that_start_together(tmp_path: Path) -> None:
+    """Four processes that want the same kernel at once all get it, and one of them compiles it."""
+    running = [_start(tmp_path) for _ in range(4)]
+    said = [process.communicate(timeout=180)[0].split() for process in running]
+
+    assert {line[0] for line in said} == {repr(math.sin(0.5) * 1.25)}
+    assert sum(line[1] == "0" for line in said) == 1
+
+
+def test_a_home_that_cannot_be_written(tmp_path: Path) -> None:
+    """Without a cache folder the kernel is compiled for the process alone."""
+    (tmp_path / "file").write_text("in the way")
+
+    said, _ = _start(tmp_path / "file").communicate(timeout=120)
+
+    assert said.split()[0] == repr(math.sin(0.5) * 1.25)
+
+
+def test_where_kernels_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder of the user's caches is used, or the one that ARMWRIGHT_CACHE names."""
+    monkeypatch.delenv("ARMWRIGHT_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
+    assert cache_folder() == Path("/somewhere/armwright")
+    monkeypatch.setenv("ARMWRIGHT_CACHE", "/elsewhere")
+    assert cache_folder() == Path("/elsewhere")
