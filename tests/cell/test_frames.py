@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 
 from armwright.arrays import Array
-from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.spatial.poses import pose
 from oracles.arms import random_pose
@@ -70,6 +70,18 @@ def test_unknown_frame(bench: FrameTree) -> None:
     """A misspelt frame gets the nearest name."""
     with pytest.raises(UnknownNameError, match="Did you mean 'BENCH'"):
         bench.world("BENSH")
+
+
+def test_a_long_chain() -> None:
+    """Five thousand frames, each hanging on the one before, are as deep as they are and no deeper than Python."""
+    tree = FrameTree().place("F0", step(0))
+    nodes = dict(tree.nodes)
+    for i in range(1, 5000):
+        nodes[f"F{i}"] = Node(parent=f"F{i - 1}", relation=step(1e-3))
+    tree = FrameTree(nodes)
+
+    np.testing.assert_allclose(tree.world("F4999"), step(4.999), atol=ROUNDING)
+    assert tree.has_value("F4999")
 
 
 def test_world_is_fixed() -> None:

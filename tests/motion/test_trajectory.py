@@ -104,6 +104,19 @@ def test_xspline_against_scipy(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(xspline(times, knots)(t), CubicHermiteSpline(times, knots, rates)(t), atol=1e-10)
 
 
+def test_what_has_no_meaning() -> None:
+    """A negative order, slowing by nothing, ends and rates that do not fit: each is refused with what came."""
+    move = quintic([0.0], [1.0], 1.0)
+    with pytest.raises(InvalidValueError, match="0 or more, got -1"):
+        move(0.5, -1)
+    with pytest.raises(InvalidValueError, match="more than 0, got 0"):
+        move.slowed(0)
+    with pytest.raises(ShapeError, match="q_goal: expected 2 numbers"):
+        quintic([0.0, 0.0], [1.0, 1.0, 1.0], 1.0)
+    with pytest.raises(ShapeError, match="start: expected 2 numbers"):
+        xspline([0, 1, 2], np.zeros((3, 2)), start=np.zeros(3))
+
+
 def test_times_must_rise() -> None:
     """Two knots at one time are refused, with the knot."""
     with pytest.raises(InvalidValueError, match=r"got 0\.5 s and then 0\.5 s at knot 2"):

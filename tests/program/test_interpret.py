@@ -272,6 +272,35 @@ def test_obstacle_on_a_line() -> None:
     assert "% of the way there" in error.diagnostic.notes[0]
 
 
+def test_millimetres_for_metres() -> None:
+    """A goal typed in millimetres gets the hint that lengths are metres."""
+    error = _fails("VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,450,0,250) ; MOVE ARM_1 TO f STRAIGHTLY ; END.")
+
+    assert error.diagnostic.helps == ("`f` is 514.8 m away: lengths in a program are metres",)
+
+
+def test_moves_to_where_the_hand_is() -> None:
+    """Going where one is, straight, by way of it or leaving through it, takes no time and is no error."""
+    text = """VAR a, b : FRAME ; BEGIN
+      a = (1,0,0, 0,-1,0, 0,0,-1, 0.45, 0.1, 0.25) ; b = (1,0,0, 0,-1,0, 0,0,-1, 0.45, 0.1, 0.25) ;
+      MOVE ARM_1 TO a ; MOVE ARM_1 TO b STRAIGHTLY ; MOVE ARM_1 TO b ; MOVE ARM_1 TO b VIA (a, b) ;
+      MOVE ARM_1 TO b WITH APPROACH = b, WITH DEPARTURE = a ; END."""
+
+    recording = run(text)
+
+    assert recording.duration == pytest.approx(recording.stages[0].t1)
+    expect(recording, ARM_1=down(0.45, 0.1, 0.25))
+
+
+def test_a_turn_on_the_spot() -> None:
+    """A straight MOVE may only turn the hand."""
+    text = """VAR a, b : FRAME ; BEGIN
+      a = (1,0,0, 0,-1,0, 0,0,-1, 0.45, 0.1, 0.25) ; b = (0,1,0, 1,0,0, 0,0,-1, 0.45, 0.1, 0.25) ;
+      MOVE ARM_1 TO a ; MOVE ARM_1 TO b STRAIGHTLY ; END."""
+
+    assert run(text).stages[1].stage.deviation < 1e-3
+
+
 def test_blind_camera() -> None:
     """An object that the camera does not find stops the program with what it does find."""
     error = _fails("VAR obj9 : FRAME ; BEGIN READ VISIONS (obj9) ; END.")
@@ -316,7 +345,7 @@ def test_effort_over_the_limit_is_a_warning() -> None:
 
     found = warnings(interpret(compiled.code, weak, Simulator(weak)))
 
-    assert [one.code for one in found] == ["W401"] * 3
+    assert [one.code for one in found] == ["W401"] * 3  # one for each MOVE: joint 2 alone is weak
     assert "joint 2 of ARM_1 would need" in found[0].message
     assert "more than its 1 N m" in found[0].message
     assert " s, in PTP to OBJ1" in found[0].label

@@ -1,7 +1,6 @@
 """A bench with two elbow arms, computed here by hand: what the page of a run is tried on."""
 
 import math
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -234,21 +233,6 @@ def animate(first: ArmRecord, second: ArmRecord, second_base: Array) -> Animatio
 @pytest.fixture(scope="session")
 def bench() -> RunPage:
     return bench_run()
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """Start the system's chromium once for all pages."""
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no chromium on this machine: pages are not tried in a browser")
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with sync_api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(
-            executable_path=chromium, args=["--headless", "--no-sandbox", "--disable-gpu"]
-        )
-        yield started
-        started.close()
 
 
 class Visit:

@@ -56,9 +56,12 @@ class FrameTree:
 
     def has_value(self, name: str) -> bool:
         """Whether the frame stands somewhere."""
-        return self.parent(name) is None or (
-            self.nodes[name].relation is not None and self.has_value(self.nodes[name].parent)
-        )
+        while name != WORLD:
+            node = self._node(name)
+            if node.relation is None:
+                return False
+            name = node.parent
+        return True
 
     def parent(self, name: str) -> str | None:
         """Return what the frame hangs on; None for WORLD.
@@ -86,15 +89,15 @@ class FrameTree:
             UnknownNameError: no such frame.
             InvalidValueError: the frame, or one it hangs on, has no value yet.
         """
-        if name == WORLD:
-            return np.eye(4)
-        node = self._node(name)
-        if node.relation is None:
-            raise InvalidValueError(f"frame {name} has no value yet")
-        return np.asarray(self.world(node.parent) @ node.relation)
+        return self.relation(name, WORLD)
 
     def relation(self, child: str, ancestor: str) -> Array:
-        """Return the pose (4, 4) of ``child`` seen from ``ancestor``, one of the frames it hangs on."""
+        """Return the pose (4, 4) of ``child`` seen from ``ancestor``, one of the frames it hangs on.
+
+        Raises:
+            UnknownNameError: no such frame.
+            InvalidValueError: the frame, or one it hangs on, has no value yet.
+        """
         X = np.eye(4)
         name = child
         while name != ancestor:

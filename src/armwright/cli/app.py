@@ -1,8 +1,10 @@
 """The command ``armwright``: its commands, and what becomes of errors."""
 
+import io
 import os
+import signal
 import sys
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -54,17 +56,36 @@ def root(
     """
 
 
+class _Interrupted(BaseException):
+    """Ctrl-C; an exception of our own, since Typer takes KeyboardInterrupt for itself and says nothing."""
+
+
+def _interrupt(_signal: int, _frame: object) -> None:
+    raise _Interrupted
+
+
 def main() -> None:
     """Run the command line; a caller's mistake ends it with one message and exit status 1."""
+    signal.signal(signal.SIGINT, _interrupt)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A terminal that knows no degree sign gets an escape, not a traceback.
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
     except ArmwrightError as error:
-        print(f"armwright: {error}", file=sys.stderr)
-        sys.exit(1)
+        _end(1, str(error))
     except BrokenPipeError:
         # The reader of our output has gone (as in `armwright show ur5 | head`): nothing is left to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except KeyboardInterrupt:
-        print("armwright: interrupted; nothing was written", file=sys.stderr)
-        sys.exit(130)
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _end(1, f"cannot write the output: {error.strerror or error}")
+    except _Interrupted:
+        _end(130, "interrupted; nothing was written")
+
+
+def _end(status: int, message: str) -> NoReturn:
+    print(f"armwright: {message}", file=sys.stderr)
+    sys.exit(status)

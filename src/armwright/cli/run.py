@@ -2,15 +2,20 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.table import Table
+    from rich.text import Text
 
     from armwright.cell.model import Cell
+    from armwright.program import Source
     from armwright.program.code import Code
+    from armwright.program.diagnostics import Diagnostic
     from armwright.program.interpret import RunError
     from armwright.program.recording import Recording, RunStage
 
@@ -51,15 +56,12 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     place = _cell(cell, servo_ms, deviation_mm)
     compiled = compile_file(program, place, strict=strict)
     if compiled.code is None:
-        print_diagnostics(compiled.diagnostics, compiled.source)
-        raise typer.Exit(1)
+        _fail(compiled.source, compiled.diagnostics, as_json=as_json)
     code = compiled.code
     try:
         recording = _interpret(code, place, watched=not (quiet or as_json))
     except RunError as error:
-        print_diagnostics([*compiled.diagnostics, error.diagnostic], code.source)
-        _print_moment(error, code)
-        raise typer.Exit(1) from error
+        _fail(code.source, [*compiled.diagnostics, error.diagnostic], error, code, as_json=as_json)
     diagnostics = (*compiled.diagnostics, *warnings(recording))
     if output is not None:
         options = {"servo_ms": place.period * 1e3, "deviation_mm": place.deviation * 1e3, "strict": strict}
@@ -77,18 +79,19 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 def _cell(path: Path, servo_ms: float | None, deviation_mm: float | None) -> "Cell":
     import attrs
 
-    from armwright.cell.reader import read_cell
+    from armwright.cell.reader import DEVIATION_MM, SERVO_MS, read_cell
 
     place = read_cell(path)
-    period = place.period if servo_ms is None else _option("--servo-ms", servo_ms) * 1e-3
-    deviation = place.deviation if deviation_mm is None else _option("--deviation-mm", deviation_mm) * 1e-3
+    period = place.period if servo_ms is None else _option("--servo-ms", servo_ms, SERVO_MS)
+    deviation = place.deviation if deviation_mm is None else _option("--deviation-mm", deviation_mm, DEVIATION_MM)
     return attrs.evolve(place, period=period, deviation=deviation)
 
 
-def _option(name: str, value: float) -> float:
-    if not 0.001 <= value <= 1000:
-        raise typer.BadParameter(f"expected 0.001 to 1000, got {value:g}", param_hint=name)
-    return value
+def _option(name: str, value: float, bounds: tuple[float, float]) -> float:
+    lower, upper = bounds
+    if not lower <= value <= upper:
+        raise typer.BadParameter(f"expected {lower:g} to {upper:g}, got {value:g}", param_hint=name)
+    return value * 1e-3
 
 
 def _interpret(code: "Code", place: "Cell", *, watched: bool) -> "Recording":
@@ -113,6 +116,37 @@ def _interpret(code: "Code", place: "Cell", *, watched: bool) -> "Recording":
         return interpret(code, place, simulator, show)
 
 
+def _fail(
+    source: "Source",
+    diagnostics: "Sequence[Diagnostic]",
+    error: "RunError | None" = None,
+    code: "Code | None" = None,
+    *,
+    as_json: bool,
+) -> NoReturn:
+    """Say why a program did not run, or did not run to its end, and stop with status 1."""
+    import json
+
+    from armwright.cli.check import print_diagnostics
+    from armwright.program.diagnostics import to_json
+
+    if as_json:
+        data = {"program": source.name, "diagnostics": [to_json(one, source) for one in diagnostics]}
+        moment = {"time": error.time, "frames": _places(error)} if error else {}
+        print(json.dumps({**data, **moment}, indent=2, ensure_ascii=False))
+    else:
+        print_diagnostics(diagnostics, source)
+        if error and code:
+            _print_moment(error, code)
+    raise typer.Exit(1)
+
+
+def _places(error: "RunError") -> dict[str, list[float] | None]:
+    """Return where every frame was when a program could not go on, in the world in m; None without a value."""
+    tree = error.tree
+    return {name: tree.world(name)[:3, 3].tolist() if tree.has_value(name) else None for name in tree}
+
+
 def _command() -> str:
     import shlex
 
@@ -122,21 +156,18 @@ def _command() -> str:
 def _print_summary(recording: "Recording", code: "Code", output: Path | None) -> None:
     from rich.console import Console
 
-    console = Console(soft_wrap=False)
+    console = Console(markup=False, highlight=False)
     console.print(_trace_table(recording, code))
     if recording.stages:
         console.print(_stage_table(recording, code))
     for stage in recording.stages:
         if stage.stage.slowed:
             line = code.source.line(stage.span.start)
-            console.print(
-                f"line {line}: {stage.stage.kind} to {stage.to[-1]} runs {stage.stage.slowed}", highlight=False
-            )
+            console.print(f"line {line}: {stage.stage.kind} to {stage.to[-1]} runs {stage.stage.slowed}")
     moves = sum(effect.kind == "MOVE" for effect in recording.effects)
     console.print(
         f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {moves} moves, "
-        f"{len(recording.stages)} stages, {len(recording.streams[0].t) if recording.streams else 0} servo ticks",
-        highlight=False,
+        f"{len(recording.stages)} stages, {len(recording.streams[0].t) if recording.streams else 0} servo ticks"
     )
     if output is not None:
         # On a line of its own and never wrapped, so that it can be clicked or copied.
@@ -150,10 +181,10 @@ def _trace_table(recording: "Recording", code: "Code") -> "Table":
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("line", justify="right", style="dim")
     table.add_column("s", justify="right")
-    table.add_column("what happened")
+    table.add_column("what happened", overflow="fold")
     for effect in recording.effects:
         if effect.kind != "PLACE":
-            table.add_row(str(code.source.line(effect.span.start)), f"{effect.t0:.3f}", effect.text.replace("[", r"\["))
+            table.add_row(str(code.source.line(effect.span.start)), f"{effect.t0:.3f}", effect.text)
     return table
 
 
@@ -162,10 +193,8 @@ def _stage_table(recording: "Recording", code: "Code") -> "Table":
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("line", "stage"):
-        table.add_column(name, justify="right" if name == "line" else "left")
-    for name in ("s", "mm", "off mm", "peak speed", "peak effort"):
-        table.add_column(name, justify="right")
+    for name in ("line", "stage", "s", "mm", "off mm", "peak speed", "peak effort"):
+        table.add_column(name, justify="left" if name == "stage" else "right", overflow="fold")
     for stage in recording.stages:
         off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
         table.add_row(
@@ -179,19 +208,18 @@ def _stage_table(recording: "Recording", code: "Code") -> "Table":
     return table
 
 
-def _peaks(stage: "RunStage", recording: "Recording") -> tuple[str, str]:
+def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
     """Say the largest share of a limit and whose it is."""
+    from rich.text import Text
+
     arm = recording.cell.arms[stage.arm].arm
+    shares = stage.stage.trajectory.peaks(1) / arm.limit("speed"), stage.peak_effort / arm.limit("effort")
     texts = []
-    for values, limit in (
-        (stage.stage.trajectory.peaks(1), arm.limit("speed")),
-        (stage.peak_effort, arm.limit("effort")),
-    ):
-        share = values / limit
+    for share in shares:
         joint = int(share.argmax())
-        text = f"{share[joint] * 100:.0f} % j{joint + 1}"
-        texts.append(f"[bold red]{text}[/]" if share[joint] > 1 + 1e-9 else text)
-    return texts[0], texts[1]
+        over = share[joint] > 1 + 1e-9
+        texts.append(Text(f"{share[joint] * 100:.0f} % j{joint + 1}", style="bold red" if over else ""))
+    return texts
 
 
 def _print_moment(error: "RunError", code: "Code") -> None:
@@ -214,4 +242,4 @@ def _print_moment(error: "RunError", code: "Code") -> None:
         if error.tree.has_value(name):
             place = ", ".join(f"{x * 1e3:.1f}" for x in error.tree.world(name)[:3, 3])
         table.add_row(code.spelled(name), "its base" if parent == name else code.spelled(parent), place)
-    Console(stderr=True).print(table)
+    Console(stderr=True, markup=False).print(table)

@@ -27,7 +27,7 @@ def write_folder(folder: Path, files: Mapping[str, str | Iterable[str]]) -> None
     try:
         with tempfile.TemporaryDirectory(prefix=".armwright-", dir=folder.parent) as beside:
             for name, text in files.items():
-                with (Path(beside) / name).open("w", encoding="utf-8", newline="\n") as file:
+                with (Path(beside) / name).open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
                     file.writelines([text] if isinstance(text, str) else text)
                     file.flush()
                     os.fsync(file.fileno())

@@ -11,10 +11,10 @@ from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse, inverse_branches, travel
 from armwright.kinematics.inverse.solution import Answer, violations
-from armwright.motion.path import Knots, Path, place_knots
+from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, Knots, Path, place_knots
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline import xspline
-from armwright.spatial.rotations import angle_between
+from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector
 
 Cause: TypeAlias = Literal["reach", "limits", "singular"]
 
@@ -26,7 +26,8 @@ _HALVINGS = 6
 # A path through several frames turns its corners without a stop, so it must round them; and it is gross motion. It
 # may leave the straight ways between its frames by this much more than a line may leave its own.
 _CORNER_ROOM = 20.0
-# A path that asks a joint for this many times its limit meets a singularity; it is refused, not crawled along.
+# A path that asks a joint for this many times its top speed meets a singularity; it is refused, not crawled along.
+# Accelerations say nothing of it: a short line asks much of them wherever it lies.
 _SLOWEST = 20.0
 # Turning the hand by this much is allowed where the place may be off by one metre's thousandth: 5 mrad per mm.
 TURN_PER_METRE = 5.0
@@ -86,8 +87,9 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
         TR-83-008, "straight line motion" and "continuous motion"; the knots of its rule are halved until the
         deviation between them, which the rule only estimates, really is within the bound.
     """
-    if not path.lengths().any():
+    if path.lengths().max() <= NEGLIGIBLE:
         return Followed(trajectory=hold(q_start, 0.0), knots=1, deviation=0.0, turn_deviation=0.0, slowed="")
+    _check_ends(arm, path)
     allowed = deviation if len(path.poses) == 2 else _CORNER_ROOM * deviation
     for halving in range(_HALVINGS + 1):
         knots = place_knots(arm, path, deviation=deviation, speed=speed, finer=2**halving)
@@ -108,6 +110,15 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
         turn_deviation=float(turned.max()),
         slowed=slowed,
     )
+
+
+def _check_ends(arm: Arm, path: Path) -> None:
+    """Refuse a path to a pose that no posture reaches, before anything between is looked at."""
+    for segment, X in enumerate(path.poses[1:]):
+        solution = inverse(arm, X)
+        if not solution.allowed:
+            cause: Cause = "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
+            raise PathError(cause, segment, 1.0, solution.explain())
 
 
 def _solve(arm: Arm, path: Path, knots: Knots, q_start: Array) -> Array:
@@ -146,22 +157,20 @@ def _deviations(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> t
     X = forward(arm, trajectory(t))
     segments = np.array(knots.segments[1:])
     A, B = path.poses[segments], path.poses[segments + 1]
-    way = B[:, :3, 3] - A[:, :3, 3]
-    square = np.maximum(np.sum(way**2, axis=-1), 1e-300)
-    relative = X[..., :3, 3] - A[:, None, :3, 3]
-    s = np.clip(np.sum(relative * way[:, None], axis=-1) / square[:, None], 0.0, 1.0)
-    off = np.linalg.norm(relative - s[..., None] * way[:, None], axis=-1)
-    turned = np.empty_like(off)
-    for i, segment in enumerate(segments):
-        # A way without length turns on the spot, where progress is read from the clock.
-        fraction = s[i] if way[i].any() else _fractions_at(knots, i, fine)
-        turned[i] = angle_between(path.at(segment, fraction)[:, :3, :3], X[i, :, :3, :3])
-    return _BETWEEN_LOOKS * off.max(axis=-1), _BETWEEN_LOOKS * turned.max(axis=-1)
-
-
-def _fractions_at(knots: Knots, i: int, fine: Array) -> Array:
-    before = knots.fractions[i] if knots.segments[i] == knots.segments[i + 1] else 0.0
-    return before + fine * (knots.fractions[i + 1] - before)
+    R_back = np.swapaxes(A[:, :3, :3], -1, -2)
+    way, turn = B[:, :3, 3] - A[:, :3, 3], rotation_vector(R_back @ B[:, :3, :3])
+    come, turned = X[..., :3, 3] - A[:, None, :3, 3], rotation_vector(R_back[:, None] @ X[..., :3, :3])
+    along, square = np.sum(come * way[:, None], axis=-1), np.sum(way**2, axis=-1)[:, None]
+    s = np.clip(along / np.maximum(square, NEGLIGIBLE**2), 0.0, 1.0)
+    off = np.linalg.norm(come - s[..., None] * way[:, None], axis=-1)
+    # How far the hand has come is read from place and turn together, so that a turn on the spot has its progress too.
+    weight = TURN_RADIUS**2
+    progress = (along + weight * np.sum(turned * turn[:, None], axis=-1)) / (
+        square + weight * np.sum(turn**2, axis=-1)[:, None]
+    )
+    R_path = A[:, None, :3, :3] @ rotation_from_vector(np.clip(progress, 0.0, 1.0)[..., None] * turn[:, None])
+    twisted = angle_between(R_path, X[..., :3, :3])
+    return _BETWEEN_LOOKS * off.max(axis=-1), _BETWEEN_LOOKS * twisted.max(axis=-1)
 
 
 def _check_between(arm: Arm, knots: Knots, trajectory: Trajectory) -> None:
@@ -179,18 +188,19 @@ def _slowing(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> tupl
         "speed": trajectory.segment_peaks(1) / arm.limit("speed"),
         "acceleration": np.sqrt(trajectory.segment_peaks(2) / arm.limit("acceleration")),
     }
-    what = max(needs, key=lambda name: float(needs[name].max()))
-    interval, joint = np.unravel_index(int(needs[what].argmax()), needs[what].shape)
-    factor = float(needs[what].max())
-    if factor > _SLOWEST:
+    if needs["speed"].max() > _SLOWEST:
+        interval, worst = np.unravel_index(int(needs["speed"].argmax()), needs["speed"].shape)
         k = int(interval) + 1
         raise PathError(
             "singular",
             knots.segments[k],
             knots.fractions[k],
-            f"near {_place(path, knots, k)} joint {joint + 1} would have to move {factor:.0f} times as fast as it may: "
-            "the arm is nearly singular there",
+            f"near {_place(path, knots, k)} joint {worst + 1} would have to move {needs['speed'].max():.0f} times as "
+            "fast as it may: the arm is nearly singular there",
         )
+    what = max(needs, key=lambda name: float(needs[name].max()))
+    joint = int(np.unravel_index(int(needs[what].argmax()), needs[what].shape)[1])
+    factor = float(needs[what].max())
     return (factor, f"{factor:.2f} times slower, for the {what} of joint {joint + 1}") if factor > 1 else (1.0, "")
 
 
@@ -204,11 +214,11 @@ def _give_up(arm: Arm, path: Path, knots: Knots, q: Array, badness: Array) -> No
     jump = np.abs(q[worst + 1] - q[worst]) / np.where(np.isfinite(arm.limit("speed")), arm.limit("speed"), 1.0)
     joint = int(jump.argmax())
     amount = abs(q[worst + 1, joint] - q[worst, joint])
-    unit, scale = ("deg", 180 / np.pi) if arm.joints[joint].revolute else ("mm", 1e3)
+    verb, unit, scale = ("turn", "deg", 180 / np.pi) if arm.joints[joint].revolute else ("move", "mm", 1e3)
     raise PathError(
         "singular",
         knots.segments[worst + 1],
         knots.fractions[worst + 1],
         f"the hand cannot stay on the path near {_place(path, knots, worst + 1)}: the arm is singular there "
-        f"and joint {joint + 1} would have to turn {amount * scale:.1f} {unit} at once",
+        f"and joint {joint + 1} would have to {verb} {amount * scale:.1f} {unit} at once",
     )

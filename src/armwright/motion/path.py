@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import accumulate
 
 import attrs
 import numpy as np
@@ -15,6 +16,8 @@ from armwright.spatial.rotations import angle_between
 
 # A turn on the spot has no length; it is timed as if a tool this long swept the way [m].
 TURN_RADIUS = 0.2
+# A way shorter than this is none: poses that should be equal differ by rounding [m].
+NEGLIGIBLE = 1e-9
 # The report's rule lets speed and step vanish for a line over the base axis; they stop falling at this part of the
 # reach, which for the arms of the catalogue lies inside the space that the arm cannot enter anyway.
 _CLOSEST = 0.1
@@ -105,7 +108,7 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
     """Place knots on a path by the report's rule.
 
     The first and the last step are half as long as the others and take as much time: so the hand gathers speed
-    and loses it.
+    and loses it. A way without length, between equal poses, gets no knots.
 
     Args:
         arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
@@ -126,21 +129,22 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
         )
     if not deviation > 0:
         raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation}")
-    times, segments, fractions = [0.0], [0], [0.0]
     lengths = path.lengths()
-    last = len(lengths) - 1
-    for i, length in enumerate(lengths):
+    moving = [i for i, length in enumerate(lengths) if length > NEGLIGIBLE]
+    times, segments, fractions = [0.0], [0], [0.0]
+    for i in moving:
         A, B = path.poses[i, :3, 3], path.poses[i + 1, :3, 3]
-        steps = _steps(math.ceil(length / report_step(arm, A, B, deviation) - 1e-9) * finer, i == 0, i == last)
-        per_step = length / sum(steps) / report_speed(arm, A, B, speed)
-        for k in range(1, len(steps) + 1):
+        count = math.ceil(lengths[i] / report_step(arm, A, B, deviation) - 1e-9)
+        steps = _steps(count * finer, first=i == moving[0], last=i == moving[-1])
+        per_step = lengths[i] / sum(steps) / report_speed(arm, A, B, speed)
+        for done in accumulate(steps):
             times.append(times[-1] + per_step)
             segments.append(i)
-            fractions.append(sum(steps[:k]) / sum(steps))
+            fractions.append(done / sum(steps))
     return Knots(times=np.array(times), segments=tuple(segments), fractions=tuple(fractions))
 
 
-def _steps(count: int, first: bool, last: bool) -> Sequence[float]:  # noqa: FBT001
+def _steps(count: int, *, first: bool, last: bool) -> Sequence[float]:
     """Return the relative lengths of the steps on one way."""
     count = max(count, 1)
     if first and last:

@@ -17,6 +17,9 @@ from armwright.motion.path import Path
 from armwright.motion.quintic import point_to_point
 from armwright.motion.trajectory import Trajectory, whole_ticks
 
+# No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
+_FARTHEST = 1e6
+
 StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE"]
 
 
@@ -123,6 +126,9 @@ def _plan(arm: Arm, q: Array, goals: Sequence[StageGoal], manner: Manner, number
 def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> list[Stage]:
     """Return the ways to make one stage, best first: one per posture for point to point, else one."""
     poses = of_shape(goal.poses, (4, 4), "poses")
+    far = np.abs(poses[:, :3, 3]).max(axis=-1)
+    if far.max() > _FARTHEST:
+        raise StageError("reach", number, int(far.argmax()), 1.0, f"the pose is {far.max():.3g} m away")
     if goal.kind == "PTP":
         return [_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number)]
     path = Path(poses=np.concatenate([forward(arm, q)[None], poses]))

@@ -5,13 +5,15 @@ import math
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.arrays import Array, ArrayLike, floats, joint_array
 from armwright.errors import InvalidValueError
 from armwright.motion.trajectory import Trajectory, hold
 
 # RLO and VAL count speed in percent of normal; 120 is all the arm allows.
 TOP_SPEED = 120.0
 LOWEST_SPEED = 1.0
+# A way of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
+_NOWHERE = 1e-12
 # Peaks of 10 u³ - 15 u⁴ + 6 u⁵ on [0, 1]: of its first and of its second derivative.
 PEAK_SPEED = 15 / 8
 PEAK_ACCELERATION = 10 / math.sqrt(3)
@@ -30,8 +32,8 @@ def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajector
     """
     if not duration > 0:
         raise InvalidValueError(f"duration: expected more than 0 s, got {duration}")
-    start = np.asarray(q_start, dtype=np.float64)
-    way = np.asarray(q_goal, dtype=np.float64) - start
+    start = floats(q_start, "q_start")
+    way = joint_array(q_goal, len(start), "q_goal") - start
     powers = np.array((0.0, 0.0, 0.0, 10 / duration**3, -15 / duration**4, 6 / duration**5))
     coefficients = powers[:, None] * way
     coefficients[0] += start
@@ -63,7 +65,7 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
     """
     speed = check_speed(speed)
     way = joint_array(q_goal, arm.n, "q_goal") - joint_array(q_start, arm.n, "q_start")
-    if not way.any():
+    if np.abs(way).max() <= _NOWHERE:
         return hold(q_start, 0.0)
     shortest = shortest_duration(arm, way)
     if shortest == 0:
@@ -77,6 +79,6 @@ def check_speed(speed: float) -> float:
     Raises:
         InvalidValueError: it is outside 1..120.
     """
-    if not LOWEST_SPEED <= speed <= TOP_SPEED:
-        raise InvalidValueError(f"speed {speed:g} is outside {LOWEST_SPEED:g}..{TOP_SPEED:g}")
+    if not isinstance(speed, int | float) or not LOWEST_SPEED <= speed <= TOP_SPEED:
+        raise InvalidValueError(f"speed {speed} is outside {LOWEST_SPEED:g}..{TOP_SPEED:g}")
     return speed

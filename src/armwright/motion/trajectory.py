@@ -60,6 +60,8 @@ class Trajectory:
         Returns:
             (..., n). At a knot where the derivative jumps, the value just after it.
         """
+        if order < 0:
+            raise InvalidValueError(f"order: expected 0 or more, got {order}")
         t = floats(t, "t")
         inside = np.clip(t, 0.0, self.duration)
         segment = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.coefficients) - 1)
@@ -92,6 +94,8 @@ class Trajectory:
 
     def slowed(self, factor: float) -> "Trajectory":
         """Return the same path run ``factor`` times slower."""
+        if not factor > 0:
+            raise InvalidValueError(f"factor: expected more than 0, got {factor}")
         powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
         return Trajectory(times=self.times * factor, coefficients=self.coefficients * powers[:, None])
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike, floats, joint_array
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.motion.trajectory import Trajectory
 
@@ -36,13 +36,13 @@ def xspline_rates(times: ArrayLike, knots: ArrayLike, start: ArrayLike, end: Arr
         raise InvalidValueError(f"X-spline: times must rise, got {t[i]:g} s and then {t[i + 1]:g} s at knot {i + 1}")
     slope = np.diff(q, axis=0) / h[:, None]
     rates = np.empty_like(q)
-    rates[0] = start
+    rates[0] = joint_array(start, q.shape[1], "start")
     for i in range(1, len(t) - 1):
         last, coming = h[i - 1], h[i]
         a = coming / (last + coming)
         curve = (slope[i] - slope[i - 1]) / (last + coming)
         rates[i] = a * (slope[i - 1] - last * curve) + (slope[i - 1] + last * curve) - a * rates[i - 1]
-    rates[-1] = end
+    rates[-1] = joint_array(end, q.shape[1], "end")
     return rates
 
 

@@ -7,6 +7,7 @@ from typing import NoReturn
 import attrs
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
 from armwright.cell.hardware import DeviceError, Hardware
@@ -34,6 +35,8 @@ from armwright.spatial.poses import from_noap, inverse
 # Called before each instruction: how many are done, how many there are, the line of the next.
 Progress = Callable[[int, int, int], None]
 
+# A place this many times farther than the arm reaches was probably typed in millimetres.
+_MILLIMETRES = 50.0
 _CODES = {"reach": "E401", "limits": "E402", "singular": "E403"}
 _WHAT = {
     "reach": "is out of reach of {arm}",
@@ -83,32 +86,31 @@ def interpret(code: Code, cell: Cell, hardware: Hardware, progress: Progress | N
 
 
 def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
-    """Return a warning for every MOVE in which inverse dynamics asks more than a joint can give."""
+    """Return a warning for every joint of every stage for which inverse dynamics asks more than it can give."""
     found = []
     for stage in recording.stages:
         arm = recording.cell.arms[stage.arm].arm
         over = stage.peak_effort / arm.limit("effort")
-        joint = int(over.argmax())
-        if over[joint] <= 1:
+        if (over <= 1).all():
             continue
         t, tau = efforts(arm, stage.stage.trajectory, recording.cell.period)
-        worst = int(np.abs(tau[:, joint]).argmax())
-        unit = "N m" if arm.joints[joint].revolute else "N"
-        limit = arm.joints[joint].limits.effort
-        found.append(
-            Diagnostic(
-                code="W401",
-                severity=Severity.WARNING,
-                message=f"joint {joint + 1} of {stage.arm} would need {abs(tau[worst, joint]):.1f} {unit}, "
-                f"{(over[joint] - 1) * 100:.0f} % more than its {limit:g} {unit}",
-                span=stage.span,
-                label=f"at {stage.t0 + t[worst]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
-                helps=(
-                    f"a lower speed than {stage.speed:g} asks for less where it is motion and not weight that costs",
-                ),
-            )
-        )
-    return tuple(dict.fromkeys(found))
+        found += [_effort_warning(stage, arm, joint, t, tau[:, joint]) for joint in np.flatnonzero(over > 1).tolist()]
+    return tuple(found)
+
+
+def _effort_warning(stage: RunStage, arm: Arm, joint: int, t: Array, tau: Array) -> Diagnostic:
+    worst = int(np.abs(tau).argmax())
+    unit = "N m" if arm.joints[joint].revolute else "N"
+    limit = arm.joints[joint].limits.effort
+    return Diagnostic(
+        code="W401",
+        severity=Severity.WARNING,
+        message=f"joint {joint + 1} of {stage.arm} would need {abs(tau[worst]):.1f} {unit}, "
+        f"{(abs(tau[worst]) / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
+        span=stage.span,
+        label=f"at {stage.t0 + t[worst]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
+        helps=(f"a lower speed than {stage.speed:g} asks for less where it is motion and not weight that costs",),
+    )
 
 
 @attrs.define
@@ -344,11 +346,9 @@ class _Run:
         spelled = self._spelled(frame)
         what = _WHAT[error.cause].format(arm=move.arm)
         on_the_way = error.fraction < 1 and error.cause != "singular"
-        message = (
-            f"`{spelled}` {what}"
-            if not on_the_way
-            else f"the way to `{spelled}` leads out of what {move.arm} can reach"
-        )
+        message = f"`{spelled}` {what}"
+        if on_the_way:
+            message = f"the way to `{spelled}` leads out of what {move.arm} can reach"
         where = f"{error.fraction * 100:.0f} % of the way there: " if error.fraction < 1 else ""
         secondary = [Label(self._written[frame], f"`{spelled}` got its place here")] if frame in self._written else []
         self._fail(
@@ -358,7 +358,15 @@ class _Run:
             "cannot be reached",
             secondary=secondary,
             notes=(f"{where}{error}",),
+            helps=self._metres(frame, move.arm),
         )
+
+    def _metres(self, frame: str, arm: str) -> tuple[str, ...]:
+        """Say that lengths are metres, where a place so far off can only be meant in millimetres."""
+        X_BW = inverse(self._tree.world(base_name(arm)))
+        away = np.linalg.norm((X_BW @ self._tree.world(frame))[:3, 3])
+        meant = away > _MILLIMETRES * self._cell.arms[arm].arm.reach
+        return (f"`{self._spelled(frame)}` is {away:.4g} m away: lengths in a program are metres",) if meant else ()
 
     def _fail(
         self,
@@ -369,8 +377,15 @@ class _Run:
         *,
         secondary: Sequence[Label] = (),
         notes: Sequence[str] = (),
+        helps: Sequence[str] = (),
     ) -> NoReturn:
         diagnostic = Diagnostic(
-            code=code, message=message, span=span, label=label, secondary=tuple(secondary), notes=tuple(notes)
+            code=code,
+            message=message,
+            span=span,
+            label=label,
+            secondary=tuple(secondary),
+            notes=tuple(notes),
+            helps=tuple(helps),
         )
         raise RunError(diagnostic, self._tree, self._now)

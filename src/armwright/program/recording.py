@@ -1,6 +1,6 @@
 """What a run leaves: every effect with its place in the program, every stage, every servo tick of every arm."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
 import attrs
@@ -14,6 +14,9 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.motion.plan import Stage
 from armwright.motion.trajectory import Trajectory
 from armwright.program.source import Span
+
+# Rows that are computed and written together.
+_ROWS_AT_ONCE = 16384
 
 EffectKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "OPEN", "GRASP", "OPERATE", "READ", "MOVE", "END"]
 
@@ -147,7 +150,10 @@ def stream(
         first, posture = end, trajectory(trajectory.duration)
     q[first:] = posture
     t: Array = np.arange(ticks, dtype=np.float64) * period
-    return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=inverse_dynamics(arm, q, qd, qdd))
+    tau = np.empty((ticks, arm.n))
+    for rows in _chunks(ticks):
+        tau[rows] = inverse_dynamics(arm, q[rows], qd[rows], qdd[rows])
+    return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
 
 
 def efforts(arm: Arm, trajectory: Trajectory, period: float) -> tuple[Array, Array]:
@@ -167,7 +173,13 @@ def motion_rows(streams: Iterable[Stream]) -> Iterable[str]:
         # Twelve digits hold a position to 1e-12, so that differences over a tick still show the speed.
         blank = "," * (joints - n)
         cell = ",".join(["%.12g"] * n) + blank
-        line = f"%.9g,{s.arm},{cell},{cell},{cell},{cell}\n"
-        block = np.concatenate([s.t[:, None], s.q, s.qd, s.qdd, s.tau], axis=1)
-        # Adding 0 turns -0 into 0, which reads better.
-        yield from (line % tuple(row) for row in (block + 0.0).tolist())
+        line = f"%.12g,{s.arm},{cell},{cell},{cell},{cell}\n"
+        for rows in _chunks(len(s.t)):
+            block = np.concatenate([s.t[rows, None], s.q[rows], s.qd[rows], s.qdd[rows], s.tau[rows]], axis=1)
+            # Adding 0 turns -0 into 0, which reads better.
+            yield from (line % tuple(row) for row in (block + 0.0).tolist())
+
+
+def _chunks(count: int) -> Iterator[slice]:
+    """Cut so many rows into pieces that a long run needs no more memory than its own arrays."""
+    return (slice(first, first + _ROWS_AT_ONCE) for first in range(0, count, _ROWS_AT_ONCE))

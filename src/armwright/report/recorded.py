@@ -1,13 +1,13 @@
 """From the recording of a run to what its page shows: thinned for a screen, with the arm as a figure of sticks."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell, CellArm, base_name
 from armwright.kinematics.forward import link_poses
 from armwright.program.code import Code
@@ -179,17 +179,22 @@ def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
 
 def _tracks(recording: Recording, code: Code, t: Array, hands: dict[str, Array]) -> Iterator[FrameTrack]:
     names = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
-    for name in names:
-        poses = np.tile(np.eye(4), (len(t), 1, 1))
-        known = np.zeros(len(t), dtype=bool)
-        for rows, tree in _reigns(recording, t):
-            if name not in tree or not tree.has_value(name):
+    poses = {name: np.tile(np.eye(4), (len(t), 1, 1)) for name in names}
+    first: dict[str, int] = {}
+    for rows, tree in _reigns(recording, t):
+        # Parents come before children, so each place is the parent's and one step more.
+        places: dict[str, Array] = {WORLD: np.eye(4), **{arm: hand[rows] for arm, hand in hands.items()}}
+        for name in tree:
+            node = tree.nodes.get(name)
+            if name in places or node is None or node.relation is None or node.parent not in places:
                 continue
-            known[rows] = True
-            arm = next((above for above in tree.ancestors(name) if above in hands), None)
-            poses[rows] = hands[arm][rows] @ tree.relation(name, arm) if arm else tree.world(name)
-        if known.any():
-            yield FrameTrack(name=code.spelled(name), poses=to_noap(poses), visible_from=int(known.argmax()))
+            places[name] = places[node.parent] @ node.relation
+            if name in poses:
+                poses[name][rows] = places[name]
+                first.setdefault(name, rows.start)
+    for name in names:
+        if name in first:
+            yield FrameTrack(name=code.spelled(name), poses=to_noap(poses[name]), visible_from=first[name])
 
 
 def _reigns(recording: Recording, t: Array) -> Iterator[tuple[slice, FrameTree]]:
@@ -202,16 +207,17 @@ def _reigns(recording: Recording, t: Array) -> Iterator[tuple[slice, FrameTree]]
 
 
 def _tree_changes(recording: Recording, code: Code) -> Iterator[TreeChange]:
-    last: dict[str, str] = {}
+    before: Mapping[str, Node] = {}
+    shown: dict[str, str] = {}
     for time, tree in recording.trees:
-        for name in tree:
-            if name == WORLD or name.endswith(".BASE") or not tree.has_value(name):
+        for name, node in tree.nodes.items():
+            if node is before.get(name) or node.relation is None or name.endswith(".BASE"):
                 continue
-            parent = tree.parent(name)
-            shown = WORLD if parent is None or parent == base_name(name) else parent
-            if last.get(name) != shown:
-                last[name] = shown
-                yield TreeChange(t=time, child=code.spelled(name), parent=code.spelled(shown))
+            parent = WORLD if node.parent == base_name(name) else node.parent
+            if shown.get(name) != parent:
+                shown[name] = parent
+                yield TreeChange(t=time, child=code.spelled(name), parent=code.spelled(parent))
+        before = tree.nodes
 
 
 def _shown(name: str, cell: Cell) -> bool:
