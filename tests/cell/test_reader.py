@@ -16,6 +16,8 @@ from armwright.cell.model import Cell, base_name
 from armwright.cell.reader import read_cell
 from armwright.errors import FileFormatError
 from armwright.kinematics.forward import forward
+from armwright.program import Source, known_cell
+from armwright.program import compile as compile_program
 
 CORPUS = Path(__file__).parent / "corpus"
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -186,6 +188,21 @@ loose = {{ at = {IDENTITY} }}
     assert parents == {"BOLT": "PLATE", "PLATE": "STATION", "STATION": WORLD, "NUT": "ARM_1", "LOOSE": WORLD}
 
 
+@pytest.mark.parametrize(
+    ("written", "name"), [("ARM_01", "ARM_1"), ("arm-007", "ARM_7"), ("ARM_10", "ARM_10"), ("ARM_00", "ARM_0")]
+)
+def test_leading_zeros_make_no_other_arm(written: str, name: str, tmp_path: Path) -> None:
+    """An arm of a cell has the name that a program finds it by, and so has what a frame hangs on."""
+    tail = f"[frames]\nnut = {{ on = '{written}', at = {IDENTITY} }}\n"
+    place = cell(tmp_path, ARM.replace("ARM_1", written) + tail)
+    program = Source(
+        "t.rlo", f"VAR nut : FRAME ; BEGIN OPEN {written} ; GRASP {name} ; UNFIX nut FROM {written} ; END."
+    )
+
+    assert (set(place.arms), place.tree().parent("NUT")) == ({name}, name)
+    assert compile_program(program, known_cell(place)).diagnostics == ()
+
+
 def test_typed_rotations_are_made_exact(tmp_path: Path) -> None:
     """A rotation typed with two digits, here of the PUMA project's pose C, is read as the nearest true one."""
     text = f"{ARM}[frames]\nC = [0.41,0.69,-0.60, -0.29,0.71,0.64, 0.87,-0.09,0.49, 0.60,0.15,-0.30]\n"
@@ -233,6 +250,11 @@ FAULTS = {
         ARM + "[arms.arm-1]\nposture = [0,0,0.3,0,0,0]\n",
         4,
         "arms, arm-1: ARM_1 is given twice",
+    ),
+    "arms that differ in leading zeros": (
+        ARM + "[arms.ARM_01]\nposture = [0,0,0.3,0,0,0]\n",
+        4,
+        "arms, ARM_01: ARM_1 is given twice; case, - or _ and leading zeros make no other arm",
     ),
     "unknown model": (
         '[arms.ARM_1]\nmodel = "pumma560"\n',

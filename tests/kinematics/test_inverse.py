@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import images, inverse, inverse_branches
-from armwright.kinematics.inverse.shoulder import shoulder_of
+from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.solution import Answer, NoPostureError
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
@@ -220,9 +220,9 @@ def test_base_and_tool_count(rng: np.random.Generator) -> None:
 
 
 def test_other_arms_are_refused() -> None:
-    """An arm without one of the two builds is told so, not solved wrongly."""
-    with pytest.raises(UnsupportedArmError, match=r"'ur5': no closed-form inverse kinematics"):
-        inverse(load_arm("ur5"), np.eye(4))
+    """An arm of another build has no branches in closed form and is told so."""
+    with pytest.raises(UnsupportedArmError, match=r"'ntu-3r': no closed-form inverse kinematics"):
+        inverse_branches(load_arm("ntu-3r"), np.eye(4))
 
 
 def test_not_a_rotation() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armwright.program import Source
+from armwright.program import KnownCell, Source
 from armwright.program import compile as translate
 from armwright.program.code import Code, Kind, Move, Op, Trajectory, listing, stages_of
 from program.shelf import BARE
@@ -155,3 +155,28 @@ def test_listing_of_names_and_numbers() -> None:
 def test_three_trajectories() -> None:
     """There are three basic trajectories."""
     assert [kind.value for kind in Trajectory] == ["PTP", "LINE", "SPLINE"]
+
+
+@pytest.mark.parametrize(
+    ("statements", "arms"),
+    [
+        ("MOVE tip TO goal ; GRASP", ["ARM_1"]),
+        ("OPEN ARM_2 ; MOVE tip TO goal ; GRASP", ["ARM_1"]),
+        ("MOVE tip TO goal ; OPEN ARM_2 ; GRASP", ["ARM_2"]),
+        (
+            "OPEN ARM_2 ; MOVE ARM_2 TO part ; GRASP ; MOVE ARM_1 TO goal ; MOVE part TO goal ; GRASP",
+            ["ARM_2", "ARM_2"],
+        ),
+    ],
+    ids=["moved", "named, then moved", "moved, then named", "moved by an implied AFFIX"],
+)
+def test_arm_of_a_grasp(statements: str, arms: list[str]) -> None:
+    """A GRASP that names no arm closes the one named or moved last; a frame that is moved moves the arm it hangs on."""
+    place = KnownCell(arms=frozenset({"ARM_1", "ARM_2"}), frames={"TIP": "ARM_1", "GOAL": "WORLD", "PART": "WORLD"})
+    text = f"VAR tip, goal, part : FRAME ; BEGIN {statements} ; MOVE tip TO part ; END."
+    code = translate(Source("t.rlo", text), place).code
+    assert code is not None
+    grasps = [step for step in code.instructions if step.op is Op.GRASP]
+
+    assert [step.operands for step in grasps] == [(arm,) for arm in arms]
+    assert {step.comment for step in grasps} == {"arm by context"}

@@ -13,10 +13,11 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Cell, CellArm
+from armwright.cell.names import arm_name
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
 from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.shoulder import shoulder_of
+from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.solution import violations
 from armwright.spatial.poses import from_noap, pose
 from armwright.spatial.poses import inverse as inverse_pose
@@ -29,7 +30,8 @@ _NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
 # Rotations typed with two digits are off by up to 0.018; they are made exact. More is a mistake.
 _TYPED_ROTATION = 2e-2
 # A faster servo fills a disk, a slower one controls nothing [ms].
-_SERVO_MS = (0.1, 100.0)
+SERVO_MS = (0.1, 100.0)
+DEVIATION_MM = (1e-3, 1e3)
 # Fingers and cameras that take longer are a slip of units [s].
 _LONGEST_WAIT = 600.0
 
@@ -57,8 +59,8 @@ def read_cell(path: Path | str) -> Cell:
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_LONGEST_WAIT),
         devices=_devices(top.table("devices")) if "devices" in top else None,
         contact_height=None if math.isnan(height) else height,
-        period=motion.number("servo_ms", default=1.0, lower=_SERVO_MS[0], upper=_SERVO_MS[1]) * 1e-3,
-        deviation=motion.number("deviation_mm", default=1.0, lower=1e-3, upper=1e3) * 1e-3,
+        period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
+        deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):
@@ -72,9 +74,10 @@ def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
         match = _ARM_NAME.fullmatch(key)
         if match is None:
             raise table.error(key, "expected the name of an arm, such as ARM_1")
-        if f"ARM_{match[1]}" in arms:
-            raise table.error(key, f"ARM_{match[1]} is given twice")
-        arms[f"ARM_{match[1]}"] = _arm(table.table(key), folder)
+        name = arm_name(match[1])
+        if name in arms:
+            raise table.error(key, f"{name} is given twice; case, - or _ and leading zeros make no other arm")
+        arms[name] = _arm(table.table(key), folder)
     if not arms:
         raise table.error(None, "expected at least one arm, such as [arms.ARM_1]")
     return arms
@@ -181,7 +184,7 @@ def _name(table: Table, key: str, taken: Iterable[str], text: str | None = None)
     written = key if text is None else text
     name, match = written.upper(), _ARM_NAME.fullmatch(written)
     if text is not None and match:
-        return f"ARM_{match[1]}"
+        return arm_name(match[1])
     if not _NAME.fullmatch(written) or (text is None and (name == WORLD or match)):
         raise table.error(
             key, f"{written!r} cannot name a frame or device: letters A to Z, digits and _, not WORLD or an arm"

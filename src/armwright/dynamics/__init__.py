@@ -1,1 +1,1 @@
-"""What it takes to move an arm: the efforts at its joints."""
+"""What it takes to move an arm, and how it moves when it is pushed."""

@@ -1,6 +1,7 @@
 """An arm as a simulation sees it: what its joints feel at one moment, and what they do between two events."""
 
 import math
+from functools import cached_property
 from typing import NamedTuple
 
 import attrs
@@ -52,6 +53,24 @@ class Phase:
     state: npt.NDArray[np.int8]
 
 
+class Start(NamedTuple):
+    """What a phase starts from.
+
+    Attributes:
+        q: (n,) joint positions.
+        qd: (n,) joint speeds.
+        phase: what the joints do from now on.
+        met: (n,) numbers of ``JointState``: what each joint has just run into, ``MOVES`` for none.
+        loss: energy that stops and brakes took [J].
+    """
+
+    q: Array
+    qd: Array
+    phase: Phase
+    met: npt.NDArray[np.int8]
+    loss: float
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Plant:
     """An arm, its controller and its surroundings.
@@ -71,17 +90,29 @@ class Plant:
     lower: Array
     upper: Array
     effort: Array
-    rotor: Array = attrs.field(init=False)
-    viscous: Array = attrs.field(init=False)
-    forward: Array = attrs.field(init=False)
-    backward: Array = attrs.field(init=False)
 
-    def __attrs_post_init__(self) -> None:
-        """Read the motors once."""
-        sources = {"rotor": "inertia", "forward": "coulomb_forward", "backward": "coulomb_backward"}
-        for name in ("rotor", "viscous", "forward", "backward"):
-            values = np.array([getattr(motor, sources.get(name, name)) for motor in self.arm.motors])
-            object.__setattr__(self, name, values)
+    @cached_property
+    def rotor(self) -> Array:
+        """Inertias of the motors, (n,)."""
+        return self._of_motors("inertia")
+
+    @cached_property
+    def viscous(self) -> Array:
+        """Friction per speed, (n,)."""
+        return self._of_motors("viscous")
+
+    @cached_property
+    def forward(self) -> Array:
+        """Dry friction against motion forward, (n,)."""
+        return self._of_motors("coulomb_forward")
+
+    @cached_property
+    def backward(self) -> Array:
+        """Dry friction against motion backward, (n,)."""
+        return self._of_motors("coulomb_backward")
+
+    def _of_motors(self, name: str) -> Array:
+        return np.array([getattr(motor, name) for motor in self.arm.motors])
 
     @property
     def dry(self) -> Flags:
@@ -116,7 +147,7 @@ class Plant:
             flags[brake.joint] |= brake.on(t)
         return flags
 
-    def begin(self, t: float, q: Array, qd: Array) -> tuple[Array, Array, Phase, float]:
+    def begin(self, t: float, q: Array, qd: Array) -> Start:
         """Begin a phase: stops and brakes take what hits them, and it is found which joints are held.
 
         Args:
@@ -125,11 +156,14 @@ class Plant:
             qd: (n,) joint speeds.
 
         Returns:
-            Positions and speeds to go on from, the phase, and the energy that stops and brakes took [J].
+            What to go on from.
         """
         at_lower, at_upper, braked = q <= self.lower + TOUCH, q >= self.upper - TOUCH, self.braked(t)
         q = np.where(at_lower, self.lower, np.where(at_upper, self.upper, q))
-        qd, loss = self._collide(q, qd, at_lower | braked, at_upper | braked)
+        hit = ((at_lower | braked) & (qd < -STILL)) | ((at_upper | braked) & (qd > STILL))
+        loss = 0.0
+        if hit.any():
+            qd, loss = self._collide(q, qd, at_lower | braked, at_upper | braked)
         touched = at_lower | at_upper | braked
         at_rest = (touched | self.dry) & (np.abs(qd) <= 10 * STILL)
         qd = np.where(at_rest, 0.0, qd)
@@ -150,12 +184,11 @@ class Plant:
             upper=upper,
             state=np.where(held, state, JointState.MOVES).astype(np.int8),
         )
-        return q, qd, phase, loss
+        met = np.where(hit, state, JointState.MOVES).astype(np.int8)
+        return Start(q=q, qd=qd, phase=phase, met=met, loss=loss)
 
     def _collide(self, q: Array, qd: Array, from_below: Flags, from_above: Flags) -> tuple[Array, float]:
         """Return speeds after impacts that leave no speed against a stop or under a brake, and the energy lost."""
-        if not ((from_below & (qd < -STILL)) | (from_above & (qd > STILL))).any():
-            return qd, 0.0
         M = self.inertia(q)
         lower, upper = np.where(from_above, -np.inf, 0.0), np.where(from_below, np.inf, 0.0)
         after = settle(M, M @ qd, from_below | from_above, lower, upper).x

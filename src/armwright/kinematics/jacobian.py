@@ -1,14 +1,18 @@
-"""The Jacobian: how fast the tool moves and turns for given joint speeds."""
+"""The Jacobian: how fast the tool moves and turns for given joint speeds, and how that changes on the way."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, TypeAlias
+
+import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import link_frames, per_joint, stack, tool_frame
 from armwright.tracing.scalar import Scalar
-from armwright.tracing.vectors import Vector, apply, cross, subtract, transpose
+from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, scale, subtract, transpose
+
+Axes: TypeAlias = Literal["base", "tool"]
 
 
 def jacobian_columns(arm: Arm, q: Sequence[Scalar]) -> list[Vector]:
@@ -20,7 +24,11 @@ def jacobian_columns(arm: Arm, q: Sequence[Scalar]) -> list[Vector]:
         Whitney (1972).
     """
     frames = link_frames(arm, q)
-    _, p_tool = tool_frame(arm, frames[-1])
+    return frame_columns(arm, frames, tool_frame(arm, frames[-1])[1])
+
+
+def frame_columns(arm: Arm, frames: Sequence[tuple[Matrix, Vector]], p_tool: Vector) -> list[Vector]:
+    """Return the columns of ``jacobian_columns``, given the frames 0 to n and the tool point."""
     columns = []
     for joint, (R, p) in zip(arm.joints, frames[:-1], strict=True):
         z = [row[2] for row in R]
@@ -28,7 +36,45 @@ def jacobian_columns(arm: Arm, q: Sequence[Scalar]) -> list[Vector]:
     return columns
 
 
-def jacobian(arm: Arm, q: ArrayLike, frame: Literal["base", "tool"] = "base") -> Array:
+def jacobian_rate_columns(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Vector]:
+    """Return the time derivatives of the n columns of ``jacobian_columns``, over abstract scalars, base axes.
+
+    The axis of joint i is carried by link i-1, so it turns with that link; the lever from the joint to the tool
+    changes with the speeds of its two ends.
+
+    Source:
+        The columns of Whitney (1972), differentiated.
+    """
+    frames = link_frames(arm, q)
+    _, p_tool = tool_frame(arm, frames[-1])
+    # The speed of the origin of frame i-1 and the angular speed of its link; then, of each joint, its lever to the
+    # tool and those two.
+    v: Vector = [0.0, 0.0, 0.0]
+    w: Vector = [0.0, 0.0, 0.0]
+    levers, turns, speeds = [], [], []
+    for joint, rate, (R, p), (_, p_next) in zip(arm.joints, qd, frames[:-1], frames[1:], strict=True):
+        z = [row[2] for row in R]
+        levers.append(subtract(p_tool, p))
+        turns.append(w)
+        speeds.append(v)
+        if joint.revolute:
+            w = add(w, scale(rate, z))
+            v = add(v, cross(w, subtract(p_next, p)))
+        else:
+            v = add(v, cross(w, subtract(p_next, p)), scale(rate, z))
+    v_tool = add(v, cross(w, subtract(p_tool, frames[-1][1])))
+    columns = []
+    for joint, (R, _), lever, turn, speed in zip(arm.joints, frames[:-1], levers, turns, speeds, strict=True):
+        z = [row[2] for row in R]
+        z_rate = cross(turn, z)
+        if joint.revolute:
+            columns.append([*add(cross(z_rate, lever), cross(z, subtract(v_tool, speed))), *z_rate])
+        else:
+            columns.append([*z_rate, 0.0, 0.0, 0.0])
+    return columns
+
+
+def jacobian(arm: Arm, q: ArrayLike, frame: Axes = "base") -> Array:
     """Return the geometric Jacobian of the tool point.
 
     Args:
@@ -42,15 +88,111 @@ def jacobian(arm: Arm, q: ArrayLike, frame: Literal["base", "tool"] = "base") ->
     Raises:
         ShapeError: the last axis of ``q`` is not n long.
         InvalidValueError: ``frame`` is neither ``base`` nor ``tool``.
+
+    Source:
+        Whitney (1972).
     """
-    if frame not in ("base", "tool"):
-        raise InvalidValueError(f"frame: expected 'base' or 'tool', got {frame!r}")
+    known_axes(frame)
     q = joint_array(q, arm.n)
     scalars = per_joint(q)
     columns = jacobian_columns(arm, scalars)
     if frame == "tool":
-        R_BT, _ = tool_frame(arm, link_frames(arm, scalars)[-1])
-        R_TB = transpose(R_BT)
-        columns = [apply(R_TB, column[:3]) + apply(R_TB, column[3:]) for column in columns]
+        R_TB = _tool_turned_back(arm, scalars)
+        columns = [_turned(R_TB, column) for column in columns]
+    return _stack_columns(columns, q.shape[:-1])
+
+
+def jacobian_rate(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -> Array:
+    """Return the time derivative of the geometric Jacobian of the tool point.
+
+    With it the acceleration of the tool is J(q) qdd + J_rate(q, qd) qd; in tool axes that is the rate of change of
+    the components, as an observer on the tool sees them.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint speeds [rad/s] or [m/s].
+        frame: whose axes the rows are seen along; the point is the tool point in both.
+
+    Returns:
+        (..., 6, n): rows 0-2 linear, rows 3-5 angular, per second.
+
+    Raises:
+        ShapeError: the last axis of ``q`` or ``qd`` is not n long, or their leading axes do not fit together.
+        InvalidValueError: ``frame`` is neither ``base`` nor ``tool``.
+
+    Source:
+        The Jacobian of Whitney (1972), differentiated; tool axes by d/dt (Rᵀ x) = Rᵀ (dx/dt - w × x).
+    """
+    known_axes(frame)
+    q, qd = together(joint_array(q, arm.n), joint_array(qd, arm.n, "qd"), "q", "qd")
+    scalars, rates = per_joint(q), per_joint(qd)
+    columns = jacobian_rate_columns(arm, scalars, rates)
+    if frame == "tool":
+        own = jacobian_columns(arm, scalars)
+        w = add(*(scale(rate, column[3:]) for rate, column in zip(rates, own, strict=True)))
+        R_TB = _tool_turned_back(arm, scalars)
+        columns = [
+            _turned(R_TB, subtract(column, [*cross(w, still[:3]), *cross(w, still[3:])]))
+            for column, still in zip(columns, own, strict=True)
+        ]
+    return _stack_columns(columns, q.shape[:-1])
+
+
+def tool_twist(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -> Array:
+    """Return how the tool moves and turns.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint speeds [rad/s] or [m/s].
+        frame: whose axes it is seen along; the point is the tool point in both.
+
+    Returns:
+        (..., 6): speed of the tool point [m/s], then angular speed [rad/s].
+
+    Raises:
+        ShapeError: the last axis of ``q`` or ``qd`` is not n long, or their leading axes do not fit together.
+        InvalidValueError: ``frame`` is neither ``base`` nor ``tool``.
+    """
+    q, qd = together(joint_array(q, arm.n), joint_array(qd, arm.n, "qd"), "q", "qd")
+    return np.asarray((jacobian(arm, q, frame) @ qd[..., None])[..., 0])
+
+
+def known_axes(frame: str) -> None:
+    """Refuse axes that are neither the base's nor the tool's.
+
+    Raises:
+        InvalidValueError: they are not.
+    """
+    if frame not in ("base", "tool"):
+        raise InvalidValueError(f"frame: expected 'base' or 'tool', got {frame!r}")
+
+
+def together(a: Array, b: Array, name_a: str, name_b: str) -> tuple[Array, Array]:
+    """Return two arrays (..., k) and (..., l) with the same leading axes, repeated where one has fewer.
+
+    Raises:
+        ShapeError: the leading axes do not fit together.
+    """
+    try:
+        lead = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    except ValueError as error:
+        raise ShapeError(
+            f"{name_a}, {name_b}: leading axes must fit together, got shapes {a.shape} and {b.shape}"
+        ) from error
+    return np.broadcast_to(a, (*lead, a.shape[-1])), np.broadcast_to(b, (*lead, b.shape[-1]))
+
+
+def _tool_turned_back(arm: Arm, q: Sequence[Scalar]) -> Matrix:
+    R_BT, _ = tool_frame(arm, link_frames(arm, q)[-1])
+    return transpose(R_BT)
+
+
+def _turned(R: Matrix, column: Vector) -> Vector:
+    return apply(R, column[:3]) + apply(R, column[3:])
+
+
+def _stack_columns(columns: Sequence[Vector], lead: tuple[int, ...]) -> Array:
     rows = [column[i] for i in range(6) for column in columns]
-    return stack(rows, q.shape[:-1]).reshape(*q.shape[:-1], 6, arm.n)
+    return stack(rows, lead).reshape(*lead, 6, len(columns))

@@ -1,4 +1,4 @@
-"""One moment in the course of a program: the frames, the names, the arm named last, and what has been found."""
+"""One moment in a program: the frames, the names, the arm named or moved last, and what has been found."""
 
 from collections.abc import Mapping
 

@@ -83,6 +83,8 @@ def _tool_or_sensor(course: Course, statement: tree.Statement) -> None:
             handling.grasp(course, statement)
         case tree.ReadSystem(arm=tree.ArmName() as arm):
             course.use_arm(arm)
+            # The sensors may find the arm elsewhere, and with it what hangs on it.
+            course.table.displace(arm.key, by=arm.key)
         case tree.ReadVisions(target=tree.Name() as target):
             handling.read(course, target, statement.span)
         case tree.ReadVisions(target=tree.Poison(names=names)):
@@ -125,6 +127,8 @@ def _affix(course: Course, affix: tree.Affix) -> None:
     handling.leaves(course, child, parent, affix.span)
     if affix.at is None:
         _late(course, affix, child, parent)
+    else:
+        course.table.displace(child)
     course.table.hang(child, parent, affix.link)
 
 

@@ -92,8 +92,12 @@ def move(course: Course, move: tree.Move) -> None:
         if isinstance(clause, tree.Speed):
             _speed(course, clause.value)
     if arm is None or moved is None:
+        # An arm has moved, but nobody knows which: that is no reason to say that none has been used.
+        lost = moved is None or course.table.unknown(moved)
+        course.arm_unknown = course.arm_unknown or (lost and course.last_arm is None)
         return
     course.arms[course.index] = arm
+    course.last_arm, course.arm_unknown = arm, False
     if goal and course.table.carrier(goal) == arm and not course.table.unknown(goal):
         _relative(course, move, goal, arm)
     course.table.arrive(arm, goal if moved == arm else moved, move.span if moved == arm else None)

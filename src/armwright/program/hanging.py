@@ -103,20 +103,35 @@ class Hanging:
             self._count(old.parent, -1)
 
     def assign(self, name: str, order: int, span: Span) -> None:
-        """Give a frame a value; what hangs on it follows, and no hand stands at it any more."""
+        """Give a frame a value, and thereby another place."""
         self.assigned[name] = Assignment(order, span, moved=name in self.valued)
         self.valued.add(name)
-        for hand in self.hands.values():
-            if hand.at and (hand.at == name or name in self.above(hand.at)):
+        self.displace(name)
+
+    def displace(self, name: str, by: str | None = None) -> None:
+        """Put a frame elsewhere; what hangs on it follows, and no hand stands at it or holds it any more.
+
+        Args:
+            name: the frame, or the arm that carries what hangs on it.
+            by: the arm that did it, if one did: what it carries goes along with its own hand.
+        """
+        for arm, hand in self.hands.items():
+            if arm == by:
+                continue
+            if hand.at and self._on(hand.at, name):
                 hand.at = hand.arrival = None
-            if hand.holds and (hand.holds == name or name in self.above(hand.holds)):
+            if hand.holds and self._on(hand.holds, name):
                 hand.holds = None
 
     def arrive(self, arm: str, at: str | None, by: Span | None) -> None:
-        """Move a hand; ``by`` is the MOVE if it moved the arm itself."""
+        """Move a hand and all that it carries; ``by`` is the MOVE if it moved the arm itself."""
+        self.displace(arm, by=arm)
         hand = self.hand(arm)
-        if hand.holds and hand.holds != at and self.carrier(hand.holds) != arm:
+        if hand.holds and hand.holds != at and not self._on(hand.holds, arm):
             hand.holds = None
+        if by and at and self._on(at, arm):
+            # The goal has gone along: the hand stands only at what it stood at before and has taken with it.
+            at, by = (hand.at if hand.at and self._on(hand.at, arm) else None), None
         hand.at, hand.arrival, hand.arrived_open, hand.opened = at, by, hand.open, None
 
     def forget(self, names: Iterable[str]) -> None:
@@ -128,6 +143,9 @@ class Hanging:
                 self.cut(name)
                 self._unknown.add(name)
                 self.valued.add(name)
+
+    def _on(self, name: str, above: str) -> bool:
+        return name == above or above in self.above(name)
 
     def _count(self, parent: str, change: int) -> None:
         self._children[parent] = self._children.get(parent, 0) + change

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import attrs
 
+from armwright.cell.names import arm_name
 from armwright.program.diagnostics import Diagnostic, Fix
 from armwright.program.source import Source, Span
 from armwright.program.words import RESERVED
@@ -31,7 +32,7 @@ class Token:
     Attributes:
         kind: what it is.
         text: as written.
-        key: as compared: upper case, ``ARM_1`` for ``arm-1``, the digits alone of a number with a unit.
+        key: as compared: upper case, ``ARM_1`` for ``arm-01``, the digits alone of a number with a unit.
         start: its first character.
         end: the one after its last.
         damaged: whether something has been said about it already.
@@ -190,7 +191,7 @@ class _Scanner:
 
     def _no_arm(self, word: str, start: int, end: int) -> Token:
         digits = word[3:].strip(" \t-_")
-        key = arm_key(f"ARM_{digits or 1}")
+        key = arm_name(digits or "1")
         message, label = (
             (f"`{word}` is not the name of an arm", "no blanks in the name of an arm")
             if digits
@@ -236,12 +237,7 @@ class _Scanner:
 
 
 def _arm(word: str, start: int, end: int) -> Token:
-    return Token(TokenKind.ARM, word, arm_key(word), start, end)
-
-
-def arm_key(word: str) -> str:
-    """Return the canonical name of an arm: ``ARM_1`` for ``arm-01``."""
-    return f"ARM_{word[4:].lstrip('0') or '0'}"
+    return Token(TokenKind.ARM, word, arm_name(word[len("ARM_") :]), start, end)
 
 
 def _is_number(word: str) -> bool:

@@ -66,7 +66,8 @@ def rotation_vector(R: ArrayLike) -> Array:
         symmetric = (R + np.swapaxes(R, -1, -2)) / 2 - cosine[..., None, None] * np.eye(3)
         column = np.argmax(np.diagonal(symmetric, axis1=-2, axis2=-1), axis=-1)
         axis = np.take_along_axis(symmetric, column[..., None, None], axis=-1)[..., 0]
-        axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
+        # Of the other rows the column is not used, and may be 0.
+        axis /= np.where(half[..., None], np.linalg.norm(axis, axis=-1, keepdims=True), 1.0)
         facing = np.where(np.sum(axis * skew, axis=-1) < 0, -1.0, 1.0)
         vector = np.where(half[..., None], axis * (facing * angle)[..., None], vector)
     return np.asarray(vector)

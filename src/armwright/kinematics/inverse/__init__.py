@@ -1,1 +1,1 @@
-"""Inverse kinematics in closed form: every posture that puts the hand at a pose, labelled and judged."""
+"""Inverse kinematics: postures that put the hand at a pose, labelled and judged; closed forms where there are."""

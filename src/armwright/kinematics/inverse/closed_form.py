@@ -1,223 +1,212 @@
-"""Closed-form inverse kinematics of arms with a spherical wrist: PUMA-like and Stanford-like."""
+"""Inverse kinematics: in closed form where the arm has one, else step by step; judged and sorted."""
 
-import math
+from collections.abc import Callable
 
 import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape
-from armwright.errors import InvalidValueError, UnsupportedArmError
-from armwright.kinematics.forward import forward, link_frames, per_joint, stack
-from armwright.kinematics.inverse.shoulder import Shoulder, Sign, first_three, nearest_wrist, shoulder_of
-from armwright.kinematics.inverse.solution import Answer, Branch, InverseSolution, violations
-from armwright.kinematics.inverse.wrist import last_three
-from armwright.spatial.poses import inverse as inverse_pose
-from armwright.spatial.poses import pose
-from armwright.spatial.rotations import angle_between, nearest_rotation, orthonormality_error
-from armwright.tracing.vectors import product, transpose
+from armwright.errors import UnsupportedArmError
+from armwright.kinematics.forward import per_joint, stack
+from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, errors, judge
+from armwright.kinematics.inverse.numeric import numeric_inverse
+from armwright.kinematics.inverse.posture import posture
+from armwright.kinematics.inverse.reach import nearest_centre
+from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.shoulder import Shoulder, Sign, turned
+from armwright.kinematics.inverse.solution import InverseSolution, violations
+from armwright.kinematics.inverse.turns import images, middle, nearest_image, nearest_turn, travel
+
+__all__ = ["BRANCHES", "images", "inverse", "inverse_branches", "label", "nearest_image", "travel"]
 
 _SIGNS: tuple[Sign, Sign] = (1, -1)
 # The order of the branches: arm, elbow (or slide), wrist.
 BRANCHES: tuple[tuple[Sign, Sign, Sign], ...] = tuple((a, e, w) for a in _SIGNS for e in _SIGNS for w in _SIGNS)
 
-# A pose typed with a few digits is turned into a rotation up to this error; beyond it is a mistake.
-_TYPED_ROTATION = 2e-2
-# A place this far outside counts as the edge of the reach: six typed digits of a metre [m].
-_EDGE = 2e-6
 # Joint positions closer than this are one posture met twice.
 _SAME_POSTURE = 1e-9
+# A posture that misses the place by less meets it; by more it is one that stretches towards it [m].
+_MET = 1e-9
+# Which joints move together, from 1, where a choice is left open: the turn of joint 1, the raising of joint 2, the
+# wrist; and the joint that then chooses.
+_FREE = {
+    "spherical": ((1, 4, 5, 6), (2, 4, 5, 6), (4, 6)),
+    "parallel": ((1, 2, 3, 4, 5, 6), (2, 4), (2, 3, 4, 6)),
+}
+_CHOOSERS = {"spherical": (1, 2, 4), "parallel": (1, 2, 6)}
+# Places of a free joint that are tried for one inside the limits.
+_TRIED = 721
 
 
 def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> tuple[Array, Array]:
     """Return all eight postures of many poses at once, unjudged.
 
     Args:
-        arm: a PUMA-like or Stanford-like arm of 6 joints.
+        arm: an arm of 6 joints with a closed form: see ``shoulder_of``.
         X_BT: (..., 4, 4) tool poses in the base frame.
-        near: (..., 6) joint positions; angles come back within half a turn of it, and a free joint 4 takes its
+        near: (..., 6) joint positions; angles come back within half a turn of it, and a free joint takes its
             value from it; the middle of the limits when left out.
 
     Returns:
-        q: (..., 8, 6) joint positions, branches in the order of ``BRANCHES``. A pose out of reach gives the
-            posture that stretches towards it.
-        singular: (..., 8) whether the wrist is singular there.
+        q: (..., 8, 6) joint positions, branches in the order of ``BRANCHES``. Where a pose has some of them only, the
+            others repeat the first that it has; a pose out of reach gives the postures that stretch towards it.
+        singular: (..., 8) whether a joint is free there.
 
     Raises:
-        UnsupportedArmError: the arm is neither PUMA-like nor Stanford-like.
+        UnsupportedArmError: the arm has no closed form.
         ShapeError: a shape does not fit.
     """
     shoulder = _shoulder(arm)
-    X_06 = inverse_pose(arm.base) @ of_shape(X_BT, (4, 4), "pose") @ inverse_pose(arm.tool)
-    reference = joint_array(_middle(arm) if near is None else near, arm.n, "near")
-    lead = np.broadcast_shapes(X_06.shape[:-2], reference.shape[:-1])
-    X_06 = np.broadcast_to(X_06, (*lead, 4, 4))
-    reference = np.broadcast_to(reference, (*lead, arm.n))
-    fixed = [joint.theta if joint.revolute else joint.d for joint in arm.joints]
-    R_06 = [per_joint(X_06[..., i, :3]) for i in range(3)]
-    p_wrist = per_joint(X_06[..., :3, 3] - shoulder.hand * X_06[..., :3, 2])
-    theta_4_free = reference[..., 3] + fixed[3]
-    found, loose = [], []
-    for side, elbow, flip in BRANCHES:
-        first = [v - f for v, f in zip(first_three(shoulder, p_wrist, side, elbow), fixed[:3], strict=True)]
-        R_B3, _ = link_frames(arm, first)[-1]
-        R_03 = product(transpose(arm.base[:3, :3].tolist()), R_B3)
-        last, singular = last_three(product(transpose(R_03), R_06), flip, theta_4_free)
-        last = [v - f for v, f in zip(last, fixed[3:], strict=True)]
-        found.append(stack([*first, *last], lead))
-        loose.append(np.broadcast_to(np.asarray(singular), lead))
-    q = _nearest_turn(arm, np.stack(found, axis=-2), reference[..., None, :])
-    return q, np.stack(loose, axis=-1)
+    X_BT = of_shape(X_BT, (4, 4), "pose")
+    q, free = _postures(arm, shoulder, X_BT, joint_array(middle(arm) if near is None else near, arm.n, "near"))
+    exists = np.asarray(_miss(arm, q, X_BT) <= _MET)
+    first = np.argmax(exists, axis=-1, keepdims=True)
+    chosen = np.where(exists | ~exists.any(axis=-1, keepdims=True), np.arange(8), first)
+    return (
+        np.take_along_axis(q, chosen[..., None], axis=-2),
+        np.take_along_axis(np.asarray(free.any(axis=-1)), chosen, axis=-1),
+    )
 
 
 def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> InverseSolution:
-    """Return every posture that puts the tool at one pose, judged and sorted.
+    """Return the postures that put the tool at one pose, judged and sorted.
+
+    With a closed form, see ``shoulder_of``, these are all there are. Any other arm is solved step by step from many
+    starting postures, see ``numeric_inverse``.
 
     Args:
-        arm: a PUMA-like or Stanford-like arm of 6 joints.
+        arm: any arm, with n joints.
         X_BT: (4, 4) tool pose in the base frame; a rotation typed with few digits is made one.
-        near: (6,) the present joint positions: of the images of an angle the nearest allowed one is taken, and
+        near: (n,) the present joint positions: of the images of an angle the nearest allowed one is taken, and
             branches come nearest first; the middle of the limits when left out.
 
     Returns:
         The branches, each labelled, with its limit violations and its residual, and the answer on the whole.
 
     Raises:
-        UnsupportedArmError: the arm is neither PUMA-like nor Stanford-like.
         ShapeError: a shape does not fit.
         InvalidValueError: the rotation part is no rotation, not even one typed with two digits.
 
     Source:
-        Paul (1981) ch. 3; spec of this project, mechanics §3.2.
+        Paul (1981) ch. 3; Hawkins (2013) for three parallel axes; spec of this project, mechanics §3.2.
     """
-    shoulder = _shoulder(arm)
-    X = _clean_pose(X_BT)
-    reference = joint_array(_middle(arm) if near is None else near, arm.n, "near")
-    X_near = _nearest_pose(arm, shoulder, X)
-    distance = float(np.linalg.norm(X_near[:3, 3] - X[:3, 3]))
-    in_reach = distance <= _EDGE
-    postures, singular = inverse_branches(arm, X_near, reference)
-    branches: list[Branch] = []
-    for q, loose, signs in zip(postures, singular, BRANCHES, strict=True):
-        q = nearest_image(arm, q, reference)  # noqa: PLW2901
-        if any(np.abs(q - other.q).max() < _SAME_POSTURE for other in branches):
-            continue
-        X_q = forward(arm, q)
-        branches.append(
-            Branch(
-                q=q,
-                label=label(shoulder, signs),
-                violations=violations(arm, q),
-                free=(4, 6) if loose else (),
-                position_error=float(np.linalg.norm(X_q[:3, 3] - X[:3, 3])),
-                rotation_error=float(angle_between(X[:3, :3], X_q[:3, :3])),
-            )
-        )
-    branches.sort(key=lambda branch: (not branch.allowed, travel(arm, reference, branch.q)))
-    allowed = [branch for branch in branches if branch.allowed]
-    if not in_reach:
-        answer = Answer.OUT_OF_REACH
-    elif not allowed:
-        answer = Answer.OUT_OF_LIMITS
-    else:
-        answer = Answer.SINGULAR if all(branch.free for branch in allowed) else Answer.SOLVED
-    return InverseSolution(
-        arm=arm,
-        answer=answer,
-        branches=tuple(branches),
-        distance=0.0 if in_reach else distance,
-        nearest_pose=X if in_reach else X_near,
-    )
+    X = clean_pose(X_BT)
+    reference = joint_array(middle(arm) if near is None else near, arm.n, "near")
+    shoulder = shoulder_of(arm)
+    return numeric_inverse(arm, X, reference) if shoulder is None else _closed(arm, shoulder, X, reference)
 
 
-def travel(arm: Arm, q_from: ArrayLike, q_to: ArrayLike) -> float:
-    """Return how far apart two postures are: the root of the summed squares of each joint's time at top speed."""
-    speed = arm.limit("speed")
-    weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
-    return float(np.linalg.norm((joint_array(q_to, arm.n) - joint_array(q_from, arm.n)) * weight))
+def label(shoulder: Shoulder, signs: tuple[Sign, Sign, Sign], angles: Array) -> str:
+    """Name a branch: arm, elbow or slide, wrist.
 
-
-def nearest_image(arm: Arm, q: ArrayLike, near: ArrayLike) -> Array:
-    """Return ``q`` (n,) with every angle turned by whole turns to the image inside the limits nearest to ``near``.
-
-    An angle with no image inside the limits takes the one that passes its limit least.
+    The elbow is up where it is above the line from joint 2 to the end of the forearm, above as the axis of joint 1
+    points. The wrist of a ``parallel`` arm is up where the angle 5 of its build is positive.
     """
-    starts = joint_array(near, arm.n, "near").tolist()
-    return np.array([min(turns, key=lambda x: abs(x - x0)) for turns, x0 in zip(_images(arm, q), starts, strict=True)])
-
-
-def images(arm: Arm, q: ArrayLike) -> Array:
-    """Return all images of one posture by whole turns that are inside the limits, (k, n); k is 0 if none is."""
-    rows = np.stack(np.meshgrid(*_images(arm, q), indexing="ij"), axis=-1).reshape(-1, arm.n)
-    inside = [row for row in rows if not violations(arm, row)]
-    return np.array(inside).reshape(len(inside), arm.n)
-
-
-def label(shoulder: Shoulder, signs: tuple[Sign, Sign, Sign]) -> str:
-    """Name a branch: arm, elbow or slide, wrist."""
-    side, elbow, flip = signs
-    words = ("up", "down") if shoulder.family == "puma" else ("out", "back")
-    # PUMA: with the arm to the left, elbow above and elbow below change places.
-    above = side * elbow > 0 if shoulder.family == "puma" else elbow > 0
-    return ", ".join(
-        ("left" if side > 0 else "right", words[0] if above else words[1], "no-flip" if flip > 0 else "flip")
-    )
+    side, second, flip = signs
+    arm = "left" if side > 0 else "right"
+    if shoulder.family == "stanford":
+        return f"{arm}, {'out' if second > 0 else 'back'}, {'no-flip' if flip > 0 else 'flip'}"
+    upper, _ = turned(angles[1], shoulder.upper, 0.0)
+    fore, _ = turned(angles[1] + angles[2], *shoulder.fore)
+    # With the wrist behind joint 2, as it is with the arm to the right, elbow above and elbow below change places.
+    elbow = "up" if second * (upper + fore) > 0 else "down"
+    if shoulder.family == "parallel":
+        return f"shoulder {arm}, elbow {elbow}, wrist {'up' if flip > 0 else 'down'}"
+    return f"{arm}, {elbow}, {'no-flip' if flip > 0 else 'flip'}"
 
 
 def _shoulder(arm: Arm) -> Shoulder:
     shoulder = shoulder_of(arm)
     if shoulder is None:
         raise UnsupportedArmError(
-            f"arm '{arm.name}': no closed-form inverse kinematics; expected an arm built like puma560 or stanford "
-            "(6 joints, spherical wrist)"
+            f"arm '{arm.name}': no closed-form inverse kinematics; expected an arm built like puma560, stanford or ur5 "
+            "(6 joints; a spherical wrist or three parallel axes)"
         )
     return shoulder
 
 
-def _clean_pose(X_BT: ArrayLike) -> Array:
-    X = of_shape(X_BT, (4, 4), "pose")
-    error = float(orthonormality_error(X[:3, :3]))
-    if X.shape != (4, 4) or error > _TYPED_ROTATION:
-        raise InvalidValueError(
-            f"pose: expected one (4, 4) pose whose rotation is orthonormal to {_TYPED_ROTATION}, "
-            f"got shape {X.shape}, error {error:.3g}"
+def _postures(arm: Arm, shoulder: Shoulder, X_BT: Array, near: Array) -> tuple[Array, Array]:
+    """Return the eight postures (..., 8, 6), existing or not, and which of three choices are free (..., 8, 3)."""
+    lead = np.broadcast_shapes(X_BT.shape[:-2], near.shape[:-1])
+    X_BT, near = np.broadcast_to(X_BT, (*lead, 4, 4)), np.broadcast_to(near, (*lead, arm.n))
+    R_BS, p_BS = shoulder.X_BS[:3, :3], shoulder.X_BS[:3, 3]
+    R_ST = R_BS.T @ X_BT[..., :3, :3]
+    p = per_joint((X_BT[..., :3, 3] - p_BS) @ R_BS + R_ST @ shoulder.p_TW)
+    R_S6 = R_ST @ shoulder.R_T6
+    R = [per_joint(R_S6[..., i, :]) for i in range(3)]
+    wanted = shoulder.angles(per_joint(near))
+    found, free = [], []
+    for signs in BRANCHES:
+        angles, *choices = posture(shoulder, p, R, signs, wanted)
+        found.append(stack(shoulder.joints(angles), lead))
+        free.append(np.stack([np.broadcast_to(np.asarray(choice, dtype=bool), lead) for choice in choices], axis=-1))
+    return nearest_turn(arm, np.stack(found, axis=-2), near[..., None, :]), np.stack(free, axis=-2)
+
+
+def _miss(arm: Arm, q: Array, X_BT: Array) -> Array:
+    """Return how far from the place asked for each of the eight branches (..., 8, 6) puts the hand [m]."""
+    return errors(arm, q, X_BT[..., None, :, :])[0]
+
+
+def _closed(arm: Arm, shoulder: Shoulder, X: Array, near: Array) -> InverseSolution:
+    target, X_near = X, None
+    postures, free = _postures(arm, shoulder, X, near)
+    miss = _miss(arm, postures, X)
+    if miss.min() > EDGE:
+        target = _nearest_pose(shoulder, X)
+        postures, free = _postures(arm, shoulder, target, near)
+        miss = _miss(arm, postures, target)
+        X_near = target if np.linalg.norm(target[:3, 3] - X[:3, 3]) > EDGE else None
+    kind = "parallel" if shoulder.family == "parallel" else "spherical"
+    candidates = []
+    for i in np.flatnonzero(miss <= max(EDGE, miss.min())):
+        q = nearest_image(arm, postures[i], near)
+        choosers = [joint for joint, is_free in zip(_CHOOSERS[kind], free[i], strict=True) if is_free]
+        for joint in choosers:
+            if violations(arm, q):
+                q = _moved_inside(
+                    arm, q, near, lambda near: _postures(arm, shoulder, target, near)[0], joint=joint, branch=int(i)
+                )
+        together = [joints for joints, is_free in zip(_FREE[kind], free[i], strict=True) if is_free]
+        angles = np.array(shoulder.angles(q.tolist()))
+        candidates.append(
+            Candidate(
+                q, label(shoulder, BRANCHES[i], angles), tuple(sorted({j for joints in together for j in joints}))
+            )
         )
-    return pose(nearest_rotation(X[:3, :3]), X[:3, 3])
+    return judge(arm, X, candidates, near, apart=_SAME_POSTURE, X_near=X_near)
 
 
-def _nearest_pose(arm: Arm, shoulder: Shoulder, X_BT: Array) -> Array:
+def _moved_inside(
+    arm: Arm, q: Array, near: Array, solve: Callable[[Array], Array], *, joint: int, branch: int
+) -> Array:
+    """Move a free joint on from ``near``, as little as it must, until all joints are inside their limits.
+
+    Args:
+        arm: the arm.
+        q: (n,) the posture with that joint near, which comes back when no other place of it helps.
+        near: (n,) where the arm is.
+        solve: returns the postures (k, 8, n) for places (k, n) of the arm.
+        joint: number of the free joint, from 1.
+        branch: which of the eight.
+    """
+    limits, start = arm.joints[joint - 1].limits, near[joint - 1]
+    lower, upper = max(limits.lower, start - np.pi), min(limits.upper, start + np.pi)
+    if lower > upper:
+        return q
+    tried = np.linspace(lower, upper, _TRIED)
+    tried = tried[np.abs(tried - start).argsort()]
+    starts = np.tile(near, (_TRIED, 1))
+    starts[:, joint - 1] = tried
+    members = (nearest_image(arm, member, near) for member in solve(starts)[:, branch])
+    return next((member for member in members if not violations(arm, member)), q)
+
+
+def _nearest_pose(shoulder: Shoulder, X_BT: Array) -> Array:
     """Return X_BT moved, not turned, so that the wrist centre comes into reach."""
-    X_06 = inverse_pose(arm.base) @ X_BT @ inverse_pose(arm.tool)
-    p_wrist = X_06[:3, 3] - shoulder.hand * X_06[:3, 2]
-    shift = np.array(nearest_wrist(shoulder, p_wrist.tolist())) - p_wrist
+    R_BS, p_BS = shoulder.X_BS[:3, :3], shoulder.X_BS[:3, 3]
+    R_ST = R_BS.T @ X_BT[:3, :3]
+    p = R_BS.T @ (X_BT[:3, 3] - p_BS) + R_ST @ shoulder.p_TW
     X = X_BT.copy()
-    X[:3, 3] += arm.base[:3, :3] @ shift
+    X[:3, 3] += R_BS @ (nearest_centre(shoulder, p, R_ST @ shoulder.R_T6) - p)
     return X
-
-
-def _middle(arm: Arm) -> Array:
-    lower, upper = arm.limit("lower"), arm.limit("upper")
-    bounded = np.isfinite(lower) & np.isfinite(upper)
-    return np.where(bounded, (np.where(bounded, lower, 0) + np.where(bounded, upper, 0)) / 2, 0.0)
-
-
-def _nearest_turn(arm: Arm, q: Array, near: Array) -> Array:
-    """Turn angles by whole turns to within half a turn of ``near``."""
-    revolute = np.array([joint.revolute for joint in arm.joints])
-    turns = np.round((near - q) / (2 * math.pi))
-    return np.asarray(np.where(revolute, q + 2 * math.pi * turns, q))
-
-
-def _images(arm: Arm, q: ArrayLike) -> list[list[float]]:
-    """List, joint by joint, the images inside the limits; where there is none, the one least outside."""
-    turn = 2 * math.pi
-    result = []
-    for joint, value in zip(arm.joints, joint_array(q, arm.n).tolist(), strict=True):
-        lower, upper = joint.limits.lower, joint.limits.upper
-        if not joint.revolute or not (math.isfinite(lower) and math.isfinite(upper)):
-            result.append([value])
-            continue
-        slack = 1e-9
-        first, last = math.ceil((lower - slack - value) / turn), math.floor((upper + slack - value) / turn)
-        least = value + turn * round(((lower + upper) / 2 - value) / turn)
-        result.append([value + k * turn for k in range(first, last + 1)] or [least])
-    return result

@@ -1,131 +1,155 @@
 """The first three joints: where they must stand to put the wrist centre at a point, over abstract scalars.
 
-Both shoulders turn about a vertical axis and carry the arm at a fixed distance beside it, so both begin with
-the same question: which angle of joint 1 puts the point at that distance from the plane of the arm.
+The builds solved here all turn about a first axis and carry the arm in a plane at a fixed distance beside it. So all
+begin with the same question, which angle of joint 1 puts the point at that distance from the axis, and go on in the
+plane of the arm, with an elbow or with a slide.
+
+Angles are those of the build, not the joints' own: see ``Shoulder``.
 """
 
 import math
 from typing import Literal, TypeAlias
 
 import attrs
-import numpy as np
 
-from armwright.arm.model import Arm
-from armwright.tracing.scalar import atan2, cos, sin, sqrt
+from armwright.arrays import Array
+from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
 from armwright.tracing.vectors import Vector
 
-Family: TypeAlias = Literal["puma", "stanford"]
+Family: TypeAlias = Literal["puma", "stanford", "parallel"]
 Sign: TypeAlias = Literal[1, -1]
 
-_RIGHT = math.pi / 2
-# Twists and joint kinds that make an arm one of the family; joints 4 to 6 are the wrist.
-_PATTERNS: dict[Family, tuple[str, tuple[float, ...]]] = {
-    "puma": ("RRRRRR", (-_RIGHT, 0.0, _RIGHT, -_RIGHT, _RIGHT, 0.0)),
-    "stanford": ("RRPRRR", (-_RIGHT, _RIGHT, 0.0, -_RIGHT, _RIGHT, 0.0)),
-}
-_SAME_LENGTH = 1e-12
+# Roots of less than this part of their terms are 0: the two branches fall together there, and what rounding leaves
+# of the radicand would be drawn out to a thousand times its size.
+_LOST = 1e-14
+# A wrist centre this close to an axis is on it [m].
+ON_AXIS = 1e-12
 
 
-@attrs.frozen(kw_only=True)
+@attrs.frozen(kw_only=True, eq=False)
 class Shoulder:
-    """The lengths of a shoulder that its closed form needs, in [m].
+    """What a closed form needs of an arm: the lengths of its build, and how its joints count.
+
+    In the shoulder frame z is the axis of joint 1 and the origin is at the height of joint 2; y is the axis of
+    joint 2 while joint 1 stands at 0, pointing to the side where the wrist is. The angle of joint i is sign_i · q_i +
+    offset_i, about z for joint 1 and about y for joints 2 and 3 (and 4 of a ``parallel`` arm); with all three at 0
+    the arm lies along x, and the axis of joint 4 (``puma``) or the slide (``stanford``) points along z.
 
     Attributes:
-        family: which closed form.
-        height: of the shoulder above frame 0.
-        side: distance of the plane of the arm from the vertical axis.
-        upper: length of the upper arm (PUMA).
-        fore: (along, across) of the forearm: a3 and d4 (PUMA).
-        hand: distance of the hand from the wrist centre.
+        family: which closed form: an elbow and a spherical wrist (``puma``), a slide and a spherical wrist
+            (``stanford``), three parallel axes (``parallel``).
+        X_BS: (4, 4) the shoulder frame, seen from the base.
+        signs: whether the joints count as the angles of the build do, 1 or -1.
+        offsets: angles of the build where the joints stand at 0 [rad]; of a slide its length [m].
+        ahead: distance of joint 2 from the axis of joint 1, along x [m].
+        side: distance of the plane of the arm from the axis of joint 1 [m].
+        upper: length of the upper arm [m]; 0 with a slide.
+        fore: (along, across) of the forearm, from joint 3 to the wrist centre or to joint 4: the a3 and d4 of the
+            PUMA; with a slide, how far the wrist centre lies beside the line through joint 2 [m].
+        crank: (x, z) from joint 4 to the point where the axes 5 and 6 meet, all turns at 0 (``parallel``) [m].
+        tilt: turn about y of the axis of joint 5 from z, all turns at 0 (``parallel``) [rad].
+        R_3W: (3, 3) the fixed turn from the forearm to the frame in which joints 4 to 6 are z, y, z angles.
+        R_T6: (3, 3) the fixed turn from the tool to the last of those.
+        p_TW: (3,) the wrist centre seen from the tool [m].
     """
 
     family: Family
-    height: float
+    X_BS: Array
+    signs: tuple[float, ...]
+    offsets: tuple[float, ...]
+    ahead: float
     side: float
-    upper: float = 0.0
-    fore: tuple[float, float] = (0.0, 0.0)
-    hand: float = 0.0
+    upper: float
+    fore: tuple[float, float]
+    crank: tuple[float, float]
+    tilt: float
+    R_3W: Array
+    R_T6: Array
+    p_TW: Array
 
     @property
-    def nearest(self) -> float:
-        """Smallest distance of the wrist centre from the shoulder [m]."""
-        return math.hypot(self.upper - math.hypot(*self.fore), self.side) if self.family == "puma" else abs(self.side)
+    def inner(self) -> float:
+        """Smallest distance of the wrist centre, or of joint 4, from joint 2 [m]."""
+        return abs(self.upper - math.hypot(*self.fore)) if self.upper else abs(self.fore[0])
+
+    @property
+    def outer(self) -> float:
+        """Largest distance of the wrist centre, or of joint 4, from joint 2 [m]; a slide has none but its limit."""
+        return self.upper + math.hypot(*self.fore) if self.upper else math.inf
 
     @property
     def farthest(self) -> float:
-        """Largest distance of the wrist centre from the shoulder [m]; a slide has none but its limit."""
-        return math.hypot(self.upper + math.hypot(*self.fore), self.side) if self.family == "puma" else math.inf
+        """Largest distance of the wrist centre from the shoulder [m]; infinite for a slide."""
+        return math.hypot(abs(self.ahead) + self.outer + math.hypot(*self.crank), self.side)
+
+    def angles(self, q: Vector) -> Vector:
+        """Return the angles of the build for joint positions, over abstract scalars."""
+        return [s * x + o for s, x, o in zip(self.signs, q, self.offsets, strict=True)]
+
+    def joints(self, angles: Vector) -> Vector:
+        """Return the joint positions for angles of the build, over abstract scalars."""
+        return [s * (x - o) for s, x, o in zip(self.signs, angles, self.offsets, strict=True)]
 
 
-def shoulder_of(arm: Arm) -> Shoulder | None:
-    """Return the shoulder of ``arm``, or None when the arm belongs to neither family."""
-    kinds = "".join("R" if joint.revolute else "P" for joint in arm.joints)
-    twists = [joint.alpha for joint in arm.joints]
-    a, d = [joint.a for joint in arm.joints], [joint.d for joint in arm.joints]
-    for family, (pattern, angles) in _PATTERNS.items():
-        if kinds != pattern or not np.allclose(twists, angles, rtol=0, atol=_SAME_LENGTH):
-            continue
-        zero = [a[0], a[3], a[4], a[5], d[4]] + ([a[1], a[2], d[3]] if family == "stanford" else [])
-        if np.abs(zero).max() > _SAME_LENGTH:
-            continue
-        if family == "puma":
-            return Shoulder(family=family, height=d[0], side=d[1] + d[2], upper=a[1], fore=(a[2], d[3]), hand=d[5])
-        return Shoulder(family=family, height=d[0], side=d[1], hand=d[5])
-    return None
+def turned(angle: Scalar, x: Scalar, z: Scalar) -> tuple[Scalar, Scalar]:
+    """Turn the point (x, z) about y, over abstract scalars: from x towards -z."""
+    c, s = cos(angle), sin(angle)
+    return c * x + s * z, c * z - s * x
 
 
-def first_three(shoulder: Shoulder, p: Vector, arm: Sign, elbow: Sign) -> Vector:
-    """Return joint variables 1 to 3 (theta, or d of a slide) that put the wrist centre at ``p``.
+def first_three(shoulder: Shoulder, p: Vector, arm: Sign, elbow: Sign, free: Vector | None = None) -> Vector:
+    """Return the angles 1 to 3 (of a slide: its length) that put the wrist centre at ``p``; not of a parallel arm.
 
     A point out of reach gives the posture that stretches, or folds, towards it.
 
     Args:
-        shoulder: the lengths.
-        p: wrist centre in frame 0 [m].
+        shoulder: a ``puma`` or a ``stanford``.
+        p: wrist centre in the shoulder frame [m].
         arm: 1 for the left arm as PUMA users say, which reaches out on the side joint 1 faces; -1 for the right.
         elbow: 1 or -1, which of the two elbow postures; for a slide, forwards or backwards.
+        free: the angles that joints 1 and 2 take where the wrist centre is on their axis.
 
     Source:
         PUMA: Paul (1981) ch. 3. Stanford: Paul (1981) ch. 3; TR-83-008 appendix 1.
     """
-    x, y, z = p
-    across = sqrt(x * x + y * y - shoulder.side**2)
-    theta_1 = atan2(y, x) - atan2(shoulder.side, arm * across)
-    # In the plane of the arm: X outwards, Z upwards, from the shoulder.
-    X, Z = arm * across, z - shoulder.height
+    free_1, free_2 = (0.0, 0.0) if free is None else free[:2]
+    theta_1, X = turn(shoulder, p, arm, free_1)
     if shoulder.family == "stanford":
-        return [theta_1, atan2(elbow * X, elbow * Z), elbow * sqrt(X * X + Z * Z)]
+        return [theta_1, *slide(shoulder, X, p[2], elbow, free_2)]
+    return [theta_1, *bend(shoulder, X, p[2], elbow, free_2)]
+
+
+def turn(shoulder: Shoulder, p: Vector, arm: Sign, free: Scalar) -> tuple[Scalar, Scalar]:
+    """Return angle 1 and how far ahead of joint 2 the wrist centre is then, in the plane of the arm.
+
+    With the wrist centre on the axis, and the plane through the axis, any angle will do: ``free`` is taken.
+    """
+    x, y, _ = p
+    square = x * x + y * y
+    across = _root(square - shoulder.side**2, square)
+    theta = atan2(y, x) - atan2(shoulder.side, arm * across)
+    return select(square < ON_AXIS**2, free, theta), arm * across - shoulder.ahead
+
+
+def bend(shoulder: Shoulder, X: Scalar, Z: Scalar, elbow: Sign, free: Scalar) -> Vector:
+    """Return angles 2 and 3 that put the end of the forearm at (X, Z) from joint 2; ``free`` where that is 0, 0."""
     a2, (a3, d4) = shoulder.upper, shoulder.fore
-    fore = math.hypot(a3, d4)
-    K = (X * X + Z * Z - a2 * a2 - fore * fore) / (2 * a2)
-    theta_3 = math.atan2(d4, a3) + elbow * atan2(sqrt(fore * fore - K * K), K)
+    fore = a3 * a3 + d4 * d4
+    K = (X * X + Z * Z - a2 * a2 - fore) / (2 * a2)
+    theta_3 = math.atan2(d4, a3) + elbow * atan2(_root(fore - K * K, fore), K)
     u = a2 + a3 * cos(theta_3) + d4 * sin(theta_3)
     v = a3 * sin(theta_3) - d4 * cos(theta_3)
     theta_2 = atan2(-Z, X) - atan2(v, u)
-    return [theta_1, theta_2, theta_3]
+    return [select(X * X + Z * Z < ON_AXIS**2, free, theta_2), theta_3]
 
 
-def nearest_wrist(shoulder: Shoulder, p: Vector) -> Vector:
-    """Return the point nearest to ``p`` where the wrist centre can be, in frame 0 [m].
+def slide(shoulder: Shoulder, X: Scalar, Z: Scalar, forwards: Sign, free: Scalar) -> Vector:
+    """Return angle 2 and the length of the slide that reach (X, Z) from joint 2; ``free`` where that is 0, 0."""
+    square, f = X * X + Z * Z, shoulder.fore[0]
+    length = forwards * _root(square - f * f, square)
+    theta_2 = atan2(X * length - Z * f, X * f + Z * length)
+    return [select(square < ON_AXIS**2, free, theta_2), length]
 
-    Seen in the half-plane of ``p``, the reach is the ring between two circles, less the strip beside the axis.
-    """
-    x, y, z = (float(value) for value in p)
-    rho, height = math.hypot(x, y), z - shoulder.height
-    inner, outer, side = shoulder.nearest, shoulder.farthest, abs(shoulder.side)
-    rounding = 1e-12 * max(1.0, rho, abs(height))
 
-    def reachable(point: tuple[float, float]) -> bool:
-        return point[0] >= side - rounding and inner - rounding <= math.hypot(*point) <= outer + rounding
-
-    candidates = [(rho, height), (side, height)]
-    for radius in (inner, outer):
-        if math.isinf(radius):
-            continue
-        distance = math.hypot(rho, height)
-        candidates.append((rho * radius / distance, height * radius / distance) if distance else (radius, 0.0))
-        corner = math.sqrt(max(radius**2 - side**2, 0.0))
-        candidates += [(side, corner), (side, -corner)]
-    best = min(filter(reachable, candidates), key=lambda c: math.hypot(c[0] - rho, c[1] - height))
-    c, s = (x / rho, y / rho) if rho else (1.0, 0.0)
-    return [best[0] * c, best[0] * s, best[1] + shoulder.height]
+def _root(radicand: Scalar, terms: Scalar) -> Scalar:
+    return sqrt(select(radicand < _LOST * terms, 0.0, radicand))

@@ -13,6 +13,8 @@ from armwright.errors import ArmwrightError
 
 # A position this close to its limit, relative to the range of the joint, is at the limit and not beyond it.
 _AT_LIMIT = 1e-9
+# A nearest pose turned by less than this has the orientation that was asked for [rad].
+_SHOWN_TURN = 1e-5
 
 
 class Answer(enum.StrEnum):
@@ -93,7 +95,9 @@ class InverseSolution:
         answer: one word on the whole.
         branches: the postures, those inside the limits first, each nearest to the asked starting point first.
         distance: how far the pose is out of reach [m]; 0 where it is in reach.
-        nearest_pose: (4, 4) the pose in reach nearest to the asked one, same orientation.
+        nearest_pose: (4, 4) the pose in reach nearest to the asked one: with a closed form of the same orientation,
+            else the best that was found.
+        turn: how far the nearest pose is turned from the asked one [rad].
     """
 
     arm: Arm
@@ -101,6 +105,7 @@ class InverseSolution:
     branches: tuple[Branch, ...]
     distance: float
     nearest_pose: Array = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
+    turn: float = 0.0
 
     def __iter__(self) -> Iterator[Branch]:
         """Walk through the branches, nearest first."""
@@ -128,8 +133,9 @@ class InverseSolution:
         """Say in one sentence why no posture can be taken."""
         if self.answer is Answer.OUT_OF_REACH:
             x, y, z = self.nearest_pose[:3, 3] * 1e3
+            turned = f" and {math.degrees(self.turn):.2f} deg" if self.turn > _SHOWN_TURN else ""
             return (
-                f"the pose is {self.distance * 1e3:.1f} mm out of reach of '{self.arm.name}'; "
+                f"the pose is {self.distance * 1e3:.1f} mm{turned} out of reach of '{self.arm.name}'; "
                 f"the nearest in reach has its origin at ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
             )
         least = min(self.branches, key=_worst_violation)

@@ -10,7 +10,7 @@ SINGULAR_SINE = 1e-10
 
 
 def last_three(R_36: Matrix, flip: Sign, theta_4_free: Scalar) -> tuple[Vector, Scalar]:
-    """Return joint angles 4 to 6 for a turn ``R_36`` of the hand against the forearm, and |sin theta_5|.
+    """Return joint angles 4 to 6 for a turn ``R_36`` of the hand against the forearm, and whether joint 4 is free.
 
     Joint 6 is solved with joint 4 put back in, so the three always reproduce the turn, at and near the
     singularity as elsewhere.

@@ -1,0 +1,127 @@
+"""Controllers: what the drives do at a moment, given where the arm is."""
+
+from collections.abc import Callable
+from typing import Protocol, TypeAlias
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.dynamics.newton_euler import dry_friction, newton_euler
+from armwright.dynamics.shares import gravity_shares
+from armwright.errors import InvalidValueError
+
+# Where the arm should be: (n,) positions at a time, or their derivative of an order 1 or 2. A trajectory is one.
+Reference: TypeAlias = Callable[[float, int], Array]
+
+
+class Controller(Protocol):
+    """Anything that can be called for the efforts of the drives."""
+
+    def __call__(self, t: float, q: Array, qd: Array, /) -> ArrayLike:
+        """Return n efforts.
+
+        It may be asked for any moment, more than once and not in order: it must depend on its arguments only.
+
+        Args:
+            t: time [s].
+            q: (n,) joint positions.
+            qd: (n,) joint speeds.
+        """
+
+
+def standing(q: ArrayLike) -> Reference:
+    """Return the reference of an arm that should stay at q (n,)."""
+    place = np.array(q, dtype=np.float64)
+    place.setflags(write=False)
+    zero = np.zeros_like(place)
+    return lambda _t, order: zero if order else place
+
+
+def no_effort(arm: Arm) -> Controller:
+    """Return the controller of an arm whose drives are off."""
+    zero = np.zeros(arm.n)
+    return lambda _t, _q, _qd: zero
+
+
+def gravity_compensation(arm: Arm) -> Controller:
+    """Return a controller that carries the weight of the arm and does nothing else."""
+    return lambda _t, q, _qd: np.array(gravity_shares(arm, q.tolist()))
+
+
+def pd(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike) -> Controller:
+    """Return a controller that pulls every joint to its reference like a spring with a damper.
+
+    Args:
+        arm: the arm, with n joints.
+        reference: where it should be.
+        kp: stiffness, (n,) or one for all [N m/rad] or [N/m].
+        kd: damping, (n,) or one for all [N m s/rad] or [N s/m].
+
+    Raises:
+        ShapeError: ``kp`` or ``kd`` are not n long.
+        InvalidValueError: a gain is negative.
+    """
+    stiffness, damping = _gains(arm, kp, "kp"), _gains(arm, kd, "kd")
+    return lambda t, q, qd: stiffness * (reference(t, 0) - q) + damping * (reference(t, 1) - qd)
+
+
+def pd_with_gravity(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike) -> Controller:
+    """Return a controller that carries the weight and pulls every joint to its reference.
+
+    Args:
+        arm: the arm, with n joints.
+        reference: where it should be.
+        kp: stiffness, (n,) or one for all [N m/rad] or [N/m].
+        kd: damping, (n,) or one for all [N m s/rad] or [N s/m].
+
+    Raises:
+        ShapeError: ``kp`` or ``kd`` are not n long.
+        InvalidValueError: a gain is negative.
+
+    Source:
+        Takegaki & Arimoto (1981).
+    """
+    weight, pull = gravity_compensation(arm), pd(arm, reference, kp, kd)
+    return lambda t, q, qd: np.asarray(weight(t, q, qd)) + np.asarray(pull(t, q, qd))
+
+
+def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike) -> Controller:
+    """Return a controller that turns the arm into n separate double integrators and steers those.
+
+    Rotors and viscous friction count. Dry friction is overcome in the direction in which the reference moves.
+
+    Args:
+        arm: the arm as the controller knows it, with n joints.
+        reference: where it should be.
+        kp: acceleration per error of position, (n,) or one for all [1/s²].
+        kd: acceleration per error of speed, (n,) or one for all [1/s].
+
+    Raises:
+        ShapeError: ``kp`` or ``kd`` are not n long.
+        InvalidValueError: a gain is negative.
+
+    Source:
+        Luh, Walker & Paul (1980), resolved acceleration in joint space; Spong, Hutchinson & Vidyasagar (2006),
+        section 8.3.
+    """
+    stiffness, damping = _gains(arm, kp, "kp"), _gains(arm, kd, "kd")
+
+    def efforts(t: float, q: Array, qd: Array) -> Array:
+        speed = reference(t, 1)
+        asked = reference(t, 2) + damping * (speed - qd) + stiffness * (reference(t, 0) - q)
+        links = newton_euler(arm, q.tolist(), qd.tolist(), asked.tolist())
+        drives = [
+            motor.inertia * a + motor.viscous * v + dry_friction(motor, direction)
+            for motor, a, v, direction in zip(arm.motors, asked.tolist(), qd.tolist(), speed.tolist(), strict=True)
+        ]
+        return np.array([link + drive for link, drive in zip(links, drives, strict=True)], dtype=np.float64)
+
+    return efforts
+
+
+def _gains(arm: Arm, value: ArrayLike, name: str) -> Array:
+    gains = joint_array(np.broadcast_to(value, (arm.n,)) if np.ndim(value) == 0 else value, arm.n, name)
+    if (gains < 0).any():
+        raise InvalidValueError(f"{name}: expected 0 or more for every joint, got {gains.tolist()}")
+    return gains

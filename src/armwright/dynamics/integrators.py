@@ -1,0 +1,195 @@
+"""Integrators of ordinary differential equations, one step at a time, with what lies between.
+
+An integrator gives a stepper, a stepper gives steps; whoever asks for them watches for events between the ends of a
+step and begins anew behind each.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError, UnknownNameError
+
+# The derivative of the state y at time t.
+Slope: TypeAlias = Callable[[float, Array], Array]
+Method: TypeAlias = Literal["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
+
+# Part of a step by which a step to a grid point may be longer rather than leave a crumb.
+_CRUMB = 1e-9
+_ROOT_2 = math.sqrt(2.0)
+
+
+class Step(NamedTuple):
+    """One step.
+
+    Attributes:
+        start: time at its start [s].
+        end: time at its end [s].
+        state: there.
+        between: the state at any time in between.
+    """
+
+    start: float
+    end: float
+    state: Array
+    between: Callable[[float], Array]
+
+
+class Stepper(Protocol):
+    """Goes from a state to an end, step by step."""
+
+    def step(self) -> Step | None:
+        """Make the next step; None when it cannot be made as precise as asked."""
+
+
+class Integrator(Protocol):
+    """A way to integrate."""
+
+    def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
+        """Return a stepper from the state y at time t that stops at the time ``end``."""
+
+
+@attrs.frozen(kw_only=True)
+class Gill:
+    """Runge-Kutta-Gill, order 4, in fixed steps that end at multiples of their length.
+
+    Attributes:
+        length: of a step [s].
+
+    Source:
+        Gill (1951); TR-83-008, section 4.
+    """
+
+    length: float = 1e-3
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse steps that lead nowhere."""
+        if not 0 < self.length < math.inf:
+            raise InvalidValueError(f"Gill: expected a step length above 0 s, got {self.length}")
+
+    def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
+        """Return a stepper from the state y at time t that stops at the time ``end``."""
+        return _GillStepper(slope, t, y, end, self.length)
+
+
+class _GillStepper:
+    """Steps of Runge-Kutta-Gill."""
+
+    def __init__(self, slope: Slope, t: float, y: Array, end: float, length: float) -> None:
+        self._slope, self._t, self._y, self._end, self._length = slope, t, y, end, length
+
+    def step(self) -> Step:
+        start, y, slope = self._t, self._y, self._slope
+        grid = self._length * (math.floor(start / self._length + _CRUMB) + 1)
+        end = self._end if grid > self._end - _CRUMB * self._length else grid
+        first = slope(start, y)
+
+        def between(t: float) -> Array:
+            return gill(slope, start, y, t - start, first)
+
+        self._t, self._y = end, between(end)
+        return Step(start=start, end=end, state=self._y, between=between)
+
+
+def gill(slope: Slope, t: float, y: Array, h: float, first: Array) -> Array:
+    """Return the state after one step of Runge-Kutta-Gill.
+
+    Args:
+        slope: the derivative of the state.
+        t: time at the start [s].
+        y: state at the start.
+        h: length of the step [s].
+        first: the slope there.
+
+    Source:
+        Gill (1951), "A process for the step-by-step integration of differential equations in an automatic digital
+        computing machine", without its sparing of memory.
+    """
+    second = slope(t + h / 2, y + h / 2 * first)
+    third = slope(t + h / 2, y + h * ((_ROOT_2 - 1) / 2 * first + (2 - _ROOT_2) / 2 * second))
+    fourth = slope(t + h, y + h * (-_ROOT_2 / 2 * second + (2 + _ROOT_2) / 2 * third))
+    return y + h / 6 * (first + (2 - _ROOT_2) * second + (2 + _ROOT_2) * third + fourth)
+
+
+@attrs.frozen(kw_only=True)
+class Adaptive:
+    """One of SciPy's methods, which choose their steps by the error they estimate.
+
+    Attributes:
+        method: its name in SciPy; ``Radau`` and ``BDF`` for stiff controllers.
+        rtol: error allowed per step, relative to the state.
+        atol: error allowed per step beside that [rad], [m], or per second.
+        longest: the longest step [s]. Between the ends of a step nothing is watched that comes and goes.
+
+    Source:
+        Hairer, Nørsett & Wanner (1993), sections II.4 and II.5, as in SciPy.
+    """
+
+    method: Method = "DOP853"
+    rtol: float = 1e-8
+    atol: float = 1e-10
+    longest: float = 0.02
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse what SciPy does not know, and tolerances that nothing meets."""
+        if self.method not in get_args(Method):
+            raise UnknownNameError("method", self.method, get_args(Method))
+        for name in ("rtol", "atol", "longest"):
+            if not getattr(self, name) > 0:
+                raise InvalidValueError(f"Adaptive: {name} must be above 0, got {getattr(self, name)}")
+
+    def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
+        """Return a stepper from the state y at time t that stops at the time ``end``."""
+        return _AdaptiveStepper(self, slope, t, y, end)
+
+
+class _AdaptiveStepper:
+    """Steps of SciPy."""
+
+    def __init__(self, how: Adaptive, slope: Slope, t: float, y: Array, end: float) -> None:
+        from scipy import integrate  # noqa: PLC0415 - SciPy takes longer to import than all else
+
+        solver = getattr(integrate, how.method)
+        self._solver = solver(slope, t, y, end, rtol=how.rtol, atol=how.atol, max_step=how.longest)
+
+    def step(self) -> Step | None:
+        solver = self._solver
+        start = float(solver.t)
+        if solver.step() is not None or solver.status == "failed":
+            return None
+        return Step(start=start, end=float(solver.t), state=solver.y.copy(), between=solver.dense_output())
+
+
+def first_crossing(value: Callable[[float], float], start: float, end: float) -> float:
+    """Return a time just behind the place where a function falls through 0, between -1 and 0 if time allows.
+
+    Args:
+        value: the function; at least 0 at the start, below 0 at the end. It is measured in what counts as nothing.
+        start: time [s].
+        end: time [s].
+
+    Source:
+        Dowell & Jarratt (1971), the Illinois method, with a bisection whenever it is slow.
+    """
+    above, below = max(value(start), 0.0), value(end)
+    weight, kept = 1.0, 0
+    for turn in range(200):
+        if below >= -1 or np.nextafter(start, end) >= end:
+            break
+        # The end that stays for a second time counts half, so that the other one comes nearer too.
+        high, low = (above * weight, below) if kept > 0 else (above, below * weight)
+        middle = start + (high / (high - low) if turn % 3 < 2 else 0.5) * (end - start)
+        if not start < middle < end:
+            middle = (start + end) / 2
+        found = value(middle)
+        side = 1 if found < 0 else -1
+        weight, kept = (weight / 2 if side == kept else 1.0), side
+        if found < 0:
+            end, below = middle, found
+        else:
+            start, above = middle, found
+    return float(end)

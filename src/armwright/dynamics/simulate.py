@@ -1,0 +1,239 @@
+"""Simulation of an arm under its drives: friction that sticks, stops, brakes, and a ledger of energy.
+
+Between events the motion is smooth: some joints move, each in a direction that its dry friction opposes, and others
+are held. An event ends that: a speed falls to zero, a stop is met, the effort that holds a joint exceeds what can
+hold it, a brake goes on or off. At an event, which joints are held from then on is one system of inequalities with
+one answer (``settle``), so nothing chatters and no speed creeps.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, exactly
+from armwright.dynamics.controllers import Controller, no_effort
+from armwright.dynamics.energy import kinetic_energy, potential_energy
+from armwright.dynamics.forward_dynamics import check_pivots, eliminated
+from armwright.dynamics.integrators import Gill, Integrator, Slope, Step, first_crossing
+from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.plant import Moment, Phase, Plant, Start
+from armwright.dynamics.simulation import Brake, Event, JointState, Simulation, Status
+from armwright.errors import InvalidValueError
+
+# So many events within so short a time [s] are an entanglement.
+_ENTANGLED = 50
+_INSTANT = 1e-9
+# Part of a period that rounding may shift a sample by.
+_CRUMB = 1e-9
+
+
+def simulate(
+    arm: Arm,
+    q: ArrayLike,
+    qd: ArrayLike | None = None,
+    *,
+    duration: float,
+    controller: Controller | None = None,
+    integrator: Integrator = Gill(),  # noqa: B008 - immutable
+    period: float = 1e-3,
+    brakes: Sequence[Brake] = (),
+    stops: bool = True,
+    saturation: bool = True,
+) -> Simulation:
+    """Simulate the motion of an arm under its drives.
+
+    Args:
+        arm: the arm, with n joints; its motors have rotor inertia and friction, its limits stops and largest efforts.
+        q: (n,) joint positions at the start [rad] or [m].
+        qd: (n,) joint speeds at the start; at rest when left out.
+        duration: how long [s].
+        controller: gives the efforts of the drives; off when left out.
+        integrator: ``Gill`` with its step, or ``Adaptive`` with its tolerances.
+        period: time between two moments of the result [s].
+        brakes: which are on, and when.
+        stops: whether position limits are stops, which take all energy of a joint that meets them.
+        saturation: whether effort limits bound what the drives do.
+
+    Returns:
+        The motion. When something goes wrong on the way, its status says what, and it ends there.
+
+    Raises:
+        ShapeError: ``q`` or ``qd`` are not n long.
+        InvalidValueError: the arm starts outside its stops, a time is not above 0, or a brake has no joint.
+        UnsupportedArmError: some joint moves nothing that resists an acceleration.
+
+    Source:
+        TR-83-008, section 4 and appendix V; Gill (1951). The friction is Coulomb's, with dry friction at rest as
+        large as in motion.
+    """
+    start = exactly(q, (arm.n,), "q")
+    speed = np.zeros(arm.n) if qd is None else exactly(qd, (arm.n,), "qd")
+    for name, value in (("duration", duration), ("period", period)):
+        if not 0 < value < math.inf:
+            raise InvalidValueError(f"{name}: expected more than 0 s, got {value}")
+    unlimited = np.full(arm.n, np.inf)
+    plant = Plant(
+        arm=arm,
+        controller=controller or no_effort(arm),
+        brakes=tuple(brakes),
+        lower=arm.limit("lower") if stops else -unlimited,
+        upper=arm.limit("upper") if stops else unlimited,
+        effort=arm.limit("effort") if saturation else unlimited,
+    )
+    _check(plant, start, speed)
+    run = _Run(plant, integrator, duration, period)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        status = run.go(start, speed)
+        return run.result(status)
+
+
+def _check(plant: Plant, q: Array, qd: Array) -> None:
+    """Refuse a start outside the stops, a brake without a joint, a controller that drives another arm."""
+    arm = plant.arm
+    for i in np.flatnonzero((q < plant.lower) | (q > plant.upper)):
+        raise InvalidValueError(
+            f"joint {i + 1} starts at {q[i]:g}, outside its stops at {plant.lower[i]:g} and {plant.upper[i]:g}; "
+            "start inside, or simulate without stops"
+        )
+    for brake in plant.brakes:
+        if not 0 <= brake.joint < arm.n:
+            raise InvalidValueError(f"brake: expected a joint from 0 to {arm.n - 1}, got {brake.joint}")
+    exactly(plant.controller(0.0, q, qd), (arm.n,), "efforts of the controller")
+    check_pivots(arm, eliminated(arm, mass_matrix(arm, q)))
+
+
+class _Sample(NamedTuple):
+    """The state at one moment of the result, and what stops and brakes have taken until then."""
+
+    t: float
+    y: Array
+    phase: Phase
+    impact: float
+
+
+class _Run:
+    """One simulation under way. Its state y holds positions, speeds, work of the drives and heat, n of each."""
+
+    def __init__(self, plant: Plant, integrator: Integrator, duration: float, period: float) -> None:
+        self._plant, self._integrator = plant, integrator
+        count = math.floor(duration / period + _CRUMB)
+        times = period * np.arange(count + 1)
+        rest = duration - times[-1]
+        self._times: list[float] = [*times.tolist(), *([duration] if rest > _CRUMB * period else [])]
+        self._times[-1] = duration
+        changes = {time for brake in plant.brakes for time in (brake.start, brake.end) if 0 < time < duration}
+        self._ends = [*sorted(changes), duration]
+        self._samples: list[_Sample] = []
+        self._events: list[Event] = []
+        self._impact = 0.0
+
+    def go(self, q: Array, qd: Array) -> Status:
+        """Go from phase to phase to the end."""
+        n = len(q)
+        t, y = 0.0, np.concatenate([q, qd, np.zeros(2 * n)])
+        before = np.full(n, JointState.MOVES, dtype=np.int8)
+        recent: list[float] = []
+        while True:
+            start = self._plant.begin(t, y[:n], y[n : 2 * n])
+            phase = start.phase
+            self._impact += start.loss
+            y = np.concatenate([start.q, start.qd, y[2 * n :]])
+            self._note(t, before, start)
+            before = phase.state
+            if not self._samples:
+                self._samples.append(_Sample(t, y, phase, self._impact))
+            recent = [time for time in recent if time > t - _INSTANT] + [t]
+            if len(recent) > _ENTANGLED:
+                return Status.ENTANGLED
+            end = next(time for time in self._ends if time > t or time == self._ends[-1])
+            reached = self._phase(t, y, phase, end)
+            if isinstance(reached, Status):
+                return reached
+            t, y = reached
+            if t >= self._ends[-1]:
+                self._samples.append(_Sample(t, y, phase, self._impact))
+                return Status.FINISHED
+
+    def _note(self, t: float, before: npt.NDArray[np.int8], start: Start) -> None:
+        """Keep the events at the start of a phase; a joint that meets a stop and leaves it at once has two."""
+        for i in range(len(before)):
+            course = [before[i], start.phase.state[i]]
+            if start.met[i] not in (JointState.MOVES, course[1]):
+                course.insert(1, start.met[i])
+            for one, next_one in itertools.pairwise(course):
+                if one != next_one:
+                    self._events.append(Event(t, i, JointState(one), JointState(next_one)))
+
+    def _phase(self, t: float, y: Array, phase: Phase, end: float) -> tuple[float, Array] | Status:
+        """Integrate one phase to its end or to the first event."""
+        stepper = self._integrator.begin(self._slope(phase), t, y, end)
+        while t < end:
+            step = stepper.step()
+            if step is None:
+                return Status.IMPRECISE
+            if not np.isfinite(step.state).all():
+                return Status.DIVERGED
+            if self._watch(phase, step.end, step.state) < 0:
+                found = first_crossing(self._watched(phase, step), step.start, step.end)
+                self._record(step, y, found, phase)
+                return found, step.between(found)
+            self._record(step, y, step.end, phase)
+            t, y = step.end, step.state
+        return t, y
+
+    def _slope(self, phase: Phase) -> Slope:
+        plant, n = self._plant, self._plant.arm.n
+
+        def slope(t: float, y: Array) -> Array:
+            if not np.isfinite(y).all():
+                return np.full_like(y, np.nan)
+            q, qd = y[:n], y[n : 2 * n]
+            moment = plant.moment(t, q, qd, phase)
+            return np.concatenate([qd, moment.qdd, moment.tau * qd, -moment.friction * qd])
+
+        return slope
+
+    def _watch(self, phase: Phase, t: float, y: Array) -> float:
+        n = self._plant.arm.n
+        return self._plant.watch(t, y[:n], y[n : 2 * n], phase)
+
+    def _watched(self, phase: Phase, step: Step) -> Callable[[float], float]:
+        """Return how far the nearest event is at any time within a step."""
+        return lambda t: self._watch(phase, t, step.between(t))
+
+    def _record(self, step: Step, y: Array, end: float, phase: Phase) -> None:
+        """Keep the samples of a step that starts in state y, up to but without its end."""
+        while len(self._samples) < len(self._times) - 1:
+            time = self._times[len(self._samples)]
+            if time >= end:
+                return
+            state = y if time <= step.start else step.between(time)
+            self._samples.append(_Sample(time, state, phase, self._impact))
+
+    def result(self, status: Status) -> Simulation:
+        """Return what has been kept, with efforts and energies."""
+        arm = self._plant.arm
+        n = arm.n
+        states = np.array([sample.y for sample in self._samples])
+        q, qd = states[:, :n], states[:, n : 2 * n]
+        moments = [self._plant.moment(s.t, s.y[:n], s.y[n : 2 * n], s.phase) for s in self._samples]
+        efforts = {name: np.array([getattr(moment, name) for moment in moments]) for name in Moment._fields}
+        return Simulation(
+            status=status,
+            t=np.array([sample.t for sample in self._samples]),
+            q=q,
+            qd=qd,
+            **efforts,
+            state=np.array([sample.phase.state for sample in self._samples]),
+            kinetic=kinetic_energy(arm, q, qd),
+            potential=potential_energy(arm, q),
+            work=states[:, 2 * n : 3 * n],
+            heat=states[:, 3 * n :],
+            impact=np.array([sample.impact for sample in self._samples]),
+            events=tuple(self._events),
+        )

@@ -1,0 +1,129 @@
+"""What a simulated motion is: its course, its energies, what happened to its joints."""
+
+import math
+from enum import Enum, IntEnum
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError
+
+
+class JointState(IntEnum):
+    """What a joint is doing."""
+
+    MOVES = 0
+    STICKS = 1
+    LOWER_STOP = 2
+    UPPER_STOP = 3
+    BRAKED = 4
+
+
+class Status(Enum):
+    """How a simulation ended."""
+
+    FINISHED = "finished"
+    IMPRECISE = "a step could not be made as precise as asked"
+    DIVERGED = "a position or speed became too large for a number"
+    ENTANGLED = "events followed one another without time going on"
+
+
+class Event(NamedTuple):
+    """A joint changed what it does.
+
+    Attributes:
+        t: when [s].
+        joint: which, from 0.
+        before: its state until then.
+        after: its state from then on.
+    """
+
+    t: float
+    joint: int
+    before: JointState
+    after: JointState
+
+
+@attrs.frozen(kw_only=True)
+class Brake:
+    """A brake that is on for some time; it stops its joint at once and holds it against any effort.
+
+    Attributes:
+        joint: which, from 0.
+        start: when it goes on [s].
+        end: when it goes off [s]; never when left out.
+
+    Source:
+        TR-83-008, subroutine GLAGRA, which sets the speed of a braked joint to zero.
+    """
+
+    joint: int
+    start: float = 0.0
+    end: float = math.inf
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse a brake that goes off before it goes on."""
+        if not 0 <= self.start < self.end:
+            raise InvalidValueError(f"brake: start {self.start} must be 0 or later, and before end {self.end}")
+
+    def on(self, t: float) -> bool:
+        """Whether the brake is on at a time, and stays on."""
+        return self.start <= t < self.end
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Simulation:
+    """A simulated motion of n joints at m moments.
+
+    At every moment M qdd + coriolis + gravity = tau + friction + hold.
+
+    Attributes:
+        status: how it ended.
+        t: (m,) times [s]; up to the asked end when it finished.
+        q: (m, n) joint positions [rad] or [m].
+        qd: (m, n) joint speeds.
+        qdd: (m, n) joint accelerations.
+        tau: (m, n) efforts of the drives, within their limits [N m] or [N].
+        friction: (m, n) efforts of viscous and dry friction on moving joints, against their motion.
+        hold: (m, n) efforts of what keeps joints at rest: dry friction, stops, brakes.
+        state: (m, n) what each joint does, as numbers of ``JointState``.
+        kinetic: (m,) energy of motion, rotors included [J].
+        potential: (m,) energy in the field of gravity [J].
+        work: (m, n) what the drives have put in since the start [J].
+        heat: (m, n) what friction has taken out [J].
+        impact: (m,) what stops and brakes have taken out [J].
+        events: what happened to joints, in order.
+    """
+
+    status: Status
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+    friction: Array
+    hold: Array
+    state: npt.NDArray[np.int8]
+    kinetic: Array
+    potential: Array
+    work: Array
+    heat: Array
+    impact: Array
+    events: tuple[Event, ...]
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic and potential energy together, (m,) [J]."""
+        return self.kinetic + self.potential
+
+    @property
+    def imbalance(self) -> Array:
+        """Energy that the ledger cannot explain, (m,) [J]: the error of the integration."""
+        return np.asarray(self.energy - self.energy[0] - self.work.sum(-1) + self.heat.sum(-1) + self.impact)
+
+    def at_rest(self, index: int = -1) -> bool:
+        """Whether no joint moves at one of the moments, the last one when left out."""
+        return not self.qd[index].any() and not self.qdd[index].any()

@@ -1,0 +1,100 @@
+"""Judging postures: residuals, limits, duplicates, order, and one word on the whole."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, of_shape
+from armwright.errors import InvalidValueError
+from armwright.kinematics.forward import forward
+from armwright.kinematics.inverse.solution import Answer, Branch, InverseSolution, violations
+from armwright.kinematics.inverse.turns import same_posture, travel
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import angle_between, nearest_rotation, orthonormality_error
+
+# A pose typed with a few digits is turned into a rotation up to this error; beyond it is a mistake.
+_TYPED_ROTATION = 2e-2
+# A place this far outside counts as the edge of the reach: six typed digits of a metre [m]; an orientation this far
+# off likewise [rad].
+EDGE = 2e-6
+
+
+class Candidate(NamedTuple):
+    """A posture (n,) with its name and the joints that are free there."""
+
+    q: Array
+    label: str
+    free: tuple[int, ...] = ()
+
+
+def clean_pose(X_BT: ArrayLike) -> Array:
+    """Return one pose (4, 4), its rotation made exact.
+
+    Raises:
+        ShapeError: it is not (4, 4).
+        InvalidValueError: the rotation part is no rotation, not even one typed with two digits.
+    """
+    X = of_shape(X_BT, (4, 4), "pose")
+    error = float(np.max(orthonormality_error(X[..., :3, :3])))
+    if X.shape != (4, 4) or error > _TYPED_ROTATION:
+        raise InvalidValueError(
+            f"pose: expected one (4, 4) pose whose rotation is orthonormal to {_TYPED_ROTATION}, "
+            f"got shape {X.shape}, error {error:.3g}"
+        )
+    return pose(nearest_rotation(X[:3, :3]), X[:3, 3])
+
+
+def errors(arm: Arm, q: Array, X: Array) -> tuple[Array, Array]:
+    """Return how far from a pose postures put the hand: distances (...) [m] and angles (...) [rad]."""
+    X_q = forward(arm, q)
+    return np.linalg.norm(X_q[..., :3, 3] - X[..., :3, 3], axis=-1), angle_between(X[..., :3, :3], X_q[..., :3, :3])
+
+
+def judge(
+    arm: Arm, X: Array, candidates: Iterable[Candidate], near: Array, *, apart: float, X_near: Array | None = None
+) -> InverseSolution:
+    """Return the solution made of candidate postures.
+
+    Args:
+        arm: the arm.
+        X: (4, 4) the pose asked for.
+        candidates: postures that meet it or, out of reach, come near it; duplicates are dropped.
+        near: (n,) where the arm is; the nearest posture comes first.
+        apart: postures closer than this are one [rad] or [m].
+        X_near: (4, 4) the pose in reach nearest to the one asked for; None when that itself is in reach.
+    """
+    kept: list[Candidate] = []
+    for candidate in candidates:
+        if not any(same_posture(arm, candidate.q, other.q, apart) for other in kept):
+            kept.append(candidate)
+    distances, angles = errors(arm, np.array([candidate.q for candidate in kept]), X)
+    branches = [
+        Branch(
+            q=q,
+            label=label,
+            violations=violations(arm, q),
+            free=free,
+            position_error=float(distance),
+            rotation_error=float(angle),
+        )
+        for (q, label, free), distance, angle in zip(kept, distances, angles, strict=True)
+    ]
+    branches.sort(key=lambda branch: (not branch.allowed, travel(arm, near, branch.q)))
+    allowed = [branch for branch in branches if branch.allowed]
+    if X_near is not None:
+        answer = Answer.OUT_OF_REACH
+    elif not allowed:
+        answer = Answer.OUT_OF_LIMITS
+    else:
+        answer = Answer.SINGULAR if all(branch.free for branch in allowed) else Answer.SOLVED
+    nearest = X if X_near is None else X_near
+    return InverseSolution(
+        arm=arm,
+        answer=answer,
+        branches=tuple(branches),
+        distance=float(np.linalg.norm(nearest[:3, 3] - X[:3, 3])),
+        turn=float(angle_between(X[:3, :3], nearest[:3, :3])),
+        nearest_pose=nearest,
+    )

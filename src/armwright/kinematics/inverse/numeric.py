@@ -1,0 +1,250 @@
+"""Inverse kinematics step by step, for every arm without a closed form: fewer than six joints, six, or more."""
+
+import math
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.kinematics.forward import forward, link_frames, per_joint, stack, tool_frame
+from armwright.kinematics.inverse.judge import EDGE, Candidate, errors, judge
+from armwright.kinematics.inverse.solution import InverseSolution
+from armwright.kinematics.inverse.turns import nearest_image, travel
+from armwright.kinematics.jacobian import frame_columns
+from armwright.spatial.rotations import rotation_vector
+
+# Starting postures in one round, and rounds at most: there is another while none has led to the pose and, where the
+# postures can be counted, while the last one brought a new one.
+_STARTS = 48
+_ROUNDS = 5
+_STEPS = 150
+# A residual this small, in parts of the size of the arm, is rounding.
+_MET = 1e-15
+# A posture whose residual no longer falls by this part in a step stands at the bottom of its valley.
+_STILL = 1e-9
+# The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds.
+_DAMPING, _FAILED, _SUCCEEDED = 1.0, 8.0, 0.25
+# Postures closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
+_SAME_POSTURE = 1e-5
+# A joint motion is taken for free where the hand is not moved by it to first order (singular values below this part
+# of the largest), nor by so long a motion along it once the other joints have made up for its curvature [rad] or [m].
+_IDLE = 1e-6
+_FREE_WAY = 0.05
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Task:
+    """Bring the hand of an arm to a pose, joints kept between bounds.
+
+    Attributes:
+        arm: the arm.
+        X: (4, 4) the pose.
+        lower: (n,) lower bounds, may be infinite.
+        upper: (n,) upper bounds.
+        size: how long the arm is, for what is small [m].
+        length: what a turn by one radian is worth [m].
+    """
+
+    arm: Arm
+    X: Array
+    lower: Array
+    upper: Array
+    size: float
+    length: float
+
+
+def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
+    """Return postures that put the tool at one pose, found by damped least squares from many starts.
+
+    The starts are the present posture and points spread evenly over the joint limits, always the same ones. The
+    limits are kept on the way. When no start leads to the pose the search is made again without limits, to tell a
+    pose that only the limits keep from one that is out of reach; then the best posture found comes back, in which a
+    turn by one radian counts as much as a quarter of the arm's length.
+
+    An arm of six joints or fewer has a finite number of postures: those that were found are given, most often all.
+    With more joints they are endless, and those that were found are examples, nearest first.
+
+    Args:
+        arm: any arm.
+        X: (4, 4) tool pose in the base frame.
+        near: (n,) the present joint positions.
+
+    Source:
+        Levenberg (1944), Marquardt (1963); damping in proportion to the squared residual after Sugihara (2011); starts
+        by the additive recurrence of Roberts (2018).
+    """
+    size = _size(arm)
+    limited = _Task(
+        arm=arm, X=X, lower=arm.limit("lower"), upper=arm.limit("upper"), size=size, length=max(size / 4, EDGE)
+    )
+    tried, met = _search(limited, near)
+    if not len(met):
+        endless = np.full(arm.n, np.inf)
+        free = attrs.evolve(limited, lower=-endless, upper=endless)
+        more = _descend(free, np.concatenate([tried, _starts(limited, near, 0, _STARTS)]))
+        met = np.array([nearest_image(arm, q, near) for q in _met(free, more)]).reshape(-1, arm.n)
+        tried = np.concatenate([tried, more])
+    if not len(met):
+        best = tried[_residuals(limited, tried).argmin()]
+        best = nearest_image(arm, best, near)
+        return judge(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_POSTURE, X_near=forward(arm, best))
+    return judge(arm, X, _named(limited, met, near), near, apart=_SAME_POSTURE)
+
+
+def _search(task: _Task, near: Array) -> tuple[Array, Array]:
+    """Return all postures (k, n) that the descents ended in, and those (l, n) that meet the pose."""
+    tried = met = np.empty((0, task.arm.n))
+    for number in range(_ROUNDS):
+        ends = _descend(task, _starts(task, near, number * _STARTS, _STARTS))
+        fresh = _met(task, ends)
+        known = [Candidate(q, "") for q in met]
+        news = any(not any(_same(task.arm, q, other) for other in known) for q in fresh)
+        tried, met = np.concatenate([tried, ends]), np.concatenate([met, fresh])
+        if len(met) and (task.arm.n > 6 or not news):
+            break
+    return tried, met
+
+
+def _named(task: _Task, met: Array, near: Array) -> list[Candidate]:
+    """Number the postures, nearest first, one of each free family."""
+    found: list[Candidate] = []
+    for q in sorted((nearest_image(task.arm, q, near) for q in met), key=lambda q: travel(task.arm, near, q)):
+        if any(_same(task.arm, q, other) for other in found):
+            continue
+        found.append(Candidate(q, f"numeric {len(found) + 1}", _free_joints(task, q)))
+    return found
+
+
+def _same(arm: Arm, q: Array, other: Candidate) -> bool:
+    """Whether a posture is another one, or a member of the family that is free there."""
+    held = [i for i in range(arm.n) if i + 1 not in other.free]
+    apart = q - other.q
+    revolute = np.array([joint.revolute for joint in arm.joints])
+    apart = np.where(revolute, np.remainder(apart + np.pi, 2 * np.pi) - np.pi, apart)
+    return bool((np.abs(apart[held]) < _SAME_POSTURE).all())
+
+
+def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
+    """Return the numbers of the joints that can move, together, without moving the hand; none of a redundant arm.
+
+    An idle motion of the Jacobian alone does not say so: a stretched arm has one as well, and cannot move. So a way
+    along it is gone and the rest made up for.
+    """
+    if task.arm.n > 6:
+        return ()
+    _, J = _residual_and_jacobian(task, q[None])
+    _, sigma, Vt = np.linalg.svd(J[0])
+    rank = int((sigma > _IDLE * sigma[0]).sum())
+    joints: set[int] = set()
+    for idle in Vt[rank:]:
+        endless = np.full(task.arm.n, np.inf)
+        loose = attrs.evolve(task, lower=-endless, upper=endless)
+        moved = _descend(loose, (q + _FREE_WAY * idle)[None])[0]
+        if len(_met(loose, moved[None])) and np.linalg.norm(moved - q) > _FREE_WAY / 2:
+            joints.update(int(i) + 1 for i in np.flatnonzero(np.abs(moved - q) > _SAME_POSTURE))
+    return tuple(sorted(joints))
+
+
+def _met(task: _Task, q: Array) -> Array:
+    """Return those of the postures (k, n) that meet the pose."""
+    distance, angle = errors(task.arm, q, task.X)
+    return q[(distance <= EDGE) & (angle <= EDGE)]
+
+
+def _residuals(task: _Task, q: Array) -> Array:
+    """Return how far each of the postures (k, n) is from the pose, place and turn together (k,) [m]."""
+    distance, angle = errors(task.arm, q, task.X)
+    return np.hypot(distance, task.length * angle)
+
+
+def _descend(task: _Task, q: Array) -> Array:
+    """Go from every start (k, n) down to where the residual is least, by damped least squares within the bounds."""
+    q = q.copy()
+    running = np.arange(len(q))
+    damping = np.full(len(q), _DAMPING)
+    e, J = _residual_and_jacobian(task, q)
+    square = np.sum(e**2, axis=-1)
+    weights = np.array([task.size**2 if joint.revolute else 1.0 for joint in task.arm.joints])
+    for _ in range(_STEPS):
+        moved = _bounded_step(task, q[running], e, J, (damping * square / task.size**2)[:, None] * weights)
+        e_moved, J_moved = _residual_and_jacobian(task, moved)
+        square_moved = np.sum(e_moved**2, axis=-1)
+        better = square_moved < square
+        still = better & (square_moved > (1 - _STILL) * square)
+        q[running[better]] = moved[better]
+        e[better], J[better] = e_moved[better], J_moved[better]
+        square = np.where(better, square_moved, square)
+        damping = np.where(better, damping * _SUCCEEDED, damping * _FAILED)
+        keep = ~still & (square > (_MET * task.size) ** 2) & (damping < 1 / _MET)
+        running, e, J, square, damping = running[keep], e[keep], J[keep], square[keep], damping[keep]
+        if not len(running):
+            break
+    return q
+
+
+def _bounded_step(task: _Task, q: Array, e: Array, J: Array, damping: Array) -> Array:
+    """Return the postures (k, n) after one damped step; a joint at a bound that the step would pass holds still."""
+    lower, upper = task.lower, task.upper
+    H = np.swapaxes(J, -1, -2) @ J
+    g = (np.swapaxes(J, -1, -2) @ e[..., None])[..., 0]
+    held = np.zeros(q.shape, dtype=bool)
+    diagonal = np.arange(q.shape[-1])
+    step = np.zeros(q.shape)
+    for _ in range(2):
+        H_held = np.where(held[:, :, None] | held[:, None, :], 0.0, H)
+        H_held[:, diagonal, diagonal] += np.where(held, 1.0, np.maximum(damping, _MET * task.size**2))
+        step = np.linalg.solve(H_held, np.where(held, 0.0, g)[..., None])[..., 0]
+        outwards = ((q <= lower) & (step < 0)) | ((q >= upper) & (step > 0))
+        if not outwards.any():
+            break
+        held |= outwards
+    # More than a radian, or a third of the arm, is no longer the neighbourhood that the step was made for.
+    longest = np.array([1.0 if joint.revolute else task.size / 3 for joint in task.arm.joints])
+    step /= np.maximum(np.max(np.abs(step) / longest, axis=-1, keepdims=True), 1.0)
+    return np.clip(q + np.where(held, 0.0, step), lower, upper)
+
+
+def _residual_and_jacobian(task: _Task, q: Array) -> tuple[Array, Array]:
+    """Return what is missing to the pose (k, 6) and its slope (k, 6, n), turns in metres."""
+    scalars, lead = per_joint(q), q.shape[:-1]
+    frames = link_frames(task.arm, scalars)
+    R, p = tool_frame(task.arm, frames[-1])
+    R_BT = stack([x for row in R for x in row], lead).reshape(*lead, 3, 3)
+    turn = rotation_vector(task.X[:3, :3] @ np.swapaxes(R_BT, -1, -2))
+    e = np.concatenate([task.X[:3, 3] - stack(p, lead), task.length * turn], axis=-1)
+    columns = frame_columns(task.arm, frames, p)
+    J = np.stack([stack(column, lead) for column in columns], axis=-1)
+    return e, J * np.repeat((1.0, task.length), 3)[:, None]
+
+
+def _starts(task: _Task, near: Array, first: int, count: int) -> Array:
+    """Return starting postures ``first`` to ``first + count``, the present one being number 0.
+
+    They fill the box of the limits evenly: each is the last one moved on by the powers of 1/g, where g is the number
+    above 1 with gⁿ⁺¹ = g + 1, modulo the box.
+    """
+    n = task.arm.n
+    g = 2.0
+    for _ in range(60):
+        g = (1 + g) ** (1 / (n + 1))
+    fractions = (0.5 + np.arange(first, first + count)[:, None] * g ** -np.arange(1.0, n + 1)) % 1.0
+    around = np.clip(near, task.lower, task.upper)
+    reach = np.array([math.pi if joint.revolute else task.size for joint in task.arm.joints])
+    bounded = np.isfinite(task.lower) & np.isfinite(task.upper)
+    middle = np.where(bounded, (np.where(bounded, task.lower, 0) + np.where(bounded, task.upper, 0)) / 2, around)
+    low, high = np.maximum(task.lower, middle - reach), np.minimum(task.upper, middle + reach)
+    starts: Array = low + fractions * (high - low)
+    if first == 0:
+        starts[0] = around
+    return starts
+
+
+def _size(arm: Arm) -> float:
+    """Return how long the arm is, joint after joint, slides as far as they go; 1 m where it has no length [m]."""
+    total = float(np.linalg.norm(arm.tool[:3, 3]))
+    for joint in arm.joints:
+        way = joint.limits.upper - joint.limits.lower
+        slide = way if not joint.revolute and math.isfinite(way) else 0.0
+        total += math.hypot(joint.a, joint.d) + slide
+    return total or 1.0

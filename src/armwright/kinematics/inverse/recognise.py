@@ -1,0 +1,217 @@
+"""Which closed form fits an arm, read from the lines of its joint axes."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.kinematics.inverse.axes import SAME, Axes, joint_axes, meeting, parallel, perpendicular
+from armwright.kinematics.inverse.shoulder import Family, Shoulder, turned
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import nearest_rotation
+
+# From a frame whose z, y, z turns the last three joints of a spherical wrist are, to one whose y, z, y turns those of
+# three parallel axes are: z and y change places, x turns round.
+_SWAP = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
+
+
+def shoulder_of(arm: Arm) -> Shoulder | None:
+    """Return the build of an arm that has a closed-form inverse, or None.
+
+    Six joints, the first a turn at a right angle to the axis of the second, and then one of
+
+    - ``puma``: joint 3 parallel to joint 2; joints 4 to 6 a spherical wrist;
+    - ``stanford``: joint 3 a slide at a right angle to the axis of joint 2; joints 4 to 6 a spherical wrist;
+    - ``parallel``: joints 2 to 4 parallel, joint 5 at a right angle to them, joint 6 meeting joint 5 at a right angle.
+
+    A spherical wrist is three axes that meet in one point, the middle one at a right angle to both others. Nothing
+    else matters: not the signs of the twists, nor where joint angles count from, nor an offset of the shoulder from
+    the first axis, nor the direction of the forearm, nor base and tool.
+
+    Args:
+        arm: any arm.
+    """
+    if arm.n != 6:
+        return None
+    axes = joint_axes(arm)
+    w = axes.directions
+    if axes.kinds not in ("RRRRRR", "RRPRRR") or not perpendicular(w[0], w[1]) or not perpendicular(w[4], w[5]):
+        return None
+    if (wrist := _wrist_centre(axes)) is not None:
+        if axes.kinds == "RRPRRR":
+            return _with_slide(axes, wrist) if perpendicular(w[1], w[2]) else None
+        if parallel(w[1], w[2]):
+            return _with_elbow(axes, wrist)
+    if axes.kinds == "RRRRRR" and parallel(w[1], w[2]) and parallel(w[1], w[3]) and perpendicular(w[3], w[4]):
+        crossing = meeting(axes.points[4], w[4], axes.points[5], w[5])
+        return None if crossing is None else _with_parallel_axes(axes, crossing)
+    return None
+
+
+def _wrist_centre(axes: Axes) -> Array | None:
+    p, w = axes.points, axes.directions
+    if not perpendicular(w[3], w[4]):
+        return None
+    centre = meeting(p[3], w[3], p[4], w[4])
+    if centre is None or float(np.linalg.norm(np.cross(p[5] - centre, w[5]))) > SAME:
+        return None
+    return centre
+
+
+class _Seen:
+    """The axes seen from the shoulder frame of an arm whose wrist centre is at ``centre``."""
+
+    def __init__(self, axes: Axes, centre: Array) -> None:
+        p, z, y = axes.points, axes.directions[0], axes.directions[1]
+        origin = p[0] + z * float((p[1] - p[0]) @ z)
+        if float((centre - origin) @ y) < -SAME:
+            y = -y
+        R = nearest_rotation(np.stack([np.cross(y, z), y, z], axis=-1))
+        self.X_BS = pose(R, origin)
+        self.points = (p - origin) @ R
+        self.directions = axes.directions @ R
+        self.centre = (centre - origin) @ R
+        self.ahead, self.side = float(self.points[1, 0]), float(self.centre[1])
+        self.R_TS = axes.X_BT[:3, :3].T @ R
+        self.p_TW = axes.X_BT[:3, :3].T @ (centre - axes.X_BT[:3, 3])
+
+    def way(self, start: Array, end: Array) -> tuple[float, float]:
+        """Return (x, z) from one point to another, seen along y."""
+        x, _, z = end - start
+        return float(x), float(z)
+
+    def sign(self, joint: int) -> float:
+        """Say whether an axis parallel to y points along it."""
+        return math.copysign(1.0, float(self.directions[joint - 1, 1]))
+
+    def build(
+        self,
+        family: Family,
+        *,
+        signs: Sequence[float],
+        offsets: Sequence[float],
+        upper: float = 0.0,
+        fore: tuple[float, float],
+        crank: tuple[float, float] = (0.0, 0.0),
+        tilt: float = 0.0,
+        R_3W: Array,
+        R_SW: Array,
+    ) -> Shoulder:
+        """Put the shoulder together; ``R_SW`` is the last frame of the wrist at joint positions 0."""
+        return Shoulder(
+            family=family,
+            X_BS=self.X_BS,
+            signs=tuple(signs),
+            offsets=tuple(offsets),
+            ahead=self.ahead,
+            side=self.side,
+            upper=upper,
+            fore=fore,
+            crank=crank,
+            tilt=tilt,
+            R_3W=R_3W,
+            R_T6=nearest_rotation(self.R_TS @ R_SW),
+            p_TW=self.p_TW,
+        )
+
+
+def _with_elbow(axes: Axes, wrist: Array) -> Shoulder | None:
+    seen = _Seen(axes, wrist)
+    upper = seen.way(seen.points[1], seen.points[2])
+    fore = seen.way(seen.points[2], seen.centre)
+    if min(math.hypot(*upper), math.hypot(*fore)) < SAME:
+        return None
+    raised = _heading(*upper)
+    axis_4 = seen.directions[3]
+    # The forearm's own z is the axis of joint 4, where that stays in the plane of the arm.
+    flat = abs(float(axis_4[1])) < SAME
+    folded = math.atan2(axis_4[0], axis_4[2]) if flat else raised
+    R_3W, offset_4, offset_5, R_SW = _wrist(seen, folded, flat)
+    return seen.build(
+        "puma",
+        signs=(1, seen.sign(2), seen.sign(3), 1, 1, 1),
+        offsets=(0, raised, folded - raised, offset_4, offset_5, 0),
+        upper=math.hypot(*upper),
+        fore=_as_floats(turned(-folded, *fore)),
+        R_3W=R_3W,
+        R_SW=R_SW,
+    )
+
+
+def _with_slide(axes: Axes, wrist: Array) -> Shoulder:
+    seen = _Seen(axes, wrist)
+    along = seen.directions[2]
+    raised = math.atan2(along[0], along[2])
+    beside, length = turned(-raised, *seen.way(seen.points[1], seen.centre))
+    R_3W, offset_4, offset_5, R_SW = _wrist(seen, raised, parallel(seen.directions[3], along))
+    return seen.build(
+        "stanford",
+        signs=(1, seen.sign(2), 1, 1, 1, 1),
+        offsets=(0, raised, length, offset_4, offset_5, 0),
+        fore=(float(beside) if abs(beside) > SAME else 0.0, 0.0),
+        R_3W=R_3W,
+        R_SW=R_SW,
+    )
+
+
+def _with_parallel_axes(axes: Axes, crossing: Array) -> Shoulder | None:
+    seen = _Seen(axes, crossing)
+    upper = seen.way(seen.points[1], seen.points[2])
+    fore = seen.way(seen.points[2], seen.points[3])
+    if min(math.hypot(*upper), math.hypot(*fore)) < SAME:
+        return None
+    raised, folded = _heading(*upper), _heading(*fore)
+    axis_5 = seen.directions[4]
+    y = np.array((0.0, 1.0, 0.0))
+    A = np.stack([np.cross(y, axis_5), y, axis_5], axis=-1)
+    across, along, _ = A.T @ seen.directions[5]
+    offset_5 = math.atan2(-across, along)
+    return seen.build(
+        "parallel",
+        signs=(1, seen.sign(2), seen.sign(3), seen.sign(4), 1, 1),
+        offsets=(0, raised, folded - raised, -folded, offset_5, 0),
+        upper=math.hypot(*upper),
+        fore=(math.hypot(*fore), 0.0),
+        crank=seen.way(seen.points[3], seen.centre),
+        tilt=math.atan2(axis_5[0], axis_5[2]),
+        R_3W=_SWAP,
+        R_SW=A @ _about_z(offset_5) @ _SWAP,
+    )
+
+
+def _wrist(seen: _Seen, raised: float, aligned: bool) -> tuple[Array, float, float, Array]:  # noqa: FBT001
+    """Return the turn from forearm to wrist, the offsets of joints 4 and 5, and the last wrist frame at zero.
+
+    ``raised`` is the turn of the forearm from x, all joints at 0; ``aligned``: whether its z is the axis of joint 4.
+    """
+    axis_4, axis_5, axis_6 = seen.directions[3:]
+    forearm = _about_y(raised)
+    A = forearm if aligned else np.stack([np.cross(axis_5, axis_4), axis_5, axis_4], axis=-1)
+    x, y, _ = A.T @ axis_5
+    offset_4 = math.atan2(-x, y)
+    A_4 = A @ _about_z(offset_4)
+    x, _, z = A_4.T @ axis_6
+    offset_5 = math.atan2(x, z)
+    R_3W = np.eye(3) if aligned else nearest_rotation(forearm.T @ A)
+    return R_3W, offset_4, offset_5, A_4 @ _about_y(offset_5)
+
+
+def _heading(x: float, z: float) -> float:
+    """Return the turn about y that brings the x axis onto (x, z)."""
+    return math.atan2(-z, x)
+
+
+def _about_y(angle: float) -> Array:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def _about_z(angle: float) -> Array:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def _as_floats(pair: tuple[float, float]) -> tuple[float, float]:
+    return float(pair[0]), float(pair[1])

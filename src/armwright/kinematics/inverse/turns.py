@@ -1,0 +1,82 @@
+"""Whole turns: which image of an angle to take, and how far apart two postures are."""
+
+import math
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.kinematics.inverse.solution import violations
+
+_TURN = 2 * math.pi
+# An image this far beyond a limit is on it [rad].
+_ON_LIMIT = 1e-9
+
+
+def travel(arm: Arm, q_from: ArrayLike, q_to: ArrayLike) -> float:
+    """Return how far apart two postures are: the root of the summed squares of each joint's time at top speed."""
+    speed = arm.limit("speed")
+    weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
+    return float(np.linalg.norm((joint_array(q_to, arm.n) - joint_array(q_from, arm.n)) * weight))
+
+
+def nearest_image(arm: Arm, q: ArrayLike, near: ArrayLike) -> Array:
+    """Return ``q`` (n,) with every angle turned by whole turns to the image inside the limits nearest to ``near``.
+
+    An angle with no image inside the limits takes the one that passes its limit least.
+    """
+    starts = joint_array(near, arm.n, "near").tolist()
+    choices = _images(arm, q, starts)
+    return np.array([min(turns, key=lambda x: abs(x - x0)) for turns, x0 in zip(choices, starts, strict=True)])
+
+
+def images(arm: Arm, q: ArrayLike) -> Array:
+    """Return all images of one posture by whole turns that are inside the limits, (k, n); k is 0 if none is.
+
+    A joint without limits has endless images; it stays where it is.
+    """
+    values = joint_array(q, arm.n).tolist()
+    rows = np.stack(np.meshgrid(*_images(arm, q, values), indexing="ij"), axis=-1).reshape(-1, arm.n)
+    inside = [row for row in rows if not violations(arm, row)]
+    return np.array(inside).reshape(len(inside), arm.n)
+
+
+def nearest_turn(arm: Arm, q: Array, near: Array) -> Array:
+    """Turn angles (..., n) by whole turns to within half a turn of ``near``, whatever the limits."""
+    revolute = np.array([joint.revolute for joint in arm.joints])
+    return np.asarray(np.where(revolute, q + _TURN * np.round((near - q) / _TURN), q))
+
+
+def same_posture(arm: Arm, a: Array, b: Array, tolerance: float) -> bool:
+    """Whether two postures (n,) are one but for whole turns."""
+    return float(np.abs(nearest_turn(arm, a, b) - b).max()) < tolerance
+
+
+def middle(arm: Arm) -> Array:
+    """Return the middle of the limits of every joint (n,); 0 where there are none."""
+    lower, upper = arm.limit("lower"), arm.limit("upper")
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    return np.where(bounded, (np.where(bounded, lower, 0) + np.where(bounded, upper, 0)) / 2, 0.0)
+
+
+def _images(arm: Arm, q: ArrayLike, starts: list[float]) -> list[list[float]]:
+    """List, joint by joint, the images inside the limits; where there is none, the one least outside.
+
+    Of the endless images of a joint with a limit missing only the one next to ``starts`` is listed.
+    """
+    result = []
+    for joint, value, start in zip(arm.joints, joint_array(q, arm.n).tolist(), starts, strict=True):
+        lower, upper = joint.limits.lower, joint.limits.upper
+        if not joint.revolute:
+            result.append([value])
+        elif math.isfinite(upper - lower):
+            first = math.ceil((lower - _ON_LIMIT - value) / _TURN)
+            last = math.floor((upper + _ON_LIMIT - value) / _TURN)
+            least = value + _TURN * round(((lower + upper) / 2 - value) / _TURN)
+            result.append([value + k * _TURN for k in range(first, last + 1)] or [least])
+        else:
+            image = value + _TURN * round((start - value) / _TURN)
+            image += _TURN * math.ceil(max(lower - _ON_LIMIT - image, 0.0) / _TURN)
+            image -= _TURN * math.ceil(max(image - upper - _ON_LIMIT, 0.0) / _TURN)
+            result.append([image])
+    return result

@@ -1,0 +1,176 @@
+"""Singular postures and their cause: which factor of the determinant vanishes, what is lost, what moves for nothing."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, exactly, joint_array
+from armwright.errors import InvalidValueError, UnsupportedArmError
+from armwright.kinematics.forward import per_joint, stack
+from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.shoulder import Shoulder, turned
+from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.manipulability import scaled_rows
+from armwright.tracing.scalar import Scalar, cos, sin
+from armwright.tracing.vectors import Vector
+
+
+@attrs.frozen(kw_only=True)
+class Factor:
+    """One factor of the determinant of the Jacobian, or one singular value of an arm whose factors are not known.
+
+    Attributes:
+        name: ``shoulder``, ``elbow``, ``slide``, ``wrist``, or ``singular value 6``.
+        value: [m], or a plain number for the wrist.
+        scale: what it is compared with, in the same unit: its value in a good posture.
+        near: whether it is near zero.
+    """
+
+    name: str
+    value: float
+    scale: float
+    near: bool
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Singularities:
+    """How near one posture is to a singularity, and what that costs.
+
+    Attributes:
+        factors: the factors of the determinant, or the singular values, largest first.
+        singular_values: (min(6, n)) of the Jacobian with its angular rows in metres, largest first [m].
+        lost: (k, 6) twists, base axes, that the hand cannot make: at a right angle to all it can, and to each other.
+            Of a singular posture one at least; of an arm with fewer than six joints those that it never can as well.
+        idle: (k, n) joint motions that leave the hand where it is, each of length 1, at right angles to each other.
+            Of a singular posture one at least; of an arm with more than six joints those that always do as well.
+    """
+
+    factors: tuple[Factor, ...]
+    singular_values: Array
+    lost: Array
+    idle: Array
+
+    @property
+    def near(self) -> tuple[str, ...]:
+        """Names of the factors that are near zero."""
+        return tuple(factor.name for factor in self.factors if factor.near)
+
+    @property
+    def singular(self) -> bool:
+        """Whether any factor is near zero."""
+        return bool(self.near)
+
+
+def factor_names(shoulder: Shoulder) -> tuple[str, str, str]:
+    """Return what the three factors of a build are called."""
+    return ("shoulder", "slide" if shoulder.family == "stanford" else "elbow", "wrist")
+
+
+def determinant_factors(shoulder: Shoulder, angles: Sequence[Scalar]) -> Vector:
+    """Return the three factors of the determinant of the Jacobian, over abstract scalars.
+
+    The determinant is their product, times the length of the upper arm where there is one, with one sign for all
+    postures of an arm:
+
+    - shoulder: distance of the wrist centre from the axis of joint 1, in the plane of the arm; of the PUMA
+      a2·c2 + a3·c23 + d4·s23, of the Stanford arm d3·s2;
+    - elbow: d4·c3 - a3·s3, how far the forearm is from lying along the upper arm; slide: its length d3;
+    - wrist: s5.
+
+    Args:
+        shoulder: the build.
+        angles: six angles of the build.
+
+    Source:
+        PUMA: the seed on its differential kinematics. The others: the columns of the Jacobian at the wrist centre.
+    """
+    _, second, third, fourth, fifth, _ = angles
+    if shoulder.family == "stanford":
+        X, _ = turned(second, shoulder.fore[0], third)
+        return [shoulder.ahead + X, third, sin(fifth)]
+    a3, d4 = shoulder.fore
+    upper, _ = turned(second, shoulder.upper, 0.0)
+    fore, _ = turned(second + third, a3, d4)
+    X = shoulder.ahead + upper + fore
+    if shoulder.family == "parallel":
+        X = X + turned(second + third + fourth, *shoulder.crank)[0]
+    return [X, d4 * cos(third) - a3 * sin(third), sin(fifth)]
+
+
+def singularity_factors(arm: Arm, q: ArrayLike) -> Array:
+    """Return the three factors of the determinant of the Jacobian for many postures.
+
+    Args:
+        arm: an arm of 6 joints with a closed form: see ``shoulder_of``.
+        q: (..., 6) joint positions [rad] or [m].
+
+    Returns:
+        (..., 3): shoulder [m], elbow or slide [m], wrist; see ``determinant_factors``.
+
+    Raises:
+        UnsupportedArmError: the arm has no closed form.
+        ShapeError: the last axis of ``q`` is not 6 long.
+    """
+    shoulder = shoulder_of(arm)
+    if shoulder is None:
+        raise UnsupportedArmError(
+            f"arm '{arm.name}': the determinant of its Jacobian has no known factors; use its singular values "
+            "(singularities, manipulability)"
+        )
+    q = joint_array(q, arm.n)
+    return stack(determinant_factors(shoulder, shoulder.angles(per_joint(q))), q.shape[:-1])
+
+
+def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: float = 1.0) -> Singularities:
+    """Say how near one posture is to a singularity, by which factor, what is lost and what moves for nothing.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (n,) joint positions [rad] or [m].
+        threshold: a factor is near zero below this part of its scale: of the farthest reach of the wrist for the
+            shoulder (1 m for a slide), of the length of the forearm for the elbow, of 1 m for the slide, of 1 for the
+            wrist; a singular value below this part of the largest.
+        length: what a turn by one radian is worth [m], where lengths and turns are compared.
+
+    Returns:
+        Factors, singular values, lost and idle directions.
+
+    Raises:
+        ShapeError: ``q`` is not (n,).
+        InvalidValueError: ``length`` is not above 0, or ``threshold`` not between 0 and 1.
+
+    Source:
+        Factors: ``determinant_factors``. Directions: Golub & Van Loan, the singular value decomposition.
+    """
+    if not 0 < threshold < 1:
+        raise InvalidValueError(f"threshold: expected a part of the scale between 0 and 1, got {threshold}")
+    q = exactly(q, (arm.n,), "q")
+    U, sigma, Vt = np.linalg.svd(scaled_rows(jacobian(arm, q), length))
+    small = int(np.count_nonzero(sigma < threshold * sigma[0]))
+    factors = _factors(arm, q, threshold) or tuple(
+        Factor(name=f"singular value {i}", value=float(value), scale=float(sigma[0]), near=value < threshold * sigma[0])
+        for i, value in enumerate(sigma, 1)
+    )
+    # What the factors call near decides; the singular values say in how many directions.
+    rank = len(sigma) - (max(small, 1) if any(factor.near for factor in factors) else 0)
+    return Singularities(
+        factors=factors,
+        singular_values=sigma,
+        lost=U[:, rank:].T / np.repeat((1.0, length), 3),
+        idle=Vt[rank:],
+    )
+
+
+def _factors(arm: Arm, q: Array, threshold: float) -> tuple[Factor, ...]:
+    shoulder = shoulder_of(arm)
+    if shoulder is None:
+        return ()
+    values = singularity_factors(arm, q).tolist()
+    reach = shoulder.farthest if np.isfinite(shoulder.farthest) else 1.0
+    fore = 1.0 if shoulder.family == "stanford" else float(np.hypot(*shoulder.fore))
+    return tuple(
+        Factor(name=name, value=value, scale=scale, near=abs(value) < threshold * scale)
+        for name, value, scale in zip(factor_names(shoulder), values, (reach, fore, 1.0), strict=True)
+    )

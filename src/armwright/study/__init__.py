@@ -1,0 +1,1 @@
+"""Experiments of the seeds, each reproducible: inputs, run, printed beside computed."""

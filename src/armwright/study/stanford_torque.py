@@ -1,0 +1,333 @@
+"""The torques of the Stanford arm in a fast move: report TR-83-008, section 4, figures 3 to 11, and appendix III.
+
+The hand runs from (0, 0, 0.2, 0, 0, 0) to (1.57, 2.36, 1.0, 1.57, 1.57, 1.57) in one second by a quintic. The efforts
+come three ways: Newton-Euler with an empty hand, Bejczy's model, Newton-Euler with the largest load. Rotors count in
+all of them, as Bejczy's constants have them. Gravity points up as in the report, so its curves and ours have one sign.
+"""
+
+import math
+from typing import Literal, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.dynamics.bejczy import PRINTED, Coefficients, bejczy_efforts, fitted
+from armwright.dynamics.bodies import body_of
+from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.dynamics.payload import payload
+from armwright.errors import UnknownNameError
+from armwright.motion.quintic import quintic
+
+Verdict: TypeAlias = Literal["agrees", "near", "wrong"]
+
+# The report's gravity: this much, and upward [m/s²].
+GRAVITY = 9.80621
+START = (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)
+GOAL = (1.57, 2.36, 1.0, 1.57, 1.57, 1.57)
+DURATION = 1.0  # s
+# The largest load: a cube with its centre in the origin of the hand frame.
+LOAD_MASS = 1.8  # kg
+LOAD_VOLUME = 422e-6  # m³
+# Seed and number of the postures that constants are fitted to.
+SEED = 83008
+POSTURES = 2000
+# A printed number that agrees is this near, or to half a unit of its last digit; one that is near may have been
+# rounded on the way.
+AGREES = 0.01
+NEAR = 0.05
+
+
+def study_arm() -> Arm:
+    """Return the arm of the report's program, with the report's gravity."""
+    return attrs.evolve(load_arm("stanford-jpl"), gravity=(0.0, 0.0, GRAVITY))
+
+
+def loaded_arm() -> Arm:
+    """Return the arm with the largest load in its hand."""
+    cube = LOAD_MASS * LOAD_VOLUME ** (2 / 3) / 6 * np.eye(3)
+    return payload(study_arm(), LOAD_MASS, inertia=cube)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Torques:
+    """The three cases of figures 6 to 11, and the motion of figures 3 to 5, at m moments.
+
+    Attributes:
+        t: (m,) times [s].
+        q: (m, 6) joint positions [rad], the third [m].
+        qd: (m, 6) joint speeds.
+        qdd: (m, 6) joint accelerations.
+        empty: (m, 6) case 1: Newton-Euler, nothing in the hand [N m], the third [N].
+        bejczy: (m, 6) case 2: Bejczy's model with the constants of the arm.
+        loaded: (m, 6) case 3: Newton-Euler with the largest load.
+        bejczy_printed: (m, 6) Bejczy's model with the constants as the report prints them.
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    empty: Array
+    bejczy: Array
+    loaded: Array
+    bejczy_printed: Array
+
+
+def torques(samples: int = 201) -> Torques:
+    """Run the motion and find the efforts of all cases.
+
+    Args:
+        samples: number of moments, the ends included.
+
+    Source:
+        TR-83-008, section 4, figures 3 to 11.
+    """
+    motion = quintic(START, GOAL, DURATION)
+    t = np.linspace(0.0, DURATION, samples)
+    q, qd, qdd = (motion(t, order) for order in range(3))
+    return Torques(
+        t=t,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        empty=inverse_dynamics(study_arm(), q, qd, qdd),
+        bejczy=bejczy_efforts(q, qdd, fitted_coefficients(), gravity=GRAVITY),
+        loaded=inverse_dynamics(loaded_arm(), q, qd, qdd),
+        bejczy_printed=bejczy_efforts(q, qdd, PRINTED, gravity=GRAVITY),
+    )
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Figure:
+    """The curves of one figure of the report.
+
+    Attributes:
+        number: of the figure in the report.
+        title: what it shows.
+        unit: of the curves.
+        t: (m,) times [s].
+        curves: (m,) numbers by the name of the curve.
+    """
+
+    number: int
+    title: str
+    unit: str
+    t: Array
+    curves: dict[str, Array]
+
+
+def figure(study: Torques, number: int) -> Figure:
+    """Return the data of one of the report's figures 3 to 11.
+
+    Args:
+        study: the torques.
+        number: 3 to 5 for position, speed and acceleration of joint 1; 6 to 11 for the efforts of joints 1 to 6.
+
+    Raises:
+        UnknownNameError: the report has no such figure of this motion.
+    """
+    courses = {
+        3: ("position of joint 1", "rad", study.q),
+        4: ("speed of joint 1", "rad/s", study.qd),
+        5: ("acceleration of joint 1", "rad/s²", study.qdd),
+    }
+    if number in courses:
+        title, unit, course = courses[number]
+        return Figure(number=number, title=title, unit=unit, t=study.t, curves={"joint 1": course[:, 0]})
+    if not 6 <= number <= 11:
+        raise UnknownNameError("figure", str(number), [str(known) for known in range(3, 12)])
+    joint = number - 6
+    return Figure(
+        number=number,
+        title=f"effort of joint {joint + 1}",
+        unit="N" if joint == 2 else "N m",
+        t=study.t,
+        curves={
+            "Newton-Euler, no load": study.empty[:, joint],
+            "Bejczy": study.bejczy[:, joint],
+            "Newton-Euler, largest load": study.loaded[:, joint],
+        },
+    )
+
+
+@attrs.frozen(kw_only=True)
+class JointRow:
+    """How far the cases are apart at one joint.
+
+    Attributes:
+        joint: from 1.
+        unit: of its efforts.
+        peak: largest effort with an empty hand.
+        peak_loaded: largest effort with the largest load.
+        limit: largest effort of the motor, appendix II.
+        bejczy: root of the mean square by which Bejczy's model is off, as a part of that of the empty hand.
+        load: the same for what the load changes.
+    """
+
+    joint: int
+    unit: str
+    peak: float
+    peak_loaded: float
+    limit: float
+    bejczy: float
+    load: float
+
+
+def joint_table(study: Torques) -> list[JointRow]:
+    """Return how far the cases are apart, joint by joint: the report says the wrist suffers most."""
+    empty = _mean(study.empty)
+    bejczy, load = _mean(study.bejczy - study.empty) / empty, _mean(study.loaded - study.empty) / empty
+    limits = study_arm().limit("effort")
+    return [
+        JointRow(
+            joint=i + 1,
+            unit="N" if i == 2 else "N m",
+            peak=float(np.abs(study.empty[:, i]).max()),
+            peak_loaded=float(np.abs(study.loaded[:, i]).max()),
+            limit=float(limits[i]),
+            bejczy=float(bejczy[i]),
+            load=float(load[i]),
+        )
+        for i in range(6)
+    ]
+
+
+def _mean(course: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(course**2, axis=0)))
+
+
+def study_postures() -> Array:
+    """Return the postures that constants are fitted to, (m, 6), spread over the joint limits."""
+    arm = study_arm()
+    rng = np.random.default_rng(SEED)
+    return rng.uniform(arm.limit("lower"), arm.limit("upper"), size=(POSTURES, arm.n))
+
+
+def fitted_coefficients() -> Coefficients:
+    """Return the constants of Bejczy's model that fit the arm best."""
+    return fitted(study_arm(), study_postures())
+
+
+@attrs.frozen(kw_only=True)
+class PrintedRow:
+    """A number of the report beside the one that the arm has.
+
+    Attributes:
+        name: as in the report.
+        unit: of both.
+        printed: in the report.
+        computed: of the arm.
+        verdict: ``agrees`` to 1 % or half a unit of the last printed digit, ``near`` to 5 %, else ``wrong``.
+        note: what is wrong, or where the number stands; empty where there is nothing to say.
+    """
+
+    name: str
+    unit: str
+    printed: float
+    computed: float
+    verdict: Verdict
+    note: str = ""
+
+
+# Name, unit, number as printed, note. The name picks the fitted constant; b4 of the report stands for three of ours.
+_PRINTED_CONSTANTS = (
+    ("b1", "kg m²", "1.423", ""),
+    ("b2", "kg m²", "2.51", ""),
+    ("b3", "kg m", "-5.49", ""),
+    ("b4", "kg", "7.257", "with the square of q3 in D11 and D22: without the rotor it is m3 + m4 + m5 + m6"),
+    ("slide", "kg", "7.257", "b4 as D33: m3 + m4 + m5 + m6 + Jm3"),
+    ("b5", "kg m", "0.232", ""),
+    ("b13", "kg m²", "4.72", ""),
+    ("b14", "kg m²", "0.107", ""),
+    ("b15", "kg m²", "0.015", ""),
+    ("b17 + b18", "kg m²", "0.112", "D55; only the sum can be found"),
+    ("b19", "kg m²", "0.02", ""),
+    ("b20", "kg m²", "0.013", "m6 k633² is 0.0003: the printed number repeats that of b18"),
+    ("k1", "kg m", "-2.788", "with gravity up, as all of G here; for an arm that stands every G changes its sign"),
+    ("k2", "kg", "7.257", "a rotor weighs nothing on the slide: m3 + m4 + m5 + m6"),
+    ("k3", "kg m", "0.116", ""),
+    ("k3 / b5", "", "0.05", "printed k3 = 0.05 b5; its value 0.116 is half of b5"),
+)
+
+
+def coefficient_table() -> list[PrintedRow]:
+    """Return every constant of Bejczy's model as printed and as it fits the arm.
+
+    Source:
+        TR-83-008, appendix III.
+    """
+    constants = attrs.asdict(fitted_coefficients())
+    constants["b17 + b18"] = constants["b17"] + constants["b18"]
+    constants["k3 / b5"] = constants["k3"] / constants["b5"]
+    return [_row(name, unit, printed, constants[name], note) for name, unit, printed, note in _PRINTED_CONSTANTS]
+
+
+def _row(name: str, unit: str, printed: str, computed: float, note: str) -> PrintedRow:
+    value = float(printed)
+    half_digit = 0.5 * 10.0 ** -len(printed.partition(".")[2])
+    off = abs(computed - value)
+    verdict: Verdict = "wrong"
+    if off <= max(AGREES * abs(computed), half_digit):
+        verdict = "agrees"
+    elif off <= NEAR * abs(computed):
+        verdict = "near"
+    return PrintedRow(name=name, unit=unit, printed=value, computed=computed, verdict=verdict, note=note)
+
+
+def load_table() -> list[PrintedRow]:
+    """Return link 6 with the largest load, as printed and as the load makes it.
+
+    Source:
+        TR-83-008, appendix II (4).
+    """
+    link = loaded_arm().links[-1]
+    tensor = body_of(link).tensor
+    return [
+        _row("m6", "kg", "2.31", link.mass, ""),
+        _row("y6", "m", "0.0014", float(link.com[1]), "that of the empty hand, which the load brings to the axis"),
+        _row("z6", "m", "-0.0203", float(link.com[2]), "cut, not rounded"),
+        _row("I6 xx", "kg m²", "0.006", tensor[0][0], "cut, not rounded: 0.0067"),
+        _row("I6 yy", "kg m²", "0.006", tensor[1][1], "cut, not rounded: 0.0067"),
+        _row("I6 zz", "kg m²", "0.002", tensor[2][2], ""),
+    ]
+
+
+@attrs.frozen(kw_only=True)
+class FormRow:
+    """How well a form of D11 can fit the arm at all, with the best constants.
+
+    Attributes:
+        form: in letters.
+        residual: root of the mean square [kg m²].
+        share: of the spread of D11 over the postures that stays unexplained.
+    """
+
+    form: str
+    residual: float
+    share: float
+
+
+def form_table() -> list[FormRow]:
+    """Return how well D11 is told with and without the square of sin q2, which the report lacks.
+
+    Source:
+        TR-83-008, appendix III.
+    """
+    q = study_postures()
+    D11 = mass_matrix(study_arm(), q)[:, 0, 0]
+    s2, q3, c5 = np.sin(q[:, 1]), q[:, 2], np.cos(q[:, 4])
+    boom = np.stack([np.ones_like(q3), q3, q3 * c5, q3**2], axis=1)
+    forms = {
+        "b1 + (b2 + b3 + b5 c5) q3 + b4 q3²": boom,
+        "b1 + s2² (b2 + (b3 + b5 c5) q3 + b4 q3²)": np.column_stack([np.ones_like(q3), s2[:, None] ** 2 * boom]),
+    }
+    rows = []
+    for form, columns in forms.items():
+        rest = D11 - columns @ np.linalg.lstsq(columns, D11, rcond=None)[0]
+        residual = math.sqrt(float(np.mean(rest**2)))
+        rows.append(FormRow(form=form, residual=residual, share=residual / float(np.std(D11))))
+    return rows

@@ -1,0 +1,266 @@
+"""The edges of inverse kinematics: right angles, singular postures and what is next to them, limits, typed poses."""
+
+import math
+
+import attrs
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm, Limits
+from armwright.arrays import Array
+from armwright.kinematics.forward import forward
+from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
+from armwright.kinematics.inverse.solution import Answer, InverseSolution
+from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.singularities import singularity_factors
+from oracles.arms import random_postures
+from oracles.with_pinocchio import pinocchio_model
+
+RESIDUAL = 1e-12  # a pose met, in m and rad
+POSTURE = 1e-9  # a posture found again where the Jacobian is regular
+REGULAR = 1e-3  # smallest singular value of a well-conditioned posture [m]
+ELBOW = math.atan2(0.433, -0.02)  # the PUMA's elbow is straight where tan q3 = d4 / a3
+# With q3 a right angle the PUMA's wrist centre is above its shoulder where (a2 + d4)·c2 = a3·s2.
+UPRIGHT = math.atan2(0.432 + 0.433, -0.02)
+# Postures in which one factor of the determinant vanishes, and the joint that leads away from there.
+SINGULAR = {
+    "PUMA wrist": ("puma560", (0.3, 0.4, 0.5, 0.6, 0.0, 0.7), 5),
+    "PUMA elbow stretched": ("puma560", (0.3, 0.4, ELBOW, 0.6, 0.5, 0.7), 3),
+    "PUMA elbow folded": ("puma560", (0.3, 0.4, ELBOW - math.pi, 0.6, 0.5, 0.7), 3),
+    "PUMA shoulder": ("puma560", (0.3, UPRIGHT, math.pi / 2, 0.6, 0.5, 0.7), 2),
+    "Stanford wrist": ("stanford", (0.3, 0.4, 0.5, 0.6, 0.0, 0.7), 5),
+    "Stanford shoulder": ("stanford", (0.3, 0.0, 0.5, 0.6, 0.5, 0.7), 2),
+    "Stanford boom drawn in": ("stanford", (0.3, 0.4, 0.0, 0.6, 0.5, 0.7), 3),
+    "UR5 wrist": ("ur5", (0.3, -1.0, 0.8, 0.6, 0.0, 0.7), 5),
+    "UR5 elbow stretched": ("ur5", (0.3, -1.0, 0.0, 0.6, 0.5, 0.7), 3),
+    "UR5 elbow folded": ("ur5", (0.3, -1.0, math.pi, 0.6, 0.5, 0.7), 3),
+}
+
+
+def _wide(name: str) -> Arm:
+    """A catalogue arm with a whole turn for every joint and a boom that reaches through the shoulder."""
+    arm = load_arm(name)
+    wide = {True: Limits(lower=-np.pi, upper=np.pi), False: Limits(lower=-1.5, upper=1.5)}
+    return attrs.evolve(arm, joints=[attrs.evolve(joint, limits=wide[joint.revolute]) for joint in arm.joints])
+
+
+def _grid(arm: Arm) -> Array:
+    """All postures inside the limits whose angles are multiples of 45 degrees."""
+    steps = [np.radians(np.arange(-180, 181, 45)) if joint.revolute else np.array((0.3, 1.0)) for joint in arm.joints]
+    kept = [
+        step[(step >= joint.limits.lower) & (step <= joint.limits.upper) & (np.abs(step) < np.pi)]
+        for step, joint in zip(steps, arm.joints, strict=True)
+    ]
+    return np.stack(np.meshgrid(*kept, indexing="ij"), axis=-1).reshape(-1, arm.n)
+
+
+def _apart(solution: InverseSolution) -> float:
+    """How far the two most similar of the branches are apart, but for whole turns."""
+    q = np.array([branch.q for branch in solution])
+    apart = np.abs(np.angle(np.exp(1j * (q[:, None] - q[None])))).max(axis=-1)
+    return float((apart + 9 * np.eye(len(q))).min())
+
+
+def _honest(solution: InverseSolution, X: Array) -> None:
+    """Pinocchio finds the same residual of every branch."""
+    model, data, tool = pinocchio_model(solution.arm)
+    for branch in solution:
+        pin.framesForwardKinematics(model, data, branch.q)
+        miss = np.linalg.norm(data.oMf[tool].translation - X[:3, 3])
+        turn = np.linalg.norm(pin.log3(X[:3, :3].T @ data.oMf[tool].rotation))
+        assert branch.position_error == pytest.approx(miss, abs=1e-14)
+        assert branch.rotation_error == pytest.approx(turn, abs=1e-7)  # its logarithm loses half the digits at 0
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+def test_every_well_conditioned_pose_of_the_grid(name: str) -> None:
+    """On the whole 45 degree grid each well-conditioned posture, q2 = 90 degrees and all, is a branch of its own pose.
+
+    And every branch meets the pose; where the posture is singular, some branch does.
+    """
+    arm = load_arm(name) if name != "ur5" else _wide("ur5")
+    q = _grid(arm)
+    q = q[:: max(1, len(q) // 20_000)]
+    X = forward(arm, q)
+    regular = np.linalg.svd(jacobian(arm, q), compute_uv=False)[:, -1] > REGULAR
+
+    found, _ = inverse_branches(arm, X, q)
+
+    assert regular.sum() > 2000
+    assert (np.abs(q[regular, 1] - np.pi / 2) < 1e-12).sum() > 100
+    assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < POSTURE
+    np.testing.assert_allclose(
+        forward(arm, found), np.broadcast_to(X[:, None], (*found.shape[:2], 4, 4)), atol=RESIDUAL
+    )
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+def test_verdict_on_the_grid(name: str) -> None:
+    """Judged one by one, grid poses are solved or singular, none has more than eight branches, and none comes twice."""
+    arm = load_arm(name) if name != "ur5" else _wide("ur5")
+    q = _grid(arm)
+    for posture in q[:: len(q) // 60]:
+        X = forward(arm, posture)
+        solution = inverse(arm, X, posture)
+
+        assert solution.answer in (Answer.SOLVED, Answer.SINGULAR), posture
+        assert 1 <= len(solution.branches) <= 8
+        assert _apart(solution) > 1e-6
+        assert np.abs(solution.best.q - posture).max() < 1e-6
+        _honest(solution, X)
+
+
+@pytest.mark.parametrize("case", SINGULAR)
+def test_exactly_singular(case: str) -> None:
+    """At a singular posture the pose is met, no branch comes twice, and the posture itself is among them."""
+    name, q, _ = SINGULAR[case]
+    arm = _wide(name)
+    X = forward(arm, q)
+
+    solution = inverse(arm, X, q)
+
+    assert solution.answer in (Answer.SOLVED, Answer.SINGULAR)
+    assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
+    assert _apart(solution) > 1e-6
+    # At the edge of a reach half of the digits of the posture are lost, and none of the pose.
+    assert min(np.abs(branch.q - q).max() for branch in solution) < 1e-6
+    _honest(solution, X)
+
+
+@pytest.mark.parametrize("case", SINGULAR)
+@pytest.mark.parametrize("distance", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+@pytest.mark.parametrize("way", [1, -1])
+def test_next_to_a_singularity(case: str, distance: float, way: int) -> None:
+    """From a thousandth to a billionth beside it the pose is met; the posture is found as well as rounding allows.
+
+    Rounding of the pose by 1e-16 moves the posture by 1e-16 over the factor of the determinant that vanishes; nearer
+    than 1e-7 the two branches that fall together at the edge of a reach are one. Where a second factor is small as
+    well, as with the wrist centre at the shoulder, all that is drawn out once more by that one.
+    """
+    name, q, joint = SINGULAR[case]
+    arm = _wide(name)
+    beside = np.array(q)
+    beside[joint - 1] += way * distance
+    beside = (beside + np.pi) % (2 * np.pi) - np.pi
+    X = forward(arm, beside)
+
+    solution = inverse(arm, X, beside)
+
+    assert solution.answer in (Answer.SOLVED, Answer.SINGULAR)
+    assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
+    assert len(solution.branches) <= 8
+    assert _apart(solution) > 1e-9
+    found = min(np.abs(np.angle(np.exp(1j * (branch.q - beside)))).max() for branch in solution)
+    least, second, _ = np.sort(np.abs(singularity_factors(arm, beside)))
+    assert found < max(1e-14 / least, min(2e-7, 2 * least)) / min(second, 0.3)
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+def test_at_every_limit(name: str, rng: np.random.Generator) -> None:
+    """A posture with a joint exactly at its limit is inside the limits, and found."""
+    arm = load_arm(name)
+    for joint in range(6):
+        for limit in (arm.joints[joint].limits.lower, arm.joints[joint].limits.upper):
+            q = random_postures(arm, rng, 1)[0]
+            q[joint] = limit
+            if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] < REGULAR:
+                continue
+
+            solution = inverse(arm, forward(arm, q), q)
+
+            assert solution.answer is Answer.SOLVED
+            np.testing.assert_allclose(solution.best.q, q, atol=POSTURE)
+            assert solution.best.allowed
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford"])
+def test_just_beyond_a_limit(name: str, rng: np.random.Generator) -> None:
+    """A millionth beyond its limit the same branch is not allowed, and the joint is named."""
+    arm = load_arm(name)
+    for joint in range(6):
+        q = random_postures(arm, rng, 1)[0]
+        q[joint] = arm.joints[joint].limits.upper + 1e-6
+
+        solution = inverse(arm, forward(arm, q), q)
+
+        branch = min(solution.branches, key=lambda branch: float(np.abs(branch.q - q).max()))
+        if np.abs(branch.q - q).max() < 1e-7:  # not where a whole turn brings the joint inside again
+            assert [violation.joint for violation in branch.violations] == [joint + 1]
+            assert branch.violations[0].excess == pytest.approx(1e-6, rel=1e-2)
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize(("digits", "off"), [(6, 2e-6), (4, 2e-4)])
+def test_typed_poses(name: str, digits: int, off: float, rng: np.random.Generator) -> None:
+    """Poses typed with six or four digits of a metre solve; the posture is off by what the rounding asks of it.
+
+    The rotation is made one first, and that pose is met to rounding.
+    """
+    arm = load_arm(name)
+    for q in random_postures(arm, rng, 60):
+        smallest = np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1]
+        if smallest < 0.02:
+            continue
+        solution = inverse(arm, np.round(forward(arm, q), digits), q)
+
+        assert solution.answer is Answer.SOLVED or _at_a_limit(arm, q, off / smallest)
+        nearest = min(solution, key=lambda branch: float(np.abs(branch.q - q).max()))
+        assert np.abs(nearest.q - q).max() < off / smallest
+        assert nearest.position_error < RESIDUAL
+        assert nearest.rotation_error < RESIDUAL
+
+
+def _at_a_limit(arm: Arm, q: Array, room: float) -> bool:
+    return bool(np.minimum(q - arm.limit("lower"), arm.limit("upper") - q).min() < room)
+
+
+@pytest.mark.parametrize(("digits", "beyond"), [(6, 1e-6), (4, 1e-4)])
+def test_typed_poses_at_the_edge_of_the_reach(digits: int, beyond: float) -> None:
+    """Stretched out, a rounded pose may be out of reach by its rounding: six digits still count as reached.
+
+    With four the answer is out of reach, by less than a tenth of a millimetre, and the nearest pose is given.
+    """
+    arm = _wide("puma560")
+    answers = set()
+    for q1 in np.linspace(-3, 3, 30):
+        X = np.round(forward(arm, (q1, 0.4, ELBOW, 0.6, 0.5, 0.7)), digits)
+        solution = inverse(arm, X)
+        answers.add(solution.answer)
+
+        assert solution.distance < beyond
+        if solution.answer is Answer.OUT_OF_REACH:
+            assert inverse(arm, solution.nearest_pose).answer is not Answer.OUT_OF_REACH
+        else:
+            assert solution.best.position_error < 2e-6
+    assert answers == ({Answer.SOLVED} if digits == 6 else {Answer.SOLVED, Answer.OUT_OF_REACH})
+
+
+def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
+    """In reach is where the wrist centre is beside the axis by d3 at least and in the shell about the shoulder.
+
+    Its radii are those of the two links, 432 and |(20, 433)| mm, at d3 = 149 mm beside the shoulder.
+    """
+    arm = load_arm("puma560")
+    fore, side = math.hypot(0.02, 0.433), 0.149
+    counts = dict.fromkeys(Answer, 0)
+    for _ in range(300):
+        X = forward(arm, random_postures(arm, rng, 1)[0])
+        X[:3, 3] = rng.uniform(-0.95, 0.95, size=3) * rng.choice((1.0, 0.2))
+        along = math.sqrt(max(X[:3, 3] @ X[:3, 3] - side**2, 0.0))
+        reached = np.hypot(X[0, 3], X[1, 3]) >= side and abs(0.432 - fore) <= along <= 0.432 + fore
+
+        solution = inverse(arm, X)
+
+        assert (solution.answer is not Answer.OUT_OF_REACH) == reached
+        counts[solution.answer] += 1
+        if solution.answer is Answer.OUT_OF_LIMITS:
+            # By brute force: no posture of the eight is inside by whole turns of any joint.
+            q, _ = inverse_branches(arm, X)
+            turns = q[..., None] + 2 * np.pi * np.arange(-2, 3)
+            lower, upper = arm.limit("lower")[:, None], arm.limit("upper")[:, None]
+            assert not ((turns >= lower) & (turns <= upper)).any(axis=-1).all(axis=-1).any()
+    assert counts[Answer.SOLVED] > 20
+    assert counts[Answer.OUT_OF_REACH] > 20
+    assert counts[Answer.OUT_OF_LIMITS] > 2
