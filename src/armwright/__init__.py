@@ -18,11 +18,17 @@ from armwright.version import __version__
 if TYPE_CHECKING:
     from armwright.arm.load import arm_names, load_arm
     from armwright.arm.model import Arm
+    from armwright.dynamics.forward_dynamics import forward_dynamics
+    from armwright.dynamics.mass_matrix import mass_matrix
     from armwright.dynamics.newton_euler import inverse_dynamics
+    from armwright.dynamics.payload import payload
+    from armwright.dynamics.simulate import simulate
+    from armwright.dynamics.terms import terms
     from armwright.errors import ArmwrightError
     from armwright.kinematics.forward import forward, link_poses
     from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
     from armwright.kinematics.jacobian import jacobian
+    from armwright.kinematics.singularities import singularities
     from armwright.motion.quintic import point_to_point, quintic
     from armwright.motion.trajectory import Trajectory
     from armwright.motion.xspline import xspline
@@ -33,14 +39,20 @@ _HOME = {
     "Trajectory": "motion.trajectory",
     "arm_names": "arm.load",
     "forward": "kinematics.forward",
+    "forward_dynamics": "dynamics.forward_dynamics",
     "inverse": "kinematics.inverse.closed_form",
     "inverse_branches": "kinematics.inverse.closed_form",
     "inverse_dynamics": "dynamics.newton_euler",
     "jacobian": "kinematics.jacobian",
     "link_poses": "kinematics.forward",
     "load_arm": "arm.load",
+    "mass_matrix": "dynamics.mass_matrix",
+    "payload": "dynamics.payload",
     "point_to_point": "motion.quintic",
     "quintic": "motion.quintic",
+    "simulate": "dynamics.simulate",
+    "singularities": "kinematics.singularities",
+    "terms": "dynamics.terms",
     "xspline": "motion.xspline",
 }
 
@@ -51,14 +63,20 @@ __all__ = [
     "__version__",
     "arm_names",
     "forward",
+    "forward_dynamics",
     "inverse",
     "inverse_branches",
     "inverse_dynamics",
     "jacobian",
     "link_poses",
     "load_arm",
+    "mass_matrix",
+    "payload",
     "point_to_point",
     "quintic",
+    "simulate",
+    "singularities",
+    "terms",
     "xspline",
 ]
 

@@ -1,9 +1,6 @@
 """The commands forward, jacobian, inverse, torque and kernel."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,20 +10,10 @@ from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward import forward
 from armwright.kinematics.jacobian import jacobian
+from cli_calls import armwright
 
 Q_DEG = "10,20,30,40,50,60"
 Q = np.radians([10, 20, 30, 40, 50, 60])
-
-
-def armwright(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
-        timeout=120,
-    )
 
 
 def test_forward_in_millimetres() -> None:

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,28 +18,13 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
+from cli_calls import armwright
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 STACKING = EXAMPLES / "stacking.rlo"
 STANFORD = EXAMPLES / "stanford_cell.toml"
 FILES = {"motion.csv", "events.jsonl", "frames.json", "run.json", "report.html"}
-
-
-def armwright(
-    *arguments: str | Path, cwd: Path | None = None, before: Callable[[], None] | None = None
-) -> subprocess.CompletedProcess[str]:
-    """Call the command line in a terminal of 100 columns that nobody watches."""
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=cwd,
-        preexec_fn=before,
-        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
-        timeout=120,
-    )
 
 
 def fails(*arguments: str | Path, **keywords: object) -> str:
@@ -311,15 +295,9 @@ def test_json_of_a_failure(tmp_path: Path) -> None:
 
 def test_narrow_terminal() -> None:
     """On a narrow terminal the tables fold, and no number is cut."""
-    done = subprocess.run(
-        [sys.executable, "-m", "armwright", "run", str(EXAMPLES / "bench.rlo"), "--cell", str(STANFORD)],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "COLUMNS": "40", "NO_COLOR": "1"},
-        timeout=60,
-    )
+    done = armwright("run", EXAMPLES / "bench.rlo", "--cell", STANFORD, columns=40)
 
+    assert done.returncode == 0
     assert "…" not in done.stdout
 
 

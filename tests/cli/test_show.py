@@ -2,16 +2,14 @@
 
 import json
 import math
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from armwright.arm.load import arm_names, load_arm
+from cli_calls import armwright
 
 HEADINGS = ("Denavit-Hartenberg", "Limits", "Links", "Drives")
 LIFT = """
@@ -28,18 +26,6 @@ mass_kg = 3
 [joint.motor]
 coulomb_backward_N = 4
 """
-
-
-def armwright(*arguments: str | Path, columns: int = 80) -> subprocess.CompletedProcess[str]:
-    """Call the command in a terminal that nobody watches."""
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "COLUMNS": str(columns), "NO_COLOR": "1"},
-        timeout=60,
-    )
 
 
 def test_the_catalogue() -> None:

@@ -15,6 +15,9 @@ from armwright.cli.inverse import inverse
 from armwright.cli.kernel import kernel
 from armwright.cli.run import run
 from armwright.cli.show import show
+from armwright.cli.simulate import simulate
+from armwright.cli.singularity import singularity
+from armwright.cli.study import study
 from armwright.cli.torque import torque
 from armwright.errors import ArmwrightError
 from armwright.version import __version__
@@ -35,6 +38,9 @@ app.command()(forward)
 app.command()(inverse)
 app.command()(jacobian)
 app.command()(torque)
+app.command()(singularity)
+app.command()(simulate)
+app.command()(study)
 app.command()(kernel)
 
 

@@ -1,0 +1,119 @@
+"""``armwright simulate``: what an arm does when its drives do this."""
+
+import enum
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armwright.cli.forward import ArmName, Json
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
+    from armwright.dynamics.simulation import JointState, Simulation
+
+
+# More changes of joints than this are counted, not listed.
+_EVENTS = 20
+
+
+class Drives(enum.StrEnum):
+    """What the drives do."""
+
+    OFF = "off"
+    GRAVITY = "gravity"
+
+
+class Method(enum.StrEnum):
+    """How the motion is integrated."""
+
+    GILL = "gill"
+    ADAPTIVE = "adaptive"
+
+
+def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
+    arm: ArmName,
+    posture: Annotated[str, typer.Option("-q", help="Where it starts, degrees and mm: 10,20,30.", show_default=False)],
+    speeds: Annotated[str | None, typer.Option("--qd", help="Speeds at the start, degrees/s and mm/s.")] = None,
+    duration: Annotated[float, typer.Option(help="How long, in s.")] = 1.0,
+    drives: Annotated[Drives, typer.Option(help="Off, or holding the arm's weight.")] = Drives.OFF,
+    method: Annotated[Method, typer.Option(help="Runge-Kutta-Gill in fixed steps, or adaptive.")] = Method.ADAPTIVE,
+    step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and time between rows.")] = 1.0,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for motion.csv.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Let an arm go and follow it: friction, stops and weight included, with an account of the energy.
+
+    **Example:** `armwright simulate puma560 -q 0,0,90,0,0,0 --duration 2`
+    """
+    import json
+
+    from armwright.arm.load import load_arm
+    from armwright.cli.joints import joint_values
+    from armwright.dynamics.controllers import gravity_compensation, no_effort
+    from armwright.dynamics.integrators import Adaptive, Gill
+    from armwright.dynamics.simulate import simulate as run
+    from armwright.files.output import write_folder
+
+    model = load_arm(arm)
+    if not 0.001 <= step_ms <= 1000:
+        raise typer.BadParameter(f"expected 0.001 to 1000, got {step_ms:g}", param_hint="--step-ms")
+    found = run(
+        model,
+        joint_values(model, posture, "-q"),
+        None if speeds is None else joint_values(model, speeds, "--qd"),
+        duration=duration,
+        controller=gravity_compensation(model) if drives is Drives.GRAVITY else no_effort(model),
+        integrator=Gill(length=step_ms * 1e-3) if method is Method.GILL else Adaptive(),
+        period=step_ms * 1e-3,
+    )
+    if output is not None:
+        write_folder(output, {"motion.csv": _rows(found)})
+    if as_json:
+        print(json.dumps({"status": found.status.name.lower(), "t": float(found.t[-1]), **_account(found)}, indent=2))
+    else:
+        _print(model, found)
+
+
+def _rows(found: "Simulation") -> Iterator[str]:
+    import numpy as np
+
+    n = found.q.shape[1]
+    yield ",".join(["t", *(f"{name}{i + 1}" for name in ("q", "qd", "qdd", "tau") for i in range(n))]) + "\n"
+    table = np.concatenate([found.t[:, None], found.q, found.qd, found.qdd, found.tau], axis=1) + 0.0
+    for row in table.tolist():
+        yield ",".join(f"{value:.12g}" for value in row) + "\n"
+
+
+def _account(found: "Simulation") -> dict[str, float]:
+    return {
+        "kinetic": float(found.kinetic[-1]),
+        "potential_change": float(found.potential[-1] - found.potential[0]),
+        "work_of_drives": float(found.work[-1].sum()),
+        "heat_of_friction": float(found.heat[-1].sum()),
+        "lost_at_stops": float(found.impact[-1]),
+        "imbalance": float(abs(found.imbalance).max()),
+    }
+
+
+def _print(model: "Arm", found: "Simulation") -> None:
+    from armwright.cli.joints import units
+
+    print(f"{found.status.name.lower()} after {found.t[-1]:.3f} s")
+    per_unit = units(model)
+    for i, joint in enumerate(model.joints):
+        unit = "deg" if joint.revolute else "mm"
+        start, end, speed = (values[i] / per_unit[i] for values in (found.q[0], found.q[-1], found.qd[-1]))
+        print(f"  joint {i + 1}: from {start:9.3f} to {end:9.3f} {unit}, at {speed:9.3f} {unit}/s")
+    for name, value in _account(found).items():
+        print(f"  {name.replace('_', ' '):<18}{value:12.6g} J")
+    shown = found.events[:_EVENTS]
+    for event in shown:
+        print(f"  {event.t:.4f} s: joint {event.joint + 1} {_word(event.before)}, then {_word(event.after)}")
+    if len(found.events) > len(shown):
+        print(f"  ... and {len(found.events) - len(shown)} changes more")
+
+
+def _word(state: "JointState") -> str:
+    return state.name.lower().replace("_", " ")

@@ -1,0 +1,40 @@
+"""Printed figures: curves over a common axis, as SVG text that is the same for the same numbers."""
+
+import io
+from collections.abc import Mapping
+
+from armwright.arrays import Array
+
+# Line styles in the order of the curves: the first is the reference, the others are told apart without colour too.
+_STYLES = ("-", "--", "-.", ":")
+
+
+def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_label: str) -> str:
+    """Draw curves over a common axis.
+
+    Args:
+        title: of the figure.
+        x: (m,) the common axis.
+        lines: (m,) values by the name of the curve.
+        x_label: what ``x`` is, with its unit.
+        y_label: what the curves are, with their unit.
+
+    Returns:
+        An SVG file's text.
+    """
+    import matplotlib as mpl  # noqa: PLC0415 - costs half a second, and only figures need it
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(7, 4.2), layout="constrained")
+    axes = figure.subplots()
+    for i, (name, y) in enumerate(lines.items()):
+        axes.plot(x, y, _STYLES[i % len(_STYLES)], label=name, linewidth=1.6)
+    axes.set(title=title, xlabel=x_label, ylabel=y_label, xlim=(float(x[0]), float(x[-1])))
+    axes.grid(visible=True, alpha=0.3)
+    if len(lines) > 1:
+        axes.legend()
+    text = io.StringIO()
+    # Without a date and with fixed names of its parts, a figure changes only when its numbers do.
+    with mpl.rc_context({"svg.hashsalt": "armwright"}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()
