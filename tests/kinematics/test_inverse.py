@@ -1,4 +1,4 @@
-"""Inverse kinematics in closed form."""
+"""Inverse kinematics in closed form: the catalogue's arms with a spherical wrist."""
 
 import math
 
@@ -7,11 +7,12 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError, UnsupportedArmError
+from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import images, inverse, inverse_branches
+from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.solution import Answer, NoPostureError
+from armwright.kinematics.inverse.turns import images
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
 from oracles.arms import random_postures
@@ -223,6 +224,17 @@ def test_other_arms_are_refused() -> None:
     """An arm of another build has no branches in closed form and is told so."""
     with pytest.raises(UnsupportedArmError, match=r"'ntu-3r': no closed-form inverse kinematics"):
         inverse_branches(load_arm("ntu-3r"), np.eye(4))
+
+
+def test_shapes_that_do_not_fit() -> None:
+    """Two poses and three starting points are refused, and so are two starting points for one judged pose."""
+    arm = load_arm("puma560")
+    with pytest.raises(
+        ShapeError, match=r"pose, near: leading axes must fit together, got shapes \(2, 4, 4\) and \(3, 6"
+    ):
+        inverse_branches(arm, np.tile(np.eye(4), (2, 1, 1)), np.zeros((3, 6)))
+    with pytest.raises(ShapeError, match=r"near: expected shape \(6,\), got \(2, 6\)"):
+        inverse(arm, np.eye(4), np.zeros((2, 6)))
 
 
 def test_not_a_rotation() -> None:

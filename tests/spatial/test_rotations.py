@@ -87,6 +87,13 @@ def test_between_is_straight_and_even(rng: np.random.Generator) -> None:
     assert angle_between(A[:3, :3], X[3, :3, :3]) == pytest.approx(angle_between(A[:3, :3], B[:3, :3]) / 2)
 
 
+def test_no_turn_beside_half_a_turn() -> None:
+    """In one array no turn at all and half a turn about x are read side by side, without a division by zero."""
+    vectors = rotation_vector([np.eye(3), np.diag((1.0, -1.0, -1.0))])
+
+    np.testing.assert_allclose(np.abs(vectors), [(0, 0, 0), (np.pi, 0, 0)], atol=ROUNDING)
+
+
 def test_shape_is_checked() -> None:
     """Three numbers are no pose."""
     with pytest.raises(ShapeError, match=r"pose: expected a shape ending in \(4, 4\), got \(3,\)"):

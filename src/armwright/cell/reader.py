@@ -93,7 +93,8 @@ def _arm(table: Table, folder: Path) -> CellArm:
     if shoulder_of(arm) is None:
         raise table.error(
             "model",
-            f"'{arm.name}' has no closed-form inverse kinematics yet; use puma560, stanford or an arm built like them",
+            f"'{arm.name}' has no closed-form inverse kinematics, which moves need; use an arm built like puma560, "
+            "stanford or ur5",
         )
     if "tool" in table:
         arm = attrs.evolve(arm, tool=_pose(table, "tool"))

@@ -9,8 +9,9 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse, inverse_branches, travel
+from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
 from armwright.kinematics.inverse.solution import Answer, violations
+from armwright.kinematics.inverse.turns import travel
 from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, Knots, Path, place_knots
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline import xspline
@@ -71,7 +72,7 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     """Return the joint motion along a path, from rest to rest, passing the poses between without a stop.
 
     Args:
-        arm: a PUMA-like or Stanford-like arm.
+        arm: an arm with a closed-form inverse.
         path: begins where the hand is at ``q_start``.
         q_start: (n,) present joint positions.
         deviation: allowed distance of the hand from a single straight way [m]; twenty times as much is allowed on a

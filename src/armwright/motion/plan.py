@@ -10,8 +10,9 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import images, inverse, travel
+from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.solution import Answer
+from armwright.kinematics.inverse.turns import images, travel
 from armwright.motion.follow import Cause, PathError, follow
 from armwright.motion.path import Path
 from armwright.motion.quintic import point_to_point
@@ -95,7 +96,7 @@ def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manne
     can go on from it, the next nearest is tried.
 
     Args:
-        arm: a PUMA-like or Stanford-like arm.
+        arm: an arm with a closed-form inverse.
         q_start: (n,) present joint positions.
         goals: the stages.
         manner: speed, deviation, servo period.

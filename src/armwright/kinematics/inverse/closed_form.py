@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array, of_shape
-from armwright.errors import UnsupportedArmError
+from armwright.arrays import Array, ArrayLike, exactly, joint_array, of_shape
+from armwright.errors import ShapeError, UnsupportedArmError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, errors, judge
 from armwright.kinematics.inverse.numeric import numeric_inverse
@@ -15,9 +15,7 @@ from armwright.kinematics.inverse.reach import nearest_centre
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.shoulder import Shoulder, Sign, turned
 from armwright.kinematics.inverse.solution import InverseSolution, violations
-from armwright.kinematics.inverse.turns import images, middle, nearest_image, nearest_turn, travel
-
-__all__ = ["BRANCHES", "images", "inverse", "inverse_branches", "label", "nearest_image", "travel"]
+from armwright.kinematics.inverse.turns import middle, nearest_image, nearest_turn
 
 _SIGNS: tuple[Sign, Sign] = (1, -1)
 # The order of the branches: arm, elbow (or slide), wrist.
@@ -91,7 +89,7 @@ def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> Inverse
         Paul (1981) ch. 3; Hawkins (2013) for three parallel axes; spec of this project, mechanics §3.2.
     """
     X = clean_pose(X_BT)
-    reference = joint_array(middle(arm) if near is None else near, arm.n, "near")
+    reference = exactly(middle(arm) if near is None else near, (arm.n,), "near")
     shoulder = shoulder_of(arm)
     return numeric_inverse(arm, X, reference) if shoulder is None else _closed(arm, shoulder, X, reference)
 
@@ -127,7 +125,12 @@ def _shoulder(arm: Arm) -> Shoulder:
 
 def _postures(arm: Arm, shoulder: Shoulder, X_BT: Array, near: Array) -> tuple[Array, Array]:
     """Return the eight postures (..., 8, 6), existing or not, and which of three choices are free (..., 8, 3)."""
-    lead = np.broadcast_shapes(X_BT.shape[:-2], near.shape[:-1])
+    try:
+        lead = np.broadcast_shapes(X_BT.shape[:-2], near.shape[:-1])
+    except ValueError as error:
+        raise ShapeError(
+            f"pose, near: leading axes must fit together, got shapes {X_BT.shape} and {near.shape}"
+        ) from error
     X_BT, near = np.broadcast_to(X_BT, (*lead, 4, 4)), np.broadcast_to(near, (*lead, arm.n))
     R_BS, p_BS = shoulder.X_BS[:3, :3], shoulder.X_BS[:3, 3]
     R_ST = R_BS.T @ X_BT[..., :3, :3]
