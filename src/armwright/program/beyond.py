@@ -14,7 +14,7 @@ _LONGEST_SHOWN = 16
 
 def report(tokens: Tokens, what: str, span: Span, instead: str, *helps: str) -> None:
     """Say that something belongs to RLO-2, and what RLO-83 has instead."""
-    tokens.report("E214", f"{what} belongs to RLO-2", span, instead, helps=helps)
+    tokens.found.say("E214", f"{what} belongs to RLO-2", span, instead, helps=helps)
 
 
 def expression(tokens: Tokens, wants: str) -> tree.Poison:

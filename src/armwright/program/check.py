@@ -49,7 +49,7 @@ def _tool_or_sensor(names: Names, statement: tree.Statement) -> None:
         case tree.ReadVisions(target=target):
             _target(names, target)
         case tree.Operate(device=tree.ArmName() as arm):
-            names.say("E201", f"OPERATE starts a device, but `{arm.text}` is an arm", arm.span, "an arm")
+            names.found.say("E201", f"OPERATE starts a device, but `{arm.text}` is an arm", arm.span, "an arm")
         case _:
             pass
 
@@ -61,11 +61,13 @@ def _init(names: Names, init: tree.Init) -> None:
         names.use(value.names)
     if isinstance(name, tree.ArmName):
         help_ = f"move it, or write `READ SYSTEM ({name.key})`"
-        names.say("E218", f"`{name.text}` is an arm and cannot be given a value", name.span, "an arm", helps=(help_,))
+        names.found.say(
+            "E218", f"`{name.text}` is an arm and cannot be given a value", name.span, "an arm", helps=(help_,)
+        )
         return
     kind = names.kind(name)
     if name.key == WORLD:
-        names.say("E218", f"`{name.text}` cannot be given a value", name.span, "the root of all frames")
+        names.found.say("E218", f"`{name.text}` cannot be given a value", name.span, "the root of all frames")
     elif kind is not None and not isinstance(value, tree.Poison):
         _fits(names, name, kind, value)
 
@@ -75,7 +77,7 @@ def _fits(names: Names, name: tree.Name, kind: Kind, value: tree.Matrix | tree.N
     is_matrix = isinstance(value, tree.Matrix)
     if is_matrix == (kind is Kind.SCALAR):
         takes = "one number" if kind is Kind.SCALAR else "twelve numbers in `( )`"
-        names.say(
+        names.found.say(
             "E217",
             f"`{name.text}` is a {kind} and takes {takes}",
             value.span,
@@ -115,9 +117,11 @@ def _child(names: Names, child: tree.Mobile, verb: str, done: str, helps: tuple[
     """Check the frame that AFFIX hangs or UNFIX cuts."""
     if isinstance(child, tree.ArmName):
         text = f"an arm cannot be {done}"
-        names.say("E308", text, child.span, "an arm hangs on its own base", helps=helps)
+        names.found.say("E308", text, child.span, "an arm hangs on its own base", helps=helps)
     elif isinstance(child, tree.Name) and child.key == WORLD:
-        names.say("E309", f"`{child.text}` cannot be {done.partition(' ')[0]}", child.span, "the root of all frames")
+        names.found.say(
+            "E309", f"`{child.text}` cannot be {done.partition(' ')[0]}", child.span, "the root of all frames"
+        )
     else:
         names.need(child, Kind.FRAME, "E215", f"{verb} a FRAME")
 
@@ -126,9 +130,9 @@ def _target(names: Names, target: tree.Mobile) -> None:
     if isinstance(target, tree.ArmName):
         help_ = f"write `READ SYSTEM ({target.key})` to read the arm"
         text = f"READ VISIONS finds a FRAME, but `{target.text}` is an arm"
-        names.say("E215", text, target.span, "an arm", helps=(help_,))
+        names.found.say("E215", text, target.span, "an arm", helps=(help_,))
     elif isinstance(target, tree.Name) and target.key == WORLD:
-        names.say("E218", f"`{target.text}` cannot be given a value", target.span, "the root of all frames")
+        names.found.say("E218", f"`{target.text}` cannot be given a value", target.span, "the root of all frames")
     else:
         names.need(target, Kind.FRAME, "E215", "READ VISIONS finds a FRAME")
 
@@ -142,7 +146,7 @@ def _arm(names: Names, node: tree.Mobile | None, who: str) -> None:
     near = closest(node.text, names.arms())
     kind = names.kinds.get(node.key)
     is_what = f"is a {kind}" if kind else "is no arm"
-    names.say(
+    names.found.say(
         "E201",
         f"{who} needs an arm, but `{node.text}` {is_what}",
         node.span,

@@ -69,7 +69,7 @@ def _clause(tokens: Tokens) -> tree.Clause | None:
         return _with(tokens, token)
     if key in WITH_CLAUSES:
         gap = Span(token.start, token.start)
-        tokens.report(
+        tokens.found.say(
             "E116",
             f"{key} needs WITH in front",
             token.span,
@@ -84,7 +84,7 @@ def _clause(tokens: Tokens) -> tree.Clause | None:
 def _meant(tokens: Tokens, token: Token) -> str:
     """Return the clause word that a misspelt one was meant to be; empty if there is none."""
     near = closest(token.text, CLAUSES)
-    tokens.report(
+    tokens.found.say(
         "E108",
         f"unknown clause `{token.text}`",
         token.span,
@@ -109,7 +109,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
     """Read what follows WITH."""
     token = tokens.now
     if tokens.sees(*PLAIN_CLAUSES):
-        tokens.report(
+        tokens.found.say(
             "E116",
             f"{token.key} stands without WITH",
             start.span,
@@ -126,7 +126,7 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
         return None
     if key is None and token.kind is TokenKind.NAME:
         key = closest(token.text, WITH_CLAUSES)
-        tokens.report(
+        tokens.found.say(
             "E108",
             f"unknown clause `WITH {token.text}`",
             token.span,

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from armwright.program import tree
 from armwright.program.code import Kind
-from armwright.program.diagnostics import Diagnostic, Label, Severity
+from armwright.program.diagnostics import Findings, Label, Severity
 from armwright.program.hanging import Hanging, is_arm
 from armwright.program.known import KnownCell
 from armwright.program.names import Symbols
@@ -16,7 +16,7 @@ class Course:
 
     def __init__(self, symbols: Symbols, spelling: Mapping[str, str], cell: KnownCell | None, *, strict: bool) -> None:
         """Start in front of the first statement."""
-        self.found: list[Diagnostic] = []
+        self.found = Findings()
         self.arms: dict[int, str] = {}
         self.implied: set[int] = set()
         self.symbols, self.spelling, self.cell, self.strict = symbols, spelling, cell, strict
@@ -39,16 +39,14 @@ class Course:
         note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
         if self.cell is None:
             note = "no cell was given; a cell file may give it one"
-        self.found.append(
-            Diagnostic(
-                code="E304" if self.cell else "W204",
-                severity=Severity.ERROR if self.cell else Severity.WARNING,
-                message=f"frame `{node.text}` is used before it has a value",
-                span=node.span,
-                label="no value here",
-                secondary=self.declared(key) if any_value or not self.cell else (),
-                notes=() if any_value and self.cell else (note,),
-            )
+        self.found.say(
+            "E304" if self.cell else "W204",
+            f"frame `{node.text}` is used before it has a value",
+            node.span,
+            "no value here",
+            secondary=self.declared(key) if any_value or not self.cell else (),
+            notes=() if any_value and self.cell else (note,),
+            severity=Severity.ERROR if self.cell else Severity.WARNING,
         )
 
     def need_number(self, node: tree.Mobile | None, kind: Kind) -> bool:
@@ -58,7 +56,7 @@ class Course:
         if node.key in self.settled or node.key in (self.scalars if kind is Kind.SCALAR else self.steps):
             return True
         self.settled.add(node.key)
-        self.say(
+        self.found.say(
             "E303",
             f"`{node.text}` is used before it has a value",
             node.span,
@@ -81,7 +79,7 @@ class Course:
             return
         self.settled.add(arm.key)
         known = ", ".join(sorted(self.cell.arms)) or "none"
-        self.say(
+        self.found.say(
             "E302", f"the cell has no arm {arm.key}", arm.span, "no such arm", notes=(f"arms of the cell: {known}",)
         )
 
@@ -97,43 +95,3 @@ class Course:
         """Return a label on the declaration of a name, if it has one."""
         declared = self.symbols.declared.get(key)
         return (Label(declared.span, "declared here"),) if declared else ()
-
-    def say(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        severity: Severity = Severity.ERROR,
-        secondary: tuple[Label, ...] = (),
-        notes: tuple[str, ...] = (),
-        helps: tuple[str, ...] = (),
-    ) -> None:
-        """Report an error, or what ``severity`` says."""
-        self.found.append(
-            Diagnostic(
-                code=code,
-                severity=severity,
-                message=message,
-                span=span,
-                label=label,
-                secondary=secondary,
-                notes=notes,
-                helps=helps,
-            )
-        )
-
-    def warn(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        secondary: tuple[Label, ...] = (),
-        notes: tuple[str, ...] = (),
-        helps: tuple[str, ...] = (),
-    ) -> None:
-        """Report a warning."""
-        self.say(code, message, span, label, severity=Severity.WARNING, secondary=secondary, notes=notes, helps=helps)

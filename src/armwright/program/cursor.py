@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NoReturn
 
-from armwright.program.diagnostics import Diagnostic, Fix, Label
+from armwright.program.diagnostics import Findings, Fix
 from armwright.program.source import Source, Span
 from armwright.program.tokens import Token, TokenKind
 from armwright.program.words import STATEMENTS
@@ -19,7 +19,7 @@ class Tokens:
     def __init__(self, source: Source, tokens: Sequence[Token]) -> None:
         """Start at the first token; the last must be the end of the text."""
         self.source = source
-        self.found: list[Diagnostic] = []
+        self.found = Findings()
         self._tokens = tokens
         self._last = len(tokens) - 1
         self.at = 0
@@ -85,32 +85,6 @@ class Tokens:
         """Whether the next token stands in the line of the one read last."""
         return self.source.line(self.before.start) == self.source.line(self.now.start)
 
-    def report(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        secondary: tuple[Label, ...] = (),
-        notes: tuple[str, ...] = (),
-        helps: tuple[str, ...] = (),
-        fixes: tuple[Fix, ...] = (),
-    ) -> None:
-        """Say that something is wrong."""
-        self.found.append(
-            Diagnostic(
-                code=code,
-                message=message,
-                span=span,
-                label=label,
-                secondary=secondary,
-                notes=notes,
-                helps=helps,
-                fixes=fixes,
-            )
-        )
-
     def lost(self, message: str, label: str, *, code: str = "E111", helps: tuple[str, ...] = ()) -> NoReturn:
         """Say what is missing at the next token, unless that was reported before, and give up the statement.
 
@@ -120,7 +94,7 @@ class Tokens:
         if not self.now.damaged:
             # At the end of the text there is nothing to mark; the gap before it is the place.
             span = self.gap() if self.done else self.now.span
-            self.report(code, message, span, label, helps=helps)
+            self.found.say(code, message, span, label, helps=helps)
         raise LostError
 
     def expect(self, key: str, where: str) -> None:
@@ -136,7 +110,7 @@ class Tokens:
         if self.accept(key):
             return
         if self._misspelt(key):
-            self.report(
+            self.found.say(
                 "E112", f"expected `{key}` {where}", self.now.span, f"expected `{key}`", helps=(f"write `{key}`",)
             )
             self.take()
@@ -144,7 +118,7 @@ class Tokens:
         gap = self.gap()
         if not self.now.damaged:
             # A word needs blanks around it; a sign goes where it is missing.
-            self.report(
+            self.found.say(
                 "E112",
                 f"missing `{key}` {where}",
                 gap,

@@ -26,7 +26,7 @@ def head(tokens: Tokens) -> list[tree.Declaration]:
             beyond.header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             gap = Span(token.start, token.start)
-            tokens.report(
+            tokens.found.say(
                 "E112", "missing `VAR` before the declarations", gap, "expected `VAR` here", fixes=(Fix(gap, "VAR "),)
             )
             found += _declarations(tokens)
@@ -45,7 +45,7 @@ def _nonsense(tokens: Tokens) -> tree.Declaration:
     """Pass over what is neither a declaration nor BEGIN; the names in it may have been meant to be declared."""
     start = tokens.take()
     if not start.damaged:
-        tokens.report("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
+        tokens.found.say("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
     names: list[tree.Name | None] = []
     if start.kind is TokenKind.NAME:
         names.append(tree.Name(start.span, start.text, start.key))
@@ -73,7 +73,7 @@ def _begin(tokens: Tokens) -> None:
         return
     gap = Span(tokens.now.start, tokens.now.start)
     if not tokens.now.damaged:
-        tokens.report(
+        tokens.found.say(
             "E115",
             "missing `BEGIN` before the first statement",
             gap,
@@ -84,7 +84,7 @@ def _begin(tokens: Tokens) -> None:
 
 def _misspelt(tokens: Tokens, near: str) -> None:
     token = tokens.now
-    tokens.report(
+    tokens.found.say(
         "E105", f"unknown word `{token.text}`", token.span, "not a word of RLO", helps=(f"did you mean `{near}`?",)
     )
 
@@ -94,10 +94,10 @@ def var_part(tokens: Tokens) -> list[tree.Declaration]:
     """Read VAR and what it declares."""
     word = tokens.take()
     if tokens.sees(","):
-        tokens.report("E111", "expected a name after VAR", tokens.now.span, "found `,`")
+        tokens.found.say("E111", "expected a name after VAR", tokens.now.span, "found `,`")
         tokens.take()
     if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not _reserved(tokens):
-        tokens.report("E111", "VAR declares nothing", word.span, "expected a name after VAR")
+        tokens.found.say("E111", "VAR declares nothing", word.span, "expected a name after VAR")
         return []
     return _declarations(tokens)
 
@@ -143,18 +143,18 @@ def _declaration(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declarat
     while True:
         if tokens.accept(","):
             if tokens.sees(":"):
-                tokens.report("E111", "expected a name after `,`", tokens.now.span, "found `:`")
+                tokens.found.say("E111", "expected a name after `,`", tokens.now.span, "found `:`")
                 break
             names.append(_declared(tokens))
         elif tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ":"):
             gap = tokens.gap()
-            tokens.report("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
+            tokens.found.say("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
             names.append(_declared(tokens))
         else:
             break
     if not tokens.accept(":"):
         gap = tokens.gap()
-        tokens.report("E112", "missing `:` before the type", gap, "expected `:` and a type here")
+        tokens.found.say("E112", "missing `:` before the type", gap, "expected `:` and a type here")
         if not tokens.sees(*TYPES):
             raise LostError
     kind = _type(tokens)
@@ -173,7 +173,7 @@ def _declared(tokens: Tokens) -> tree.Name | None:
         return name
     if token.kind is TokenKind.ARM:
         if not token.damaged:
-            tokens.report("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
+            tokens.found.say("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
         tokens.take()
         return None
     if _reserved(tokens):
@@ -193,7 +193,7 @@ def _type(tokens: Tokens) -> tree.TypeName:
     if token.kind is not TokenKind.NAME:
         tokens.lost("expected a type after `:`", f"expected {', '.join(TYPES[:-1])} or {TYPES[-1]}")
     near = closest(token.text, TYPES)
-    tokens.report(
+    tokens.found.say(
         "E205",
         f"unknown type `{token.text}`",
         token.span,
@@ -208,7 +208,7 @@ def _close(tokens: Tokens) -> None:
     if tokens.accept(";"):
         return
     gap = tokens.gap()
-    tokens.report(
+    tokens.found.say(
         "E104",
         "missing `;` after the declaration",
         gap,

@@ -69,6 +69,38 @@ class Diagnostic:
         return self.code.startswith("E1")
 
 
+class Findings(list[Diagnostic]):
+    """What one pass over a program has found so far."""
+
+    def say(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        label: str,
+        *,
+        severity: Severity = Severity.ERROR,
+        secondary: tuple[Label, ...] = (),
+        notes: tuple[str, ...] = (),
+        helps: tuple[str, ...] = (),
+        fixes: tuple[Fix, ...] = (),
+    ) -> None:
+        """Add an error, or what ``severity`` says; the arguments are those of ``Diagnostic``."""
+        self.append(
+            Diagnostic(
+                code=code,
+                severity=severity,
+                message=message,
+                span=span,
+                label=label,
+                secondary=secondary,
+                notes=notes,
+                helps=helps,
+                fixes=fixes,
+            )
+        )
+
+
 def in_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Return them sorted by their place in the text."""
     return tuple(sorted(diagnostics, key=lambda one: (one.span.start, one.span.end)))

@@ -8,7 +8,7 @@ import attrs
 from armwright.program import handling, tree
 from armwright.program.code import Kind
 from armwright.program.course import Course
-from armwright.program.diagnostics import Diagnostic, Label
+from armwright.program.diagnostics import Diagnostic, Label, Severity
 from armwright.program.hanging import is_arm
 from armwright.program.known import WORLD, KnownCell
 from armwright.program.names import Symbols
@@ -142,7 +142,7 @@ def _ring(course: Course, affix: tree.Affix, child: str, parent: str) -> None:
         if link.span:
             chain.append(Label(link.span, f"{name(below)} hangs on {name(link.parent)}"))
     on = "itself" if child == parent else name(parent)
-    course.say(
+    course.found.say(
         "E305",
         "this AFFIX would close a ring",
         affix.link,
@@ -158,13 +158,14 @@ def _late(course: Course, affix: tree.Affix, child: str, parent: str) -> None:
     if above is None or below is None or not above.moved or above.order < below.order:
         return
     name = course.name
-    course.warn(
+    course.found.say(
         "L303",
         f"`{name(parent)}` was moved before `{name(child)}` hung on it",
         affix.link,
         f"{name(child)} follows only from here on",
         secondary=(Label(above.span, f"{name(child)} did not follow this"),),
         helps=("put the AFFIX before the assignment, or give the step with AT",),
+        severity=Severity.WARNING,
     )
 
 
@@ -185,7 +186,7 @@ def _not_affixed(course: Course, unfix: tree.Unfix, child: str) -> None:
     link, name = course.table.links.get(child), course.name
     where = Label(link.span, f"{name(child)} was affixed to {name(link.parent)} here") if link and link.span else None
     instead = f"write `UNFIX {name(child)} FROM {name(link.parent)}`" if link else "leave this UNFIX out"
-    course.say(
+    course.found.say(
         "E306",
         f"`{name(child)}` is not affixed to `{unfix.parent.text}`",
         unfix.parent.span,

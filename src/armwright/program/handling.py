@@ -4,7 +4,7 @@ from armwright.errors import closest
 from armwright.program import tree
 from armwright.program.code import HIGHEST_SPEED, LOWEST_SPEED, Kind
 from armwright.program.course import Course
-from armwright.program.diagnostics import Diagnostic, Label, Severity
+from armwright.program.diagnostics import Label, Severity
 from armwright.program.hanging import is_arm
 from armwright.program.known import WORLD
 from armwright.program.moves import SPEED_NOTE
@@ -21,7 +21,7 @@ def grasp(course: Course, grasp: tree.Grasp) -> None:
         if not course.arm_unknown:
             help_ = f"write `GRASP {course.some_arm()}`"
             text = "GRASP does not say which arm, and none has been used yet"
-            course.say("E307", text, grasp.span, "which arm?", helps=(help_,))
+            course.found.say("E307", text, grasp.span, "which arm?", helps=(help_,))
         return
     course.arms[course.index] = arm
     hand = course.table.hand(arm)
@@ -36,13 +36,14 @@ def _closed_on_arrival(course: Course, arm: str) -> None:
     never_opened = hand.arrived_open is False and hand.opened is None
     if hand.arrival is None or hand.at is None or not (opened_late or never_opened):
         return
-    course.warn(
+    course.found.say(
         "L301",
         f"{arm} {'may come' if opened_late else 'comes'} to `{course.name(hand.at)}` with closed fingers",
         hand.arrival,
         "it arrives here",
         secondary=(Label(hand.opened, "they open only here"),) if hand.opened else (),
         helps=(f"write `OPEN {arm}` before this MOVE",),
+        severity=Severity.WARNING,
     )
 
 
@@ -54,12 +55,13 @@ def read(course: Course, target: tree.Name, span: Span) -> None:
     if visions is not None and target.key not in visions and target.key not in course.settled:
         course.settled.add(target.key)
         near = closest(target.text, visions)
-        course.warn(
+        course.found.say(
             "W601",
             f"the camera of the cell has no answer for `{target.text}`",
             target.span,
             "will not be found",
             helps=(f"did you mean `{near}`?",) if near else (),
+            severity=Severity.WARNING,
         )
     course.table.assign(target.key, course.index, span)
 
@@ -71,7 +73,7 @@ def operate(course: Course, device: tree.Name) -> None:
         return
     near = closest(device.text, known)
     listed = ", ".join(sorted(known)) or "none"
-    course.say(
+    course.found.say(
         "R602",
         f"the cell has no device `{device.text}`",
         device.span,
@@ -119,16 +121,14 @@ def _carrier(course: Course, move: tree.Move, moved: str | None) -> str | None:
 
 def _imply(course: Course, move: tree.Move, moved: str, arm: str) -> None:
     name, grasp = course.name(moved), course.table.hand(arm).grasp
-    course.found.append(
-        Diagnostic(
-            code="W201",
-            severity=Severity.ERROR if course.strict else Severity.WARNING,
-            message=f"`{name}` is moved, but no AFFIX hangs it on {arm}",
-            span=move.span,
-            label=f"`AFFIX {name} TO {arm}` is implied",
-            secondary=(Label(grasp, f"{arm} grasped it here"),) if grasp else (),
-            helps=(f"write `AFFIX {name} TO {arm}` after GRASP",),
-        )
+    course.found.say(
+        "W201",
+        f"`{name}` is moved, but no AFFIX hangs it on {arm}",
+        move.span,
+        f"`AFFIX {name} TO {arm}` is implied",
+        secondary=(Label(grasp, f"{arm} grasped it here"),) if grasp else (),
+        helps=(f"write `AFFIX {name} TO {arm}` after GRASP",),
+        severity=Severity.ERROR if course.strict else Severity.WARNING,
     )
     leaves(course, moved, arm, move.span)
     course.table.hang(moved, arm, move.span)
@@ -141,7 +141,7 @@ def leaves(course: Course, child: str, parent: str, span: Span) -> None:
     if link is None or link.parent == parent:
         return
     name = course.name
-    course.warn(
+    course.found.say(
         "W203",
         f"`{name(child)}` still hangs on `{name(link.parent)}`",
         span,
@@ -149,13 +149,14 @@ def leaves(course: Course, child: str, parent: str, span: Span) -> None:
         secondary=(Label(link.span, f"affixed to {name(link.parent)} here"),) if link.span else (),
         notes=() if link.span else (f"in the cell it hangs on {name(link.parent)}",),
         helps=(f"write `UNFIX {name(child)} FROM {name(link.parent)}` first to say so",),
+        severity=Severity.WARNING,
     )
 
 
 def _not_carried(course: Course, move: tree.Move, moved: str) -> None:
     assert isinstance(move.moved, tree.Name)  # noqa: S101 - an arm carries itself
     link, name = course.table.links.get(moved), course.name(moved)
-    course.say(
+    course.found.say(
         "E301",
         f"`{name}` cannot be moved: it is not affixed to an arm",
         move.moved.span,
@@ -168,12 +169,13 @@ def _not_carried(course: Course, move: tree.Move, moved: str) -> None:
 
 
 def _relative(course: Course, move: tree.Move, goal: str, arm: str) -> None:
-    course.warn(
+    course.found.say(
         "L302",
         f"`{course.name(goal)}` moves together with {arm}, which is to come to it",
         move.goal.span,
         f"hangs on {arm}",
         notes=("the goal is taken where it is when the motion starts, so this is a relative motion",),
+        severity=Severity.WARNING,
     )
 
 
@@ -184,7 +186,7 @@ def _speed(course: Course, node: tree.Number | tree.Mobile) -> None:
     value, span = course.scalars.get(node.key, (None, node.span))
     if value is not None and not LOWEST_SPEED <= value <= HIGHEST_SPEED and node.key not in course.settled:
         course.settled.add(node.key)
-        course.say(
+        course.found.say(
             "E207",
             f"speed `{node.text}` = {value:.12g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
             node.span,

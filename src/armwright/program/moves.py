@@ -60,7 +60,7 @@ def check(names: Names, move: tree.Move) -> None:
 def _place(names: Names, node: tree.Mobile, code: str, what: str, helps: tuple[str, ...] = ()) -> None:
     """Check a frame to come to; an arm as one is an expression of RLO-2."""
     if isinstance(node, tree.ArmName):
-        names.say(
+        names.found.say(
             "E214", f"`{node.text}` as a place belongs to RLO-2", node.span, "RLO-83 takes the name of a FRAME here"
         )
     else:
@@ -70,7 +70,7 @@ def _place(names: Names, node: tree.Mobile, code: str, what: str, helps: tuple[s
 def _speed(names: Names, number: tree.Number) -> None:
     # A number that was reported before is NaN and in no range, nor out of it.
     if number.value < LOWEST_SPEED or number.value > HIGHEST_SPEED:
-        names.say(
+        names.found.say(
             "E207",
             f"speed {number.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
             number.span,
@@ -84,7 +84,7 @@ def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
     first: dict[type, tree.Clause] = {}
     for clause in clauses:
         if (earlier := first.setdefault(type(clause), clause)) is not clause:
-            names.say(
+            names.found.say(
                 "E213",
                 f"{_WORDS[type(clause)]} is given twice in one MOVE",
                 clause.span,
@@ -94,7 +94,7 @@ def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
     direct, straight = first.get(tree.Directly), first.get(tree.Straightly)
     for kind, clause in first.items():
         if direct and kind in _NOT_ASKED:
-            names.say(
+            names.found.say(
                 "E208",
                 f"DIRECTLY cannot be combined with {_WORDS[kind]}",
                 clause.span,
@@ -103,7 +103,7 @@ def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
                 helps=("remove one of the two",),
             )
         elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
-            names.say(
+            names.found.say(
                 "E209",
                 f"STRAIGHTLY cannot be combined with {_WORDS[kind]}",
                 clause.span,

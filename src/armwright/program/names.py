@@ -7,9 +7,8 @@ import attrs
 from armwright.errors import closest
 from armwright.program import tree
 from armwright.program.code import Kind
-from armwright.program.diagnostics import Diagnostic, Label, Severity
+from armwright.program.diagnostics import Findings, Label, Severity
 from armwright.program.known import STATION, WORLD, KnownCell
-from armwright.program.source import Span
 
 PREDECLARED = {WORLD: Kind.FRAME, STATION: Kind.FRAME}
 
@@ -40,7 +39,7 @@ class Names:
 
     def __init__(self, cell: KnownCell | None) -> None:
         """Start with the predeclared names."""
-        self.found: list[Diagnostic] = []
+        self.found = Findings()
         self.kinds: dict[str, Kind | None] = dict(PREDECLARED)
         self.declared: dict[str, tree.Name] = {}
         self.poisoned: set[str] = set()
@@ -58,7 +57,7 @@ class Names:
         for name in declaration.names:
             if name.key in self.declared:
                 first = self.declared[name.key]
-                self.say(
+                self.found.say(
                     "E203",
                     f"`{name.text}` is declared twice",
                     name.span,
@@ -68,7 +67,7 @@ class Names:
             elif name.key == WORLD or (name.key == STATION and kind not in (Kind.FRAME, None)):
                 note = "the station may be declared again as a FRAME" if name.key == STATION else ""
                 text = f"`{name.text}` is predeclared as a FRAME"
-                self.say("E203", text, name.span, "declared again here", notes=(note,) if note else ())
+                self.found.say("E203", text, name.span, "declared again here", notes=(note,) if note else ())
             else:
                 self.declared[name.key] = name
                 self.kinds[name.key] = kind
@@ -77,14 +76,12 @@ class Names:
         """Point at names that are declared and never used."""
         for key, name in self.declared.items():
             if key not in self._used and self.kinds[key] is not None:
-                self.found.append(
-                    Diagnostic(
-                        code="L304",
-                        severity=Severity.WARNING,
-                        message=f"`{name.text}` is never used",
-                        span=name.span,
-                        label="declared here",
-                    )
+                self.found.say(
+                    "L304",
+                    f"`{name.text}` is never used",
+                    name.span,
+                    "declared here",
+                    severity=Severity.WARNING,
                 )
 
     def use(self, keys: Iterable[str]) -> None:
@@ -126,7 +123,7 @@ class Names:
             helps: of the diagnostic.
         """
         if isinstance(node, tree.ArmName) and kind is not Kind.FRAME:
-            self.say(code, f"{what}, but `{node.text}` is an arm", node.span, "an arm", notes=notes)
+            self.found.say(code, f"{what}, but `{node.text}` is an arm", node.span, "an arm", notes=notes)
         elif isinstance(node, tree.Poison):
             self._used |= node.names
         elif isinstance(node, tree.Name):
@@ -134,7 +131,7 @@ class Names:
             if found in (None, kind) or node.key in self.poisoned:
                 return
             self.poisoned.add(node.key)
-            self.say(
+            self.found.say(
                 code,
                 f"{what}, but `{node.text}` is a {found}",
                 node.span,
@@ -160,22 +157,4 @@ class Names:
             helps = (f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`",)
         else:
             helps = (f"did you mean `{near}`?",) if near else ("declare it in the VAR part",)
-        self.say("E202", f"`{name.text}` is not declared", name.span, "unknown name", helps=helps)
-
-    def say(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        label: str,
-        *,
-        secondary: tuple[Label, ...] = (),
-        notes: tuple[str, ...] = (),
-        helps: tuple[str, ...] = (),
-    ) -> None:
-        """Report an error."""
-        self.found.append(
-            Diagnostic(
-                code=code, message=message, span=span, label=label, secondary=secondary, notes=notes, helps=helps
-            )
-        )
+        self.found.say("E202", f"`{name.text}` is not declared", name.span, "unknown name", helps=helps)

@@ -48,7 +48,7 @@ def program(tokens: Tokens) -> tree.Program:
     elif not tokens.now.damaged:
         at = tokens.gap() if declarations else Span(0, 0)
         text = "the program has no statements" if declarations else "there is no program here"
-        tokens.report("E115", text, at, "expected `BEGIN ... END.`")
+        tokens.found.say("E115", text, at, "expected `BEGIN ... END.`")
     return tree.Program(tokens.since(start), tuple(declarations), tuple(found), tokens.before.span)
 
 
@@ -59,14 +59,14 @@ def _ends(tokens: Tokens) -> bool:
     if tokens.accept("."):
         if not tokens.done:
             last = tokens.now
-            tokens.report("E114", "text after the end of the program", last.span, "the program ended with `END.`")
+            tokens.found.say("E114", "text after the end of the program", last.span, "the program ended with `END.`")
             while not tokens.done:
                 tokens.take()
             return True
     elif tokens.done or (tokens.sees(";") and tokens.ahead().kind is TokenKind.END):
         if not tokens.now.damaged:
             semicolon = tokens.accept(";")
-            tokens.report(
+            tokens.found.say(
                 "E110",
                 "the program does not end with `.`",
                 gap,
@@ -75,7 +75,7 @@ def _ends(tokens: Tokens) -> bool:
                 fixes=(Fix(gap.to(semicolon.span) if semicolon else gap, "."),),
             )
     else:
-        tokens.report("E114", "END closes the program, but more follows", end.span, "the program would end here")
+        tokens.found.say("E114", "END closes the program, but more follows", end.span, "the program would end here")
         return False
     return True
 
@@ -106,7 +106,7 @@ def _statements(tokens: Tokens, found: list[tree.Statement], declarations: list[
 
 def _no_end(tokens: Tokens) -> None:
     if not tokens.now.damaged:
-        tokens.report("E115", "the program has no END", tokens.gap(), "expected `END.` here")
+        tokens.found.say("E115", "the program has no END", tokens.gap(), "expected `END.` here")
 
 
 def _at_end(tokens: Tokens) -> bool:
@@ -122,7 +122,7 @@ def _at_end(tokens: Tokens) -> bool:
 
 def _late_declarations(tokens: Tokens, declarations: list[tree.Declaration]) -> None:
     word = tokens.now
-    tokens.report("E118", "VAR stands behind BEGIN", word.span, "declarations belong in front of BEGIN")
+    tokens.found.say("E118", "VAR stands behind BEGIN", word.span, "declarations belong in front of BEGIN")
     declarations += var_part(tokens)
 
 
@@ -152,7 +152,7 @@ def statement(tokens: Tokens) -> tree.Statement:
 
 def _misspelt(tokens: Tokens, near: str) -> None:
     token = tokens.now
-    tokens.report(
+    tokens.found.say(
         "E105",
         f"unknown statement `{token.text}`",
         token.span,
@@ -172,7 +172,7 @@ def _no_statement(tokens: Tokens) -> tree.Statement:
         text, label = f"{shown(token)} does not start a statement", "expected a statement"
     helps = (f"statements begin with {', '.join(STATEMENTS)}, or with a name and `=`",)
     notes = ("line numbers count only in a text whose first line has one",) if token.kind is TokenKind.NUMBER else ()
-    tokens.report("E105", text, token.span, label, helps=helps, notes=notes)
+    tokens.found.say("E105", text, token.span, label, helps=helps, notes=notes)
     raise LostError
 
 
@@ -183,7 +183,7 @@ def _separator(tokens: Tokens) -> None:
     token = tokens.now
     if _starts_statement(tokens):
         gap = tokens.gap()
-        tokens.report(
+        tokens.found.say(
             "E104",
             "missing `;` between two statements",
             gap,
@@ -293,7 +293,7 @@ def _read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
     if sensor is None and word.kind is TokenKind.NAME:
         sensor = closest(word.text, SENSORS)
         if sensor:
-            tokens.report(
+            tokens.found.say(
                 "E105",
                 f"unknown statement `READ {word.text}`",
                 word.span,
@@ -313,7 +313,7 @@ def _read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
         return tree.ReadVisions(tokens.since(start), targets[0])
     arms = parenthesised(tokens, _ARM, "after SYSTEM")
     if len(arms) > 1:
-        tokens.report("E117", "READ SYSTEM reads one arm", arms[1].span, "does not belong here")
+        tokens.found.say("E117", "READ SYSTEM reads one arm", arms[1].span, "does not belong here")
     return tree.ReadSystem(tokens.since(start), arms[0])
 
 

@@ -58,13 +58,13 @@ def refuse_reserved(tokens: Tokens) -> None:
     """Say that the word that stands here cannot be a name."""
     token = tokens.now
     text = f"`{token.text}` is a reserved word and cannot be a name"
-    tokens.report("E107", text, token.span, "a word of the language")
+    tokens.found.say("E107", text, token.span, "a word of the language")
 
 
 def check_length(tokens: Tokens, name: tree.Name) -> None:
     """Refuse a name of more than nine characters."""
     if len(name.text) > LONGEST_NAME:
-        tokens.report(
+        tokens.found.say(
             "E103",
             f"the name `{name.text}` is longer than {LONGEST_NAME} characters",
             name.span,
@@ -90,7 +90,7 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
         return
     token = tokens.now
     if tokens.accept(":="):
-        tokens.report(
+        tokens.found.say(
             "E109",
             f"{what} gets its value with `=`, not `:=`",
             token.span,
@@ -100,7 +100,7 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
     elif tokens.done or tokens.sees(";", ",", ")", "END"):
         tokens.lost(f"{what} needs `=` and a value", "expected `=` and a value here", code="E109")
     elif not token.damaged:
-        tokens.report(
+        tokens.found.say(
             "E109",
             f"{what} needs `=` before its value",
             token.span,
@@ -142,7 +142,7 @@ def _matrix(tokens: Tokens) -> tree.Matrix | None:
         number = _signed_or_none(tokens)
         if number is None:
             if numbers and tokens.sees(")") and tokens.before.key == ",":
-                tokens.report("E111", "expected a number after `,`", tokens.now.span, "found `)`")
+                tokens.found.say("E111", "expected a number after `,`", tokens.now.span, "found `)`")
                 numbers.append(tree.Number(tokens.gap(), "", math.nan))
                 break
             if tokens.done or tokens.sees(";", "END", ")", ","):
@@ -153,7 +153,9 @@ def _matrix(tokens: Tokens) -> tree.Matrix | None:
             continue
         if tokens.now.kind is TokenKind.NUMBER and not tokens.before.damaged:
             gap = tokens.gap()
-            tokens.report("E112", "missing `,` between two numbers", gap, "expected `,` here", fixes=(Fix(gap, ","),))
+            tokens.found.say(
+                "E112", "missing `,` between two numbers", gap, "expected `,` here", fixes=(Fix(gap, ","),)
+            )
             continue
         break
     if tokens.now.kind in (TokenKind.NAME, TokenKind.ARM, TokenKind.STRING) or tokens.sees(*beyond.OPERATORS, "(", "["):
@@ -185,7 +187,9 @@ def _signed_or_none(tokens: Tokens) -> tree.Number | None:
         tokens.take()
     tokens.take()
     if sign == "+":
-        tokens.report("E113", "a number has no `+` in front", start.span, "leave it out", fixes=(Fix(start.span, ""),))
+        tokens.found.say(
+            "E113", "a number has no `+` in front", start.span, "leave it out", fixes=(Fix(start.span, ""),)
+        )
     if not token.damaged and token.key != token.text:
         unit = token.text[len(token.key) :]
         beyond.report(tokens, f"the unit `{unit}`", token.span, "RLO-83 counts in metres and takes bare numbers")
@@ -206,7 +210,7 @@ def parenthesised(tokens: Tokens, wants: str, where: str) -> tuple[tree.Mobile, 
             tokens.at -= 1
             break
         if tokens.sees(")"):
-            tokens.report("E111", f"expected {wants} after `,`", comma.span, "nothing follows")
+            tokens.found.say("E111", f"expected {wants} after `,`", comma.span, "nothing follows")
             break
         names.append(operand(tokens, wants, "after `,`"))
     if opening:
@@ -214,5 +218,5 @@ def parenthesised(tokens: Tokens, wants: str, where: str) -> tuple[tree.Mobile, 
     else:
         closing = tokens.accept(")")
         fixes = (Fix(gap, " ("),) if closing else (Fix(gap, " ("), Fix(tokens.gap(), ")"))
-        tokens.report("E112", f"missing `(` {where}", gap, "expected `(` here", fixes=fixes)
+        tokens.found.say("E112", f"missing `(` {where}", gap, "expected `(` here", fixes=fixes)
     return tuple(names)
