@@ -10,8 +10,8 @@ from armwright.arrays import Array, ArrayLike
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
-from armwright.kinematics.inverse.solution import Answer, violations
-from armwright.kinematics.inverse.turns import travel
+from armwright.kinematics.inverse.solution import Answer, InverseSolution, violations
+from armwright.kinematics.inverse.turns import nearest_turn, travel
 from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, Knots, Path, place_knots
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline import xspline
@@ -113,13 +113,17 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     )
 
 
+def cause_of(solution: InverseSolution) -> Cause:
+    """Return why no posture of a solution can be taken."""
+    return "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
+
+
 def _check_ends(arm: Arm, path: Path) -> None:
     """Refuse a path to a pose that no posture reaches, before anything between is looked at."""
     for segment, X in enumerate(path.poses[1:]):
         solution = inverse(arm, X)
         if not solution.allowed:
-            cause: Cause = "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
-            raise PathError(cause, segment, 1.0, solution.explain())
+            raise PathError(cause_of(solution), segment, 1.0, solution.explain())
 
 
 def _solve(arm: Arm, path: Path, knots: Knots, q_start: Array) -> Array:
@@ -132,10 +136,7 @@ def _solve(arm: Arm, path: Path, knots: Knots, q_start: Array) -> Array:
         if singular[k].any():
             # A free joint stays where it was at the last knot, not where it was at the start.
             candidates[k], _ = inverse_branches(arm, X[k], q[k - 1])
-        revolute = np.array([joint.revolute for joint in arm.joints])
-        turns = np.where(revolute, np.round((q[k - 1] - candidates[k]) / (2 * np.pi)), 0.0)
-        near = candidates[k] + 2 * np.pi * turns
-        q[k] = min(near, key=lambda posture: travel(arm, q[k - 1], posture))
+        q[k] = min(nearest_turn(arm, candidates[k], q[k - 1]), key=lambda posture: travel(arm, q[k - 1], posture))
         _check_knot(arm, X[k], q[k], knots, k)
     return q
 

@@ -1,6 +1,6 @@
 """The stages of one move, planned together: point to point, straight line, through frames."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Literal, TypeAlias
 
 import attrs
@@ -11,9 +11,8 @@ from armwright.arrays import Array, ArrayLike, joint_array, of_shape
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.solution import Answer
 from armwright.kinematics.inverse.turns import images, travel
-from armwright.motion.follow import Cause, PathError, follow
+from armwright.motion.follow import Cause, PathError, cause_of, follow
 from armwright.motion.path import Path
 from armwright.motion.quintic import point_to_point
 from armwright.motion.trajectory import Trajectory, whole_ticks
@@ -124,20 +123,22 @@ def _plan(arm: Arm, q: Array, goals: Sequence[StageGoal], manner: Manner, number
     raise first_error
 
 
-def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> list[Stage]:
-    """Return the ways to make one stage, best first: one per posture for point to point, else one."""
+def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[Stage]:
+    """Give the ways to make one stage, best first: one per posture for point to point, else one."""
     poses = of_shape(goal.poses, (4, 4), "poses")
     far = np.abs(poses[:, :3, 3]).max(axis=-1)
     if far.max() > _FARTHEST:
         raise StageError("reach", number, int(far.argmax()), 1.0, f"the pose is {far.max():.3g} m away")
     if goal.kind == "PTP":
-        return [_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number)]
+        # Planned as they are asked for: nearly always the first one does.
+        yield from (_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number))
+        return
     path = Path(poses=np.concatenate([forward(arm, q)[None], poses]))
     try:
         found = follow(arm, path, q, deviation=manner.deviation, speed=manner.speed)
     except PathError as error:
         raise StageError(error.cause, number, error.segment, error.fraction, str(error)) from error
-    stage = Stage(
+    yield Stage(
         kind=goal.kind,
         trajectory=whole_ticks(found.trajectory, manner.period),
         length=float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=-1).sum()),
@@ -145,15 +146,13 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> l
         deviation=found.deviation,
         slowed=found.slowed,
     )
-    return [stage]
 
 
 def _postures(arm: Arm, X: Array, q: Array, number: int) -> list[Array]:
     """Return the postures inside the limits that reach a pose, whole turns included, nearest first."""
     solution = inverse(arm, X, q)
     if not solution.allowed:
-        cause: Cause = "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
-        raise StageError(cause, number, 0, 1.0, solution.explain())
+        raise StageError(cause_of(solution), number, 0, 1.0, solution.explain())
     postures = [image for branch in solution.allowed for image in images(arm, branch.q)]
     return sorted(postures, key=lambda posture: travel(arm, q, posture))
 
