@@ -18,6 +18,7 @@ from armwright.version import __version__
 if TYPE_CHECKING:
     from armwright.arm.load import arm_names, load_arm
     from armwright.arm.model import Arm
+    from armwright.dynamics.compiled import compile_arm
     from armwright.dynamics.forward_dynamics import forward_dynamics
     from armwright.dynamics.mass_matrix import mass_matrix
     from armwright.dynamics.newton_euler import inverse_dynamics
@@ -38,6 +39,7 @@ _HOME = {
     "ArmwrightError": "errors",
     "Trajectory": "motion.trajectory",
     "arm_names": "arm.load",
+    "compile_arm": "dynamics.compiled",
     "forward": "kinematics.forward",
     "forward_dynamics": "dynamics.forward_dynamics",
     "inverse": "kinematics.inverse.closed_form",
@@ -62,6 +64,7 @@ __all__ = [
     "Trajectory",
     "__version__",
     "arm_names",
+    "compile_arm",
     "forward",
     "forward_dynamics",
     "inverse",

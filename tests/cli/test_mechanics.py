@@ -135,8 +135,9 @@ def test_kernel() -> None:
     """The emitted source and the operation count are shown; a misspelt quantity gets the nearest name."""
     data = json.loads(armwright("kernel", "stanford-jpl", "forward", "--json").stdout)
     assert data["total"] == sum(data["operations"].values())
-    assert "def kernel(" in data["source"]
+    assert "def rows(" in data["source"]
     compile(data["source"], "kernel", "exec")
+    assert "def one(" in armwright("kernel", "stanford-jpl", "forward", "--one").stdout
     assert "operations per configuration" in armwright("kernel", "ur5", "jacobian", "--count").stdout
     wrong = armwright("kernel", "ur5", "jacobain")
     assert (wrong.returncode, "Did you mean 'jacobian'?" in wrong.stderr) == (1, True)

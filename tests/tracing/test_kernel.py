@@ -16,7 +16,7 @@ from armwright.kinematics.inverse.closed_form import BRANCHES
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.shoulder import first_three
 from armwright.tracing.emit import LANES, emit
-from armwright.tracing.kernel import Kernel, cache_folder, compiled
+from armwright.tracing.kernel import Kernel, cache_folder
 from armwright.tracing.scalar import atan2, cos, sin
 from oracles.arms import random_arm, random_postures
 
@@ -30,14 +30,18 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
 @pytest.fixture(scope="module")
 def circle() -> Kernel:
     """Sine and cosine of one input, and the angle of the point of both."""
-    return compiled(emit("circle", lambda x, y: [[sin(x[0]), cos(x[0]), atan2(y[0], x[0])]], [1, 1]))
+    return Kernel(emitted=emit("circle", lambda x, y: [[sin(x[0]), cos(x[0]), atan2(y[0], x[0])]], {"x": 1, "y": 1}))
 
 
 @pytest.fixture(scope="module")
 def stanford() -> Kernel:
     """Inverse dynamics of the Stanford arm at JPL."""
     arm = load_arm("stanford-jpl")
-    return compiled(emit("inverse dynamics", lambda q, qd, qdd: [newton_euler(arm, q, qd, qdd)], [6, 6, 6]))
+    return Kernel(emitted=emit("inverse dynamics", lambda q, qd, qdd: [newton_euler(arm, q, qd, qdd)], _motion(6)))
+
+
+def _motion(joints: int) -> dict[str, int]:
+    return {"q": joints, "qd": joints, "qdd": joints}
 
 
 def _ulps(value: np.ndarray, exact: np.ndarray) -> float:
@@ -49,7 +53,7 @@ def test_sine_and_cosine_to_two_units(circle: Kernel, reach: float, rng: np.rand
     """Sine and cosine are within 2 units in the last place of the machine's library, up to 1e5 rad."""
     x = np.concatenate([rng.uniform(-reach, reach, 100_000), reach * np.linspace(-1, 1, 1001)])
 
-    (values,) = circle(x[:, None], np.ones((len(x), 1)))
+    values = circle(x[:, None], np.ones((len(x), 1)))
 
     exact = np.array([(math.sin(v), math.cos(v)) for v in x])
     assert _ulps(values[:, 0], exact[:, 0]) <= 2
@@ -60,7 +64,7 @@ def test_near_the_quarter_turns(circle: Kernel) -> None:
     """Next to the multiples of a right angle, where digits cancel, the small one of the two keeps its digits."""
     x = np.array([k * math.pi / 2 * (1 + d) for k in range(-40, 41) for d in (-1e-12, -1e-16, 0, 1e-16, 1e-12)])
 
-    (values,) = circle(x[:, None], np.ones((len(x), 1)))
+    values = circle(x[:, None], np.ones((len(x), 1)))
 
     exact = np.array([(math.sin(v), math.cos(v)) for v in x])
     np.testing.assert_allclose(values[:, :2], exact, rtol=1e-12, atol=1e-25)
@@ -71,11 +75,11 @@ def test_arc_tangent_to_two_units(circle: Kernel, rng: np.random.Generator) -> N
     angle, size = rng.uniform(-np.pi, np.pi, 100_000), 10 ** rng.uniform(-150, 150, 100_000)
     y, x = size * np.sin(angle), size * np.cos(angle)
 
-    (values,) = circle(x[:, None], y[:, None])
+    values = circle(x[:, None], y[:, None])
 
     assert _ulps(values[:, 2], np.array([math.atan2(b, a) for a, b in zip(x, y, strict=True)])) <= 2
     axes = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 0.0)])
-    (values,) = circle(axes[:, :1], axes[:, 1:])
+    values = circle(axes[:, :1], axes[:, 1:])
     np.testing.assert_array_equal(values[:, 2], (0, math.pi / 2, math.pi, -math.pi / 2, 0))
 
 
@@ -83,7 +87,7 @@ def test_agrees_with_the_equation(stanford: Kernel, rng: np.random.Generator) ->
     """The kernel gives the efforts of the law of motion evaluated with the machine's own functions."""
     q, qd, qdd = rng.uniform(-3, 3, size=(3, 1000, 6))
 
-    (tau,) = stanford(q, qd, qdd)
+    tau = stanford(q, qd, qdd)
 
     np.testing.assert_allclose(tau, inverse_dynamics(load_arm("stanford-jpl"), q, qd, qdd, drives=False), atol=1e-11)
 
@@ -93,14 +97,14 @@ def test_same_bits_alone_and_in_company(stanford: Kernel, rows: int, rng: np.ran
     """A configuration has the same bits alone, at any place of any batch, and on any number of threads."""
     q, qd, qdd = rng.uniform(-3, 3, size=(3, rows, 6))
 
-    (together,) = stanford(q, qd, qdd)
+    together = stanford(q, qd, qdd)
 
     for threads in (2, 3):
-        np.testing.assert_array_equal(stanford(q, qd, qdd, threads=threads)[0], together)
+        np.testing.assert_array_equal(stanford(q, qd, qdd, threads=threads), together)
     for k in {0, rows // 2, rows - 1}:
-        np.testing.assert_array_equal(stanford(q[k], qd[k], qdd[k])[0], together[k])
+        np.testing.assert_array_equal(stanford(q[k], qd[k], qdd[k]), together[k])
     order = rng.permutation(rows)
-    np.testing.assert_array_equal(stanford(q[order], qd[order], qdd[order])[0], together[order])
+    np.testing.assert_array_equal(stanford(q[order], qd[order], qdd[order]), together[order])
 
 
 def test_shapes(stanford: Kernel) -> None:
@@ -108,16 +112,16 @@ def test_shapes(stanford: Kernel) -> None:
     still = np.zeros(6)
     still.setflags(write=False)
 
-    assert stanford(np.zeros((2, 5, 6)), still, still)[0].shape == (2, 5, 6)
-    assert stanford(still, still, still)[0].shape == (6,)
-    assert stanford(np.zeros((0, 6)), still, still)[0].shape == (0, 6)
+    assert stanford(np.zeros((2, 5, 6)), still, still).shape == (2, 5, 6)
+    assert stanford(still, still, still).shape == (6,)
+    assert stanford(np.zeros((0, 6)), still, still).shape == (0, 6)
 
 
 def test_bad_input(stanford: Kernel) -> None:
     """Wrong widths, counts, leading axes and NaN are refused as by the plain function."""
-    with pytest.raises(ShapeError, match="expected 3 arrays, got 2"):
+    with pytest.raises(ShapeError, match=r"expected 3 arrays \(q, qd, qdd\), got 2"):
         stanford(np.zeros(6), np.zeros(6))
-    with pytest.raises(ShapeError, match=r"input 2: expected 6 numbers on the last axis, got shape \(5,\)"):
+    with pytest.raises(ShapeError, match=r"qd: expected shape \(6,\) on the last axes, got shape \(5,\)"):
         stanford(np.zeros(6), np.zeros(5), np.zeros(6))
     with pytest.raises(ShapeError, match=r"leading axes must fit together, got \(2, 6\), \(3, 6\), \(6,\)"):
         stanford(np.zeros((2, 6)), np.zeros((3, 6)), np.zeros(6))
@@ -131,10 +135,10 @@ def test_choices_and_arc_tangents(rng: np.random.Generator) -> None:
     shoulder = shoulder_of(arm)
     assert shoulder is not None
     side, elbow, _ = BRANCHES[2]
-    kernel = compiled(emit("shoulder", lambda p: [first_three(shoulder, p, side, elbow)], [3]))
+    kernel = Kernel(emitted=emit("shoulder", lambda p: [first_three(shoulder, p, side, elbow)], {"p": 3}))
     points = rng.uniform(-0.5, 0.5, size=(500, 3))
 
-    (found,) = kernel(points)
+    found = kernel(points)
 
     expected = np.array([first_three(shoulder, p.tolist(), side, elbow) for p in points])
     difference = np.angle(np.exp(1j * (found - expected)))
@@ -145,20 +149,20 @@ def test_choices_and_arc_tangents(rng: np.random.Generator) -> None:
 def test_random_arm(rng: np.random.Generator) -> None:
     """A general arm with prismatic joints compiles and agrees too."""
     arm = random_arm(rng, 4)
-    kernel = compiled(emit("random", lambda q, qd, qdd: [newton_euler(arm, q, qd, qdd)], [4, 4, 4]))
+    kernel = Kernel(emitted=emit("random", lambda q, qd, qdd: [newton_euler(arm, q, qd, qdd)], _motion(4)))
     q, qd, qdd = random_postures(arm, rng, 90).reshape(3, 30, 4)
 
-    np.testing.assert_allclose(kernel(q, qd, qdd)[0], inverse_dynamics(arm, q, qd, qdd, drives=False), atol=1e-11)
+    np.testing.assert_allclose(kernel(q, qd, qdd), inverse_dynamics(arm, q, qd, qdd, drives=False), atol=1e-11)
 
 
 _START = """
 import os, sys, time
 import numpy as np
 from armwright.tracing.emit import emit
-from armwright.tracing.kernel import compiled
+from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import sin
-kernel = compiled(emit("wave", lambda x: [[sin(x[0]) * 1.25]], [1]))
-print(repr(float(kernel(np.array([0.5]))[0][0])), len(kernel._function.stats.cache_hits))
+kernel = Kernel(emitted=emit("wave", lambda x: [[sin(x[0]) * 1.25]], {"x": 1}))
+print(repr(float(kernel(np.array([0.5]))[0])), len(kernel.one.stats.cache_hits))
 """
 
 

@@ -7,8 +7,14 @@ import typer
 
 def kernel(
     arm: Annotated[str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)],
-    quantity: Annotated[str, typer.Argument(help="forward, jacobian or inverse_dynamics.", show_default=False)],
+    quantity: Annotated[
+        str,
+        typer.Argument(
+            help="Such as forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics.", show_default=False
+        ),
+    ],
     count: Annotated[bool, typer.Option("--count", help="Print the operation count only.")] = False,
+    one: Annotated[bool, typer.Option("--one", help="Print the function of one configuration, not of many.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print source and operation count as JSON.")] = False,
 ) -> None:
     """Print the kernel that a quantity is compiled to for an arm, and its operation count.
@@ -18,15 +24,17 @@ def kernel(
     import json
 
     from armwright.arm.load import load_arm
-    from armwright.dynamics.quantities import emit_quantity
+    from armwright.dynamics.compiled import emit_quantity
 
     emitted = emit_quantity(load_arm(arm), quantity)
     total = sum(emitted.operations.values())
+    source = emitted.one if one else emitted.rows
     if as_json:
-        print(json.dumps({"operations": emitted.operations, "total": total, "source": emitted.source}, indent=2))
+        counts = {"operations": emitted.operations, "total": total, "joined": emitted.joined}
+        print(json.dumps({**counts, "source": source}, indent=2))
         return
     if not count:
-        print(emitted.source)
-    print(f"{emitted.title}: {total} operations per configuration")
+        print(source)
+    print(f"{emitted.title}: {total} operations per configuration; {emitted.joined} additions take in a multiplication")
     for name, number in emitted.operations.items():
         print(f"  {name:<12}{number:>5}")

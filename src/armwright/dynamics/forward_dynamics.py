@@ -15,7 +15,7 @@ from armwright.kinematics.forward import stack
 from armwright.tracing.scalar import Scalar
 
 # An inertia this small beside its likes is what rounding has left of zero.
-_NOTHING = 1e-12
+NEGLIGIBLE = 1e-12
 
 
 def forward_dynamics(
@@ -43,7 +43,9 @@ def forward_dynamics(
         qdd: (..., n) joint accelerations.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
         UnsupportedArmError: some joint moves nothing that resists an acceleration.
 
     Source:
@@ -51,7 +53,7 @@ def forward_dynamics(
     """
     lead, (q_, qd_, tau_), push = batch(arm, wrench=wrench, q=q, qd=qd, tau=tau)
     model = arm if drives else _without_drives(arm)
-    driving = _less_friction(model, qd_, tau_)
+    driving = less_friction(model, qd_, tau_)
     if not lead:
         # A division by zero must give no error here but an acceleration that the pivots give away.
         q_, qd_, driving = ([np.array(x) for x in scalars] for scalars in (q_, qd_, driving))
@@ -88,7 +90,9 @@ def toacc(
         qdd: (..., n) joint accelerations.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
         UnsupportedArmError: some joint moves nothing that resists an acceleration.
 
     Source:
@@ -98,7 +102,7 @@ def toacc(
     model = arm if drives else _without_drives(arm)
     D = stack_matrix(unit_accelerations(model, q_), lead)
     bias = newton_euler(model, q_, qd_, [0.0] * arm.n, push)
-    left = stack([a - b for a, b in zip(_less_friction(model, qd_, tau_), bias, strict=True)], lead)
+    left = stack([a - b for a, b in zip(less_friction(model, qd_, tau_), bias, strict=True)], lead)
     check_pivots(model, eliminated(model, D))
     return np.asarray(np.linalg.solve(D, left[..., None])[..., 0], dtype=np.float64)
 
@@ -144,7 +148,7 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
         UnsupportedArmError: a pivot is 0 but for rounding, or no number; the joint nearest to the hand is named.
     """
     for i in reversed(range(arm.n)):
-        if not np.all(np.asarray(pivots[i].inertia) > _NOTHING * np.asarray(pivots[i].size)):
+        if not np.all(np.asarray(pivots[i].inertia) > NEGLIGIBLE * np.asarray(pivots[i].size)):
             what, amount = ("about", "moment of inertia") if arm.joints[i].revolute else ("along", "mass")
             raise UnsupportedArmError(
                 f"arm '{arm.name}': no acceleration can be found for joint {i + 1}: nothing it moves resists {what} "
@@ -152,7 +156,8 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
             )
 
 
-def _less_friction(arm: Arm, qd: Sequence[Scalar], tau: Sequence[Scalar]) -> list[Scalar]:
+def less_friction(arm: Arm, qd: Sequence[Scalar], tau: Sequence[Scalar]) -> list[Scalar]:
+    """Return what the friction of the moving drives leaves of the efforts, over abstract scalars."""
     return [
         effort - motor.viscous * speed - dry_friction(motor, speed)
         for motor, speed, effort in zip(arm.motors, qd, tau, strict=True)

@@ -1,23 +1,31 @@
-"""From a graph to the source of a kernel: straight-line code inside a loop over many configurations.
+"""From a graph to the source of a kernel: straight-line code, for one configuration and for many.
 
-Inputs and outputs are row-major at the door, one row per configuration. Inside, blocks of ``LANES`` configurations
+Inputs and outputs are row-major at the door, one row per configuration. For many, blocks of ``LANES`` configurations
 are turned over so that each quantity lies in a row of its own; the loop over the lanes is what the compiler
-vectorises. Every block is computed whole, the unused lanes of the last one too: so each configuration goes through
-the same instructions whether it comes alone or among millions, and its bits are the same.
+vectorises. Nothing is left to the compiler that would change a bit: no operation is reordered, and where a
+multiplication and an addition become one instruction is written down (``fuse``). So a configuration has the same bits
+alone, in any batch and inside other compiled code.
 """
 
 import inspect
+import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Literal, NamedTuple, TypeAlias
 
 import attrs
+import numpy as np
 
 from armwright.tracing import elementary
-from armwright.tracing.graph import Graph, Traced, operation_count, reachable
+from armwright.tracing.fuse import fused
+from armwright.tracing.graph import Graph, Node, Traced, operation_count, reachable
 from armwright.tracing.scalar import Scalar
 
-# Configurations in a block: 64 lanes of the thirty-odd rows of a six-joint arm stay in the first-level cache.
-LANES = 64
+# Configurations in a block. So few that the processor fetches the next block while it works on this one, and enough
+# for two to four vectors.
+LANES = 16
+
+Shape: TypeAlias = tuple[int, ...]
 
 _INFIX = {
     "add": "{} + {}",
@@ -26,6 +34,8 @@ _INFIX = {
     "divide": "{} / {}",
     "negate": "-{}",
     "absolute": "abs({})",
+    # Adding and taking away 1.5 · 2^52 leaves no digit behind the point.
+    "round": "({} + 6755399441055744.0) - 6755399441055744.0",
     "sqrt": "sqrt({0} if {0} > 0.0 else 0.0)",
     "atan2": "arc_tangent({}, {})",
     "less": "{} < {}",
@@ -33,89 +43,148 @@ _INFIX = {
     "select": "{1} if {0} else {2}",
 }
 
+_NOT_FINITE = {"nan": "np.nan", "inf": "np.inf", "-inf": "-np.inf"}
+
 _HEAD = '''"""Emitted by armwright: {title}. {count} operations per configuration."""
 
 from math import sqrt
 
 import numpy as np
-from numba import float64, njit, types
+from llvmlite.binding import get_host_cpu_features
+from numba import boolean, float64, int64, njit, types
+from numba.extending import intrinsic
+
+if get_host_cpu_features().get("fma", True):
+
+    @intrinsic
+    def fma(typing, a, b, c):
+        def instruction(context, builder, signature, operands):
+            return builder.fma(*operands)
+
+        return float64(float64, float64, float64), instruction
+
+else:
+
+    @njit(forceinline=True)
+    def fma(a, b, c):
+        return a * b + c
 
 '''
 
-_KERNEL = """
-@njit(
-    types.void({signature}),
-    fastmath={{"contract"}}, error_model="numpy", nogil=True, cache=True,
-)
-def kernel({arguments}):
+_ROWS = """
+@njit(int64(int64, int64, {signature}), error_model="numpy", nogil=True, cache=True)
+def rows(first, last, {arguments}):
     x = np.zeros({in_size})
     y = np.zeros({out_size})
+    trusted = np.zeros({lanes})
     for start in range(first, last, {lanes}):
         m = min({lanes}, last - start)
 {load}
         for k in range({lanes}):
 {body}
+            trusted[k] += trust
 {store}
+    lost = 0
+    for k in range({lanes}):
+        lost += 0 if trusted[k] == 0.0 else 1
+    return lost
 """
+
+_ONE = """
+@njit(int64({signature}), error_model="numpy", nogil=True, cache=True)
+def one({arguments}):
+    if {misfit}:
+        return 1
+{body}
+    return 0 if trust == 0.0 else 1
+"""
+
+
+class Guarded(NamedTuple):
+    """What an equation returns whose values mean something only under conditions.
+
+    Attributes:
+        values: one list of scalars per output.
+        positive: scalars that must be above 0.
+    """
+
+    values: Sequence[Sequence[Scalar]]
+    positive: Sequence[Scalar]
+
+
+Equation: TypeAlias = Callable[..., Sequence[Sequence[Scalar]] | Guarded]
 
 
 @attrs.frozen(kw_only=True)
 class Emitted:
     """The source of a kernel and what it takes.
 
+    Both functions fill the output arrays and return 0, or another number where some configuration came out without
+    meaning: an input is not finite (or the inputs add up to more than a float holds), or a condition of the equation
+    is broken.
+
     Attributes:
         title: what it computes, in words.
-        source: Python for Numba.
-        inputs: width of each input array.
-        outputs: width of each output array.
+        rows: source of ``rows(first, last, *inputs, *outputs)``, for arrays of (N, *shape).
+        one: source of ``one(*inputs, *outputs)``, for arrays of (*shape). It returns 1 as well where the shape of an
+            input is wrong.
+        inputs: shape of one value of each input, by its name.
+        outputs: shape of one value of each output.
+        flags: numbers of the outputs that are truth values.
         operations: how many of each kind, per configuration.
+        joined: how many additions take in a multiplication.
     """
 
     title: str
-    source: str
-    inputs: tuple[int, ...]
-    outputs: tuple[int, ...]
+    rows: str
+    one: str
+    inputs: dict[str, Shape]
+    outputs: tuple[Shape, ...]
+    flags: tuple[int, ...]
     operations: dict[str, int]
+    joined: int
 
 
-def emit(title: str, equation: Callable[..., Sequence[Sequence[Scalar]]], inputs: Sequence[int]) -> Emitted:
+def emit(
+    title: str,
+    equation: Equation,
+    inputs: Mapping[str, int | Shape],
+    *,
+    shapes: Sequence[Shape] | None = None,
+    flags: Collection[int] = (),
+) -> Emitted:
     """Trace an equation and write its kernel.
 
     Args:
         title: what it computes, in words.
-        equation: takes one list of scalars per input, returns one list per output.
-        inputs: how many scalars each input has.
-
-    Returns:
-        The kernel's source; its function takes the first row and the one after the last, then the arrays.
+        equation: takes one list of scalars per input, returns one list per output, or ``Guarded`` ones.
+        inputs: of each input, by its name, the width or the shape of one value; a matrix comes to the equation row
+            by row.
+        shapes: shape of one value of each output; vectors when left out.
+        flags: numbers of the outputs that are truth values.
     """
     graph = Graph()
-    lists = [graph.inputs(width) for width in inputs]
-    results = equation(*lists)
-    outputs = [[x.node if isinstance(x, Traced) else graph.constant(float(x)) for x in row] for row in results]
+    taken = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
+    lists = [graph.inputs(math.prod(shape)) for shape in taken.values()]
+    result = equation(*lists)
+    rows, positive = result if isinstance(result, Guarded) else (result, ())
+    outputs = [[_node(graph, x) for x in row] for row in rows]
+    given = tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes)
     flat = [node for row in outputs for node in row]
-    widths = tuple(len(row) for row in outputs)
+    code = _Code(graph, flat, [_node(graph, x) for x in positive], [x.node for row in lists for x in row])
     operations = operation_count(graph, flat)
-    names = [*(f"in{i}" for i in range(len(inputs))), *(f"out{i}" for i in range(len(outputs)))]
-    kinds = ["types.int64"] * 2 + ["float64[:, ::1]"] * len(names)
-    kernel = _KERNEL.format(
-        signature=", ".join(kinds),
-        arguments=", ".join(["first", "last", *names]),
-        in_size=max(sum(inputs), 1) * LANES,
-        out_size=max(sum(widths), 1) * LANES,
-        lanes=LANES,
-        load=_moves("in", inputs, "x[{row} * {lanes} + r] = {name}[start + r, {column}]"),
-        body=textwrap.indent("\n".join(_lines(graph, flat)), " " * 12),
-        store=_moves("out", widths, "{name}[start + r, {column}] = y[{row} * {lanes} + r]"),
-    )
+    door = _Door(tuple(taken.values()), given, tuple(flags))
     head = _HEAD.format(title=title, count=sum(operations.values()))
-    helpers = [name for name, ops in _HELPERS.items() if ops & set(operations)]
+    helpers = "".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations))
     return Emitted(
         title=title,
-        source=head + "".join(_helper(name) for name in helpers) + kernel,
-        inputs=tuple(inputs),
-        outputs=widths,
+        rows=head + helpers + _rows_source(code, door),
+        one=head + helpers + _one_source(code, door),
+        inputs=taken,
+        outputs=given,
+        flags=tuple(flags),
         operations=operations,
+        joined=len(code.joined),
     )
 
 
@@ -124,43 +193,134 @@ _HELPERS = {"sine_cosine": {"sin", "cos"}, "arc_tangent": {"atan2"}}
 
 def _helper(name: str) -> str:
     text = inspect.getsource(getattr(elementary, name))
-    return f'\n@njit(fastmath={{"contract"}}, error_model="numpy", forceinline=True)\n{text}\n'
+    return f'\n@njit(error_model="numpy", forceinline=True)\n{text}\n'
 
 
-def _moves(name: str, widths: Sequence[int], move: str) -> str:
-    """Write the loops that carry rows in or out of a block."""
-    lines: list[str] = []
-    row = 0
-    for i, width in enumerate(widths):
-        lines.append("        for r in range(m):")
-        lines += [
-            "            " + move.format(name=f"{name}{i}", row=row + column, column=column, lanes=LANES)
-            for column in range(width)
-        ]
-        row += width
-    return "\n".join(lines)
+def _node(graph: Graph, x: Scalar) -> int:
+    return x.node if isinstance(x, Traced) else graph.constant(float(x))
 
 
-def _lines(graph: Graph, outputs: Sequence[int]) -> list[str]:
-    """Write one assignment per node, and the outputs at the end."""
-    lines: list[str] = []
-    names: dict[int, str] = {}
-    circular: set[int] = set()
-    for i in reachable(graph, outputs):
-        node = graph.nodes[i]
-        operands = [names[j] for j in node.operands]
-        names[i] = f"v{i}"
-        if node.op == "constant":
-            names[i] = f"({node.value!r})"
-        elif node.op == "input":
-            lines.append(f"v{i} = x[{int(node.value)} * {LANES} + k]")
-        elif node.op in ("sin", "cos"):
-            angle = node.operands[0]
-            names[i] = f"{node.op}{angle}"
-            if angle not in circular:
-                circular.add(angle)
-                lines.append(f"sin{angle}, cos{angle} = sine_cosine({operands[0]})")
-        else:
-            lines.append(f"v{i} = {_INFIX[node.op].format(*operands)}")
-    lines += [f"y[{place} * {LANES} + k] = {names[node]}" for place, node in enumerate(outputs)]
-    return lines
+class _Door(NamedTuple):
+    """What the arrays look like that a kernel takes and fills."""
+
+    inputs: tuple[Shape, ...]
+    outputs: tuple[Shape, ...]
+    flags: tuple[int, ...]
+
+    @property
+    def names(self) -> list[str]:
+        return [*(f"in{i}" for i in range(len(self.inputs))), *(f"out{i}" for i in range(len(self.outputs)))]
+
+    def types(self, *, rows: bool) -> str:
+        """Return the types of the arrays; inputs may be read-only."""
+        kinds = [f'types.Array(float64, {len(shape) + rows}, "C", readonly=True)' for shape in self.inputs]
+        for i, shape in enumerate(self.outputs):
+            kind = "boolean" if i in self.flags else "float64"
+            kinds.append(f'types.Array({kind}, {len(shape) + rows}, "C")')
+        return ", ".join(kinds)
+
+    def places(self, side: Literal["in", "out"], before: str = "") -> Iterator[str]:
+        """Give the place of every number of the inputs or the outputs, such as ``in0[1, 2]``."""
+        shapes = self.inputs if side == "in" else self.outputs
+        for i, shape in enumerate(shapes):
+            for index in np.ndindex(shape):
+                yield f"{side}{i}[{before}{', '.join(map(str, index))}]"
+
+    def stores(self, before: str = "") -> Iterator[str]:
+        """Give the statement that fills every place of the outputs, with a gap for the value."""
+        for place in self.places("out", before):
+            is_flag = int(place[3 : place.index("[")]) in self.flags
+            yield f"{place} = {{}} != 0" if is_flag else f"{place} = {{}}"
+
+
+class _Code:
+    """The assignments of a kernel, the same for one configuration and for many."""
+
+    def __init__(self, graph: Graph, outputs: Sequence[int], positive: Sequence[int], inputs: Sequence[int]) -> None:
+        self._graph, self._outputs, self._positive, self._inputs = graph, outputs, positive, inputs
+        asked = [*outputs, *positive]
+        self._order = reachable(graph, [*inputs, *asked])
+        self.joined = fused(graph, self._order, asked)
+        self._gone = set(self.joined.values())
+
+    def lines(self, load: Sequence[str], store: Sequence[str]) -> str:
+        """Write one assignment per node, and whether the inputs can be trusted.
+
+        Args:
+            load: where each input comes from.
+            store: the statement that takes each output, with a gap for its name.
+        """
+        lines: list[str] = []
+        names: dict[int, str] = {}
+        circular: set[int] = set()
+        for i in self._order:
+            node = self._graph.nodes[i]
+            names[i] = f"v{i}"
+            if node.op == "constant":
+                names[i] = f"({node.value!r})" if math.isfinite(node.value) else f"({_NOT_FINITE[str(node.value)]})"
+            elif node.op == "input":
+                lines.append(f"v{i} = {load[int(node.value)]}")
+            elif node.op in ("sin", "cos"):
+                angle = node.operands[0]
+                names[i] = f"{node.op}{angle}"
+                if angle not in circular:
+                    circular.add(angle)
+                    lines.append(f"sin{angle}, cos{angle} = sine_cosine({names[angle]})")
+            elif i in self.joined:
+                lines.append(f"v{i} = {self._fused(node, self.joined[i], names)}")
+            elif i not in self._gone:
+                lines.append(f"v{i} = {_INFIX[node.op].format(*(names[j] for j in node.operands))}")
+        lines += [place.format(names[node]) for place, node in zip(store, self._outputs, strict=True)]
+        # Not a number where an input is none; a condition that fails makes it none.
+        lines += [f"trust = {' + '.join(names[i] for i in self._inputs)}", "trust = trust - trust"]
+        lines += [f"trust = trust if {names[i]} > 0.0 else np.nan" for i in self._positive]
+        return "\n".join(lines)
+
+    def _fused(self, node: Node, product: int, names: dict[int, str]) -> str:
+        a, b = (names[j] for j in self._graph.nodes[product].operands)
+        first, second = node.operands
+        if node.op == "add":
+            return f"fma({a}, {b}, {names[second if first == product else first]})"
+        return f"fma({a}, {b}, -{names[second]})" if first == product else f"fma(-{a}, {b}, {names[first]})"
+
+
+def _rows_source(code: _Code, door: _Door) -> str:
+    width_in = sum(map(math.prod, door.inputs))
+    width_out = sum(map(math.prod, door.outputs))
+    body = code.lines(
+        [f"x[{row} * {LANES} + k]" for row in range(width_in)],
+        [f"y[{row} * {LANES} + k] = {{}}" for row in range(width_out)],
+    )
+    load = [f"x[{row} * {LANES} + r] = {place}" for row, place in enumerate(door.places("in", "start + r, "))]
+    store = [statement.format(f"y[{row} * {LANES} + r]") for row, statement in enumerate(door.stores("start + r, "))]
+    return _ROWS.format(
+        signature=door.types(rows=True),
+        arguments=", ".join(door.names),
+        in_size=width_in * LANES,
+        out_size=width_out * LANES,
+        lanes=LANES,
+        load=_moves(load, door.inputs),
+        body=textwrap.indent(body, " " * 12),
+        store=_moves(store, door.outputs),
+    )
+
+
+def _moves(lines: Sequence[str], shapes: Sequence[Shape]) -> str:
+    """Write the loops that carry rows in or out of a block, one per array."""
+    text: list[str] = []
+    rest = iter(lines)
+    for shape in shapes:
+        text.append("        for r in range(m):")
+        text += ["            " + next(rest) for _ in range(math.prod(shape))]
+    return "\n".join(text)
+
+
+def _one_source(code: _Code, door: _Door) -> str:
+    misfits = [f"in{i}.shape[{axis}] != {size}" for i, s in enumerate(door.inputs) for axis, size in enumerate(s)]
+    body = code.lines(list(door.places("in")), list(door.stores()))
+    return _ONE.format(
+        signature=door.types(rows=False),
+        arguments=", ".join(door.names),
+        misfit=" or ".join(misfits),
+        body=textwrap.indent(body, " " * 4),
+    )

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 ARITY = {
     "input": 0, "constant": 0,
     "add": 2, "subtract": 2, "multiply": 2, "divide": 2, "negate": 1,
-    "sin": 1, "cos": 1, "sqrt": 1, "atan2": 2, "absolute": 1,
+    "sin": 1, "cos": 1, "sqrt": 1, "atan2": 2, "absolute": 1, "round": 1,
     "less": 2, "less_equal": 2, "select": 3,
 }  # fmt: skip
 _COMMUTE = frozenset({"add", "multiply"})
@@ -180,17 +180,25 @@ def evaluate(graph: Graph, outputs: Sequence[int], inputs: Sequence[float]) -> l
     return [values[i] for i in outputs]
 
 
+def _ratio(a: float, b: float) -> float:
+    """Divide as the processor does: by 0 too."""
+    if b:
+        return a / b
+    return math.copysign(math.inf, a) * math.copysign(1.0, b) if a and a == a else math.nan  # noqa: PLR0124
+
+
 _FOLD: dict[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
     "multiply": lambda a, b: a * b,
-    "divide": lambda a, b: a / b,
+    "divide": _ratio,
     "negate": lambda a: -a,
     "sin": math.sin,
     "cos": math.cos,
     "sqrt": lambda a: math.sqrt(max(a, 0.0)),
     "atan2": math.atan2,
     "absolute": abs,
+    "round": lambda a: float(round(a)),
     "less": lambda a, b: float(a < b),
     "less_equal": lambda a, b: float(a <= b),
     "select": lambda c, a, b: a if c else b,

@@ -42,6 +42,13 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     return math.atan2(y, x)
 
 
+def whole(x: Scalar) -> Scalar:
+    """Return the whole number nearest to ``x``, as a float; the even one of two."""
+    if is_traced(x):
+        return traced("round", x)
+    return np.round(x) if isinstance(x, np.ndarray) else float(round(x))
+
+
 def select(condition: Any, then: Scalar, otherwise: Scalar) -> Scalar:
     """Return ``then`` where ``condition`` holds and ``otherwise`` elsewhere; both are evaluated."""
     if is_traced(condition, then, otherwise):

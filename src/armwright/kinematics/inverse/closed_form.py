@@ -6,25 +6,20 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, exactly, joint_array, of_shape
-from armwright.errors import ShapeError, UnsupportedArmError
+from armwright.errors import ShapeError
 from armwright.kinematics.forward import per_joint, stack
-from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, errors, judge
+from armwright.kinematics.inverse.branches import BRANCHES, Branches, branches, merged
+from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, judge
 from armwright.kinematics.inverse.numeric import numeric_inverse
-from armwright.kinematics.inverse.posture import posture
 from armwright.kinematics.inverse.reach import nearest_centre
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.recognise import closed_form_of, shoulder_of
 from armwright.kinematics.inverse.shoulder import Shoulder, Sign, turned
 from armwright.kinematics.inverse.solution import InverseSolution, violations
-from armwright.kinematics.inverse.turns import middle, nearest_image, nearest_turn
-
-_SIGNS: tuple[Sign, Sign] = (1, -1)
-# The order of the branches: arm, elbow (or slide), wrist.
-BRANCHES: tuple[tuple[Sign, Sign, Sign], ...] = tuple((a, e, w) for a in _SIGNS for e in _SIGNS for w in _SIGNS)
+from armwright.kinematics.inverse.turns import middle, nearest_image
+from armwright.tracing.scalar import select
 
 # Joint positions closer than this are one posture met twice.
 _SAME_POSTURE = 1e-9
-# A posture that misses the place by less meets it; by more it is one that stretches towards it [m].
-_MET = 1e-9
 # Which joints move together, from 1, where a choice is left open: the turn of joint 1, the raising of joint 2, the
 # wrist; and the joint that then chooses.
 _FREE = {
@@ -54,16 +49,11 @@ def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -
         UnsupportedArmError: the arm has no closed form.
         ShapeError: a shape does not fit.
     """
-    shoulder = _shoulder(arm)
-    X_BT = of_shape(X_BT, (4, 4), "pose")
-    q, free = _postures(arm, shoulder, X_BT, joint_array(middle(arm) if near is None else near, arm.n, "near"))
-    exists = np.asarray(_miss(arm, q, X_BT) <= _MET)
-    first = np.argmax(exists, axis=-1, keepdims=True)
-    chosen = np.where(exists | ~exists.any(axis=-1, keepdims=True), np.arange(8), first)
-    return (
-        np.take_along_axis(q, chosen[..., None], axis=-2),
-        np.take_along_axis(np.asarray(free.any(axis=-1)), chosen, axis=-1),
-    )
+    shoulder = closed_form_of(arm)
+    X_BT, near = of_shape(X_BT, (4, 4), "pose"), joint_array(middle(arm) if near is None else near, arm.n, "near")
+    lead, found = _branches(arm, shoulder, X_BT, near)
+    q, singular = merged(found)
+    return np.stack([stack(row, lead) for row in q], axis=-2), stack(singular, lead) > 0
 
 
 def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> InverseSolution:
@@ -113,18 +103,8 @@ def label(shoulder: Shoulder, signs: tuple[Sign, Sign, Sign], angles: Array) -> 
     return f"{arm}, {elbow}, {'no-flip' if flip > 0 else 'flip'}"
 
 
-def _shoulder(arm: Arm) -> Shoulder:
-    shoulder = shoulder_of(arm)
-    if shoulder is None:
-        raise UnsupportedArmError(
-            f"arm '{arm.name}': no closed-form inverse kinematics; expected an arm built like puma560, stanford or ur5 "
-            "(6 joints; a spherical wrist or three parallel axes)"
-        )
-    return shoulder
-
-
-def _postures(arm: Arm, shoulder: Shoulder, X_BT: Array, near: Array) -> tuple[Array, Array]:
-    """Return the eight postures (..., 8, 6), existing or not, and which of three choices are free (..., 8, 3)."""
+def _branches(arm: Arm, shoulder: Shoulder, X_BT: Array, near: Array) -> tuple[tuple[int, ...], Branches]:
+    """Return the leading axes that poses (..., 4, 4) and places of the arm (..., 6) share, and the postures."""
     try:
         lead = np.broadcast_shapes(X_BT.shape[:-2], near.shape[:-1])
     except ValueError as error:
@@ -132,33 +112,23 @@ def _postures(arm: Arm, shoulder: Shoulder, X_BT: Array, near: Array) -> tuple[A
             f"pose, near: leading axes must fit together, got shapes {X_BT.shape} and {near.shape}"
         ) from error
     X_BT, near = np.broadcast_to(X_BT, (*lead, 4, 4)), np.broadcast_to(near, (*lead, arm.n))
-    R_BS, p_BS = shoulder.X_BS[:3, :3], shoulder.X_BS[:3, 3]
-    R_ST = R_BS.T @ X_BT[..., :3, :3]
-    p = per_joint((X_BT[..., :3, 3] - p_BS) @ R_BS + R_ST @ shoulder.p_TW)
-    R_S6 = R_ST @ shoulder.R_T6
-    R = [per_joint(R_S6[..., i, :]) for i in range(3)]
-    wanted = shoulder.angles(per_joint(near))
-    found, free = [], []
-    for signs in BRANCHES:
-        angles, *choices = posture(shoulder, p, R, signs, wanted)
-        found.append(stack(shoulder.joints(angles), lead))
-        free.append(np.stack([np.broadcast_to(np.asarray(choice, dtype=bool), lead) for choice in choices], axis=-1))
-    return nearest_turn(arm, np.stack(found, axis=-2), near[..., None, :]), np.stack(free, axis=-2)
+    R = [per_joint(X_BT[..., i, :3]) for i in range(3)]
+    return lead, branches(arm, shoulder, R, per_joint(X_BT[..., :3, 3]), per_joint(near))
 
 
-def _miss(arm: Arm, q: Array, X_BT: Array) -> Array:
-    """Return how far from the place asked for each of the eight branches (..., 8, 6) puts the hand [m]."""
-    return errors(arm, q, X_BT[..., None, :, :])[0]
+def _postures(arm: Arm, shoulder: Shoulder, X_BT: Array, near: Array) -> tuple[Array, Array, Array]:
+    """Return the eight postures (..., 8, 6), which of three choices are free (..., 8, 3), and misses (..., 8) [m]."""
+    lead, found = _branches(arm, shoulder, X_BT, near)
+    free = [stack([select(choice, 1.0, 0.0) for choice in choices], lead) > 0 for choices in found.free]
+    return np.stack([stack(q, lead) for q in found.q], axis=-2), np.stack(free, axis=-2), stack(found.miss, lead)
 
 
 def _closed(arm: Arm, shoulder: Shoulder, X: Array, near: Array) -> InverseSolution:
     target, X_near = X, None
-    postures, free = _postures(arm, shoulder, X, near)
-    miss = _miss(arm, postures, X)
+    postures, free, miss = _postures(arm, shoulder, X, near)
     if miss.min() > EDGE:
         target = _nearest_pose(shoulder, X)
-        postures, free = _postures(arm, shoulder, target, near)
-        miss = _miss(arm, postures, target)
+        postures, free, miss = _postures(arm, shoulder, target, near)
         X_near = target if np.linalg.norm(target[:3, 3] - X[:3, 3]) > EDGE else None
     kind = "parallel" if shoulder.family == "parallel" else "spherical"
     candidates = []

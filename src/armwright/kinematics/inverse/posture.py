@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from armwright.kinematics.inverse.shoulder import ON_AXIS, Shoulder, Sign, bend, first_three, turn, turned
+from armwright.kinematics.inverse.shoulder import ON_AXIS, Shoulder, Sign, bend, first_three, stray, turn, turned
 from armwright.kinematics.inverse.wrist import last_three
 from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
 from armwright.tracing.vectors import Matrix, Vector, product, transpose
@@ -13,13 +13,14 @@ class Posture(NamedTuple):
     """Angles of the build, and which of the three choices a pose may leave open it does.
 
     ``turn_free``: the wrist centre is on the axis of joint 1. ``raise_free``: it is, or joint 4 is, on the axis of
-    joint 2. ``wrist_free``: joint 5 is straight.
+    joint 2. ``wrist_free``: joint 5 is straight. ``miss``: how far the hand stays from a place out of reach [m].
     """
 
     angles: Vector
     turn_free: Scalar
     raise_free: Scalar
     wrist_free: Scalar
+    miss: Scalar
 
 
 def posture(shoulder: Shoulder, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector) -> Posture:
@@ -40,7 +41,7 @@ def posture(shoulder: Shoulder, p: Vector, R: Matrix, signs: tuple[Sign, Sign, S
     R_SW = product(_about_z_then_y(first[0], raised), shoulder.R_3W.tolist())
     last, wrist_free = last_three(product(transpose(R_SW), R), flip, near[3])
     _, X = turn(shoulder, p, arm, near[0])
-    return Posture([*first, *last], _on_first_axis(p), _zero(X, p[2]), wrist_free)
+    return Posture([*first, *last], _on_first_axis(p), _zero(X, p[2]), wrist_free, stray(shoulder, p, X, p[2]))
 
 
 def _parallel(shoulder: Shoulder, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector) -> Posture:
@@ -66,7 +67,8 @@ def _parallel(shoulder: Shoulder, p: Vector, R: Matrix, signs: tuple[Sign, Sign,
     x, z = turned(raised, *shoulder.crank)
     theta_2, theta_3 = bend(shoulder, X - x, p[2] - z, elbow, near[1])
     angles = [theta_1, theta_2, theta_3, raised - theta_2 - theta_3, theta_5, theta_6]
-    return Posture(angles, _on_first_axis(p), _zero(X - x, p[2] - z), wrist_free)
+    miss = stray(shoulder, p, X - x, p[2] - z)
+    return Posture(angles, _on_first_axis(p), _zero(X - x, p[2] - z), wrist_free, miss)
 
 
 def _into_reach(shoulder: Shoulder, X: Scalar, Z: Scalar, raised: Scalar) -> Scalar:

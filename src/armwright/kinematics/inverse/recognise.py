@@ -7,6 +7,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.errors import UnsupportedArmError
 from armwright.kinematics.inverse.axes import SAME, Axes, joint_axes, meeting, parallel, perpendicular
 from armwright.kinematics.inverse.shoulder import Family, Shoulder, turned
 from armwright.spatial.poses import pose
@@ -48,6 +49,21 @@ def shoulder_of(arm: Arm) -> Shoulder | None:
         crossing = meeting(axes.points[4], w[4], axes.points[5], w[5])
         return None if crossing is None else _with_parallel_axes(axes, crossing)
     return None
+
+
+def closed_form_of(arm: Arm) -> Shoulder:
+    """Return the build of an arm, as ``shoulder_of`` does.
+
+    Raises:
+        UnsupportedArmError: it has no closed form.
+    """
+    shoulder = shoulder_of(arm)
+    if shoulder is None:
+        raise UnsupportedArmError(
+            f"arm '{arm.name}': no closed-form inverse kinematics; expected an arm built like puma560, stanford or ur5 "
+            "(6 joints; a spherical wrist or three parallel axes)"
+        )
+    return shoulder
 
 
 def _wrist_centre(axes: Axes) -> Array | None:

@@ -151,5 +151,26 @@ def slide(shoulder: Shoulder, X: Scalar, Z: Scalar, forwards: Sign, free: Scalar
     return [select(square < ON_AXIS**2, free, theta_2), length]
 
 
+def stray(shoulder: Shoulder, p: Vector, X: Scalar, Z: Scalar) -> Scalar:
+    """Return how far the posture that stretches towards ``p`` stays from it [m]; 0 in reach.
+
+    Args:
+        shoulder: the build.
+        p: wrist centre in the shoulder frame [m].
+        X: how far ahead of joint 2 the end of the forearm, or of the slide, should be, in the plane of the arm [m].
+        Z: how far above it.
+    """
+    from_axis, distance = sqrt(p[0] * p[0] + p[1] * p[1]), sqrt(X * X + Z * Z)
+    beside = _positive(abs(shoulder.side) - from_axis)
+    short = _positive(shoulder.inner - distance)
+    if math.isfinite(shoulder.outer):
+        short = short + _positive(distance - shoulder.outer)
+    return sqrt(beside * beside + short * short)
+
+
+def _positive(x: Scalar) -> Scalar:
+    return select(x > 0, x, 0.0)
+
+
 def _root(radicand: Scalar, terms: Scalar) -> Scalar:
     return sqrt(select(radicand < _LOST * terms, 0.0, radicand))

@@ -1,0 +1,239 @@
+"""An arm's quantities as compiled kernels: the same equations as everywhere, traced for that arm."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import attrs
+
+from armwright.arm.model import Arm
+from armwright.dynamics.articulated_body import articulated_body
+from armwright.dynamics.forward_dynamics import NEGLIGIBLE, forward_dynamics, less_friction
+from armwright.dynamics.mass_matrix import composite_rigid_body
+from armwright.dynamics.newton_euler import drive_effort, newton_euler
+from armwright.errors import UnknownNameError
+from armwright.kinematics.forward import link_frames, tool_frame
+from armwright.kinematics.inverse.branches import branches, merged
+from armwright.kinematics.inverse.recognise import closed_form_of
+from armwright.kinematics.jacobian import frame_columns
+from armwright.tracing.emit import Emitted, Guarded, emit
+from armwright.tracing.kernel import Kernel
+from armwright.tracing.scalar import Scalar
+from armwright.tracing.vectors import Matrix, Vector
+
+Numbers = Sequence[Scalar]
+Rows = list[list[Scalar]]
+
+
+def compile_arm(arm: Arm) -> "CompiledArm":
+    """Return an arm whose quantities are compiled, each when it is first asked for.
+
+    A first compilation takes some seconds and is kept on disk: see ``armwright.tracing.kernel.cache_folder``.
+    """
+    return CompiledArm(arm=arm)
+
+
+@attrs.frozen(kw_only=True, slots=False)
+class CompiledArm:
+    """Kernels of one arm: functions of arrays with any leading axes, as fast as the processor goes.
+
+    They are called like the plain functions of the same names, without the arm, and give the same numbers but for
+    rounding. A configuration has the same bits alone, in any batch and on any number of threads. Each takes
+    ``threads``, how many cores to use, and ``out``, arrays to fill: see ``Kernel``. Angles of more than a turn
+    get no warning here.
+
+    Attributes:
+        arm: the arm, with n joints.
+    """
+
+    arm: Arm
+
+    @cached_property
+    def forward(self) -> Kernel:
+        """Of q (..., n): the tool pose (..., 4, 4)."""
+        return self._kernel("forward")
+
+    @cached_property
+    def link_poses(self) -> Kernel:
+        """Of q (..., n): the poses of frames 0 to n and of the tool (..., n + 2, 4, 4)."""
+        return self._kernel("link_poses")
+
+    @cached_property
+    def jacobian(self) -> Kernel:
+        """Of q (..., n): the Jacobian of the tool point along base axes (..., 6, n)."""
+        return self._kernel("jacobian")
+
+    @cached_property
+    def pose_and_jacobian(self) -> Kernel:
+        """Of q (..., n): the tool pose (..., 4, 4) and the Jacobian (..., 6, n)."""
+        return self._kernel("pose_and_jacobian")
+
+    @cached_property
+    def inverse_branches(self) -> Kernel:
+        """Of poses (..., 4, 4) and near (..., 6): eight postures (..., 8, 6), and whether a joint is free (..., 8).
+
+        Raises:
+            UnsupportedArmError: the arm has no closed form.
+        """
+        return self._kernel("inverse_branches")
+
+    @cached_property
+    def inverse_dynamics(self) -> Kernel:
+        """Of q, qd, qdd (..., n): the efforts (..., n), drives included."""
+        return self._kernel("inverse_dynamics")
+
+    @cached_property
+    def inverse_dynamics_with_wrench(self) -> Kernel:
+        """Of q, qd, qdd (..., n) and a wrench (..., 6) on the tool along base axes: the efforts (..., n)."""
+        return self._kernel("inverse_dynamics_with_wrench")
+
+    @cached_property
+    def forward_dynamics(self) -> Kernel:
+        """Of q, qd, tau (..., n): the accelerations (..., n).
+
+        Calls raise UnsupportedArmError where some joint moves nothing that resists an acceleration.
+        """
+        return self._kernel("forward_dynamics")
+
+    @cached_property
+    def mass_matrix(self) -> Kernel:
+        """Of q (..., n): the mass matrix (..., n, n), rotor inertia included."""
+        return self._kernel("mass_matrix")
+
+    @cached_property
+    def mass_and_bias(self) -> Kernel:
+        """Of q, qd (..., n): the mass matrix (..., n, n) and the efforts that speeds and gravity take (..., n).
+
+        With them tau = M qdd + bias + friction.
+        """
+        return self._kernel("mass_and_bias")
+
+    def _kernel(self, name: str) -> Kernel:
+        def explain(*inputs: Any) -> None:
+            _QUANTITIES[name].plain(self.arm, *inputs)
+
+        return Kernel(emitted=emit_quantity(self.arm, name), explain=explain)
+
+
+def emit_quantity(arm: Arm, name: str) -> Emitted:
+    """Return the source of a quantity's kernel and its operation count.
+
+    Args:
+        arm: the arm.
+        name: of a quantity of ``CompiledArm``.
+
+    Raises:
+        UnknownNameError: no such quantity.
+        UnsupportedArmError: the arm has no such quantity.
+    """
+    if name not in _QUANTITIES:
+        raise UnknownNameError("quantity", name, _QUANTITIES)
+    quantity = _QUANTITIES[name]
+    outputs = [tuple(_size(arm, x) for x in shape) for shape in quantity.outputs]
+    inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
+
+    def equation(*lists: Numbers) -> Rows | Guarded:
+        return quantity.equation(arm, *lists)
+
+    return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags)
+
+
+def quantity_names() -> tuple[str, ...]:
+    """Return the names of the quantities that can be compiled."""
+    return tuple(_QUANTITIES)
+
+
+def _forward(arm: Arm, q: Numbers) -> Rows:
+    return [_pose(tool_frame(arm, link_frames(arm, q)[-1]))]
+
+
+def _link_poses(arm: Arm, q: Numbers) -> Rows:
+    frames = link_frames(arm, q)
+    return [[x for frame in [*frames, tool_frame(arm, frames[-1])] for x in _pose(frame)]]
+
+
+def _pose_and_jacobian(arm: Arm, q: Numbers) -> Rows:
+    frames = link_frames(arm, q)
+    tool = tool_frame(arm, frames[-1])
+    columns = frame_columns(arm, frames, tool[1])
+    return [_pose(tool), [column[i] for i in range(6) for column in columns]]
+
+
+def _jacobian(arm: Arm, q: Numbers) -> Rows:
+    return _pose_and_jacobian(arm, q)[1:]
+
+
+def _inverse_branches(arm: Arm, X_BT: Numbers, near: Numbers) -> Rows:
+    R = [list(X_BT[4 * i : 4 * i + 3]) for i in range(3)]
+    q, singular = merged(branches(arm, closed_form_of(arm), R, [X_BT[4 * i + 3] for i in range(3)], near))
+    return [[x for row in q for x in row], singular]
+
+
+def _inverse_dynamics(arm: Arm, q: Numbers, qd: Numbers, qdd: Numbers, *wrench: Numbers) -> Rows:
+    efforts = newton_euler(arm, q, qd, qdd, *wrench)
+    drives = (drive_effort(*of_joint) for of_joint in zip(arm.motors, qd, qdd, strict=True))
+    return [[effort + drive for effort, drive in zip(efforts, drives, strict=True)]]
+
+
+def _forward_dynamics(arm: Arm, q: Numbers, qd: Numbers, tau: Numbers) -> Guarded:
+    accelerations, pivots = articulated_body(arm, q, qd, less_friction(arm, qd, tau))
+    return Guarded([accelerations], [pivot.inertia - NEGLIGIBLE * pivot.size for pivot in pivots])
+
+
+def _mass_matrix(arm: Arm, q: Numbers) -> Rows:
+    M = composite_rigid_body(arm, q)
+    for i, motor in enumerate(arm.motors):
+        M[i][i] = M[i][i] + motor.inertia
+    return [[x for row in M for x in row]]
+
+
+def _mass_and_bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
+    return [*_mass_matrix(arm, q), newton_euler(arm, q, qd, [0.0] * arm.n)]
+
+
+def _pose(frame: tuple[Matrix, Vector]) -> Vector:
+    rows = [[*row, place] for row, place in zip(*frame, strict=True)]
+    return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
+
+
+def _nothing_to_explain(*_inputs: Any) -> None:
+    """Raise nothing: the quantity has no conditions."""
+
+
+class _Quantity(NamedTuple):
+    """One row of the table: shapes stand in letters, n for the number of joints and f for that of the frames.
+
+    Attributes:
+        equation: over abstract scalars.
+        inputs: their shapes by their names.
+        outputs: their shapes.
+        flags: which outputs are truth values.
+        plain: the plain function; raises what belongs to inputs that break a condition.
+    """
+
+    equation: Callable[..., Rows | Guarded]
+    inputs: Mapping[str, tuple[str | int, ...]]
+    outputs: tuple[tuple[str | int, ...], ...]
+    flags: tuple[int, ...] = ()
+    plain: Callable[..., object] = _nothing_to_explain
+
+
+def _size(arm: Arm, letter: str | int) -> int:
+    return letter if isinstance(letter, int) else {"n": arm.n, "f": arm.n + 2}[letter]
+
+
+_STATE: dict[str, tuple[str | int, ...]] = {"q": ("n",), "qd": ("n",)}
+_MOTION = {**_STATE, "qdd": ("n",)}
+_Q = {"q": ("n",)}
+_QUANTITIES = {
+    "forward": _Quantity(_forward, _Q, ((4, 4),)),
+    "link_poses": _Quantity(_link_poses, _Q, (("f", 4, 4),)),
+    "jacobian": _Quantity(_jacobian, _Q, ((6, "n"),)),
+    "pose_and_jacobian": _Quantity(_pose_and_jacobian, _Q, ((4, 4), (6, "n"))),
+    "inverse_branches": _Quantity(_inverse_branches, {"pose": (4, 4), "near": (6,)}, ((8, 6), (8,)), flags=(1,)),
+    "inverse_dynamics": _Quantity(_inverse_dynamics, _MOTION, (("n",),)),
+    "inverse_dynamics_with_wrench": _Quantity(_inverse_dynamics, {**_MOTION, "wrench": (6,)}, (("n",),)),
+    "forward_dynamics": _Quantity(_forward_dynamics, {**_STATE, "tau": ("n",)}, (("n",),), plain=forward_dynamics),
+    "mass_matrix": _Quantity(_mass_matrix, _Q, (("n", "n"),)),
+    "mass_and_bias": _Quantity(_mass_and_bias, _STATE, (("n", "n"), ("n",))),
+}

@@ -1,0 +1,203 @@
+"""Arms whose quantities are compiled."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm, Joint, Link
+from armwright.arrays import Array
+from armwright.dynamics.compiled import CompiledArm, compile_arm, emit_quantity, quantity_names
+from armwright.dynamics.forward_dynamics import forward_dynamics
+from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
+from armwright.kinematics.forward import forward, link_poses
+from armwright.kinematics.inverse.closed_form import inverse_branches
+from armwright.kinematics.jacobian import jacobian
+from oracles.arms import random_arm, random_postures
+
+ROUNDING = 1e-11  # two orders of the same sums, and sines that differ by two units in the last place
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile into one folder of the tests' own."""
+    monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path_factory.getbasetemp() / "kernels"))
+
+
+def _with_wrench(arm: Arm, q: Array, qd: Array, qdd: Array, wrench: Array) -> Array:
+    return inverse_dynamics(arm, q, qd, qdd, wrench=wrench)
+
+
+def _pose_and_jacobian(arm: Arm, q: Array) -> tuple[Array, Array]:
+    return forward(arm, q), jacobian(arm, q)
+
+
+def _mass_and_bias(arm: Arm, q: Array, qd: Array) -> tuple[Array, Array]:
+    return mass_matrix(arm, q), inverse_dynamics(arm, q, qd, np.zeros_like(q), drives=False)
+
+
+PLAIN: dict[str, Callable[..., Any]] = {
+    "forward": forward,
+    "link_poses": link_poses,
+    "jacobian": jacobian,
+    "pose_and_jacobian": _pose_and_jacobian,
+    "inverse_dynamics": inverse_dynamics,
+    "inverse_dynamics_with_wrench": _with_wrench,
+    "forward_dynamics": forward_dynamics,
+    "mass_matrix": mass_matrix,
+    "mass_and_bias": _mass_and_bias,
+}
+
+
+def _inputs(fast: CompiledArm, name: str, rng: np.random.Generator, lead: tuple[int, ...]) -> list[Array]:
+    """Return random inputs of a quantity."""
+    shapes = getattr(fast, name).emitted.inputs
+    positions = random_postures(fast.arm, rng, int(np.prod(lead))).reshape(*lead, fast.arm.n)
+    return [positions if key == "q" else rng.normal(size=(*lead, *shape)) for key, shape in shapes.items()]
+
+
+def _all(values: Any) -> tuple[Array, ...]:
+    return values if isinstance(values, tuple) else (values,)
+
+
+@pytest.mark.parametrize("arm", ["stanford", "ur5", "random"])
+@pytest.mark.parametrize("name", PLAIN)
+def test_agrees_with_the_plain_function(name: str, arm: str, rng: np.random.Generator) -> None:
+    """A compiled quantity has the values and shapes of the plain function, for many configurations and for one."""
+    fast = compile_arm(random_arm(np.random.default_rng(5), 4) if arm == "random" else load_arm(arm))
+    inputs = _inputs(fast, name, rng, (4, 5))
+
+    found = _all(getattr(fast, name)(*inputs))
+
+    for values, expected in zip(found, _all(PLAIN[name](fast.arm, *inputs)), strict=True):
+        assert values.shape == expected.shape
+        np.testing.assert_allclose(values, expected, atol=ROUNDING * max(1.0, np.abs(expected).max()))
+    alone = _all(getattr(fast, name)(*(x[2, 3] for x in inputs)))
+    for one, values in zip(alone, found, strict=True):
+        np.testing.assert_array_equal(one, values[2, 3])
+
+
+def test_every_quantity_is_compared() -> None:
+    """The list above is whole."""
+    assert {*PLAIN, "inverse_branches"} == set(quantity_names())
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+def test_branches(name: str, rng: np.random.Generator) -> None:
+    """Compiled branches are those of the plain function: in reach and out of it, and where a joint is free."""
+    arm = load_arm(name)
+    fast = compile_arm(arm).inverse_branches
+    postures = random_postures(arm, rng, 300)
+    postures[:100, 4] = 0.0
+    X, near = forward(arm, postures), np.tile(arm.limit("lower") * 0.3, (300, 1))
+    X[250:, :3, 3] *= 2.0
+
+    q, singular = fast(X, near)
+
+    expected, expected_singular = inverse_branches(arm, X, near)
+    np.testing.assert_array_equal(singular, expected_singular)
+    assert singular.dtype == bool
+    assert singular[:100].any()
+    assert not singular[100:].any()
+    # Postures may differ by rounding where the arm is stretched out; what they put the hand at may not.
+    np.testing.assert_allclose(forward(arm, q), forward(arm, expected), atol=1e-9)
+    in_reach = np.linalg.norm(forward(arm, q)[..., :3, 3] - X[:, None, :3, 3], axis=-1).max(axis=-1) < 1e-9
+    assert in_reach[:250].all()
+    alone, free = fast(X[7], near[7])
+    np.testing.assert_array_equal(alone, q[7])
+    np.testing.assert_array_equal(free, singular[7])
+
+
+def test_no_closed_form() -> None:
+    """An arm without closed form says so when its branches are asked for."""
+    with pytest.raises(UnsupportedArmError, match="'ntu-3r': no closed-form inverse"):
+        _ = compile_arm(load_arm("ntu-3r")).inverse_branches
+
+
+def test_an_arm_that_moves_nothing() -> None:
+    """A joint without inertia is refused by the compiled forward dynamics in the words of the plain one."""
+    light = Arm(name="light", joints=[Joint(kind="revolute", a=1.0)] * 2, links=[Link(mass=1.0), Link()])
+
+    for shape in ((2,), (5, 2)):
+        with pytest.raises(UnsupportedArmError, match="no acceleration can be found for joint 2"):
+            compile_arm(light).forward_dynamics(np.zeros(shape), np.zeros(shape), np.zeros(shape))
+
+
+def test_called_from_other_compiled_code(rng: np.random.Generator) -> None:
+    """A compiled loop that calls the function of one configuration gets the bits that a batch has."""
+    arm = load_arm("stanford-jpl")
+    fast = compile_arm(arm).inverse_dynamics
+    one = fast.one
+
+    @njit
+    def efforts(q: Array, qd: Array, qdd: Array, tau: Array) -> int:
+        lost = 0
+        for k in range(len(q)):
+            lost += one(q[k], qd[k], qdd[k], tau[k])
+        return lost
+
+    q, qd, qdd = rng.normal(size=(3, 50, arm.n))
+    tau = np.empty_like(q)
+
+    assert efforts(q, qd, qdd, tau) == 0
+
+    np.testing.assert_array_equal(tau, fast(q, qd, qdd))
+
+
+def test_into_arrays_of_the_callers(rng: np.random.Generator) -> None:
+    """Results can be written into arrays at hand; arrays that do not fit are refused with what would."""
+    fast = compile_arm(load_arm("stanford"))
+    q = rng.normal(size=(7, 6))
+    X, J = np.empty((7, 4, 4)), np.empty((7, 6, 6))
+
+    assert fast.pose_and_jacobian(q, out=(X, J))[0] is X
+
+    np.testing.assert_array_equal(J, fast.pose_and_jacobian(q)[1])
+    with pytest.raises(ShapeError, match=r"out: expected writable arrays in C order, \(7, 4, 4\) float64; got \(4, 4"):
+        fast.forward(q, out=np.empty((4, 4)))
+
+
+@pytest.mark.parametrize("shape", [(6,), (3, 6)])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_numbers_that_are_none(shape: tuple[int, ...], bad: float) -> None:
+    """One NaN or infinity among the inputs is refused by name, alone and in a batch."""
+    qd = np.zeros(shape)
+    qd[..., 3] = bad
+
+    with pytest.raises(InvalidValueError, match="qd: every number must be finite"):
+        compile_arm(load_arm("stanford")).inverse_dynamics(np.zeros(shape), qd, np.zeros(shape))
+
+
+def test_other_kinds_of_input(rng: np.random.Generator) -> None:
+    """Lists, whole numbers, read-only and scattered arrays give what the array of the same numbers gives."""
+    fast = compile_arm(load_arm("stanford")).forward
+    q = rng.integers(-3, 3, size=6)
+    expected = fast(q.astype(np.float64))
+    wide = np.zeros(12)
+    wide[::2] = q
+    still = q.astype(np.float64)
+    still.setflags(write=False)
+
+    for same in (q, q.tolist(), tuple(q.tolist()), wide[::2], still):
+        np.testing.assert_array_equal(fast(same), expected)
+
+
+def test_unknown_quantity() -> None:
+    """A misspelt quantity gets the nearest name."""
+    with pytest.raises(UnknownNameError, match="Did you mean 'jacobian'"):
+        emit_quantity(load_arm("ur5"), "jacobain")
+
+
+def test_right_angles_make_it_cheaper() -> None:
+    """The Stanford arm, with two lengths fewer than the UR5, takes fewer operations for every quantity."""
+
+    def total(arm: Arm, quantity: str) -> int:
+        return sum(emit_quantity(arm, quantity).operations.values())
+
+    for quantity in quantity_names():
+        assert total(load_arm("stanford"), quantity) < total(load_arm("ur5"), quantity)
