@@ -35,7 +35,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/gearbox.rlo --cell examples/puma_cell.toml -o out/gearbox
 
 bench: $(VENV)/test   ## Measure against the peers, one core each
-	PYTHONPATH=tests $(BIN)/python benchmarks/inverse_dynamics.py
+	PYTHONPATH=tests $(BIN)/python benchmarks/run.py
 
 clean:            ## Remove what was built
 	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

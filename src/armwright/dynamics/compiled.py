@@ -1,8 +1,8 @@
 """An arm's quantities as compiled kernels: the same equations as everywhere, traced for that arm."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
-from typing import Any, NamedTuple
+from functools import cached_property, partial
+from typing import Any, NamedTuple, TypeAlias
 
 import attrs
 
@@ -23,24 +23,26 @@ from armwright.tracing.vectors import Matrix, Vector
 
 Numbers = Sequence[Scalar]
 Rows = list[list[Scalar]]
+# Of arrays with any leading axes.
+Function: TypeAlias = Callable[..., Any]
 
 
 def compile_arm(arm: Arm) -> "CompiledArm":
     """Return an arm whose quantities are compiled, each when it is first asked for.
 
-    A first compilation takes some seconds and is kept on disk: see ``armwright.tracing.kernel.cache_folder``.
+    A first compilation takes some seconds and is kept on disk: see ``armwright.tracing.cache.cache_folder``.
     """
     return CompiledArm(arm=arm)
 
 
 @attrs.frozen(kw_only=True, slots=False)
 class CompiledArm:
-    """Kernels of one arm: functions of arrays with any leading axes, as fast as the processor goes.
+    """Functions of one arm, as fast as the processor goes.
 
     They are called like the plain functions of the same names, without the arm, and give the same numbers but for
     rounding. A configuration has the same bits alone, in any batch and on any number of threads. Each takes
-    ``threads``, how many cores to use, and ``out``, arrays to fill: see ``Kernel``. Angles of more than a turn
-    get no warning here.
+    ``threads=``, how many cores to use, and ``out=``, arrays to fill: see ``Kernel.function``. Angles of more than a
+    turn get no warning here.
 
     Attributes:
         arm: the arm, with n joints.
@@ -49,70 +51,84 @@ class CompiledArm:
     arm: Arm
 
     @cached_property
-    def forward(self) -> Kernel:
+    def forward(self) -> Function:
         """Of q (..., n): the tool pose (..., 4, 4)."""
-        return self._kernel("forward")
+        return self._function("forward")
 
     @cached_property
-    def link_poses(self) -> Kernel:
+    def link_poses(self) -> Function:
         """Of q (..., n): the poses of frames 0 to n and of the tool (..., n + 2, 4, 4)."""
-        return self._kernel("link_poses")
+        return self._function("link_poses")
 
     @cached_property
-    def jacobian(self) -> Kernel:
+    def jacobian(self) -> Function:
         """Of q (..., n): the Jacobian of the tool point along base axes (..., 6, n)."""
-        return self._kernel("jacobian")
+        return self._function("jacobian")
 
     @cached_property
-    def pose_and_jacobian(self) -> Kernel:
+    def pose_and_jacobian(self) -> Function:
         """Of q (..., n): the tool pose (..., 4, 4) and the Jacobian (..., 6, n)."""
-        return self._kernel("pose_and_jacobian")
+        return self._function("pose_and_jacobian")
 
     @cached_property
-    def inverse_branches(self) -> Kernel:
+    def inverse_branches(self) -> Function:
         """Of poses (..., 4, 4) and near (..., 6): eight postures (..., 8, 6), and whether a joint is free (..., 8).
 
         Raises:
             UnsupportedArmError: the arm has no closed form.
         """
-        return self._kernel("inverse_branches")
+        return self._function("inverse_branches")
 
     @cached_property
-    def inverse_dynamics(self) -> Kernel:
+    def inverse_dynamics(self) -> Function:
         """Of q, qd, qdd (..., n): the efforts (..., n), drives included."""
-        return self._kernel("inverse_dynamics")
+        return self._function("inverse_dynamics")
 
     @cached_property
-    def inverse_dynamics_with_wrench(self) -> Kernel:
+    def inverse_dynamics_with_wrench(self) -> Function:
         """Of q, qd, qdd (..., n) and a wrench (..., 6) on the tool along base axes: the efforts (..., n)."""
-        return self._kernel("inverse_dynamics_with_wrench")
+        return self._function("inverse_dynamics_with_wrench")
 
     @cached_property
-    def forward_dynamics(self) -> Kernel:
+    def forward_dynamics(self) -> Function:
         """Of q, qd, tau (..., n): the accelerations (..., n).
 
         Calls raise UnsupportedArmError where some joint moves nothing that resists an acceleration.
         """
-        return self._kernel("forward_dynamics")
+        return self._function("forward_dynamics")
 
     @cached_property
-    def mass_matrix(self) -> Kernel:
+    def mass_matrix(self) -> Function:
         """Of q (..., n): the mass matrix (..., n, n), rotor inertia included."""
-        return self._kernel("mass_matrix")
+        return self._function("mass_matrix")
 
     @cached_property
-    def mass_and_bias(self) -> Kernel:
+    def mass_and_bias(self) -> Function:
         """Of q, qd (..., n): the mass matrix (..., n, n) and the efforts that speeds and gravity take (..., n).
 
         With them tau = M qdd + bias + friction.
         """
-        return self._kernel("mass_and_bias")
+        return self._function("mass_and_bias")
 
-    def _kernel(self, name: str) -> Kernel:
-        def explain(*inputs: Any) -> None:
-            _QUANTITIES[name].plain(self.arm, *inputs)
+    def __reduce__(self) -> tuple[Callable[[Arm], "CompiledArm"], tuple[Arm]]:
+        """Let another process compile for itself: it finds the kernels on disk."""
+        return compile_arm, (self.arm,)
 
-        return Kernel(emitted=emit_quantity(self.arm, name), explain=explain)
+    def kernel(self, name: str) -> Kernel:
+        """Return the kernel behind a function, whose part for one configuration other compiled code can call.
+
+        Args:
+            name: of the function.
+
+        Raises:
+            UnknownNameError: no such function.
+            UnsupportedArmError: the arm has no such function.
+        """
+        emitted = emit_quantity(self.arm, name)
+        return Kernel(emitted=emitted, explain=partial(_QUANTITIES[name].plain, self.arm))
+
+    def _function(self, name: str) -> Function:
+        return self.kernel(name).function(name, str(getattr(type(self), name).__doc__))
 
 
 def emit_quantity(arm: Arm, name: str) -> Emitted:

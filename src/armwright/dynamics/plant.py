@@ -10,9 +10,8 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.dynamics.compiled import CompiledArm, compile_arm
 from armwright.dynamics.controllers import Controller
-from armwright.dynamics.mass_matrix import composite_rigid_body
-from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.settle import settle
 from armwright.dynamics.simulation import Brake, JointState
 
@@ -92,9 +91,9 @@ class Plant:
     effort: Array
 
     @cached_property
-    def rotor(self) -> Array:
-        """Inertias of the motors, (n,)."""
-        return self._of_motors("inertia")
+    def compiled(self) -> CompiledArm:
+        """The arm's equations, compiled: they are asked for many thousands of times."""
+        return compile_arm(self.arm)
 
     @cached_property
     def viscous(self) -> Array:
@@ -119,10 +118,6 @@ class Plant:
         """Which joints have dry friction, (n,)."""
         return (self.forward > 0) | (self.backward > 0)
 
-    def inertia(self, q: Array) -> Array:
-        """Return the mass matrix, rotors included."""
-        return np.array(composite_rigid_body(self.arm, q.tolist())) + np.diag(self.rotor)
-
     def moment(self, t: float, q: Array, qd: Array, phase: Phase) -> Moment:
         """Return what the joints feel at one moment of a phase."""
         M, tau, friction, left = self._pushed(t, q, qd, phase.way, phase.held)
@@ -134,11 +129,11 @@ class Plant:
 
     def _pushed(self, t: float, q: Array, qd: Array, way: Array, held: Flags) -> tuple[Array, Array, Array, Array]:
         """Return mass matrix, efforts of drives, of friction, and what is left to accelerate with."""
-        bias = newton_euler(self.arm, q.tolist(), qd.tolist(), [0.0] * self.arm.n)
+        M, bias = self.compiled.mass_and_bias(q, qd)
         tau = np.clip(np.asarray(self.controller(t, q, qd), dtype=np.float64), -self.effort, self.effort)
         dry = np.where(way > 0, self.forward, np.where(way < 0, -self.backward, 0.0))
         friction = np.where(held, 0.0, -self.viscous * qd - dry)
-        return self.inertia(q), tau, friction, tau + friction - np.array(bias)
+        return M, tau, friction, tau + friction - bias
 
     def braked(self, t: float) -> Flags:
         """Return which joints have a brake on at a time, (n,)."""
@@ -189,7 +184,7 @@ class Plant:
 
     def _collide(self, q: Array, qd: Array, from_below: Flags, from_above: Flags) -> tuple[Array, float]:
         """Return speeds after impacts that leave no speed against a stop or under a brake, and the energy lost."""
-        M = self.inertia(q)
+        M, _ = self.compiled.mass_and_bias(q, qd)
         lower, upper = np.where(from_above, -np.inf, 0.0), np.where(from_below, np.inf, 0.0)
         after = settle(M, M @ qd, from_below | from_above, lower, upper).x
         return after, float(qd @ M @ qd - after @ M @ after) / 2

@@ -74,6 +74,8 @@ else:
 _ROWS = """
 @njit(int64(int64, int64, {signature}), error_model="numpy", nogil=True, cache=True)
 def rows(first, last, {arguments}):
+    if {misfit}:
+        return 1
     x = np.zeros({in_size})
     y = np.zeros({out_size})
     trusted = np.zeros({lanes})
@@ -120,14 +122,13 @@ class Emitted:
     """The source of a kernel and what it takes.
 
     Both functions fill the output arrays and return 0, or another number where some configuration came out without
-    meaning: an input is not finite (or the inputs add up to more than a float holds), or a condition of the equation
-    is broken.
+    meaning: the shape of an input is wrong, an input is not finite (or the inputs add up to more than a float holds),
+    or a condition of the equation is broken.
 
     Attributes:
         title: what it computes, in words.
         rows: source of ``rows(first, last, *inputs, *outputs)``, for arrays of (N, *shape).
-        one: source of ``one(*inputs, *outputs)``, for arrays of (*shape). It returns 1 as well where the shape of an
-            input is wrong.
+        one: source of ``one(*inputs, *outputs)``, for arrays of (*shape).
         inputs: shape of one value of each input, by its name.
         outputs: shape of one value of each output.
         flags: numbers of the outputs that are truth values.
@@ -219,6 +220,14 @@ class _Door(NamedTuple):
             kinds.append(f'types.Array({kind}, {len(shape) + rows}, "C")')
         return ", ".join(kinds)
 
+    def misfits(self, before: int = 0) -> Iterator[str]:
+        """Give the conditions under which the shape of an input is wrong; of many rows there may be too few."""
+        for i, shape in enumerate(self.inputs):
+            if before:
+                yield f"in{i}.shape[0] < last"
+            for axis, size in enumerate(shape):
+                yield f"in{i}.shape[{axis + before}] != {size}"
+
     def places(self, side: Literal["in", "out"], before: str = "") -> Iterator[str]:
         """Give the place of every number of the inputs or the outputs, such as ``in0[1, 2]``."""
         shapes = self.inputs if side == "in" else self.outputs
@@ -296,6 +305,7 @@ def _rows_source(code: _Code, door: _Door) -> str:
     return _ROWS.format(
         signature=door.types(rows=True),
         arguments=", ".join(door.names),
+        misfit=" or ".join(door.misfits(before=1)),
         in_size=width_in * LANES,
         out_size=width_out * LANES,
         lanes=LANES,
@@ -316,11 +326,10 @@ def _moves(lines: Sequence[str], shapes: Sequence[Shape]) -> str:
 
 
 def _one_source(code: _Code, door: _Door) -> str:
-    misfits = [f"in{i}.shape[{axis}] != {size}" for i, s in enumerate(door.inputs) for axis, size in enumerate(s)]
     body = code.lines(list(door.places("in")), list(door.stores()))
     return _ONE.format(
         signature=door.types(rows=False),
         arguments=", ".join(door.names),
-        misfit=" or ".join(misfits),
+        misfit=" or ".join(door.misfits()),
         body=textwrap.indent(body, " " * 4),
     )
