@@ -209,7 +209,7 @@ def test_help() -> None:
     """The functions have the names, the arguments and the texts that help shows."""
     fast = compile_arm(load_arm("stanford")).inverse_dynamics
 
-    assert str(inspect.signature(fast)) == "(q, qd, qdd, *, threads=1, out=None)"
+    assert str(inspect.signature(fast)) == "(q, qd, qdd, *, threads=None, out=None)"
     assert fast.__name__ == "inverse_dynamics"
     assert "drives included" in (fast.__doc__ or "")
     with pytest.raises(TypeError, match="missing 1 required positional argument: 'qdd'"):

@@ -12,7 +12,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.errors import ShapeError
+from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled_module
 from armwright.tracing.emit import LANES, Emitted, Shape
 
@@ -22,14 +22,14 @@ _ROWS_PER_THREAD = 4096
 # The function that is called with arrays: the shortest way for those that come as they should, which is why its text
 # is made for the kernel. What does not come so goes the careful way.
 _DOOR = """
-def {name}({inputs}, *, threads=1, out=None):
+def {name}({inputs}, *, threads=None, out=None):
     if out is None:
         try:
             if {first}.ndim == {axes}:
                 {blanks}
                 if not one({inputs}, {outputs}):
                     return {outputs}
-            elif {first}.ndim == {axes} + 1 and threads == 1:
+            elif {first}.ndim == {axes} + 1 and (len({first}) < {few} or threads == 1):
                 rows_asked = len({first})
                 {blanks_of_many}
                 if not rows(0, rows_asked, {inputs}, {outputs}):
@@ -66,11 +66,11 @@ class Kernel:
         """Return the function that evaluates the equation for one configuration or many.
 
         It takes one array (..., *shape) per input, leading axes are broadcast; by name only, ``threads``, how many
-        cores to use, on which the bits do not depend; and ``out``, an array to fill, or a tuple of them for several
+        cores to use, all there are when left out, on which the bits do not depend; and ``out``, an array to fill, or a tuple of them for several
         outputs. It returns an array (..., *shape), or a tuple of them. It raises
 
         - ShapeError: a last axis, or the leading axes do not fit, or ``out`` does not.
-        - InvalidValueError: a number is NaN or infinite.
+        - InvalidValueError: a number is NaN or infinite, or there are fewer than one ``threads``.
         - another ArmwrightError: a condition of the equation does not hold.
 
         Args:
@@ -99,6 +99,7 @@ class Kernel:
             inputs=", ".join(inputs),
             first=next(iter(inputs)),
             axes=len(next(iter(inputs.values()))),
+            few=2 * _ROWS_PER_THREAD,
             blanks=blanks(""),
             blanks_of_many=blanks("rows_asked, "),
             outputs=", ".join(outputs),
@@ -108,7 +109,7 @@ class Kernel:
         made.__doc__ = doc
         return made
 
-    def __call__(self, *inputs: ArrayLike, threads: int = 1, out: Any = None) -> Any:
+    def __call__(self, *inputs: ArrayLike, threads: int | None = None, out: Any = None) -> Any:
         """Evaluate the equation: see ``function``."""
         return self._careful(inputs, threads, out)
 
@@ -116,8 +117,10 @@ class Kernel:
     def _kinds(self) -> tuple[tuple[Shape, type], ...]:
         return tuple((s, bool if i in self.emitted.flags else float) for i, s in enumerate(self.emitted.outputs))
 
-    def _careful(self, inputs: Sequence[ArrayLike], threads: int, out: Any) -> Any:
+    def _careful(self, inputs: Sequence[ArrayLike], threads: int | None, out: Any) -> Any:
         """Check everything, evaluate, and find out what is wrong where something is."""
+        if threads is not None and not (isinstance(threads, int) and threads > 0):
+            raise InvalidValueError(f"threads: expected a whole number above 0, or None for all cores, got {threads!r}")
         arrays, lead = self._checked(inputs)
         results = self._results(lead, out)
         if self._run(arrays, lead, results, threads):
@@ -156,14 +159,14 @@ class Kernel:
             raise ShapeError(f"out: expected writable arrays in C order, {wanted}; got {got}")
         return given
 
-    def _run(self, arrays: list[Array], lead: Shape, results: list[Array], threads: int) -> int:
+    def _run(self, arrays: list[Array], lead: Shape, results: list[Array], threads: int | None) -> int:
         if not lead:
             return self.one(*map(np.ascontiguousarray, arrays), *results)
         rows = math.prod(lead)
         shapes = self.emitted.inputs.values()
         flat = [_rows(x, lead, shape) for x, shape in zip(arrays, shapes, strict=True)]
         flat += results if len(lead) == 1 else [x.reshape(rows, *x.shape[len(lead) :]) for x in results]
-        threads = min(threads, max(rows // _ROWS_PER_THREAD, 1))
+        threads = min(_cores() if threads is None else threads, max(rows // _ROWS_PER_THREAD, 1))
         if threads <= 1:
             return self.rows(0, rows, *flat)
         blocks = -(-rows // LANES)
@@ -187,6 +190,11 @@ def _rows(array: Array, lead: Shape, shape: Shape) -> Array:
     if len(lead) > 1:
         array = array.reshape(-1, *shape)
     return array if array.flags.c_contiguous else np.ascontiguousarray(array)
+
+
+def _cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @cache
