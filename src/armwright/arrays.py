@@ -1,52 +1,92 @@
 """Arrays at the door: named converters that check shape and meaning, copy to float64 and make read-only."""
 
-from typing import TypeAlias
+import sys
+from collections.abc import Callable, Mapping
+from decimal import Decimal
+from numbers import Real
+from typing import Any, TypeAlias
 
+import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 
 Array: TypeAlias = npt.NDArray[np.float64]
 ArrayLike: TypeAlias = npt.ArrayLike
+Flags: TypeAlias = npt.NDArray[np.bool_]
+
+# No quantity of a robot is larger, and products of three such numbers are still numbers.
+LARGEST = 1e100
+_ANY = sys.float_info.max
 
 
-def floats(value: ArrayLike, what: str) -> Array:
+def floats(value: ArrayLike, what: str, largest: float = _ANY) -> Array:
     """Return a fresh float64 copy of ``value``.
 
+    Args:
+        value: numbers of any shape.
+        what: how they are called in a message.
+        largest: what none of them may exceed; ``LARGEST`` for what is multiplied further.
+
     Raises:
-        ShapeError: the value is not an array of numbers.
-        InvalidValueError: a number is NaN or infinite.
+        KindError: the value is something else than real numbers: texts, truth values, complex numbers, nothing.
+        ShapeError: its rows differ in length.
+        InvalidValueError: a number is NaN, infinite, or too large.
     """
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"{what}: expected numbers, got {value!r}") from error
-    if not np.isfinite(array).all():
-        raise InvalidValueError(f"{what}: every number must be finite, got {array[~np.isfinite(array)].flat[0]}")
+    array = _plain(value, what)
+    if array.size and not np.abs(array).max() <= largest:  # what is NaN compares with nothing
+        place = tuple(int(i) for i in np.argwhere(~(np.abs(array) <= largest))[0])
+        wrong, where = array[place], f" at {shown(place)}" if place else ""
+        if np.isfinite(wrong):
+            raise InvalidValueError(f"{what}: expected numbers no larger than {largest:g}, got {wrong:g}{where}")
+        raise InvalidValueError(f"{what}: every number must be finite, got {wrong}{where}")
     return array
 
 
-def of_shape(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
-    """Return a read-only float64 copy of ``value``, whose last axes must have ``shape``.
+def number(value: float, what: str) -> float:
+    """Return one real number as a float; it may be NaN or infinite.
 
     Raises:
-        ShapeError: the last axes are not as asked.
+        KindError: the value is something else than a real number.
+        InvalidValueError: it has more digits than a float can tell.
     """
-    array = floats(value, what)
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if not _is_real(value):
+        raise KindError(f"{what}: expected a number, got {shown(value)}")
+    try:
+        return float(value)
+    except OverflowError as error:
+        raise InvalidValueError(
+            f"{what}: expected a number no larger than {_ANY:.3g}, got one of many digits"
+        ) from error
+
+
+def of_shape(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float = _ANY) -> Array:
+    """Return a read-only float64 copy of ``value``, whose last axes must have ``shape``; see ``floats``.
+
+    Raises:
+        KindError: the value is something else than real numbers.
+        ShapeError: the last axes are not as asked.
+        InvalidValueError: a number is NaN or infinite.
+    """
+    array = floats(value, what, largest)
     if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
         raise ShapeError(f"{what}: expected a shape ending in {shape}, got {array.shape}")
     array.setflags(write=False)
     return array
 
 
-def exactly(value: ArrayLike, shape: tuple[int, ...], what: str) -> Array:
-    """Return a read-only float64 copy of ``value``, which must have ``shape``.
+def exactly(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float = _ANY) -> Array:
+    """Return a read-only float64 copy of ``value``, which must have ``shape``; see ``floats``.
 
     Raises:
-        ShapeError: it has another.
+        KindError: the value is something else than real numbers.
+        ShapeError: it has another shape.
+        InvalidValueError: a number is NaN or infinite.
     """
-    array = of_shape(value, shape, what)
+    array = of_shape(value, shape, what, largest)
     if array.shape != shape:
         raise ShapeError(f"{what}: expected shape {shape}, got {array.shape}")
     return array
@@ -61,11 +101,72 @@ def joint_array(q: ArrayLike, joints: int, what: str = "q") -> Array:
         what: how the array is called in a message.
 
     Raises:
+        KindError: the value is something else than real numbers.
         ShapeError: the last axis is not n long.
-        InvalidValueError: a number is NaN or infinite.
+        InvalidValueError: a number is NaN, infinite, or larger than any of a robot.
     """
-    array = floats(q, what)
+    array = floats(q, what, LARGEST)
     if array.ndim == 0 or array.shape[-1] != joints:
         raise ShapeError(f"{what}: expected {joints} numbers on the last axis, one per joint, got shape {array.shape}")
     array.setflags(write=False)
     return array
+
+
+def one_per_joint(q: ArrayLike, joints: int, what: str = "q") -> Array:
+    """Return ``q`` as read-only float64 of shape (n,); all else as ``joint_array``.
+
+    Raises:
+        ShapeError: the shape is another.
+    """
+    array = joint_array(q, joints, what)
+    if array.ndim != 1:
+        raise ShapeError(f"{what}: expected shape ({joints},), got {array.shape}")
+    return array
+
+
+def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return a copy that cannot be written to: the converter of fields of results, which need no check."""
+    copy = np.array(array)
+    copy.setflags(write=False)
+    return copy
+
+
+def content(array: Array) -> tuple[tuple[int, ...], bytes]:
+    """Return what arrays have in common when they are equal: fields are compared and hashed by it."""
+    return array.shape, (array + 0.0).tobytes()  # -0.0 + 0.0 is 0.0
+
+
+def by_fields(value: Any) -> tuple[Callable[..., Any], tuple[type, Mapping[str, Any]]]:
+    """Take a value of an attrs class apart for ``copy`` and ``pickle``: its ``__reduce__``.
+
+    NumPy makes every copy of a read-only array writable. Built anew from its fields, a value has its arrays read-only.
+    """
+    return _built, (type(value), {one.alias: getattr(value, one.name) for one in attrs.fields(type(value))})
+
+
+def _built(kind: Callable[..., Any], fields: Mapping[str, Any]) -> Any:
+    return kind(**fields)
+
+
+def _plain(value: ArrayLike, what: str) -> Array:
+    """Return real numbers of any kind as float64."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise InvalidValueError(f"{what}: masked entries have no value; fill them or leave them out")
+    try:
+        array = np.array(value, order="C")  # how it was stored must not change a bit of a result
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{what}: expected numbers in rows of one length, got {shown(value)}") from error
+    if array.dtype == np.float64:
+        return array
+    if array.dtype.kind not in "fiu" and not (array.dtype == object and all(map(_is_real, array.flat))):
+        raise KindError(f"{what}: expected numbers, got {shown(value)}")
+    try:
+        with np.errstate(over="ignore"):  # what becomes infinite is refused
+            return array.astype(np.float64)
+    except (OverflowError, TypeError, ValueError) as error:
+        raise InvalidValueError(f"{what}: expected numbers no larger than {_ANY:.3g}, got {shown(value)}") from error
+
+
+def _is_real(entry: object) -> bool:
+    """Whether an object is a real number, such as a fraction; a truth value is none."""
+    return isinstance(entry, Real | Decimal) and not isinstance(entry, bool)

@@ -8,10 +8,16 @@ from pathlib import Path
 
 # Glyphs that a scan, a listing or a tired eye takes for one another.
 _CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "B": "8"})
+# Of a value that is not what was expected, a message shows this many characters.
+_LONGEST_SHOWN = 60
 
 
 class ArmwrightError(Exception):
     """The caller asked for something that cannot be; the text says what and what to do."""
+
+
+class KindError(ArmwrightError, TypeError):
+    """A value is of the wrong kind: a text where numbers belong, a name where an arm does."""
 
 
 class ShapeError(ArmwrightError, ValueError):
@@ -25,9 +31,9 @@ class InvalidValueError(ArmwrightError, ValueError):
 class UnknownNameError(ArmwrightError, LookupError):
     """A name stands for nothing; the text lists what there is."""
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         """Say that no ``kind`` is called ``name``, and what is known instead."""
-        choices = sorted(known)
+        name, choices = str(name), sorted(known)
         near = closest(name, choices)
         hint = f" Did you mean '{near}'?" if near else ""
         listing = f" Known: {', '.join(choices)}." if choices else " There is none."
@@ -48,8 +54,39 @@ class UnsupportedArmError(ArmwrightError, ValueError):
     """The method does not fit this arm."""
 
 
+class MissingExtraError(ArmwrightError, ImportError):
+    """Something needs a library that the core does not install; the text says how to get it."""
+
+
 class OutputError(ArmwrightError, OSError):
     """A result could not be written; nothing half-written was left behind."""
+
+
+class UnitWarning(UserWarning):
+    """A number looks as if it were in another unit: degrees where radians belong."""
+
+
+def one_of(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return ``name`` if it is one of those known.
+
+    Args:
+        kind: what is named, as a message calls it.
+        name: what was asked for.
+        known: what there is.
+
+    Raises:
+        UnknownNameError: there is nothing of that name; the nearest is told.
+    """
+    choices = tuple(known)
+    if not isinstance(name, str) or name not in choices:
+        raise UnknownNameError(kind, name, choices)
+    return name
+
+
+def shown(value: object) -> str:
+    """Write a value for a message: on one line, not too long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
 
 
 def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:

@@ -159,7 +159,10 @@ def test_json(tmp_path: Path) -> None:
     assert (arm.name, arm.title, arm.joints[0].d) == ("arm", "one", 0.25)
 
 
-NO_BODY = " kg m² about its centre of mass; check inertia_about and com"
+NO_BODY = (
+    " kg m² about its centre of mass: none may be negative, or larger than the other two together; "
+    "check inertia_about and com"
+)
 MISTAKES = {
     "no joint": ("title = 'x'\n", " joint: missing, expected one or more tables [[joint]]"),
     "no kind": ("\n[[joint]]\nd_m = 1\n", "2: joint 1, kind: missing, expected one of prismatic, revolute"),

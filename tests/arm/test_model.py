@@ -1,6 +1,11 @@
 """The model of an arm: it never changes, and refuses what no arm can be."""
 
+import copy
 import math
+import pickle
+from collections.abc import Callable
+from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import attrs
@@ -9,7 +14,8 @@ import pytest
 
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, exact_cosine, exact_sine
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.dynamics.payload import payload
+from armwright.errors import InvalidValueError, KindError, ShapeError
 from oracles.arms import random_arm
 
 
@@ -23,6 +29,10 @@ def arrays_of(thing: Any) -> list[np.ndarray]:
         if (attrs.has(type(thing)))
         else []
     )
+
+
+def parts_of(arm: Arm) -> list[object]:
+    return [*arm.joints, *arm.links, *arm.motors]
 
 
 @pytest.mark.parametrize("name", arm_names())
@@ -71,6 +81,64 @@ def test_equal_arms(rng: np.random.Generator) -> None:
     assert attrs.evolve(arm, links=[*arm.links[:2], heavier]) != arm
 
 
+@pytest.mark.parametrize("name", arm_names())
+def test_equal_arms_hash_equal(name: str) -> None:
+    """An arm is a key: one that is read again finds what was kept for the first, a heavier one does not."""
+    arm, again = load_arm(name), load_arm(name)
+    heavier = attrs.evolve(arm, links=[*arm.links[:-1], attrs.evolve(arm.links[-1], mass=arm.links[-1].mass + 1)])
+    asked = []
+
+    @lru_cache
+    def answer(one: Arm) -> int:
+        asked.append(one)
+        return one.n
+
+    assert {arm: "kept"}[again] == "kept"
+    assert heavier not in {arm: "kept"}
+    assert (answer(arm), answer(again), answer(heavier)) == (arm.n,) * 3
+    assert asked == [arm, heavier]
+    for part, same in zip(
+        (*arm.joints, *arm.links, *arm.motors), (*again.joints, *again.links, *again.motors), strict=True
+    ):
+        assert hash(part) == hash(same)
+
+
+def test_nought_has_no_sign() -> None:
+    """0 and -0 are one number: arms that differ in nothing else are equal and hash equal."""
+    plus, minus = (Arm(name="one", joints=ONE, gravity=[zero, zero, -9.8]) for zero in (0.0, -0.0))
+
+    assert plus == minus
+    assert hash(plus) == hash(minus)
+    assert Link(com=[0.0, 0.0, 1.0]) == Link(com=[-0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda arm: pickle.loads(pickle.dumps(arm))])
+def test_copies(copied: Callable[[Any], Any], rng: np.random.Generator) -> None:
+    """A copy, in this process or another one, is equal to the arm, hashes equal, and cannot be changed either."""
+    for arm in (load_arm("puma560"), random_arm(rng, 3)):
+        hash(arm)  # what is kept of it must not go with the copy
+
+        twin = copied(arm)
+
+        assert twin == arm
+        assert hash(twin) == hash(arm)
+        assert all(not array.flags.writeable for array in arrays_of(twin))
+
+
+def test_shown_in_a_line() -> None:
+    """An arm shows itself by name, number and kinds of its joints, and not by its tables."""
+    assert repr(load_arm("stanford")) == "<Arm 'stanford': 6 joints, RRPRRR>"
+    assert repr(Arm(name="one", joints=ONE)) == "<Arm 'one': 1 joint, R>"
+
+
+def test_numbers_of_any_kind() -> None:
+    """Whole numbers, fractions and NumPy's numbers are made plain numbers."""
+    joint = Joint(kind="revolute", d=1, a=np.float32(0.5), theta=Fraction(1, 4), limits=Limits(upper=np.int64(3)))
+
+    assert [type(x) for x in (joint.d, joint.a, joint.theta, joint.limits.upper)] == [float] * 4
+    assert joint == Joint(kind="revolute", d=1.0, a=0.5, theta=0.25, limits=Limits(upper=3.0))
+
+
 def test_an_arm_of_geometry_alone() -> None:
     """Without links and drives an arm has massless ones, hangs upright and is limited by nothing."""
     arm = Arm(name="bare", joints=(Joint(kind="revolute") for _ in range(2)))
@@ -117,12 +185,46 @@ REFUSED = {
     "mass that is no number": (lambda: Link(mass=math.nan), "link: mass must be 0 or more, got nan"),
     "endless mass": (lambda: Link(mass=math.inf), "link: mass must be 0 or more, got inf"),
     "asymmetric tensor": (lambda: Link(inertia=ASYMMETRIC), "inertia: expected a symmetric tensor"),
+    "a moment above the two others together": (
+        lambda: Link(mass=2, inertia=np.diag([1, 1, 3])),
+        (
+            "link of 2 kg: no body has the principal moments 1, 1, 3 kg m² of its inertia [[1.0, 0.0, 0.0], "
+            "[0.0, 1.0, 0.0], [0.0, 0.0, 3.0]]: none may be negative, or larger than the other two together. Give the "
+            "tensor about the centre of mass"
+        ),
+    ),
+    "a moment below none": (
+        lambda: Link(mass=2, inertia=[[1, 2, 0], [2, 1, 0], [0, 0, 1]]),
+        "no body has the principal moments -1, 1, 3 kg m² of its inertia",
+    ),
+    "a tensor beyond measure": (lambda: Link(inertia=1e200 * np.eye(3)), "inertia: expected numbers no larger than"),
+    "mass beyond measure": (lambda: Link(mass=1e200), "link: mass must not be larger than 1e+100, got 1e+200"),
+    "mass in words": (lambda: Link(mass="2 kg"), "link: mass: expected a number, got '2 kg'"),  # type: ignore[arg-type]
+    "a joint in words": (
+        lambda: Arm(name="one", joints=["revolute"]),  # type: ignore[list-item]
+        "joints: expected each to be a Joint, got 'revolute' as number 1",
+    ),
+    "one joint, and no list of it": (
+        lambda: Arm(name="one", joints=ONE[0]),  # type: ignore[arg-type]
+        "joints: expected a list of Joint, got Joint(kind='revolute'",
+    ),
+    "limits in numbers": (
+        lambda: Joint(kind="revolute", limits=(-1, 1)),  # type: ignore[arg-type]
+        "joint: expected limits to be Limits, got (-1, 1)",
+    ),
+    "a hand that reaches nowhere": (
+        lambda: Arm(name="one", joints=ONE, reach=0),
+        "arm 'one': reach must be above 0, got 0",
+    ),
     "a tensor of two axes": (
         lambda: Link(inertia=np.eye(2)),
         r"inertia: expected a shape ending in (3, 3), got (2, 2)",
     ),
-    "a centre of mass in a plane": (lambda: Link(com=[0, 0]), "vector: expected a shape ending in (3,), got (2,)"),
-    "a centre of mass nowhere": (lambda: Link(com=[0, 0, math.nan]), "vector: every number must be finite, got nan"),
+    "a centre of mass in a plane": (lambda: Link(com=[0, 0]), "com: expected a shape ending in (3,), got (2,)"),
+    "a centre of mass nowhere": (
+        lambda: Link(com=[0, 0, math.nan]),
+        "com: every number must be finite, got nan at (2,)",
+    ),
     "a motor that pushes itself": (lambda: Motor(viscous=-0.1), "motor: viscous must be 0 or more, got -0.1"),
     "an endless rotor": (lambda: Motor(inertia=math.inf), "motor: inertia must be 0 or more, got inf"),
     "no joints": (lambda: Arm(name="none", joints=[]), "arm 'none': expected at least one joint"),
@@ -133,11 +235,11 @@ REFUSED = {
     "no link for one joint": (lambda: Arm(name="one", joints=ONE, links=[]), "arm 'one': 1 joints but 0 links"),
     "a base that is no pose": (
         lambda: Arm(name="one", joints=ONE, base=2 * np.eye(4)),
-        "pose: expected a rotation, a place and the row 0 0 0 1",
+        "base: expected a rotation, a place and the row 0 0 0 1",
     ),
     "a tool of three rows": (
         lambda: Arm(name="one", joints=ONE, tool=np.eye(4)[:3]),
-        "pose: expected a shape ending in (4, 4), got (3, 4)",
+        "tool: expected a shape ending in (4, 4), got (3, 4)",
     ),
 }
 
@@ -147,7 +249,29 @@ def test_what_no_arm_can_be(what: str) -> None:
     """What cannot be is refused when the arm is built, and the message says what and what was got."""
     build, message = REFUSED[what]
 
-    with pytest.raises((InvalidValueError, ShapeError)) as caught:
+    with pytest.raises((InvalidValueError, KindError, ShapeError)) as caught:
         build()
 
     assert message in str(caught.value)
+
+
+def test_moments_that_are_not_known() -> None:
+    """A single known moment is let pass, and so is a tensor whose other moments are said not to be known."""
+    assert Link(inertia=np.diag([0, 0, 0.35])).complete
+    assert not Link(mass=1, inertia=np.diag([0.1, 0.1, 0.35]), complete=False).complete
+
+
+def test_load_on_a_hand_of_one_moment() -> None:
+    """A hand of which one moment is known carries a load; the sum of the two need not be a tensor that a body has."""
+    hand = Arm(name="wheel", joints=ONE, links=[Link(mass=1, inertia=np.diag([0, 0, 0.35]))])
+
+    loaded = payload(hand, 1.0, (0, 0, 0), 0.01 * np.eye(3))
+
+    np.testing.assert_allclose(loaded.links[0].inertia, np.diag([0.01, 0.01, 0.36]), atol=1e-15)
+    assert pickle.loads(pickle.dumps(loaded)) == loaded
+
+
+def test_massless_parts() -> None:
+    """A part that weighs nothing is a part: a joint between two links, a rod in a sketch."""
+    assert Link(mass=0).mass == 0
+    assert Arm(name="one", joints=ONE, links=[Link(mass=0)]).links == (Link(),)

@@ -39,13 +39,6 @@ def test_catalogue_against_pinocchio(name: str, rng: np.random.Generator) -> Non
     _compare(load_arm(name), rng)
 
 
-@pytest.mark.parametrize("joints", range(1, 9))
-def test_random_arms_against_pinocchio(joints: int, rng: np.random.Generator) -> None:
-    """Pinocchio agrees on arms with any mix of joints, products of inertia, any base and gravity."""
-    for _ in range(3):
-        _compare(random_arm(rng, joints), rng)
-
-
 def test_there_and_back(rng: np.random.Generator) -> None:
     """The efforts of a motion give its accelerations back: friction, rotors and a push on the tool included."""
     arm = load_arm("puma560")

@@ -38,13 +38,6 @@ def test_catalogue_against_newton_euler(name: str, rng: np.random.Generator) -> 
     _compare(load_arm(name), rng)
 
 
-@pytest.mark.parametrize("joints", range(1, 9))
-def test_random_arms_against_newton_euler(joints: int, rng: np.random.Generator) -> None:
-    """They agree on arms with any mix of joints, products of inertia, any base and gravity."""
-    for _ in range(2):
-        _compare(random_arm(rng, joints), rng)
-
-
 def test_pose_derivatives_are_derivatives(rng: np.random.Generator) -> None:
     """U_ij and U_ijk are what small steps in the joints make of the pose of link i."""
     arm = random_arm(rng, 4)
@@ -84,20 +77,6 @@ def test_pseudo_inertia_has_the_products(rng: np.random.Generator) -> None:
 
     lever = link.com @ link.com * np.eye(3) - np.outer(link.com, link.com)
     np.testing.assert_allclose(tensor, link.inertia + link.mass * lever, atol=1e-14)
-
-
-def test_skew_symmetry(rng: np.random.Generator) -> None:
-    """dM/dt - 2 C is skew, so centrifugal and Coriolis efforts do no work beyond what the mass matrix stores."""
-    step = 1e-5
-    for joints in (2, 4, 6):
-        arm = random_arm(rng, joints)
-        q, qd = rng.normal(size=(2, joints))
-        change = (mass_matrix(arm, q + step * qd) - mass_matrix(arm, q - step * qd)) / (2 * step)
-
-        S = change - 2 * coriolis_matrix(arm, q, qd)
-
-        np.testing.assert_allclose(S, -S.T, atol=1e-7 * np.abs(change).max())
-        assert np.abs(change).max() > 0.1
 
 
 def test_skew_symmetry_exactly(rng: np.random.Generator) -> None:

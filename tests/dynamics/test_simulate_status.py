@@ -88,7 +88,7 @@ def test_what_cannot_be_simulated() -> None:
         simulate(hoist, [1.0], duration=1.0, brakes=[Brake(joint=1)])
     with pytest.raises(InvalidValueError, match="brake: start 2 must be 0 or later, and before end 1"):
         Brake(joint=0, start=2, end=1)
-    with pytest.raises(ShapeError, match=r"efforts of the controller: expected a shape ending in \(1,\), got \(2,\)"):
+    with pytest.raises(ShapeError, match=r"efforts of the controller at 0 s: expected shape \(1,\), got \(2,\)"):
         simulate(hoist, [1.0], duration=1.0, controller=lambda _t, _q, _qd: np.zeros(2))
     with pytest.raises(UnsupportedArmError, match="joint 1"):
         simulate(Arm(name="rail", joints=[Joint(kind="prismatic")]), [0.0], duration=1.0)

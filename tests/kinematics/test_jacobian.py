@@ -44,13 +44,6 @@ def test_rate_of_catalogue_arms_against_pinocchio(name: str, rng: np.random.Gene
     _against_pinocchio(load_arm(name), rng)
 
 
-@pytest.mark.parametrize("joints", range(1, 9))
-def test_rate_of_random_arms_against_pinocchio(joints: int, rng: np.random.Generator) -> None:
-    """Pinocchio agrees on arms with any mix of joints, skew axes, any base and tool."""
-    for _ in range(5):
-        _against_pinocchio(random_arm(rng, joints), rng)
-
-
 @pytest.mark.parametrize("frame", ["base", "tool"])
 def test_rate_is_the_slope_of_the_jacobian(frame: Axes, rng: np.random.Generator) -> None:
     """Along a motion the Jacobian changes by its rate times the time, to second order."""

@@ -1,5 +1,6 @@
 """Arms to test with: random ones of every kind of joint."""
 
+import attrs
 import numpy as np
 
 from armwright.arm.model import Arm, Joint, Limits, Link, Motor
@@ -44,6 +45,24 @@ def random_arm(rng: np.random.Generator, joints: int) -> Arm:
         base=random_pose(rng),
         tool=random_pose(rng),
         gravity=rng.normal(scale=9, size=3),
+    )
+
+
+def squared(arm: Arm, rng: np.random.Generator) -> Arm:
+    """The arm with the geometry that builders like: right angles, and lengths that are often nothing."""
+    quarter = np.pi / 2
+    return attrs.evolve(
+        arm,
+        joints=[
+            attrs.evolve(
+                joint,
+                theta=quarter * rng.integers(-2, 3),
+                d=joint.d * rng.integers(0, 2),
+                a=joint.a * rng.integers(0, 2),
+                alpha=quarter * rng.integers(-2, 3),
+            )
+            for joint in arm.joints
+        ],
     )
 
 

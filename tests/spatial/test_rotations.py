@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from armwright.errors import ShapeError
+from armwright.errors import KindError, ShapeError
 from armwright.spatial.poses import between, from_noap, inverse, pose, to_noap
 from armwright.spatial.rotations import (
     angle_between,
@@ -98,5 +98,5 @@ def test_shape_is_checked() -> None:
     """Three numbers are no pose."""
     with pytest.raises(ShapeError, match=r"pose: expected a shape ending in \(4, 4\), got \(3,\)"):
         inverse(np.zeros(3))
-    with pytest.raises(ShapeError, match="expected numbers"):
+    with pytest.raises(KindError, match="rotation: expected numbers, got 'abc'"):
         pose("abc", np.zeros(3))

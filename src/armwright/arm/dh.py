@@ -54,7 +54,7 @@ def from_modified(joints: Sequence[Joint], links: Sequence[Link]) -> tuple[Array
 def carry(link: Link, X_NM: Array) -> Link:
     """Describe a link of frame M in frame N instead, X_NM (4, 4) being the pose of M seen from N."""
     R, p = X_NM[:3, :3], X_NM[:3, 3]
-    return Link(mass=link.mass, com=R @ link.com + p, inertia=R @ link.inertia @ R.T)
+    return Link(mass=link.mass, com=R @ link.com + p, inertia=R @ link.inertia @ R.T, complete=link.complete)
 
 
 def about_com(inertia: Array, mass: float, com: Array) -> Array:

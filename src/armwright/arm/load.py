@@ -1,4 +1,4 @@
-"""Arms from TOML files: the catalogue by name, any other by path."""
+"""Arms from files: the catalogue by name, any other by path."""
 
 import math
 from pathlib import Path
@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from armwright.arm.dh import about_com, from_modified, turn
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arm.urdf.reader import load_urdf
 from armwright.arrays import Array
-from armwright.errors import UnknownNameError
+from armwright.errors import KindError, UnknownNameError, shown
 from armwright.files.document import Document, Table
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
@@ -17,11 +18,10 @@ _CATALOGUE = Path(__file__).parent / "catalogue"
 # Keys carry their unit: factors to SI by the ending of the key.
 _ANGLE = {"deg": math.pi / 180, "rad": 1.0}
 _LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-# Published tensors are measured and rounded: the triangle inequality may be broken by this part of the trace. The worst
-# of the catalogue is link 3 of the PUMA 560, 0.066 + 0.0125 against 0.086 kg m², which is 0.046 of its trace.
-_TENSOR_ROUNDING = 0.05
-# Rotations typed with two digits are off by up to 0.018; they are made exact. More is a mistake.
+# Rotations typed with two digits are off by up to 0.018; they are made exact. More is a mistake. Those that are
+# computed are off by rounding, and are kept as they are.
 _TYPED_ROTATION = 2e-2
+_COMPUTED_ROTATION = 1e-12
 
 
 def arm_names() -> tuple[str, ...]:
@@ -33,14 +33,18 @@ def load_arm(name: str | Path) -> Arm:
     """Return an arm by its name in the catalogue, or from a file.
 
     Args:
-        name: such as ``puma560``; something with a slash or ending in .toml or .json is a path.
+        name: such as ``puma560``; something with a slash or ending in .toml, .json or .urdf is a path.
 
     Raises:
+        MissingExtraError: the file is URDF, and lxml is not installed.
+        KindError: the name is neither a text nor a path.
         UnknownNameError: the catalogue has no such arm; the nearest is named.
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
     """
+    if not isinstance(name, str | Path):
+        raise KindError(f"name: expected the name of an arm or the path of a file, got {shown(name)}")
     if is_path(name):
-        return read_arm(name)
+        return load_urdf(name) if Path(name).suffix.lower() == ".urdf" else read_arm(name)
     if name not in arm_names():
         raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")
@@ -48,7 +52,7 @@ def load_arm(name: str | Path) -> Arm:
 
 def is_path(name: str | Path) -> bool:
     """Whether a name means a file and not an arm of the catalogue."""
-    return isinstance(name, Path) or "/" in name or name.lower().endswith((".toml", ".json"))
+    return isinstance(name, Path) or "/" in name or name.lower().endswith((".toml", ".json", ".urdf"))
 
 
 def read_arm(path: Path | str) -> Arm:
@@ -94,6 +98,20 @@ def read_arm(path: Path | str) -> Arm:
     return arm
 
 
+def read_load(path: Path | str) -> Link:
+    """Read the file of a load in the hand: the keys of a link, in the tool frame.
+
+    Args:
+        path: the file; its format is in docs/arms.md.
+
+    Raises:
+        FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
+    """
+    top = Document.read(path).root
+    top.number("mass_kg")  # a link may go without, a load not
+    return _link(top)
+
+
 def _joint(table: Table) -> Joint:
     kind = table.choice("kind", ("revolute", "prismatic"))
     limits = table.table("limits")
@@ -130,25 +148,15 @@ def _link(table: Table) -> Link:
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if about == "frame":
         inertia = about_com(inertia, mass, com)
-    _require_possible(table, inertia)
-    return Link(mass=mass, com=com, inertia=inertia)
-
-
-def _require_possible(table: Table, inertia: Array) -> None:
-    """Refuse a tensor that no body has: a negative moment, or one larger than the other two together.
-
-    A link of which only one moment is known leaves the others 0; that is allowed, since a tensor with a single
-    moment says nothing about the others.
-    """
-    moments = np.linalg.eigvalsh(inertia)
-    slack = _TENSOR_ROUNDING * np.abs(moments).sum()
-    single = np.count_nonzero(np.abs(moments) > slack) == 1
-    if moments[0] < -slack or (not single and moments[2] > moments[0] + moments[1] + slack):
-        shown = ", ".join(f"{moment:.3g}" for moment in moments)
+    moments = impossible_moments(mass, com, inertia)
+    if moments is not None:
+        said = ", ".join(f"{moment:.3g}" for moment in moments)
         raise table.error(
             "inertia_kgm2",
-            f"no body has the principal moments {shown} kg m² about its centre of mass; check inertia_about and com",
+            f"no body has the principal moments {said} kg m² about its centre of mass: none may be negative, or larger "
+            "than the other two together; check inertia_about and com",
         )
+    return Link(mass=mass, com=com, inertia=inertia)
 
 
 def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
@@ -191,7 +199,7 @@ def _rotation(table: Table) -> Array:
     error = float(orthonormality_error(rows))
     if error > _TYPED_ROTATION:
         raise table.error("rotation", f"expected the rows of a rotation, got a matrix that is off by {error:.2g}")
-    return nearest_rotation(rows)
+    return np.array(rows) if error < _COMPUTED_ROTATION else nearest_rotation(rows)
 
 
 def _written(kind: str, position: float) -> str:

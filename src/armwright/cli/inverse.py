@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     xyz: Annotated[str | None, typer.Option(help="Place of the tool in mm: 400,100,200.", show_default=False)] = None,
-    rpy: Annotated[str, typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees.")] = "0,0,0",
+    rpy: Annotated[
+        str | None,
+        typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees; 0,0,0 when left out.", show_default=False),
+    ] = None,
     noap: Annotated[
         str | None, typer.Option(help="The pose as twelve numbers, columns n, o, a, p in m.", show_default=False)
     ] = None,
@@ -58,7 +61,7 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
         raise typer.Exit(1)
 
 
-def _pose(xyz: str | None, rpy: str, noap: str | None) -> "Array":
+def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
     import numpy as np
 
     from armwright.cli.joints import numbers
@@ -68,9 +71,11 @@ def _pose(xyz: str | None, rpy: str, noap: str | None) -> "Array":
     if (xyz is None) == (noap is None):
         raise typer.BadParameter("give the pose, either as --xyz and --rpy or as --noap", param_hint="--xyz")
     if noap is not None:
+        if rpy is not None:
+            raise typer.BadParameter("the twelve numbers have the turn already", param_hint="--rpy")
         return from_noap(numbers(noap, 12, "--noap"))
     assert xyz is not None  # noqa: S101 - one of the two is given
-    roll, pitch, yaw = np.radians(numbers(rpy, 3, "--rpy"))
+    roll, pitch, yaw = np.radians(numbers("0,0,0" if rpy is None else rpy, 3, "--rpy"))
     turns = [rotation_from_vector(np.array(w)) for w in ((0, 0, yaw), (0, pitch, 0), (roll, 0, 0))]
     return pose(turns[0] @ turns[1] @ turns[2], np.array(numbers(xyz, 3, "--xyz")) * 1e-3)
 

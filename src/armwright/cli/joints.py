@@ -1,6 +1,7 @@
 """Joint values and poses on the command line: degrees and millimetres in, rows of SI files too."""
 
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,16 +16,23 @@ def numbers(text: str, count: int, option: str) -> list[float]:
     """Read numbers apart by commas or blanks.
 
     Raises:
-        BadParameter: it is not ``count`` finite numbers.
+        BadParameter: it is not ``count`` finite numbers, or one is larger than any of a robot.
     """
+    from armwright.arrays import LARGEST
+
     words = text.replace(",", " ").split()
     try:
         values = [float(word) for word in words]
     except ValueError:
         wrong = next(word for word in words if not _is_number(word))
         raise typer.BadParameter(f"expected {count} numbers, got '{wrong}'", param_hint=option) from None
-    if len(values) != count or not all(map(math.isfinite, values)):
+    if len(values) != count:
         raise typer.BadParameter(f"expected {count} finite numbers, got {len(values)}: {text}", param_hint=option)
+    for value, word in zip(values, words, strict=True):
+        if not abs(value) <= LARGEST:  # what is NaN compares with nothing
+            raise typer.BadParameter(
+                f"every number must be finite and no larger than {LARGEST:g}, got {word}", param_hint=option
+            )
     return values
 
 
@@ -45,11 +53,16 @@ def units(arm: "Arm") -> "Array":
 def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     """Read columns such as q1 … qn, qd1 … qdn of a CSV file in SI units, such as motion.csv; others are passed over.
 
+    Args:
+        arm: the arm.
+        path: the file.
+        quantities: what to read; the first are the joint positions.
+
     Returns:
         One array (rows, n) per quantity.
 
     Raises:
-        FileFormatError: the file is missing, a column is missing, or a value is no finite number.
+        FileFormatError: the file, a column or all rows are missing, or a value is no finite number.
     """
     import csv
 
@@ -59,25 +72,44 @@ def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     from armwright.files.document import read_text
 
     reader = csv.reader(read_text(path).splitlines())
-    header = [name.strip() for name in next(reader, [])]
+    try:
+        lines = [(reader.line_num, row) for row in reader if row]
+    except csv.Error as error:
+        raise FileFormatError(path, reader.line_num + 1, "", f"not valid CSV: {error}") from error
+    header = [name.strip() for name in lines[0][1]] if lines else []
     wanted = [f"{quantity}{i + 1}" for quantity in quantities for i in range(arm.n)]
     missing = [name for name in wanted if name not in header]
     if missing:
-        raise FileFormatError(path, 1, missing[0], f"no such column; expected {wanted[0]} to {wanted[-1]}")
+        raise FileFormatError(path, 1, missing[0], f"no such column; expected {wanted[0]} to {wanted[-1]}, with commas")
+    twice = [name for name in wanted if header.count(name) > 1]
+    if twice:
+        raise FileFormatError(path, 1, twice[0], "there are two columns of this name")
     places = [header.index(name) for name in wanted]
     table = []
-    for row in reader:
-        if not row:
-            continue
+    for line, row in lines[1:]:
         try:
             values = [float(row[place]) for place in places]
-        except (ValueError, IndexError) as error:
-            raise FileFormatError(path, reader.line_num, "", f"expected {len(header)} numbers: {error}") from error
+        except IndexError as error:
+            raise FileFormatError(path, line, "", f"expected {len(header)} numbers, got {len(row)}") from error
+        except ValueError as error:
+            raise FileFormatError(path, line, "", f"expected {len(header)} numbers: {error}") from error
         if not all(map(math.isfinite, values)):
-            raise FileFormatError(path, reader.line_num, "", "every number must be finite")
+            raise FileFormatError(path, line, "", "every number must be finite")
         table.append(values)
+    if not table:
+        raise FileFormatError(path, None, "", "no rows below the names of the columns")
     array = np.array(table).reshape(len(table), len(quantities), arm.n)
+    _ask_for_degrees(arm, path, array[:, 0])
     return [array[:, i] for i in range(len(quantities))]
+
+
+def _ask_for_degrees(arm: "Arm", path: Path, q: "Array") -> None:
+    """Say on the error output that the positions (rows, n) of a file look like degrees, if they do."""
+    from armwright.arm.positions import degrees_by_mistake
+
+    found = degrees_by_mistake(arm, q)
+    if found:
+        print(f"armwright: warning: {path}: {found}; the columns of a file are in SI units", file=sys.stderr)
 
 
 def _is_number(word: str) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.forward import ArmName, Json
+from armwright.cli.load import Load
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -40,6 +41,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     drives: Annotated[Drives, typer.Option(help="Off, or holding the arm's weight.")] = Drives.OFF,
     method: Annotated[Method, typer.Option(help="Runge-Kutta-Gill in fixed steps, or adaptive.")] = Method.ADAPTIVE,
     step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and time between rows.")] = 1.0,
+    load: Load = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for motion.csv.")] = None,
     as_json: Json = False,
 ) -> None:
@@ -51,12 +53,17 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
+    from armwright.cli.load import load_in_hand
     from armwright.dynamics.controllers import gravity_compensation, no_effort
     from armwright.dynamics.integrators import Adaptive, Gill
+    from armwright.dynamics.payload import payload
     from armwright.dynamics.simulate import simulate as run
     from armwright.files.output import write_folder
 
     model = load_arm(arm)
+    if load is not None:
+        held = load_in_hand(load)
+        model = payload(model, held.mass, held.com, held.inertia)
     if not 0.001 <= step_ms <= 1000:
         raise typer.BadParameter(f"expected 0.001 to 1000, got {step_ms:g}", param_hint="--step-ms")
     found = run(

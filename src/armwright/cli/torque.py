@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.forward import ArmName, Json
+from armwright.cli.load import Load
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -23,23 +24,37 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     csv: Annotated[
         Path | None, typer.Option("--csv", help="Rows of q, qd and qdd in SI units, such as motion.csv.")
     ] = None,
+    load: Load = None,
+    wrench: Annotated[
+        str | None,
+        typer.Option(
+            "--wrench",
+            help="Force and moment on the tool from outside, along base axes: FX,FY,FZ,MX,MY,MZ in N and N m.",
+            show_default=False,
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Print the efforts of a motion, in all and by cause, as the report's main program did.
 
     Torques in N m, forces of slides in N, positive in the direction of the joint.
 
-    **Example:** `armwright torque stanford-jpl -q 0,90,500,0,45,0 --qdd 60,0,0,0,0,0`
+    **Example:** `armwright torque stanford-jpl -q 0,90,500,0,45,0 --qdd 60,0,0,0,0,0 --load 1.8,0,0,50`
     """
     import json
 
     from armwright.arm.load import load_arm
+    from armwright.arm.model import Link
+    from armwright.cli.joints import numbers
+    from armwright.cli.load import load_in_hand
     from armwright.dynamics.terms import terms
 
     model = load_arm(arm)
+    held = Link() if load is None else load_in_hand(load)
+    push = None if wrench is None else numbers(wrench, 6, "--wrench")
     motion = _motion(model, q, qd, qdd, csv)
     for row in range(len(motion[0])):
-        found = terms(model, *(values[row] for values in motion))
+        found = terms(model, *(values[row] for values in motion), load=held, wrench=push)
         if as_json:
             print(json.dumps({"total": found.total.tolist(), **_causes(found)}))
         else:
@@ -52,10 +67,12 @@ def _motion(model: "Arm", q: str | None, qd: str | None, qdd: str | None, csv: P
     if (q is None) == (csv is None):
         raise typer.BadParameter("give the motion, either as -q, --qd and --qdd or as --csv FILE", param_hint="-q")
     if csv is not None:
+        if qd is not None or qdd is not None:
+            raise typer.BadParameter("a file has its own speeds and accelerations", param_hint="--csv")
         return rows(model, csv, ("q", "qd", "qdd"))
     still = ",".join(["0"] * model.n)
-    texts = (("-q", q or still), ("--qd", qd or still), ("--qdd", qdd or still))
-    return [joint_values(model, text, option)[None] for option, text in texts]
+    texts = (("-q", q), ("--qd", qd), ("--qdd", qdd))
+    return [joint_values(model, still if text is None else text, option)[None] for option, text in texts]
 
 
 def _causes(found: "Terms") -> dict[str, list[float]]:
@@ -69,6 +86,8 @@ def _causes(found: "Terms") -> dict[str, list[float]]:
         "gravity": found.gravity,
         "viscous friction": found.viscous,
         "dry friction": found.dry,
+        "load": found.load,
+        "wrench": found.outside,
     }
     return {name: values.tolist() for name, values in causes.items()}
 
@@ -78,5 +97,5 @@ def _print(model: "Arm", found: "Terms") -> None:
     width = max(map(len, names)) + 2
     print(f"{'':<18}" + "".join(f"{name:>{width}}" for name in names))
     for cause, values in _causes(found).items():
-        print(f"{cause:<18}" + "".join(f"{value + 0.0:>{width}.4f}" for value in values))
-    print(f"{'total':<18}" + "".join(f"{value:>{width}.4f}" for value in found.total))
+        print(f"{cause:<18}" + "".join(f"{round(value, 4) + 0.0:>{width}.4f}" for value in values))
+    print(f"{'total':<18}" + "".join(f"{round(value, 4) + 0.0:>{width}.4f}" for value in found.total.tolist()))

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array, of_shape
+from armwright.arm.positions import known_arm, positions
+from armwright.arrays import LARGEST, Array, ArrayLike, joint_array, of_shape
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.tracing.scalar import Scalar
@@ -23,7 +24,9 @@ class Batch(NamedTuple):
 
 
 def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> Batch:
-    """Check joint arrays and take them apart into scalars.
+    """Check joint arrays and take them apart into scalars; joint positions are those that are called ``q``.
+
+    The public function whose arguments they are calls this itself.
 
     Args:
         arm: the arm, with n joints.
@@ -34,10 +37,18 @@ def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> 
         The scalars, in the order of the arguments.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
+
+    Warns:
+        UnitWarning: the positions look like degrees.
     """
-    checked = [joint_array(value, arm.n, name) for name, value in arrays.items()]
-    outside = None if wrench is None else of_shape(wrench, (6,), "wrench")
+    n = known_arm(arm).n
+    checked: list[Array] = []
+    for name, value in arrays.items():
+        checked.append(positions(arm, value, callers=2) if name == "q" else joint_array(value, n, name))
+    outside = None if wrench is None else of_shape(wrench, (6,), "wrench", LARGEST)
     everything = [*checked, *([] if outside is None else [outside])]
     try:
         lead = np.broadcast_shapes(*(array.shape[:-1] for array in everything))

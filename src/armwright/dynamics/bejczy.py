@@ -11,12 +11,14 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import STANDARD_GRAVITY, Arm
+from armwright.arm.positions import known_arm, positions
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.dynamics.bodies import body_of, shifted
 from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.shares import gravity_efforts
-from armwright.errors import UnsupportedArmError
+from armwright.errors import ShapeError, UnsupportedArmError
 from armwright.kinematics.forward import per_joint, stack
+from armwright.kinematics.jacobian import together
 from armwright.tracing.scalar import Scalar, cos, sin
 
 _KINDS = [True, True, False, True, True, True]  # which joints of a Stanford arm turn
@@ -141,14 +143,16 @@ def bejczy_efforts(
         tau: (..., 6) torques [N m], the third a force [N].
 
     Raises:
-        ShapeError: a last axis is not 6 long.
+        KindError: an array is something else than real numbers.
+        ShapeError: a last axis is not 6 long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008, appendix III; Bejczy (1974).
     """
-    positions, accelerations = joint_array(q, 6), joint_array(qdd, 6, "qdd")
-    lead = np.broadcast_shapes(positions.shape[:-1], accelerations.shape[:-1])
-    q_, qdd_ = per_joint(positions), per_joint(accelerations)
+    postures, accelerations = together(joint_array(q, 6), joint_array(qdd, 6, "qdd"), "q", "qdd")
+    lead = postures.shape[:-1]
+    q_, qdd_ = per_joint(postures), per_joint(accelerations)
     holding = bejczy_gravity(coefficients, q_, gravity)
     moving = [D * a for D, a in zip(bejczy_inertias(coefficients, q_), qdd_, strict=True)]
     return stack([a + b for a, b in zip(moving, holding, strict=True)], lead)
@@ -166,12 +170,16 @@ def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
         q: (m, 6) postures to fit to.
 
     Raises:
-        ShapeError: the last axis of ``q`` is not 6 long.
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
+        ShapeError: ``q`` is not (m, 6), or has fewer postures than there are constants.
+        InvalidValueError: a number is NaN or infinite.
         UnsupportedArmError: the arm has other joints than a Stanford arm.
     """
-    if [joint.revolute for joint in arm.joints] != _KINDS:
+    if [joint.revolute for joint in known_arm(arm).joints] != _KINDS:
         raise UnsupportedArmError(f"arm '{arm.name}' is no Stanford arm: of six joints, the third alone must slide")
-    q = joint_array(q, 6)
+    q = positions(arm, q)
+    if q.ndim != 2 or len(q) < len(attrs.fields(Coefficients)):
+        raise ShapeError(f"q: expected (m, 6) postures, as many as there are constants to fit or more, got {q.shape}")
     D = np.diagonal(mass_matrix(arm, q), axis1=-2, axis2=-1).T
     G = gravity_efforts(arm, q).T / arm.gravity[2]
     carried = sum(link.mass for link in arm.links[2:])

@@ -58,9 +58,13 @@ def welded(a: Body, b: Body) -> Body:
 
 
 def as_link(body: Body) -> Link:
-    """Return a body of floats as a link: centre of mass, and the tensor about it."""
+    """Return a body of floats as a link: centre of mass, and the tensor about it.
+
+    It is not asked for a tensor that a body can have: moments unknown of a part are unknown of the whole, and of a
+    point mass rounding leaves anything.
+    """
     if body.mass == 0:
-        return Link(inertia=body.tensor)
+        return Link(inertia=body.tensor, complete=False)
     com = scale(1 / body.mass, body.moment)
     about_com = shifted(body, scale(-1.0, com))
-    return Link(mass=body.mass, com=com, inertia=about_com.tensor)
+    return Link(mass=body.mass, com=com, inertia=about_com.tensor, complete=False)

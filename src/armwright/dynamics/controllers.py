@@ -6,10 +6,11 @@ from typing import Protocol, TypeAlias
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.arm.positions import known_arm
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, joint_array
 from armwright.dynamics.newton_euler import dry_friction, newton_euler
 from armwright.dynamics.shares import gravity_shares
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, ShapeError
 
 # Where the arm should be: (n,) positions at a time, or their derivative of an order 1 or 2. A trajectory is one.
 Reference: TypeAlias = Callable[[float, int], Array]
@@ -32,7 +33,7 @@ class Controller(Protocol):
 
 def standing(q: ArrayLike) -> Reference:
     """Return the reference of an arm that should stay at q (n,)."""
-    place = np.array(q, dtype=np.float64)
+    place = floats(q, "q", LARGEST)
     place.setflags(write=False)
     zero = np.zeros_like(place)
     return lambda _t, order: zero if order else place
@@ -40,12 +41,13 @@ def standing(q: ArrayLike) -> Reference:
 
 def no_effort(arm: Arm) -> Controller:
     """Return the controller of an arm whose drives are off."""
-    zero = np.zeros(arm.n)
+    zero = np.zeros(known_arm(arm).n)
     return lambda _t, _q, _qd: zero
 
 
 def gravity_compensation(arm: Arm) -> Controller:
     """Return a controller that carries the weight of the arm and does nothing else."""
+    known_arm(arm)
     return lambda _t, q, _qd: np.array(gravity_shares(arm, q.tolist()))
 
 
@@ -121,7 +123,11 @@ def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
 
 
 def _gains(arm: Arm, value: ArrayLike, name: str) -> Array:
-    gains = joint_array(np.broadcast_to(value, (arm.n,)) if np.ndim(value) == 0 else value, arm.n, name)
+    n = known_arm(arm).n
+    given = floats(value, name, LARGEST)
+    gains = joint_array(np.broadcast_to(given, (n,)) if given.ndim == 0 else given, n, name)
+    if gains.ndim != 1:
+        raise ShapeError(f"{name}: expected one gain per joint, shape ({n},), got {gains.shape}")
     if (gains < 0).any():
         raise InvalidValueError(f"{name}: expected 0 or more for every joint, got {gains.tolist()}")
     return gains

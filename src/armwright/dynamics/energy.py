@@ -60,7 +60,9 @@ def kinetic_energy(arm: Arm, q: ArrayLike, qd: ArrayLike, *, drives: bool = True
         (...) energy [J].
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008 eq. (8).
@@ -84,7 +86,9 @@ def potential_energy(arm: Arm, q: ArrayLike) -> Array:
         (...) energy [J].
 
     Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008 eq. (10).

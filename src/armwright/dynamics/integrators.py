@@ -11,8 +11,8 @@ from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args
 import attrs
 import numpy as np
 
-from armwright.arrays import Array
-from armwright.errors import InvalidValueError, UnknownNameError
+from armwright.arrays import Array, number
+from armwright.errors import InvalidValueError, one_of
 
 # The derivative of the state y at time t.
 Slope: TypeAlias = Callable[[float, Array], Array]
@@ -68,7 +68,7 @@ class Gill:
 
     def __attrs_post_init__(self) -> None:
         """Refuse steps that lead nowhere."""
-        if not 0 < self.length < math.inf:
+        if not 0 < number(self.length, "Gill: length") < math.inf:
             raise InvalidValueError(f"Gill: expected a step length above 0 s, got {self.length}")
 
     def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
@@ -136,10 +136,9 @@ class Adaptive:
 
     def __attrs_post_init__(self) -> None:
         """Refuse what SciPy does not know, and tolerances that nothing meets."""
-        if self.method not in get_args(Method):
-            raise UnknownNameError("method", self.method, get_args(Method))
+        one_of("method", self.method, get_args(Method))
         for name in ("rtol", "atol", "longest"):
-            if not getattr(self, name) > 0:
+            if not number(getattr(self, name), f"Adaptive: {name}") > 0:
                 raise InvalidValueError(f"Adaptive: {name} must be above 0, got {getattr(self, name)}")
 
     def begin(self, slope: Slope, t: float, y: Array, end: float) -> Stepper:
@@ -153,13 +152,27 @@ class _AdaptiveStepper:
     def __init__(self, how: Adaptive, slope: Slope, t: float, y: Array, end: float) -> None:
         from scipy import integrate  # noqa: PLC0415 - SciPy takes longer to import than all else
 
+        self._lost = False
+
+        def watched(t: float, y: Array) -> Array:
+            found = slope(t, y)
+            self._lost |= not np.isfinite(found).all()
+            return found
+
         solver = getattr(integrate, how.method)
-        self._solver = solver(slope, t, y, end, rtol=how.rtol, atol=how.atol, max_step=how.longest)
+        self._solver = solver(watched, t, y, end, rtol=how.rtol, atol=how.atol, max_step=how.longest)
 
     def step(self) -> Step | None:
         solver = self._solver
         start = float(solver.t)
-        if solver.step() is not None or solver.status == "failed":
+        try:
+            failed = solver.step() is not None or solver.status == "failed"
+        except ValueError:
+            # The implicit methods stumble over a slope that is no number.
+            if not self._lost:
+                raise
+            failed = True
+        if failed:
             return None
         return Step(start=start, end=float(solver.t), state=solver.y.copy(), between=solver.dense_output())
 

@@ -196,7 +196,9 @@ def coriolis_tensor(arm: Arm, q: ArrayLike) -> Array:
         h: (..., n, n, n); effort i is the sum of h[i, j, k] qd[j] qd[k].
 
     Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008 eq. (15).
@@ -220,7 +222,9 @@ def coriolis_matrix(arm: Arm, q: ArrayLike, qd: ArrayLike) -> Array:
         C: (..., n, n).
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008 eq. (15); Spong, Hutchinson & Vidyasagar (2006), section 7.2.

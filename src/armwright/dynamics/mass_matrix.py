@@ -56,7 +56,9 @@ def mass_matrix(arm: Arm, q: ArrayLike, *, drives: bool = True) -> Array:
         M: (..., n, n), symmetric; [kg m²], [kg m] or [kg] by the kinds of the two joints.
 
     Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         Walker & Orin (1982), method 3; TR-83-008 eq. (14).

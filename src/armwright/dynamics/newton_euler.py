@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from armwright.arm.model import Arm, Joint, Motor
-from armwright.arrays import Array, ArrayLike, exactly
+from armwright.arrays import LARGEST, Array, ArrayLike, exactly
 from armwright.dynamics.arguments import NO_WRENCH, batch
 from armwright.kinematics.forward import link_frames, link_transform, stack
 from armwright.tracing.scalar import Scalar, select
@@ -159,13 +159,15 @@ def inverse_dynamics(
         tau: (..., n) torques [N m] or forces [N], positive in the direction of q.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25).
     """
     lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
-    moved = exactly(base_acceleration, (3,), "base_acceleration").tolist()
+    moved = exactly(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
     efforts = newton_euler(arm, q_, qd_, qdd_, push, base_acceleration=moved)
     if drives:
         efforts = [

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm, Link
+from armwright.arm.positions import known_arm
 from armwright.arrays import ArrayLike
 from armwright.dynamics.bodies import as_link, body_of, seen_from_before, welded
 
@@ -23,13 +24,14 @@ def payload(arm: Arm, mass: float, com: ArrayLike = (0.0, 0.0, 0.0), inertia: Ar
         The same arm whose last link is one body with the load.
 
     Raises:
-        InvalidValueError: the mass is negative, or the tensor is not symmetric.
+        KindError: ``arm`` is no arm, or an argument something else than real numbers.
+        InvalidValueError: the mass is negative, a number is not finite, or no body has the tensor.
         ShapeError: ``com`` or ``inertia`` have another shape.
 
     Source:
         TR-83-008, appendix II (4).
     """
     load = Link(mass=mass, com=com, inertia=inertia)
-    R, p = arm.tool[:3, :3].tolist(), arm.tool[:3, 3].tolist()
+    R, p = known_arm(arm).tool[:3, :3].tolist(), arm.tool[:3, 3].tolist()
     last = welded(body_of(arm.links[-1]), seen_from_before(body_of(load), R, p))
     return attrs.evolve(arm, links=(*arm.links[:-1], as_link(last)))

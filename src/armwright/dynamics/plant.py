@@ -9,13 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.dynamics.compiled import CompiledArm, compile_arm
 from armwright.dynamics.controllers import Controller
 from armwright.dynamics.settle import settle
 from armwright.dynamics.simulation import Brake, JointState
-
-Flags = npt.NDArray[np.bool_]
 
 # A speed and a distance that are nothing [rad/s, m/s, rad, m]. Events are found to within them.
 STILL = 1e-11

@@ -32,7 +32,9 @@ def gravity_efforts(arm: Arm, q: ArrayLike) -> Array:
         G: (..., n) torques [N m] or forces [N], positive in the direction of q.
 
     Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008 eq. (16), by (17)-(25) at rest.
@@ -53,7 +55,9 @@ def coriolis_efforts(arm: Arm, q: ArrayLike, qd: ArrayLike) -> Array:
         H: (..., n) torques [N m] or forces [N], positive in the direction of q.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008 eq. (15), by (17)-(25) without acceleration and gravity.

@@ -15,7 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, exactly
+from armwright.arm.positions import one_posture
+from armwright.arrays import Array, ArrayLike, exactly, number, one_per_joint
 from armwright.dynamics.controllers import Controller, no_effort
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.forward_dynamics import check_pivots, eliminated
@@ -23,13 +24,17 @@ from armwright.dynamics.integrators import Gill, Integrator, Slope, Step, first_
 from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.plant import Moment, Phase, Plant, Start
 from armwright.dynamics.simulation import Brake, Event, JointState, Simulation, Status
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 
 # So many events within so short a time [s] are an entanglement.
 _ENTANGLED = 50
 _INSTANT = 1e-9
 # Part of a period that rounding may shift a sample by.
 _CRUMB = 1e-9
+# More moments than this are no result that anybody looks at, and fill the memory.
+_MOMENTS = 10**7
+# No position or speed of a robot is as large; squares of such numbers are still numbers.
+_LOST = 1e50
 
 
 def simulate(
@@ -63,23 +68,29 @@ def simulate(
         The motion. When something goes wrong on the way, its status says what, and it ends there.
 
     Raises:
-        ShapeError: ``q`` or ``qd`` are not n long.
-        InvalidValueError: the arm starts outside its stops, a time is not above 0, or a brake has no joint.
+        KindError: ``arm`` is no arm, a number none, or controller, integrator or a brake something else.
+        ShapeError: ``q``, ``qd`` or what the controller returns are not n long.
+        InvalidValueError: the arm starts outside its stops, a time is not above 0, a number is not finite, a brake has
+            no joint, or the result would have too many moments.
         UnsupportedArmError: some joint moves nothing that resists an acceleration.
 
     Source:
         TR-83-008, section 4 and appendix V; Gill (1951). The friction is Coulomb's, with dry friction at rest as
         large as in motion.
     """
-    start = exactly(q, (arm.n,), "q")
-    speed = np.zeros(arm.n) if qd is None else exactly(qd, (arm.n,), "qd")
-    for name, value in (("duration", duration), ("period", period)):
-        if not 0 < value < math.inf:
-            raise InvalidValueError(f"{name}: expected more than 0 s, got {value}")
+    start = one_posture(arm, q)
+    speed = np.zeros(arm.n) if qd is None else one_per_joint(qd, arm.n, "qd")
+    duration, period = _time(duration, "duration"), _time(period, "period")
+    if duration / period > _MOMENTS:
+        raise InvalidValueError(
+            f"duration: {duration:g} s, one moment every {period:g} s, would be {duration / period:.3g} moments; "
+            f"expected at most {_MOMENTS:g}: make the duration shorter or the period longer"
+        )
+    _check_kinds(controller, integrator, brakes)
     unlimited = np.full(arm.n, np.inf)
     plant = Plant(
         arm=arm,
-        controller=controller or no_effort(arm),
+        controller=no_effort(arm) if controller is None else _held_to_shape(controller, arm.n),
         brakes=tuple(brakes),
         lower=arm.limit("lower") if stops else -unlimited,
         upper=arm.limit("upper") if stops else unlimited,
@@ -90,6 +101,40 @@ def simulate(
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         status = run.go(start, speed)
         return run.result(status)
+
+
+def _time(value: float, what: str) -> float:
+    """Return a time above 0 [s]."""
+    time = number(value, what)
+    if not 0 < time < math.inf:
+        raise InvalidValueError(f"{what}: expected more than 0 s, got {value}")
+    return time
+
+
+def _check_kinds(controller: Controller | None, integrator: Integrator, brakes: Sequence[Brake]) -> None:
+    """Refuse what cannot steer, integrate or hold."""
+    if controller is not None and not callable(controller):
+        raise KindError(f"controller: expected a function of t, q and qd that returns efforts, got {shown(controller)}")
+    if isinstance(integrator, type) or not callable(getattr(integrator, "begin", None)):
+        raise KindError(f"integrator: expected one such as Gill() or Adaptive(), got {shown(integrator)}")
+    if not isinstance(brakes, Sequence) or not all(isinstance(brake, Brake) for brake in brakes):
+        raise KindError(f"brakes: expected a list of Brake, got {shown(brakes)}")
+
+
+def _held_to_shape(controller: Controller, n: int) -> Controller:
+    """Return the controller, which is refused at the first moment at which it does not give n efforts."""
+
+    def efforts(t: float, q: Array, qd: Array) -> Array:
+        given = controller(t, q, qd)
+        try:
+            array = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise KindError(f"efforts of the controller at {t:g} s: expected numbers, got {shown(given)}") from error
+        if array.shape != (n,):
+            raise ShapeError(f"efforts of the controller at {t:g} s: expected shape ({n},), got {array.shape}")
+        return array
+
+    return efforts
 
 
 def _check(plant: Plant, q: Array, qd: Array) -> None:
@@ -176,7 +221,7 @@ class _Run:
             step = stepper.step()
             if step is None:
                 return Status.IMPRECISE
-            if not np.isfinite(step.state).all():
+            if not np.abs(step.state[: 2 * self._plant.arm.n]).max() < _LOST or not np.isfinite(step.state).all():
                 return Status.DIVERGED
             if self._watch(phase, step.end, step.state) < 0:
                 found = first_crossing(self._watched(phase, step), step.start, step.end)

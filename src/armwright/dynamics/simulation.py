@@ -2,14 +2,15 @@
 
 import math
 from enum import Enum, IntEnum
+from numbers import Integral
 from typing import NamedTuple
 
 import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array
-from armwright.errors import InvalidValueError
+from armwright.arrays import Array, by_fields, number, read_only
+from armwright.errors import InvalidValueError, KindError, shown
 
 
 class JointState(IntEnum):
@@ -27,7 +28,7 @@ class Status(Enum):
 
     FINISHED = "finished"
     IMPRECISE = "a step could not be made as precise as asked"
-    DIVERGED = "a position or speed became too large for a number"
+    DIVERGED = "a position or speed became larger than any of a robot"
     ENTANGLED = "events followed one another without time going on"
 
 
@@ -65,8 +66,10 @@ class Brake:
     end: float = math.inf
 
     def __attrs_post_init__(self) -> None:
-        """Refuse a brake that goes off before it goes on."""
-        if not 0 <= self.start < self.end:
+        """Refuse a brake of no joint, and one that goes off before it goes on."""
+        if isinstance(self.joint, bool) or not isinstance(self.joint, Integral):
+            raise KindError(f"brake: expected the number of a joint, from 0, got {shown(self.joint)}")
+        if not 0 <= number(self.start, "brake: start") < number(self.end, "brake: end"):
             raise InvalidValueError(f"brake: start {self.start} must be 0 or later, and before end {self.end}")
 
     def on(self, t: float) -> bool:
@@ -99,20 +102,22 @@ class Simulation:
     """
 
     status: Status
-    t: Array
-    q: Array
-    qd: Array
-    qdd: Array
-    tau: Array
-    friction: Array
-    hold: Array
-    state: npt.NDArray[np.int8]
-    kinetic: Array
-    potential: Array
-    work: Array
-    heat: Array
-    impact: Array
+    t: Array = attrs.field(converter=read_only)
+    q: Array = attrs.field(converter=read_only)
+    qd: Array = attrs.field(converter=read_only)
+    qdd: Array = attrs.field(converter=read_only)
+    tau: Array = attrs.field(converter=read_only)
+    friction: Array = attrs.field(converter=read_only)
+    hold: Array = attrs.field(converter=read_only)
+    state: npt.NDArray[np.int8] = attrs.field(converter=read_only)
+    kinetic: Array = attrs.field(converter=read_only)
+    potential: Array = attrs.field(converter=read_only)
+    work: Array = attrs.field(converter=read_only)
+    heat: Array = attrs.field(converter=read_only)
+    impact: Array = attrs.field(converter=read_only)
     events: tuple[Event, ...]
+
+    __reduce__ = by_fields
 
     @property
     def energy(self) -> Array:

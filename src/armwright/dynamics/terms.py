@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm, Link
-from armwright.arrays import Array, ArrayLike
+from armwright.arrays import Array, ArrayLike, by_fields, read_only
 from armwright.dynamics.arguments import batch, stack_matrix
 from armwright.dynamics.lagrange_euler import (
     gravity_coefficients,
@@ -14,6 +14,7 @@ from armwright.dynamics.lagrange_euler import (
 )
 from armwright.dynamics.newton_euler import dry_friction, newton_euler
 from armwright.dynamics.payload import payload
+from armwright.errors import KindError, shown
 from armwright.kinematics.forward import stack
 
 _NO_LOAD = Link()
@@ -41,16 +42,18 @@ class Terms:
         TR-83-008, the program of appendix IV.
     """
 
-    own: Array
-    coupling: Array
-    motor: Array
-    centrifugal: Array
-    coriolis: Array
-    gravity: Array
-    viscous: Array
-    dry: Array
-    load: Array
-    outside: Array
+    own: Array = attrs.field(converter=read_only)
+    coupling: Array = attrs.field(converter=read_only)
+    motor: Array = attrs.field(converter=read_only)
+    centrifugal: Array = attrs.field(converter=read_only)
+    coriolis: Array = attrs.field(converter=read_only)
+    gravity: Array = attrs.field(converter=read_only)
+    viscous: Array = attrs.field(converter=read_only)
+    dry: Array = attrs.field(converter=read_only)
+    load: Array = attrs.field(converter=read_only)
+    outside: Array = attrs.field(converter=read_only)
+
+    __reduce__ = by_fields
 
     @property
     def by_acceleration(self) -> Array:
@@ -91,11 +94,15 @@ def terms(
         The terms; their total is what ``inverse_dynamics`` gives for the arm with the load.
 
     Raises:
+        KindError: ``arm`` is no arm, ``load`` no link, or an array something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         TR-83-008 eq. (12)-(16) and subroutine GLAGRA, which adds them up as ACCF, COR and G.
     """
+    if not isinstance(load, Link):
+        raise KindError(f"load: expected a Link, got {shown(load)}")
     lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
     n = arm.n
     rest = [0.0] * n

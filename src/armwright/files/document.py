@@ -249,15 +249,15 @@ class Table:
         return FileFormatError(self._document.path, self._document.line(keys), _shown(keys), message)
 
 
-def read_text(path: Path | str) -> str:
-    """Return the text of a UTF-8 file; a mark of byte order is dropped, line ends become line feeds.
+def read_bytes(path: Path | str) -> bytes:
+    """Return what a file holds.
 
     Raises:
-        FileFormatError: it is missing (the nearest name in its folder is told), a folder, or not UTF-8.
+        FileFormatError: it is missing (the nearest name in its folder is told), or a folder.
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        return path.read_bytes()
     except FileNotFoundError:
         near = closest(path.name, _names_in(path.parent))
         hint = f"; did you mean '{path.parent / near}'?" if near else ""
@@ -268,6 +268,15 @@ def read_text(path: Path | str) -> str:
         raise FileFormatError(path, None, "", f"cannot be read: {error.strerror}") from error
     except ValueError as error:  # a zero byte in the name
         raise FileFormatError(repr(str(path)), None, "", "no such file can be") from error
+
+
+def read_text(path: Path | str) -> str:
+    """Return the text of a UTF-8 file; a mark of byte order is dropped, line ends become line feeds.
+
+    Raises:
+        FileFormatError: it is missing (the nearest name in its folder is told), a folder, or not UTF-8.
+    """
+    data = read_bytes(path)
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError as error:

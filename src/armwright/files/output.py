@@ -1,4 +1,4 @@
-"""Writing results: a folder gets all of its files or none."""
+"""Writing results: a folder gets all of its files or none, a file all of its text or none."""
 
 import contextlib
 import os
@@ -27,10 +27,7 @@ def write_folder(folder: Path, files: Mapping[str, str | Iterable[str]]) -> None
     try:
         with tempfile.TemporaryDirectory(prefix=".armwright-", dir=folder.parent) as beside:
             for name, text in files.items():
-                with (Path(beside) / name).open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
-                    file.writelines([text] if isinstance(text, str) else text)
-                    file.flush()
-                    os.fsync(file.fileno())
+                _write(Path(beside) / name, text)
             folder.mkdir(exist_ok=True)
             _refuse_what_cannot_be_replaced(folder, files)
             for name in files:
@@ -42,6 +39,38 @@ def write_folder(folder: Path, files: Mapping[str, str | Iterable[str]]) -> None
     except BaseException:
         _remove(made)
         raise
+
+
+def write_file(path: Path, text: str | Iterable[str]) -> None:
+    """Write one file, or leave what was there before.
+
+    Args:
+        path: its folder is made where it is missing, with its parents.
+        text: or pieces of it that are written as they come.
+
+    Raises:
+        OutputError: it cannot be written; the text says why.
+    """
+    path = path.absolute()
+    made = _make_parents(path)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".armwright-", dir=path.parent) as beside:
+            _write(Path(beside) / path.name, text)
+            (Path(beside) / path.name).replace(path)
+    except OSError as error:
+        _remove(made)
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot write '{path}': {reason}; nothing was written") from error
+    except BaseException:
+        _remove(made)
+        raise
+
+
+def _write(path: Path, text: str | Iterable[str]) -> None:
+    with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
+        file.writelines([text] if isinstance(text, str) else text)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def _make_parents(folder: Path) -> list[Path]:

@@ -4,9 +4,10 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array, of_shape
+from armwright.arm.positions import positions
+from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, number, of_shape, read_only
 from armwright.errors import InvalidValueError
-from armwright.kinematics.jacobian import Axes, jacobian, together
+from armwright.kinematics.jacobian import Axes, jacobian, known_axes, together
 from armwright.kinematics.manipulability import scaled_rows
 
 
@@ -21,10 +22,12 @@ class DampedRates:
         smallest: (...) smallest singular value of the Jacobian, angular rows in metres [m].
     """
 
-    rates: Array
-    error: Array
-    bound: Array
-    smallest: Array
+    rates: Array = attrs.field(converter=read_only)
+    error: Array = attrs.field(converter=read_only)
+    bound: Array = attrs.field(converter=read_only)
+    smallest: Array = attrs.field(converter=read_only)
+
+    __reduce__ = by_fields
 
 
 def damped_rates(
@@ -54,17 +57,21 @@ def damped_rates(
         value.
 
     Raises:
+        KindError: ``arm`` is no arm, or an argument something else than real numbers.
         ShapeError: a shape does not fit.
-        InvalidValueError: ``damping`` or ``length`` is not above 0, or ``frame`` is neither ``base`` nor ``tool``.
+        InvalidValueError: a number is NaN or infinite, ``damping`` or ``length`` is not above 0, or ``frame`` is
+            neither ``base`` nor ``tool``.
 
     Source:
         Nakamura & Hanafusa (1986), with the damping of Chiaverini (1997) that depends on the singular values, taken for
         each direction by itself (Maciejewski & Klein 1988, numerical filtering): damping² · (1 - s²/damping²) / 2 in
         the damped inverse s / (s² + ...) is the gain above, and the least that keeps the bound.
     """
+    known_axes(frame)
+    damping, length = number(damping, "damping"), number(length, "length")
     if not 0 < damping < np.inf:
         raise InvalidValueError(f"damping: expected a singular value above 0 at which it begins, got {damping}")
-    q, twist = together(joint_array(q, arm.n), of_shape(twist, (6,), "twist"), "q", "twist")
+    q, twist = together(positions(arm, q), of_shape(twist, (6,), "twist", LARGEST), "q", "twist")
     J = jacobian(arm, q, frame)
     weight = np.repeat((1.0, length), 3)
     U, sigma, Vt = np.linalg.svd(scaled_rows(J, length), full_matrices=False)

@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array, of_shape
-from armwright.errors import ArmwrightError, UnknownNameError, UnsupportedArmError
+from armwright.arm.positions import known_arm, positions
+from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, of_shape, read_only
+from armwright.errors import ArmwrightError, UnsupportedArmError, one_of
 from armwright.kinematics.forward import link_frames, per_joint, stack, tool_frame
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.shoulder import Shoulder
@@ -70,9 +71,11 @@ class DifferentialInverse:
         singular: (..., 3) which of them vanish.
     """
 
-    rates: Array
-    factors: Array
-    singular: npt.NDArray[np.bool_]
+    rates: Array = attrs.field(converter=read_only)
+    factors: Array = attrs.field(converter=read_only)
+    singular: npt.NDArray[np.bool_] = attrs.field(converter=read_only)
+
+    __reduce__ = by_fields
 
     def checked(self) -> Array:
         """Return the rates (..., 6), all of which make their twist.
@@ -104,24 +107,24 @@ def differential_inverse(
         the factor.
 
     Raises:
+        KindError: ``arm`` is no arm, or an argument something else than real numbers.
         UnsupportedArmError: the arm is not built like the PUMA.
         UnknownNameError: there is no such way.
         ShapeError: a shape does not fit.
-        InvalidValueError: ``frame`` is neither ``base`` nor ``tool``.
+        InvalidValueError: a number is NaN or infinite, or ``frame`` is neither ``base`` nor ``tool``.
 
     Source:
         The seed on the differential kinematics of the PUMA, (a) and (b); the illegible inverse of (b) derived anew.
     """
-    shoulder = shoulder_of(arm)
+    shoulder = shoulder_of(known_arm(arm))
     if shoulder is None or shoulder.family != "puma" or not np.array_equal(shoulder.R_3W, np.eye(3)):
         raise UnsupportedArmError(
             f"arm '{arm.name}': no differential inverse in closed form; expected an arm built like puma560 "
             "(damped_rates takes any arm)"
         )
-    if way not in get_args(Way):
-        raise UnknownNameError("way", way, get_args(Way))
+    one_of("way", way, get_args(Way))
     known_axes(frame)
-    q, twist = together(joint_array(q, arm.n), of_shape(twist, (6,), "twist"), "q", "twist")
+    q, twist = together(positions(arm, q), of_shape(twist, (6,), "twist", LARGEST), "q", "twist")
     lead = q.shape[:-1]
     joints, asked = per_joint(q), per_joint(twist)
     angles = shoulder.angles(joints)

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from armwright.arm.model import Arm, Joint
-from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.arm.positions import positions
+from armwright.arrays import Array, ArrayLike
 from armwright.spatial.poses import pose
 from armwright.tracing.scalar import Scalar, cos, sin
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product
@@ -65,12 +66,14 @@ def forward(arm: Arm, q: ArrayLike) -> Array:
         X_BT: (..., 4, 4) homogeneous poses, translations in [m].
 
     Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
+        InvalidValueError: a number is NaN or infinite.
 
     Source:
         Denavit & Hartenberg (1955); TR-83-008 eq. (2).
     """
-    q = joint_array(q, arm.n)
+    q = positions(arm, q)
     return _stack_pose(tool_frame(arm, link_frames(arm, per_joint(q))[-1]), q.shape[:-1])
 
 
@@ -85,9 +88,11 @@ def link_poses(arm: Arm, q: ArrayLike) -> Array:
         (..., n + 2, 4, 4) homogeneous poses, translations in [m].
 
     Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
+        InvalidValueError: a number is NaN or infinite.
     """
-    q = joint_array(q, arm.n)
+    q = positions(arm, q)
     frames = link_frames(arm, per_joint(q))
     frames.append(tool_frame(arm, frames[-1]))
     return np.stack([_stack_pose(frame, q.shape[:-1]) for frame in frames], axis=-3)

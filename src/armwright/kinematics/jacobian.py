@@ -6,8 +6,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from armwright.arm.model import Arm
+from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike, joint_array
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, ShapeError, shown
 from armwright.kinematics.forward import link_frames, per_joint, stack, tool_frame
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, scale, subtract, transpose
@@ -86,14 +87,15 @@ def jacobian(arm: Arm, q: ArrayLike, frame: Axes = "base") -> Array:
         (..., 6, n): rows 0-2 linear [m/s per joint speed], rows 3-5 angular [rad/s per joint speed].
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
-        InvalidValueError: ``frame`` is neither ``base`` nor ``tool``.
+        InvalidValueError: a number is NaN or infinite, or ``frame`` is neither ``base`` nor ``tool``.
 
     Source:
         Whitney (1972).
     """
     known_axes(frame)
-    q = joint_array(q, arm.n)
+    q = positions(arm, q)
     scalars = per_joint(q)
     columns = jacobian_columns(arm, scalars)
     if frame == "tool":
@@ -118,14 +120,15 @@ def jacobian_rate(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -
         (..., 6, n): rows 0-2 linear, rows 3-5 angular, per second.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: the last axis of ``q`` or ``qd`` is not n long, or their leading axes do not fit together.
-        InvalidValueError: ``frame`` is neither ``base`` nor ``tool``.
+        InvalidValueError: a number is NaN or infinite, or ``frame`` is neither ``base`` nor ``tool``.
 
     Source:
         The Jacobian of Whitney (1972), differentiated; tool axes by d/dt (Rᵀ x) = Rᵀ (dx/dt - w × x).
     """
     known_axes(frame)
-    q, qd = together(joint_array(q, arm.n), joint_array(qd, arm.n, "qd"), "q", "qd")
+    q, qd = together(positions(arm, q), joint_array(qd, arm.n, "qd"), "q", "qd")
     scalars, rates = per_joint(q), per_joint(qd)
     columns = jacobian_rate_columns(arm, scalars, rates)
     if frame == "tool":
@@ -152,10 +155,12 @@ def tool_twist(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -> A
         (..., 6): speed of the tool point [m/s], then angular speed [rad/s].
 
     Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: the last axis of ``q`` or ``qd`` is not n long, or their leading axes do not fit together.
-        InvalidValueError: ``frame`` is neither ``base`` nor ``tool``.
+        InvalidValueError: a number is NaN or infinite, or ``frame`` is neither ``base`` nor ``tool``.
     """
-    q, qd = together(joint_array(q, arm.n), joint_array(qd, arm.n, "qd"), "q", "qd")
+    known_axes(frame)
+    q, qd = together(positions(arm, q), joint_array(qd, arm.n, "qd"), "q", "qd")
     return np.asarray((jacobian(arm, q, frame) @ qd[..., None])[..., 0])
 
 
@@ -165,8 +170,8 @@ def known_axes(frame: str) -> None:
     Raises:
         InvalidValueError: they are not.
     """
-    if frame not in ("base", "tool"):
-        raise InvalidValueError(f"frame: expected 'base' or 'tool', got {frame!r}")
+    if not isinstance(frame, str) or frame not in {"base", "tool"}:
+        raise InvalidValueError(f"frame: expected 'base' or 'tool', got {shown(frame)}")
 
 
 def together(a: Array, b: Array, name_a: str, name_b: str) -> tuple[Array, Array]:

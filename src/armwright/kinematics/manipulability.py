@@ -5,8 +5,9 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike
-from armwright.errors import InvalidValueError, UnknownNameError
+from armwright.arm.positions import positions
+from armwright.arrays import LARGEST, Array, ArrayLike, number
+from armwright.errors import InvalidValueError, one_of
 from armwright.kinematics.jacobian import jacobian
 
 Measure: TypeAlias = Literal["yoshikawa", "smallest", "inverse-condition"]
@@ -38,18 +39,17 @@ def manipulability(
         (...) the measure, 0 or more.
 
     Raises:
+        KindError: ``arm`` is no arm, or an argument something else than real numbers.
         ShapeError: the last axis of ``q`` is not n long.
         UnknownNameError: there is no such measure or motion.
-        InvalidValueError: ``length`` is not above 0.
+        InvalidValueError: a number is NaN or infinite, or ``length`` is not above 0.
 
     Source:
         Yoshikawa (1985); Klein & Blaho (1987) for the other two.
     """
-    if measure not in get_args(Measure):
-        raise UnknownNameError("measure", measure, get_args(Measure))
-    if motion not in _ROWS:
-        raise UnknownNameError("motion", motion, _ROWS)
-    J = scaled_rows(jacobian(arm, q), length)[..., _ROWS[motion], :]
+    one_of("measure", measure, get_args(Measure))
+    rows = _ROWS[one_of("motion", motion, _ROWS)]
+    J = scaled_rows(jacobian(arm, positions(arm, q)), length)[..., rows, :]
     sigma = np.asarray(np.linalg.svd(J, compute_uv=False), dtype=np.float64)
     if measure == "yoshikawa":
         return np.asarray(np.prod(sigma, axis=-1))
@@ -63,8 +63,10 @@ def scaled_rows(J: Array, length: float) -> Array:
     """Return the Jacobian (..., 6, n) with its angular rows in metres: multiplied by ``length`` [m].
 
     Raises:
-        InvalidValueError: ``length`` is not above 0.
+        KindError: ``length`` is no number.
+        InvalidValueError: it is not above 0.
     """
-    if not 0 < length < np.inf:
+    length = number(length, "length")
+    if not 0 < length <= LARGEST:
         raise InvalidValueError(f"length: expected a length above 0 that a turn is worth, got {length}")
     return np.asarray(J * np.repeat((1.0, length), 3)[:, None])

@@ -6,7 +6,8 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, exactly, joint_array
+from armwright.arm.positions import known_arm, one_posture, positions
+from armwright.arrays import Array, ArrayLike, by_fields, number, read_only
 from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.kinematics.inverse.recognise import shoulder_of
@@ -48,9 +49,11 @@ class Singularities:
     """
 
     factors: tuple[Factor, ...]
-    singular_values: Array
-    lost: Array
-    idle: Array
+    singular_values: Array = attrs.field(converter=read_only)
+    lost: Array = attrs.field(converter=read_only)
+    idle: Array = attrs.field(converter=read_only)
+
+    __reduce__ = by_fields
 
     @property
     def near(self) -> tuple[str, ...]:
@@ -110,16 +113,18 @@ def singularity_factors(arm: Arm, q: ArrayLike) -> Array:
         (..., 3): shoulder [m], elbow or slide [m], wrist; see ``determinant_factors``.
 
     Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         UnsupportedArmError: the arm has no closed form.
         ShapeError: the last axis of ``q`` is not 6 long.
+        InvalidValueError: a number is NaN or infinite.
     """
-    shoulder = shoulder_of(arm)
+    shoulder = shoulder_of(known_arm(arm))
     if shoulder is None:
         raise UnsupportedArmError(
             f"arm '{arm.name}': the determinant of its Jacobian has no known factors; use its singular values "
             "(singularities, manipulability)"
         )
-    q = joint_array(q, arm.n)
+    q = positions(arm, q)
     return stack(determinant_factors(shoulder, shoulder.angles(per_joint(q))), q.shape[:-1])
 
 
@@ -138,15 +143,17 @@ def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: fl
         Factors, singular values, lost and idle directions.
 
     Raises:
+        KindError: ``arm`` is no arm, or an argument something else than real numbers.
         ShapeError: ``q`` is not (n,).
-        InvalidValueError: ``length`` is not above 0, or ``threshold`` not between 0 and 1.
+        InvalidValueError: a number is NaN or infinite, ``length`` is not above 0, or ``threshold`` not between 0 and 1.
 
     Source:
         Factors: ``determinant_factors``. Directions: Golub & Van Loan, the singular value decomposition.
     """
+    threshold, length = number(threshold, "threshold"), number(length, "length")
     if not 0 < threshold < 1:
         raise InvalidValueError(f"threshold: expected a part of the scale between 0 and 1, got {threshold}")
-    q = exactly(q, (arm.n,), "q")
+    q = one_posture(arm, q)
     U, sigma, Vt = np.linalg.svd(scaled_rows(jacobian(arm, q), length))
     small = int(np.count_nonzero(sigma < threshold * sigma[0]))
     factors = _factors(arm, q, threshold) or tuple(

@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, floats, joint_array
-from armwright.errors import InvalidValueError
+from armwright.arm.positions import one_posture
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, joint_array, number, one_per_joint
+from armwright.errors import InvalidValueError, ShapeError
 from armwright.motion.trajectory import Trajectory, hold
 
 # RLO and VAL count speed in percent of normal; 120 is all the arm allows.
@@ -14,6 +15,8 @@ TOP_SPEED = 120.0
 LOWEST_SPEED = 1.0
 # A way of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
 _NOWHERE = 1e-12
+# A motion shorter than a billionth of a second is a slip of the unit; powers of its time would not be numbers [s].
+_SHORTEST = 1e-9
 # Peaks of 10 u³ - 15 u⁴ + 6 u⁵ on [0, 1]: of its first and of its second derivative.
 PEAK_SPEED = 15 / 8
 PEAK_ACCELERATION = 10 / math.sqrt(3)
@@ -25,15 +28,23 @@ def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajector
     Args:
         q_start: (n,) joint positions [rad] or [m].
         q_goal: (n,) joint positions.
-        duration: [s], above 0.
+        duration: [s], a billionth or more.
+
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: the positions are not (n,), both of them.
+        InvalidValueError: a number is NaN or infinite, or the duration too short.
 
     Source:
         Mujtaba (1980); TR-83-008, "point to point motion".
     """
-    if not duration > 0:
-        raise InvalidValueError(f"duration: expected more than 0 s, got {duration}")
-    start = floats(q_start, "q_start")
-    way = joint_array(q_goal, len(start), "q_goal") - start
+    duration = number(duration, "duration")
+    if not _SHORTEST <= duration <= LARGEST:
+        raise InvalidValueError(f"duration: expected more than 0 s, {_SHORTEST:g} s at least, got {duration}")
+    start = floats(q_start, "q_start", LARGEST)
+    if start.ndim != 1 or not start.size:
+        raise ShapeError(f"q_start: expected shape (n,), got {start.shape}")
+    way = one_per_joint(q_goal, len(start), "q_goal") - start
     powers = np.array((0.0, 0.0, 0.0, 10 / duration**3, -15 / duration**4, 6 / duration**5))
     coefficients = powers[:, None] * way
     coefficients[0] += start
@@ -58,27 +69,33 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
         speed: 1 to 120; 120 is the fastest the limits allow, all else in proportion.
 
     Raises:
-        InvalidValueError: the speed is out of range, or the arm has neither speed nor acceleration limits.
+        KindError: ``arm`` is no arm, or an argument something else than real numbers.
+        ShapeError: the positions are not (n,).
+        InvalidValueError: a number is NaN or infinite, the speed is out of range, or the arm has neither speed nor
+            acceleration limits.
 
     Source:
         TR-83-008, "point to point motion"; the meaning of 120 from its section on MOVE.
     """
     speed = check_speed(speed)
-    way = joint_array(q_goal, arm.n, "q_goal") - joint_array(q_start, arm.n, "q_start")
+    start, goal = one_posture(arm, q_start, "q_start"), one_posture(arm, q_goal, "q_goal")
+    way = goal - start
     if np.abs(way).max() <= _NOWHERE:
-        return hold(q_start, 0.0)
+        return hold(start, 0.0)
     shortest = shortest_duration(arm, way)
     if shortest == 0:
         raise InvalidValueError(f"arm '{arm.name}' has no speed and no acceleration limit, so a move has no duration")
-    return quintic(q_start, q_goal, shortest * TOP_SPEED / speed)
+    return quintic(start, goal, shortest * TOP_SPEED / speed)
 
 
 def check_speed(speed: float) -> float:
     """Return ``speed`` if it is one.
 
     Raises:
+        KindError: it is no number.
         InvalidValueError: it is outside 1..120.
     """
-    if not isinstance(speed, int | float) or not LOWEST_SPEED <= speed <= TOP_SPEED:
-        raise InvalidValueError(f"speed {speed} is outside {LOWEST_SPEED:g}..{TOP_SPEED:g}")
+    speed = number(speed, "speed")
+    if not LOWEST_SPEED <= speed <= TOP_SPEED:
+        raise InvalidValueError(f"speed {speed:g} is outside {LOWEST_SPEED:g}..{TOP_SPEED:g}")
     return speed

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from numbers import Integral
 
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, number
+from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 
 
 def _times(value: ArrayLike) -> Array:
@@ -22,7 +23,7 @@ def _times(value: ArrayLike) -> Array:
 
 def _coefficients(value: ArrayLike) -> Array:
     coefficients = floats(value, "coefficients")
-    if coefficients.ndim != 3:
+    if coefficients.ndim != 3 or not coefficients.size:
         raise ShapeError(f"coefficients: expected (segments, powers, joints), got shape {coefficients.shape}")
     coefficients.setflags(write=False)
     return coefficients
@@ -39,6 +40,8 @@ class Trajectory:
 
     times: Array = attrs.field(converter=_times)
     coefficients: Array = attrs.field(converter=_coefficients)
+
+    __reduce__ = by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse a number of segments that does not fit the times."""
@@ -59,7 +62,13 @@ class Trajectory:
 
         Returns:
             (..., n). At a knot where the derivative jumps, the value just after it.
+
+        Raises:
+            KindError: a time is no number, or the order no whole number.
+            InvalidValueError: a time is NaN or infinite, or the order below 0.
         """
+        if isinstance(order, bool) or not isinstance(order, Integral):
+            raise KindError(f"order: expected a whole number from 0, got {shown(order)}")
         if order < 0:
             raise InvalidValueError(f"order: expected 0 or more, got {order}")
         t = floats(t, "t")
@@ -93,8 +102,14 @@ class Trajectory:
         return np.asarray(self.segment_peaks(order).max(axis=0))
 
     def slowed(self, factor: float) -> "Trajectory":
-        """Return the same path run ``factor`` times slower."""
-        if not factor > 0:
+        """Return the same path run ``factor`` times slower.
+
+        Raises:
+            KindError: the factor is no number.
+            InvalidValueError: it is not above 0.
+        """
+        factor = number(factor, "factor")
+        if not 0 < factor <= LARGEST:
             raise InvalidValueError(f"factor: expected more than 0, got {factor}")
         powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
         return Trajectory(times=self.times * factor, coefficients=self.coefficients * powers[:, None])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats, joint_array
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_per_joint
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.motion.trajectory import Trajectory
 
@@ -24,25 +24,28 @@ def xspline_rates(times: ArrayLike, knots: ArrayLike, start: ArrayLike, end: Arr
     Returns:
         (k, n).
 
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: fewer than two knots, or shapes that do not fit.
+        InvalidValueError: times do not rise, or a number is not finite.
+
     Source:
         Clenshaw & Negus (1978); Behforooz, Papamichael & Worsey (1980); TR-83-008, "straight line motion".
     """
-    t, q = floats(times, "times"), floats(knots, "knots")
-    if t.ndim != 1 or q.ndim != 2 or len(t) != len(q) or len(t) < 2:
-        raise ShapeError(f"X-spline: expected k times and (k, n) knots with k at least 2, got {t.shape} and {q.shape}")
+    t, q = _knots(times, knots)
     h = np.diff(t)
     if (h <= 0).any():
         i = int(np.argmax(h <= 0))
         raise InvalidValueError(f"X-spline: times must rise, got {t[i]:g} s and then {t[i + 1]:g} s at knot {i + 1}")
     slope = np.diff(q, axis=0) / h[:, None]
     rates = np.empty_like(q)
-    rates[0] = joint_array(start, q.shape[1], "start")
+    rates[0] = one_per_joint(start, q.shape[1], "start")
     for i in range(1, len(t) - 1):
         last, coming = h[i - 1], h[i]
         a = coming / (last + coming)
         curve = (slope[i] - slope[i - 1]) / (last + coming)
         rates[i] = a * (slope[i - 1] - last * curve) + (slope[i - 1] + last * curve) - a * rates[i - 1]
-    rates[-1] = joint_array(end, q.shape[1], "end")
+    rates[-1] = one_per_joint(end, q.shape[1], "end")
     return rates
 
 
@@ -58,10 +61,11 @@ def xspline(
         end: (n,) rate at the last knot; at rest when left out.
 
     Raises:
+        KindError: an argument is something else than real numbers.
         ShapeError: fewer than two knots, or shapes that do not fit.
-        InvalidValueError: times do not rise, or a number is not finite.
+        InvalidValueError: times do not rise from 0, or a number is not finite.
     """
-    t, q = floats(times, "times"), floats(knots, "knots")
+    t, q = _knots(times, knots)
     rest = np.zeros(q.shape[-1])
     m = xspline_rates(t, q, rest if start is None else start, rest if end is None else end)
     h = np.diff(t)[:, None]
@@ -69,3 +73,11 @@ def xspline(
     bend = (3 * slope - 2 * m[:-1] - m[1:]) / h
     twist = (m[:-1] + m[1:] - 2 * slope) / h**2
     return Trajectory(times=t, coefficients=np.stack([q[:-1], m[:-1], bend, twist], axis=1))
+
+
+def _knots(times: ArrayLike, knots: ArrayLike) -> tuple[Array, Array]:
+    """Return times (k,) and knots (k, n), two at least."""
+    t, q = floats(times, "times", LARGEST), floats(knots, "knots", LARGEST)
+    if t.ndim != 1 or q.ndim != 2 or len(t) != len(q) or len(t) < 2 or not q.size:
+        raise ShapeError(f"X-spline: expected k times and (k, n) knots with k at least 2, got {t.shape} and {q.shape}")
+    return t, q

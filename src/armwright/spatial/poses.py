@@ -10,16 +10,16 @@ from armwright.spatial.rotations import orthonormality_error, rotation_from_vect
 _ROUNDING = 1e-9
 
 
-def one_pose(value: ArrayLike) -> Array:
+def one_pose(value: ArrayLike, what: str = "pose") -> Array:
     """Return ``value`` as a read-only pose (4, 4): the converter of fields that hold one.
 
     Raises:
         ShapeError: it is not (4, 4).
         InvalidValueError: it has no rotation in it, or its last row is not 0 0 0 1.
     """
-    X = exactly(value, (4, 4), "pose")
+    X = exactly(value, (4, 4), what)
     if orthonormality_error(X[:3, :3]) > _ROUNDING or not np.array_equal(X[3], (0, 0, 0, 1)):
-        raise InvalidValueError(f"pose: expected a rotation, a place and the row 0 0 0 1, got {X.tolist()}")
+        raise InvalidValueError(f"{what}: expected a rotation, a place and the row 0 0 0 1, got {X.tolist()}")
     return X
 
 

@@ -5,11 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, exactly, joint_array, of_shape
+from armwright.arm.positions import known_arm, one_posture, positions
+from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.kinematics.inverse.branches import BRANCHES, Branches, branches, merged
-from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, judge
+from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, judge, typed_poses
 from armwright.kinematics.inverse.numeric import numeric_inverse
 from armwright.kinematics.inverse.reach import nearest_centre
 from armwright.kinematics.inverse.recognise import closed_form_of, shoulder_of
@@ -31,7 +32,7 @@ _CHOOSERS = {"spherical": (1, 2, 4), "parallel": (1, 2, 6)}
 _TRIED = 721
 
 
-def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> tuple[Array, Array]:
+def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> tuple[Array, Flags]:
     """Return all eight postures of many poses at once, unjudged.
 
     Args:
@@ -46,11 +47,13 @@ def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -
         singular: (..., 8) whether a joint is free there.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array something else than real numbers.
         UnsupportedArmError: the arm has no closed form.
         ShapeError: a shape does not fit.
+        InvalidValueError: a number is not finite, or a pose none.
     """
-    shoulder = closed_form_of(arm)
-    X_BT, near = of_shape(X_BT, (4, 4), "pose"), joint_array(middle(arm) if near is None else near, arm.n, "near")
+    shoulder = closed_form_of(known_arm(arm))
+    X_BT, near = typed_poses(X_BT), middle(arm) if near is None else positions(arm, near, "near")
     lead, found = _branches(arm, shoulder, X_BT, near)
     q, singular = merged(found)
     return np.stack([stack(row, lead) for row in q], axis=-2), stack(singular, lead) > 0
@@ -72,14 +75,15 @@ def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> Inverse
         The branches, each labelled, with its limit violations and its residual, and the answer on the whole.
 
     Raises:
+        KindError: ``arm`` is no arm, or an array something else than real numbers.
         ShapeError: a shape does not fit.
-        InvalidValueError: the rotation part is no rotation, not even one typed with two digits.
+        InvalidValueError: a number is not finite, or the pose is none, not even one typed with two digits.
 
     Source:
         Paul (1981) ch. 3; Hawkins (2013) for three parallel axes; spec of this project, mechanics §3.2.
     """
     X = clean_pose(X_BT)
-    reference = exactly(middle(arm) if near is None else near, (arm.n,), "near")
+    reference = middle(known_arm(arm)) if near is None else one_posture(arm, near, "near")
     shoulder = shoulder_of(arm)
     return numeric_inverse(arm, X, reference) if shoulder is None else _closed(arm, shoulder, X, reference)
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, of_shape
-from armwright.errors import InvalidValueError
+from armwright.arrays import LARGEST, Array, ArrayLike, of_shape
+from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.solution import Answer, Branch, InverseSolution, violations
 from armwright.kinematics.inverse.turns import same_posture, travel
@@ -16,6 +16,8 @@ from armwright.spatial.rotations import angle_between, nearest_rotation, orthono
 
 # A pose typed with a few digits is turned into a rotation up to this error; beyond it is a mistake.
 _TYPED_ROTATION = 2e-2
+# The last row of a pose is 0 0 0 1 but for the rounding of a product.
+_LAST_ROW = 1e-9
 # A place this far outside counts as the edge of the reach: six typed digits of a metre [m]; an orientation this far
 # off likewise [rad].
 EDGE = 2e-6
@@ -34,16 +36,39 @@ def clean_pose(X_BT: ArrayLike) -> Array:
 
     Raises:
         ShapeError: it is not (4, 4).
-        InvalidValueError: the rotation part is no rotation, not even one typed with two digits.
+        InvalidValueError: it is no pose, not even one typed with two digits.
     """
-    X = of_shape(X_BT, (4, 4), "pose")
-    error = float(np.max(orthonormality_error(X[..., :3, :3])))
-    if X.shape != (4, 4) or error > _TYPED_ROTATION:
-        raise InvalidValueError(
-            f"pose: expected one (4, 4) pose whose rotation is orthonormal to {_TYPED_ROTATION}, "
-            f"got shape {X.shape}, error {error:.3g}"
-        )
+    X = typed_poses(X_BT)
+    if X.ndim != 2:
+        raise ShapeError(f"pose: expected one pose, shape (4, 4), got {X.shape}; inverse_branches takes many")
     return pose(nearest_rotation(X[:3, :3]), X[:3, 3])
+
+
+def typed_poses(X_BT: ArrayLike) -> Array:
+    """Return poses (..., 4, 4), read-only, as they were typed.
+
+    Raises:
+        KindError: they are something else than real numbers.
+        ShapeError: the last axes are not (4, 4).
+        InvalidValueError: a number is not finite, a last row is not 0 0 0 1, or a rotation none, not even one typed
+            with two digits.
+    """
+    X = of_shape(X_BT, (4, 4), "pose", LARGEST)
+    wrong = np.flatnonzero(np.abs(X[..., 3, :] - (0, 0, 0, 1)).max(axis=-1).ravel() > _LAST_ROW)
+    if len(wrong):
+        one = X.reshape(-1, 4, 4)[wrong[0]]
+        hint = "; is it transposed?" if one[3, :3].any() and not one[:3, 3].any() else ""
+        raise InvalidValueError(f"pose: expected 0 0 0 1 as the last row, got {one[3].tolist()}{hint}")
+    error = orthonormality_error(X[..., :3, :3])
+    worst = float(np.max(error, initial=0.0))
+    if worst > _TYPED_ROTATION:
+        R = X.reshape(-1, 4, 4)[error.argmax(), :3, :3]
+        hint = "; it is a mirror image: one axis points the other way" if np.linalg.det(R) < 0 else ""
+        raise InvalidValueError(
+            f"pose: expected a rotation, orthonormal to {_TYPED_ROTATION}, got one that is off by {worst:.3g}: "
+            f"{R.tolist()}{hint}"
+        )
+    return X
 
 
 def errors(arm: Arm, q: Array, X: Array) -> tuple[Array, Array]:

@@ -92,6 +92,21 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     return judge(arm, X, _named(limited, met, near), near, apart=_SAME_POSTURE)
 
 
+def next_posture(arm: Arm, X: Array, near: Array) -> Array:
+    """Return the posture (n,) that a single descent from ``near`` leads to, whatever the limits.
+
+    For a pose close to that of ``near``, as on a path; whether it is met is for the caller to see.
+
+    Args:
+        arm: any arm.
+        X: (4, 4) tool pose in the base frame.
+        near: (n,) joint positions.
+    """
+    size, endless = _size(arm), np.full(arm.n, np.inf)
+    task = _Task(arm=arm, X=X, lower=-endless, upper=endless, size=size, length=max(size / 4, EDGE))
+    return np.asarray(_descend(task, near[None])[0])
+
+
 def _search(task: _Task, near: Array) -> tuple[Array, Array]:
     """Return all postures (k, n) that the descents ended in, and those (l, n) that meet the pose."""
     tried = met = np.empty((0, task.arm.n))

@@ -5,10 +5,9 @@ import math
 from collections.abc import Iterator
 
 import attrs
-import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.arrays import Array, ArrayLike, by_fields, content, joint_array, read_only
 from armwright.errors import ArmwrightError
 
 # A position this close to its limit, relative to the range of the joint, is at the limit and not beyond it.
@@ -73,12 +72,14 @@ class Branch:
         rotation_error: angle of the hand from the asked orientation [rad].
     """
 
-    q: Array = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
+    q: Array = attrs.field(converter=read_only, eq=content)
     label: str
     violations: tuple[Violation, ...] = ()
     free: tuple[int, ...] = ()
     position_error: float = 0.0
     rotation_error: float = 0.0
+
+    __reduce__ = by_fields
 
     @property
     def allowed(self) -> bool:
@@ -104,8 +105,10 @@ class InverseSolution:
     answer: Answer
     branches: tuple[Branch, ...]
     distance: float
-    nearest_pose: Array = attrs.field(eq=attrs.cmp_using(eq=np.array_equal))
+    nearest_pose: Array = attrs.field(converter=read_only, eq=content)
     turn: float = 0.0
+
+    __reduce__ = by_fields
 
     def __iter__(self) -> Iterator[Branch]:
         """Walk through the branches, nearest first."""

@@ -1,0 +1,105 @@
+"""Joint positions at the door of a public function: one per joint, and a warning where they look like degrees."""
+
+import inspect
+import math
+import warnings
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array, ArrayLike, joint_array
+from armwright.errors import KindError, ShapeError, UnitWarning, shown
+
+_TURN = 2 * math.pi
+_PACKAGE = __name__.partition(".")[0]
+
+
+def positions(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> Array:
+    """Return joint positions as read-only float64 of shape (..., n).
+
+    A turn farther than once around, on a joint whose limits do not go so far, is taken for degrees: there is one
+    warning, at the line outside of this package that has called. A public function that another part of the package
+    calls says nothing: the positions of a motion, or images of an angle, may be anything.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        what: how the array is called in a message.
+        callers: how many calls up from here the public function is.
+
+    Raises:
+        KindError: ``arm`` is no arm, or ``q`` is something else than real numbers.
+        ShapeError: the last axis is not n long.
+        InvalidValueError: a number is NaN or infinite.
+
+    Warns:
+        UnitWarning: the positions look like degrees.
+    """
+    array = joint_array(q, known_arm(arm).n, what)
+    if array.size and np.abs(array).max() > _TURN:
+        _ask_for_degrees(arm, array, what, callers + 1)
+    return array
+
+
+def one_posture(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> Array:
+    """Return the joint positions (n,) of one posture; all else as ``positions``.
+
+    Raises:
+        ShapeError: the shape is not (n,).
+    """
+    array = positions(arm, q, what, callers=callers + 1)
+    if array.ndim != 1:
+        raise ShapeError(f"{what}: expected shape ({arm.n},), got {array.shape}")
+    return array
+
+
+def known_arm(arm: Arm) -> Arm:
+    """Return ``arm`` if it is one.
+
+    Raises:
+        KindError: it is something else, such as a name.
+    """
+    if not isinstance(arm, Arm):
+        raise KindError(f"arm: expected an Arm, such as load_arm('puma560') returns, got {shown(arm)}")
+    return arm
+
+
+def admitted(arm: Arm) -> Array:
+    """Return how far every joint may be from 0 before its position looks like degrees, (n,) [rad]; slides always."""
+    farthest = [max(abs(x) for x in (_TURN, *_known(joint.limits.lower, joint.limits.upper))) for joint in arm.joints]
+    return np.array([far if joint.revolute else math.inf for far, joint in zip(farthest, arm.joints, strict=True)])
+
+
+def degrees_by_mistake(arm: Arm, q: Array) -> str:
+    """Say of joint positions (..., n) that they look like degrees, by the first such joint; empty if none does."""
+    rows = np.abs(q.reshape(-1, arm.n))
+    suspects = np.flatnonzero((rows > admitted(arm) * (1 + 1e-9)).any(axis=0))
+    if not len(suspects):
+        return ""
+    i = int(suspects[0])
+    value = float(q.reshape(-1, arm.n)[rows[:, i].argmax(), i])
+    return (
+        f"joint {i + 1} of '{arm.name}' stands at {value:g} rad, {abs(value) / _TURN:.1f} turns. If degrees are meant, "
+        f"{value:g} degrees are {math.radians(value):.6g} rad"
+    )
+
+
+def _known(*limits: float) -> list[float]:
+    return [limit for limit in limits if math.isfinite(limit)]
+
+
+def _ask_for_degrees(arm: Arm, q: Array, what: str, callers: int) -> None:
+    """Warn of positions that look like degrees, unless the package itself has called the public function."""
+    frame = inspect.currentframe()
+    for _ in range(callers + 1):
+        frame = frame.f_back if frame else None
+    if frame is None or frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:
+        return
+    found = degrees_by_mistake(arm, q)
+    if found:
+        warnings.warn(
+            f"{what}: {found}: give numpy.deg2rad(...). A joint that really turns so far has limits that say so; or "
+            "silence this: warnings.simplefilter('ignore', armwright.UnitWarning)",
+            UnitWarning,
+            stacklevel=callers + 2,
+        )

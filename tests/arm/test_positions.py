@@ -1,0 +1,88 @@
+"""Positions that look like degrees get a warning; all others, and all else, get none."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import armwright
+import doors
+from armwright.arm.model import Arm, Joint, Limits, Link
+from armwright.dynamics.controllers import gravity_compensation
+from armwright.errors import UnitWarning
+from doors import DOORS, PUMA
+
+DEGREES = (10.0, 90.0, 20.0, 30.0, 90.0, 0.0)
+
+
+POSITIONS = [name for name in DOORS if name.endswith((": q", ": q_start", ": q_goal", ": near"))]
+
+
+@pytest.mark.parametrize("door", [name for name in POSITIONS if not name.startswith(("bejczy", "quintic"))])
+def test_degrees_by_mistake(door: str) -> None:
+    """Positions of many turns get one warning, at the line of the caller, with the joint and what it would be."""
+    what = door.partition(": ")[2]
+
+    with pytest.warns(UnitWarning) as caught:
+        DOORS[door](DEGREES)
+
+    assert len(caught) == 1
+    assert caught[0].filename == doors.__file__
+    assert str(caught[0].message).startswith(
+        f"{what}: joint 1 of 'puma560' stands at 10 rad, 1.6 turns. If degrees are meant, 10 degrees are 0.174533 rad: "
+        "give numpy.deg2rad(...)."
+    )
+
+
+@pytest.mark.parametrize("door", [name for name in DOORS if name.endswith((": qd", ": qdd", ": tau", "twist"))])
+def test_speeds_and_efforts_are_not_positions(door: str) -> None:
+    """A speed of many turns per second, or an effort, is no position and gets no warning."""
+    DOORS[door](DEGREES)
+
+
+def test_one_warning_for_many_postures() -> None:
+    """However many postures there are, there is one warning, of the first such joint and its farthest position."""
+    rows = np.zeros((50, 4, 6))
+    rows[:, 2, 3], rows[7, 2, 3], rows[:, :, 4] = 30.0, -170.0, 80.0
+
+    with pytest.warns(UnitWarning, match="joint 4 of 'puma560' stands at -170 rad, 27.1 turns") as caught:
+        armwright.forward(PUMA, rows)
+
+    assert len(caught) == 1
+
+
+def test_joints_that_turn_so_far() -> None:
+    """A joint whose limits admit several turns gets no warning inside them, and one without limits does."""
+    turns = Joint(kind="revolute", limits=Limits(lower=-50.0, upper=50.0))
+    winch = Arm(name="winch", joints=[turns])
+
+    armwright.forward(winch, [49.0])
+    with pytest.warns(UnitWarning, match="stands at 90 rad"):
+        armwright.forward(winch, [90.0])
+    with pytest.warns(UnitWarning, match="stands at 49 rad"):
+        armwright.forward(Arm(name="free", joints=[Joint(kind="revolute")]), [49.0])
+
+
+def test_slides_are_no_angles() -> None:
+    """A slide of many metres is long, and no angle; a whole turn, but for rounding, is none too many."""
+    armwright.forward(Arm(name="crane", joints=[Joint(kind="prismatic")]), [100.0])
+    armwright.forward(armwright.load_arm("ur5"), [2 * np.pi, -2 * np.pi * (1 + 1e-12), 0, 0, 0, 0])
+
+
+def test_what_the_package_asks_itself() -> None:
+    """A shaft that spins many turns is simulated, and followed by a controller of ours, without a warning."""
+    shaft = Arm(name="shaft", joints=[Joint(kind="revolute", a=0.1)], links=[Link(mass=1.0)])
+
+    found = armwright.simulate(shaft, [0.0], [100.0], duration=0.5, controller=gravity_compensation(shaft))
+
+    assert found.q[-1, 0] > 2 * np.pi
+    assert np.isfinite(found.energy).all()
+
+
+def test_silenced(recwarn: pytest.WarningsRecorder) -> None:
+    """The warning is of a category of its own, which can be silenced."""
+    warnings.simplefilter("ignore", armwright.UnitWarning)
+
+    armwright.forward(PUMA, DEGREES)
+
+    assert not len(recwarn)
