@@ -15,7 +15,7 @@ $(VENV)/core: pyproject.toml
 
 $(VENV)/test: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,urdf]'
 	@touch $@ $(VENV)/core
 
 demo: $(VENV)/core   ## Run the report's stacking program and write its report page

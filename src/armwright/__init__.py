@@ -18,6 +18,7 @@ from armwright.version import __version__
 if TYPE_CHECKING:
     from armwright.arm.load import arm_names, load_arm
     from armwright.arm.model import Arm
+    from armwright.arm.urdf.reader import load_urdf
     from armwright.dynamics.compiled import compile_arm
     from armwright.dynamics.forward_dynamics import forward_dynamics
     from armwright.dynamics.mass_matrix import mass_matrix
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from armwright.dynamics.payload import payload
     from armwright.dynamics.simulate import simulate
     from armwright.dynamics.terms import terms
-    from armwright.errors import ArmwrightError
+    from armwright.errors import ArmwrightError, UnitWarning
     from armwright.kinematics.forward import forward, link_poses
     from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
     from armwright.kinematics.jacobian import jacobian
@@ -38,6 +39,7 @@ _HOME = {
     "Arm": "arm.model",
     "ArmwrightError": "errors",
     "Trajectory": "motion.trajectory",
+    "UnitWarning": "errors",
     "arm_names": "arm.load",
     "compile_arm": "dynamics.compiled",
     "forward": "kinematics.forward",
@@ -48,6 +50,7 @@ _HOME = {
     "jacobian": "kinematics.jacobian",
     "link_poses": "kinematics.forward",
     "load_arm": "arm.load",
+    "load_urdf": "arm.urdf.reader",
     "mass_matrix": "dynamics.mass_matrix",
     "payload": "dynamics.payload",
     "point_to_point": "motion.quintic",
@@ -62,6 +65,7 @@ __all__ = [
     "Arm",
     "ArmwrightError",
     "Trajectory",
+    "UnitWarning",
     "__version__",
     "arm_names",
     "compile_arm",
@@ -73,6 +77,7 @@ __all__ = [
     "jacobian",
     "link_poses",
     "load_arm",
+    "load_urdf",
     "mass_matrix",
     "payload",
     "point_to_point",

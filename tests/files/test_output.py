@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from armwright.errors import OutputError
-from armwright.files.output import write_folder
+from armwright.files.output import write_file, write_folder
 
 
 def test_writes_and_replaces(tmp_path: Path) -> None:
@@ -80,3 +80,29 @@ def test_no_permission(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="nothing was written"):
         write_folder(tmp_path / "run", {"x.txt": "one"})
     tmp_path.chmod(0o700)
+
+
+def test_one_file(tmp_path: Path) -> None:
+    """One file is written into a folder that is made for it, and replaced; others stay."""
+    path = tmp_path / "a" / "b" / "x.txt"
+    write_file(path, "one")
+    (path.parent / "mine.txt").write_text("keep")
+
+    write_file(path, ["t", "wo"])
+
+    assert {p.name: p.read_text() for p in path.parent.iterdir()} == {"x.txt": "two", "mine.txt": "keep"}
+
+
+def test_one_file_half_written(tmp_path: Path) -> None:
+    """A full disk leaves the old file as it was, and no folder that was made for a new one."""
+
+    def full_disk() -> Iterator[str]:
+        yield "some"
+        raise OSError(28, os.strerror(28))
+
+    write_file(tmp_path / "old.txt", "old")
+    for path in (tmp_path / "old.txt", tmp_path / "new" / "x.txt"):
+        with pytest.raises(OutputError, match="No space left on device; nothing was written"):
+            write_file(path, full_disk())
+
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"old.txt": "old"}

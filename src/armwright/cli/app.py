@@ -10,6 +10,7 @@ import typer
 
 from armwright.cli.arms import arms
 from armwright.cli.check import check
+from armwright.cli.convert import convert
 from armwright.cli.forward import forward, jacobian
 from armwright.cli.inverse import inverse
 from armwright.cli.kernel import kernel
@@ -34,6 +35,7 @@ app.command()(run)
 app.command()(check)
 app.command()(arms)
 app.command()(show)
+app.command()(convert)
 app.command()(forward)
 app.command()(inverse)
 app.command()(jacobian)

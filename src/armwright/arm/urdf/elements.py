@@ -1,0 +1,219 @@
+"""URDF text as elements that know their place: what is read is checked, and named with file, line and key.
+
+Elements and attributes that URDF does not have are skipped, as files are full of what other programs put there. But
+one that is spelt nearly as URDF spells it is refused, since what it says would be lost; and so is whatever else an
+<origin> says of a place.
+"""
+
+import math
+import re
+from collections.abc import Collection
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arrays import LARGEST, Array
+from armwright.errors import FileFormatError, MissingExtraError, closest, shown
+from armwright.files.document import read_bytes
+
+_MISSING: Any = object()
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_XACRO = "xacro is expanded before it is URDF: xacro FILE > robot.urdf"
+# What URDF has in a link, in a joint, and below those: elements, attributes.
+_KNOWN: dict[str, tuple[Collection[str], Collection[str]]] = {
+    "robot": (("link", "joint", "material", "transmission", "gazebo", "sensor"), ("name", "version")),
+    "link": (("inertial", "visual", "collision"), ("name", "type")),
+    "joint": (
+        ("origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller"),
+        ("name", "type"),
+    ),
+    "inertial": (("origin", "mass", "inertia"), ()),
+    "origin": ((), ("xyz", "rpy")),
+    "mass": ((), ("value",)),
+    "inertia": ((), ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
+    "parent": ((), ("link",)),
+    "child": ((), ("link",)),
+    "axis": ((), ("xyz",)),
+    "limit": ((), ("lower", "upper", "effort", "velocity")),
+    "dynamics": ((), ("damping", "friction")),
+}
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Element:
+    """An element of a URDF file.
+
+    Attributes:
+        path: the file.
+        line: where the element starts.
+        place: how messages call it, such as ``joint 'elbow', limit``; empty for the robot.
+        tag: its name.
+        attributes: its attributes as they are written.
+        children: the elements in it, those of other namespaces left out.
+    """
+
+    path: Path
+    line: int
+    place: str
+    tag: str
+    attributes: dict[str, str]
+    children: "tuple[Element, ...]"
+
+    @property
+    def name(self) -> str:
+        """The attribute ``name``."""
+        return self.text("name")
+
+    def error(self, attribute: str, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of an attribute, or of the element itself where that is empty."""
+        key = ", ".join(part for part in (self.place, attribute) if part)
+        return FileFormatError(self.path, self.line, key, message)
+
+    def all(self, tag: str) -> "list[Element]":
+        """Return the elements in it that have a name, in their order."""
+        return [child for child in self.children if child.tag == tag]
+
+    def one(self, tag: str) -> "Element | None":
+        """Return the element in it that has a name, or None.
+
+        Raises:
+            FileFormatError: there are two.
+        """
+        found = self.all(tag)
+        if len(found) > 1:
+            raise found[1].error("", f"given twice, first in line {found[0].line}")
+        return found[0] if found else None
+
+    def needed(self, tag: str) -> "Element":
+        """Return the element in it that has a name.
+
+        Raises:
+            FileFormatError: there is none, or there are two.
+        """
+        found = self.one(tag)
+        if found is None:
+            raise self.error("", f"expected <{tag}> in it")
+        return found
+
+    def text(self, attribute: str) -> str:
+        """Return an attribute as it is written.
+
+        Raises:
+            FileFormatError: it is missing or empty.
+        """
+        text = self.attributes.get(attribute, "")
+        if not text:
+            raise self.error(attribute, "missing")
+        return text
+
+    def number(self, attribute: str, default: Any = _MISSING, *, lower: float = -math.inf) -> float:
+        """Return an attribute as a number.
+
+        Raises:
+            FileFormatError: it is missing without a default, no number, too large, or below ``lower``.
+        """
+        if attribute not in self.attributes and default is not _MISSING:
+            return float(default)
+        value = self._number(attribute, self.text(attribute).strip())
+        if value < lower:
+            raise self.error(attribute, f"expected {lower:g} or more, got {value:g}")
+        return value
+
+    def vector(self, attribute: str, default: Any = _MISSING) -> Array:
+        """Return an attribute as three numbers, (3,).
+
+        Raises:
+            FileFormatError: it is missing without a default, or something else.
+        """
+        if attribute not in self.attributes and default is not _MISSING:
+            return np.array(default, dtype=np.float64)
+        words = self.text(attribute).split()
+        numbers = [self._number(attribute, word) for word in words]
+        if len(numbers) != 3:
+            raise self.error(attribute, f"expected 3 numbers, got {len(numbers)}")
+        return np.array(numbers)
+
+    def _number(self, attribute: str, word: str) -> float:
+        if not _NUMBER.fullmatch(word):
+            hint = f"; {_XACRO}" if "${" in word else ""
+            raise self.error(attribute, f"expected a number, got {shown(word)}{hint}")
+        value = float(word)
+        if abs(value) > LARGEST:
+            raise self.error(attribute, f"expected a number no larger than {LARGEST:g}, got {shown(word)}")
+        return value
+
+
+def read_elements(path: Path) -> Element:
+    """Return the element ``robot`` of a URDF file.
+
+    Raises:
+        MissingExtraError: lxml is not installed.
+        FileFormatError: the file is missing, no XML, or no URDF.
+    """
+    data = read_bytes(path)
+    etree = _lxml()
+    # Nothing is fetched, and entities stay as they are: a file from elsewhere cannot make this read other files.
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
+    try:
+        raw = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        message = str(error.msg).partition(", line ")[0]
+        hint = f"; {_XACRO}" if "xacro" in message else ""
+        raise FileFormatError(path, error.lineno or None, "", f"not valid XML: {message}{hint}") from error
+    space, tag = _split(raw)
+    if tag != "robot":
+        raise FileFormatError(path, raw.sourceline, "", f"expected <robot>, as URDF files have, got <{tag}>")
+    foreign = next((one for one in raw.iter() if "xacro" in _split(one)[0]), None)
+    if foreign is not None:
+        raise FileFormatError(path, foreign.sourceline, f"<{_split(foreign)[1]}>", _XACRO)
+    return _element(path, raw, space, "")
+
+
+def _lxml() -> Any:
+    """Import lxml, which only those need who read URDF."""
+    try:
+        return import_module("lxml.etree")
+    except ImportError as error:
+        raise MissingExtraError("reading URDF needs lxml; install it by: pip install 'armwright[urdf]'") from error
+
+
+def _split(raw: Any) -> tuple[str, str]:
+    """Return namespace and name of an element; those of a processing instruction or an entity are empty."""
+    if not isinstance(raw.tag, str):
+        return "", ""
+    space, _, tag = raw.tag.rpartition("}")
+    return space.removeprefix("{"), tag
+
+
+def _element(path: Path, raw: Any, space: str, around: str) -> Element:
+    tag = _split(raw)[1]
+    attributes = dict(raw.attrib)
+    if tag in {"link", "joint"} and not around:
+        place = f"{tag} {shown(attributes['name'])}" if "name" in attributes else tag
+    else:
+        place = ", ".join(part for part in (around, tag) if part and tag != "robot")
+    inside = [one for one in raw if _split(one)[0] == space and _split(one)[1]]
+    children = tuple(_element(path, one, space, place) for one in inside) if tag in _KNOWN else ()
+    element = Element(path=path, line=raw.sourceline, place=place, tag=tag, attributes=attributes, children=children)
+    _refuse_misspelt(element)
+    return element
+
+
+def _refuse_misspelt(element: Element) -> None:
+    """Refuse what is not an element or an attribute of URDF, but nearly so."""
+    if element.tag not in _KNOWN:
+        return
+    tags, attributes = _KNOWN[element.tag]
+    for child in element.children:
+        near = None if child.tag in tags else closest(child.tag, tags)
+        if near:
+            raise child.error("", f"unknown element; did you mean <{near}>?")
+    for attribute in element.attributes:
+        near = None if attribute in attributes else closest(attribute, attributes)
+        if near:
+            raise element.error(attribute, f"unknown attribute; did you mean '{near}'?")
+        if element.tag == "origin" and attribute not in attributes:
+            raise element.error(attribute, "unknown attribute; known here: xyz and rpy")

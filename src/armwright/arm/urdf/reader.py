@@ -1,0 +1,131 @@
+"""Arms from URDF files."""
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from armwright.arm.dh import carry
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, impossible_moments
+from armwright.arm.urdf.axes import Frames, cleared, cleared_pose, frames_of
+from armwright.arm.urdf.chain import Chain, chain_of
+from armwright.arm.urdf.robot import limits_of, motor_of, read_robot
+from armwright.arrays import Array
+from armwright.errors import KindError, shown
+from armwright.spatial.poses import inverse
+
+# An axis that is made parallel by less than this was parallel but for rounding [rad].
+_TOLD = 1e-9
+
+
+@attrs.frozen(kw_only=True)
+class Reading:
+    """What a URDF file gives.
+
+    Attributes:
+        arm: the arm.
+        notes: sentences on what was not taken as it stands.
+    """
+
+    arm: Arm
+    notes: tuple[str, ...]
+
+
+def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Collection[str] = ()) -> Arm:
+    """Return the serial arm between two links of a URDF file.
+
+    Positions of the arm are those of the joints in the file; the base is the frame of the base link, the tool that of
+    the tip link. Fixed joints weld links together. Gravity points down in the root link of the file.
+
+    Args:
+        path: the file; what is read of it is in docs/arms.md.
+        base: name of the link that stands still; the one that hangs on nothing when left out.
+        tip: name of the link that is the tool; the only one at the end of moving joints when left out.
+        lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper.
+
+    Raises:
+        KindError: ``path`` is no path, or ``lock`` one text.
+        MissingExtraError: lxml is not installed.
+        UnknownNameError: there is no link, or no joint, of that name.
+        FileFormatError: the file is missing, broken, or has no such arm; the text has file, line and key.
+    """
+    return read_urdf(path, base=base, tip=tip, lock=lock).arm
+
+
+def read_urdf(
+    path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Collection[str] = ()
+) -> Reading:
+    """Return the serial arm between two links of a URDF file, and what was not taken as it stands.
+
+    Arguments and errors are those of ``load_urdf``.
+    """
+    if not isinstance(path, str | Path):
+        raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
+    if isinstance(lock, str):
+        raise KindError(f"lock: expected a list of names of joints, got {shown(lock)}")
+    path = Path(path)
+    robot = read_robot(path, tuple(lock))
+    chain = chain_of(robot, base, tip)
+    size = _size(chain)
+    frames = frames_of([one.X_BJ for one in chain.moving], [one.axis for one in chain.moving], size)
+    joints, links, motors, notes = [], [], [], _bent(chain, frames)
+    for moving, row, X in zip(chain.moving, frames.rows, frames.poses, strict=True):
+        limits, unknown = limits_of(moving.joint)
+        slides = moving.joint.kind == "prismatic"
+        joints.append(Joint(kind="prismatic" if slides else "revolute", **attrs.asdict(row), limits=limits))
+        links.append(_link(moving.bodies, X, size))
+        motors.append(motor_of(moving.joint))
+        notes += unknown
+    down = chain.X_RB[:3, :3].T @ (0.0, 0.0, -STANDARD_GRAVITY)
+    arm = Arm(
+        name=robot.name,
+        joints=joints,
+        links=links,
+        motors=motors,
+        base=cleared_pose(frames.first, size),
+        tool=cleared_pose(inverse(frames.poses[-1]) @ chain.X_BT, size),
+        gravity=cleared(down, STANDARD_GRAVITY),
+        source=f"{path.name}, link '{chain.base}' to link '{chain.tip}'",
+    )
+    return Reading(arm=arm, notes=tuple(notes))
+
+
+def _size(chain: Chain) -> float:
+    """Return how far the joints and the tip are from the base, or 1 m where all are in one place."""
+    places = np.array([*(one.X_BJ[:3, 3] for one in chain.moving), chain.X_BT[:3, 3]])
+    return float(np.linalg.norm(places, axis=-1).max()) or 1.0
+
+
+def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
+    """Weld bodies that are given in the frame of the base, and see them from the frame of a link."""
+    whole = _welded([body for body in bodies if body.mass or body.inertia.any()])
+    seen = carry(whole, inverse(X_BL))
+    # What has no mass has no centre of mass either; it is put at the origin.
+    com = cleared(seen.com, size) if seen.mass else np.zeros(3)
+    inertia = cleared(seen.inertia, float(np.abs(seen.inertia).max()))
+    known = impossible_moments(seen.mass, com, inertia) is None
+    return Link(mass=seen.mass, com=com, inertia=inertia, complete=known)
+
+
+def _welded(bodies: Sequence[Link]) -> Link:
+    """Return bodies that are given in one frame as one."""
+    if len(bodies) == 1:
+        return bodies[0]
+    mass = sum(body.mass for body in bodies)
+    com = sum((body.mass * body.com for body in bodies), start=np.zeros(3)) / (mass or 1.0)
+    inertia = np.zeros((3, 3))
+    for body in bodies:
+        r = body.com - com
+        inertia += body.inertia + body.mass * ((r @ r) * np.eye(3) - np.outer(r, r))
+    return Link(mass=mass, com=com, inertia=inertia, complete=False)
+
+
+def _bent(chain: Chain, frames: Frames) -> list[str]:
+    """Say which axes were made parallel."""
+    return [
+        f"joints '{one.joint.name}' and '{other.joint.name}': their axes are {angle:.1e} rad from parallel and are "
+        "taken to be parallel"
+        for one, other, angle in zip(chain.moving, chain.moving[1:], frames.bent, strict=False)
+        if angle > _TOLD
+    ]

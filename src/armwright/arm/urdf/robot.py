@@ -1,0 +1,267 @@
+"""What stands in a URDF file: links and joints that make a tree, poses, bodies, limits and friction."""
+
+import math
+from collections.abc import Collection
+from pathlib import Path
+
+import attrs
+import numpy as np
+
+from armwright.arm.dh import turn
+from armwright.arm.model import Limits, Link, Motor, impossible_moments
+from armwright.arm.urdf.elements import Element, read_elements
+from armwright.arrays import Array
+from armwright.errors import FileFormatError, closest, one_of
+from armwright.spatial.poses import pose
+
+# URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
+NO_LIMIT = 1e30
+_MOVING = ("revolute", "continuous", "prismatic")
+_KINDS = ("fixed", *_MOVING, "planar", "floating")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class UrdfJoint:
+    """A joint of the tree.
+
+    Attributes:
+        name: as in the file.
+        kind: one of those URDF has; ``fixed`` also of one that is locked.
+        parent: link it hangs on.
+        child: link it carries.
+        element: where it stands in the file.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    element: Element
+
+    @property
+    def fixed(self) -> bool:
+        """Whether the joint welds its links together."""
+        return self.kind == "fixed"
+
+    @property
+    def origin(self) -> Array:
+        """Pose (4, 4) of the child in the frame of the parent, the joint at 0."""
+        return origin_of(self.element)
+
+    def require_serial(self) -> None:
+        """Refuse a joint that is no part of a serial arm.
+
+        Raises:
+            FileFormatError: it is planar, floating, or follows another joint.
+        """
+        if self.fixed:
+            return
+        if self.kind not in _MOVING:
+            raise self.element.error("type", f"a {self.kind} joint is no joint of an arm; expected {_either(_MOVING)}")
+        follows = self.element.one("mimic")
+        if follows is not None:
+            master = follows.attributes.get("joint", "another joint")
+            raise follows.error("", f"the joint follows '{master}'; an arm has only joints that move by themselves")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Robot:
+    """A URDF file.
+
+    Attributes:
+        path: the file.
+        name: of the robot; that of the file where it has none.
+        links: by name, in the order of the file.
+        above: by the name of a link: the joint that carries it.
+        below: by the name of a link: the joints that hang on it.
+    """
+
+    path: Path
+    name: str
+    links: dict[str, Element]
+    above: dict[str, UrdfJoint]
+    below: dict[str, list[UrdfJoint]]
+
+    def error(self, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of the whole file."""
+        return FileFormatError(self.path, None, "", message)
+
+
+def read_robot(path: Path, lock: Collection[str] = ()) -> Robot:
+    """Read a URDF file.
+
+    Args:
+        path: the file.
+        lock: names of joints that are held at 0, as if they were fixed.
+
+    Raises:
+        MissingExtraError: the library that parses it is not installed.
+        UnknownNameError: a joint to lock is not there.
+        FileFormatError: the file is missing, broken, or its links and joints make no tree.
+    """
+    root = read_elements(path)
+    links: dict[str, Element] = {}
+    for element in root.all("link"):
+        if element.name in links:
+            raise element.error("name", f"there is another link of that name in line {links[element.name].line}")
+        links[element.name] = element
+    names: dict[str, UrdfJoint] = {}
+    above: dict[str, UrdfJoint] = {}
+    below: dict[str, list[UrdfJoint]] = {name: [] for name in links}
+    for element in root.all("joint"):
+        joint = _joint(element, links, lock)
+        if joint.name in names:
+            raise element.error("name", f"there is another joint of that name in line {names[joint.name].element.line}")
+        if joint.child in above:
+            raise element.error("child", f"link '{joint.child}' hangs on joint '{above[joint.child].name}' already")
+        names[joint.name] = above[joint.child] = joint
+        below[joint.parent].append(joint)
+    for name in lock:
+        one_of("joint", name, names)
+    if not links:
+        raise root.error("", "expected at least one <link> in <robot>")
+    robot = Robot(path=path, name=root.attributes.get("name") or path.stem, links=links, above=above, below=below)
+    _refuse_rings(robot)
+    return robot
+
+
+def _joint(element: Element, links: dict[str, Element], lock: Collection[str]) -> UrdfJoint:
+    kind = element.text("type")
+    if kind not in _KINDS:
+        near = closest(kind, _KINDS)
+        hint = f"; did you mean '{near}'?" if near else ""
+        raise element.error("type", f"expected one of {', '.join(_KINDS)}, got '{kind}'{hint}")
+    ends = []
+    for tag in ("parent", "child"):
+        end = element.needed(tag)
+        link = end.text("link")
+        if link not in links:
+            near = closest(link, links)
+            hint = f"; did you mean '{near}'?" if near else ""
+            raise end.error("link", f"there is no link '{link}'{hint}")
+        ends.append(link)
+    kind = "fixed" if element.name in lock else kind
+    return UrdfJoint(name=element.name, kind=kind, parent=ends[0], child=ends[1], element=element)
+
+
+def _refuse_rings(robot: Robot) -> None:
+    """Refuse links that hang on one another in a ring."""
+    settled: set[str] = set()
+    for start in robot.links:
+        way: dict[str, None] = {}
+        link = start
+        while link not in settled and link in robot.above:
+            if link in way:
+                ring = list(way)[list(way).index(link) :]
+                raise robot.above[link].element.error(
+                    "", f"links hang on one another in a ring: {', '.join(map(repr, sorted(ring)))}"
+                )
+            way[link] = None
+            link = robot.above[link].parent
+        settled.update(way)
+
+
+def origin_of(element: Element) -> Array:
+    """Return the pose (4, 4) that the <origin> in an element gives; the same frame where there is none.
+
+    Raises:
+        FileFormatError: it is not written as one.
+    """
+    origin = element.one("origin")
+    if origin is None:
+        return np.eye(4)
+    roll, pitch, yaw = origin.vector("rpy", (0.0, 0.0, 0.0))
+    return pose(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll), origin.vector("xyz", (0.0, 0.0, 0.0)))
+
+
+def axis_of(joint: UrdfJoint) -> Array:
+    """Return the axis of a joint as a unit vector (3,) in the frame of its child.
+
+    Raises:
+        FileFormatError: it is no axis.
+    """
+    element = joint.element.one("axis")
+    if element is None:
+        return np.array((1.0, 0.0, 0.0))
+    axis = element.vector("xyz", (1.0, 0.0, 0.0))
+    largest = float(np.abs(axis).max())
+    if largest == 0:
+        raise element.error("xyz", "an axis of 0 0 0 has no direction")
+    axis = axis / largest  # an axis of any length has a direction, though its square may be no number
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def body_of(link: Element) -> Link:
+    """Return the body of a link in the frame of the link; one without mass where the file gives none.
+
+    Raises:
+        FileFormatError: mass or inertia are missing, or those of no body.
+    """
+    inertial = link.one("inertial")
+    if inertial is None:
+        return Link()
+    X = origin_of(inertial)
+    mass = inertial.needed("mass").number("value", lower=0.0)
+    element = inertial.needed("inertia")
+    xx, yy, zz, xy, xz, yz = (element.number(key) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments = impossible_moments(mass, X[:3, 3], tensor)
+    if moments is not None:
+        said = ", ".join(f"{moment:.3g}" for moment in moments)
+        raise element.error(
+            "",
+            f"no body has the principal moments {said} kg m² about its centre of mass: none may be negative, or larger "
+            "than the other two together",
+        )
+    R = X[:3, :3]
+    return Link(mass=mass, com=X[:3, 3], inertia=R @ tensor @ R.T, complete=False)
+
+
+def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
+    """Return the limits of a joint, and sentences on what was taken for unknown.
+
+    Raises:
+        FileFormatError: there are none where the kind of joint needs them, or nothing can satisfy them.
+    """
+    element = joint.element.one("limit")
+    if element is None:
+        if joint.kind == "continuous":
+            return Limits(), []
+        raise joint.element.error(
+            "", f"a {joint.kind} joint needs <limit>; a joint that turns without end is of type continuous"
+        )
+    largest, notes = {}, []
+    for name, key in (("effort", "effort"), ("speed", "velocity")):
+        value = element.number(key, math.inf, lower=0.0)
+        if value == 0:
+            notes.append(f"joint '{joint.name}': a largest {key} of 0 is taken to say that it is not known")
+        largest[name] = value if 0 < value < NO_LIMIT else math.inf
+    if joint.kind == "continuous":
+        return Limits(**largest), notes
+    lower, upper = element.number("lower", 0.0), element.number("upper", 0.0)
+    if not lower < upper:
+        raise element.error(
+            "",
+            f"the lower limit must be below the upper, got {lower:g} and {upper:g}, where one left out is 0; a joint "
+            "that turns without end is of type continuous",
+        )
+    lower, upper = (value if abs(value) < NO_LIMIT else math.copysign(math.inf, value) for value in (lower, upper))
+    return Limits(lower=lower, upper=upper, **largest), notes
+
+
+def motor_of(joint: UrdfJoint) -> Motor:
+    """Return the friction of a joint; the dry one is the same both ways.
+
+    Raises:
+        FileFormatError: it is negative.
+    """
+    element = joint.element.one("dynamics")
+    if element is None:
+        return Motor()
+    dry = element.number("friction", 0.0, lower=0.0)
+    viscous = element.number("damping", 0.0, lower=0.0)
+    return Motor(viscous=viscous, coulomb_forward=dry, coulomb_backward=dry)
+
+
+def _either(words: tuple[str, ...]) -> str:
+    return f"{', '.join(words[:-1])} or {words[-1]}"

@@ -1,0 +1,126 @@
+"""Arms as TOML files, which ``load_arm`` reads back to equal arms: every number to the last bit, in SI and radians.
+
+Of a base or tool whose rotation is off by more than rounding, the nearest true one is read back.
+"""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError
+
+_UPRIGHT = (0.0, 0.0, -STANDARD_GRAVITY)
+
+
+def toml_text(arm: Arm) -> str:
+    """Return an arm as the text of an arm file; its format is in docs/arms.md.
+
+    What is as it would be if left out is left out.
+
+    Raises:
+        InvalidValueError: arm files cannot hold it: a gear ratio that is not above 0, a tensor that no body has.
+    """
+    return "\n".join(_lines(arm))
+
+
+def _lines(arm: Arm) -> Iterator[str]:
+    yield f"name = {_text(arm.name)}"
+    for key in ("title", "source"):
+        if getattr(arm, key):
+            yield f"{key} = {_text(getattr(arm, key))}"
+    yield ""
+    hand = {"reach_m": arm.reach, "speed_m_per_s": arm.tool_speed}
+    yield from _table("hand", {key: value for key, value in hand.items() if math.isfinite(value)})
+    yield from _pose("base", arm.base)
+    yield from _pose("tool", arm.tool)
+    if not np.array_equal(arm.gravity, _UPRIGHT):
+        yield from _table("gravity", {"m_per_s2": arm.gravity})
+    for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
+        yield f"[[joint]]  # {i}"
+        yield f'kind = "{joint.kind}"'
+        geometry = {"theta_rad": joint.theta, "d_m": joint.d, "a_m": joint.a, "alpha_rad": joint.alpha}
+        yield from _numbers({key: value for key, value in geometry.items() if value})
+        yield ""
+        yield from _table("joint.limits", _limits(joint))
+        yield from _table("joint.link", _link(arm, i, link))
+        yield from _table("joint.motor", _motor(arm, i, motor, joint))
+
+
+def _limits(joint: Joint) -> dict[str, float]:
+    position, effort = ("rad", "Nm") if joint.revolute else ("m", "N")
+    keys = {
+        "lower": f"lower_{position}",
+        "upper": f"upper_{position}",
+        "speed": f"speed_{position}_per_s",
+        "acceleration": f"acceleration_{position}_per_s2",
+        "effort": f"effort_{effort}",
+    }
+    values = attrs.asdict(joint.limits)
+    return {keys[field.name]: values[field.name] for field in attrs.fields(Limits) if math.isfinite(values[field.name])}
+
+
+def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:
+    if impossible_moments(link.mass, link.com, link.inertia) is not None:
+        raise InvalidValueError(
+            f"arm '{arm.name}': link {i} has the inertia {link.inertia.tolist()}, of which not all moments are known; "
+            "an arm file cannot say so"
+        )
+    values: dict[str, float | Array] = {}
+    if link.mass:
+        values["mass_kg"] = link.mass
+    if link.com.any():
+        values["com_m"] = link.com
+    if link.inertia.any():
+        I = link.inertia
+        moments, products = np.diag(I), np.array((I[0, 1], I[0, 2], I[1, 2]))
+        values["inertia_kgm2"] = np.append(moments, products) if products.any() else moments
+    return values
+
+
+def _motor(arm: Arm, i: int, motor: Motor, joint: Joint) -> dict[str, float]:
+    if not motor.gear_ratio > 0:
+        raise InvalidValueError(
+            f"arm '{arm.name}': joint {i} has the gear ratio {motor.gear_ratio:g}; in an arm file it is above 0"
+        )
+    inertia, viscous, dry = ("kgm2", "Nms", "Nm") if joint.revolute else ("kg", "Ns_per_m", "N")
+    values = {
+        f"inertia_{inertia}": motor.inertia,
+        f"viscous_{viscous}": motor.viscous,
+        f"coulomb_forward_{dry}": motor.coulomb_forward,
+        f"coulomb_backward_{dry}": motor.coulomb_backward,
+    }
+    values = {key: value for key, value in values.items() if value}
+    return values if motor.gear_ratio == 1 else {**values, "gear_ratio": motor.gear_ratio}
+
+
+def _pose(name: str, X: Array) -> Iterator[str]:
+    values: dict[str, Array] = {}
+    if X[:3, 3].any():
+        values["xyz_m"] = X[:3, 3]
+    if not np.array_equal(X[:3, :3], np.eye(3)):
+        values["rotation"] = X[:3, :3]
+    yield from _table(name, values)
+
+
+def _table(name: str, values: Mapping[str, float | Array]) -> Iterator[str]:
+    """Write a table and an empty line below it; nothing if there is nothing in it."""
+    if values:
+        yield f"[{name}]"
+        yield from _numbers(values)
+        yield ""
+
+
+def _numbers(values: Mapping[str, float | Array]) -> Iterator[str]:
+    for key, value in values.items():
+        # -0.0 + 0.0 is 0.0; repr and tolist write a number so that it is read back to the last bit.
+        yield f"{key} = {(np.asarray(value) + 0.0).tolist()!r}"
+
+
+def _text(text: str) -> str:
+    """Write a text as TOML does: as JSON, but for the one control character that JSON lets stand."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")

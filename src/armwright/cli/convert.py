@@ -1,0 +1,69 @@
+"""``armwright convert``: an arm from one file format to another."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armwright.cli.forward import ArmName
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
+
+
+def convert(  # noqa: PLR0917 - Typer reads one parameter per option
+    arm: ArmName,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="File to write: .urdf, or .toml for an arm file.", show_default=False)
+    ],
+    base: Annotated[
+        str | None, typer.Option(help="Of a URDF file: the link that stands still.", show_default=False)
+    ] = None,
+    tip: Annotated[
+        str | None, typer.Option(help="Of a URDF file: the link that is the tool.", show_default=False)
+    ] = None,
+    lock: Annotated[
+        str | None,
+        typer.Option(help="Of a URDF file: joints to hold at 0, as those of a gripper: J1,J2.", show_default=False),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
+) -> None:
+    """Write an arm as URDF or as an arm file, and say what the file cannot hold.
+
+    **Example:** `armwright convert puma560 -o puma560.urdf`
+    """
+    import json
+
+    from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
+    from armwright.arm.write import toml_text
+    from armwright.files.output import write_file
+
+    kind = output.suffix.lower()
+    if kind not in {".urdf", ".toml"}:
+        raise typer.BadParameter(f"expected a name that ends in .urdf or .toml, got {output}", param_hint="-o")
+    if output.exists() and Path(arm).exists() and output.samefile(arm):
+        raise typer.BadParameter("this is the file that is read; it may hold more than an arm", param_hint="-o")
+    model, notes = _read(arm, base, tip, [] if lock is None else lock.split(","))
+    lost = lost_in_urdf(model) if kind == ".urdf" else []
+    write_file(output, urdf_text(model) if kind == ".urdf" else toml_text(model))
+    if as_json:
+        said = {"written": str(output), "name": model.name, "joints": model.n, "notes": notes, "lost": lost}
+        print(json.dumps(said, indent=2, ensure_ascii=False))
+        return
+    print(f"{model.name}: {model.n} joint{'s' if model.n > 1 else ''} written to {output}")
+    for sentence in (*notes, *lost):
+        print(f"  {sentence}")
+
+
+def _read(name: str, base: str | None, tip: str | None, lock: list[str]) -> "tuple[Arm, list[str]]":
+    """Return an arm, and what was not taken as it stands in its file."""
+    from armwright.arm.load import load_arm
+    from armwright.arm.urdf.reader import read_urdf
+
+    if name.lower().endswith(".urdf"):
+        reading = read_urdf(name, base=base, tip=tip, lock=lock)
+        return reading.arm, list(reading.notes)
+    for option, value in (("--base", base), ("--tip", tip), ("--lock", lock)):
+        if value:
+            raise typer.BadParameter(f"only URDF files have links and joints to name, not '{name}'", param_hint=option)
+    return load_arm(name), []

@@ -1,0 +1,234 @@
+"""URDF files with mistakes in them: what each is answered with."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
+from armwright.arm.urdf.reader import load_urdf
+from armwright.errors import FileFormatError, KindError, MissingExtraError, UnknownNameError
+from urdf_texts import ARM_WITH_GRIPPER, LIMIT, MASS, joint, link, one, robot
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[..., Arm]:
+    """Write a text into a file and read it as an arm."""
+
+    def write(text: str, **options: object) -> Arm:
+        (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
+        return load_urdf(tmp_path / "arm.urdf", **options)
+
+    return write
+
+
+def test_twins_are_told_apart_by_line(read: Callable[..., Arm]) -> None:
+    """Two links of one name are refused with both lines."""
+    with pytest.raises(
+        FileFormatError, match=r"arm.urdf:3: link 'a', name: there is another link of that name in line 2"
+    ):
+        read(robot(link("a"), link("a")))
+
+
+FORK = (
+    *(link(name) for name in ("base", "a", "b")),
+    joint("ja", "continuous", "base", "a"),
+    joint("jb", "continuous", "base", "b"),
+)
+MISTAKES: dict[str, tuple[str, str]] = {
+    "nothing": ("", "arm.urdf:1: not valid XML: Document is empty"),
+    "no XML": ("hello", "arm.urdf:1: not valid XML: Start tag expected, '<' not found"),
+    "not closed": (one().replace("</link>", "", 1), "arm.urdf:5: not valid XML: Opening and ending tag mismatch"),
+    "another format": ("<sdf/>", "arm.urdf:1: expected <robot>, as URDF files have, got <sdf>"),
+    "xacro": (
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:include filename="a"/></robot>',
+        "arm.urdf:2: <include>: xacro is expanded before it is URDF: xacro FILE > robot.urdf",
+    ),
+    "xacro without its namespace": (
+        "<robot><xacro:include/></robot>",
+        "Namespace prefix xacro on include is not defined; xacro is expanded before it is URDF",
+    ),
+    "a property of xacro": (
+        one(f'<origin xyz="0 0 ${{height}}"/>{LIMIT}'),
+        "joint 'turn', origin, xyz: expected a number, got '${height}'; xacro is expanded",
+    ),
+    "no link": ("<robot/>", "arm.urdf:1: expected at least one <link> in <robot>"),
+    "a link without a name": (robot("<link/>"), "arm.urdf:2: link, name: missing"),
+    "a joint without a name": (robot(link("a"), "<joint/>"), "arm.urdf:3: joint, type: missing"),
+    "no parent": (one().replace('<parent link="base"/>', ""), "joint 'turn': expected <parent> in it"),
+    "a link that is not there": (
+        one().replace('<child link="hand"/>', '<child link="hnad"/>'),
+        "arm.urdf:4: joint 'turn', child, link: there is no link 'hnad'; did you mean 'hand'?",
+    ),
+    "unknown kind": (
+        one(kind="revolut"),
+        "one of fixed, revolute, continuous, prismatic, planar, floating, got 'revolut'; did you mean 'revolute'?",
+    ),
+    "planar": (one(kind="planar"), "joint 'turn', type: a planar joint is no joint of an arm"),
+    "floating": (one(kind="floating"), "joint 'turn', type: a floating joint is no joint of an arm"),
+    "mimic": (
+        one(f'{LIMIT}<mimic joint="other"/>'),
+        "joint 'turn', mimic: the joint follows 'other'; an arm has only joints that move by themselves",
+    ),
+    "nothing moves": (
+        robot(link("base"), link("hand"), joint("weld", "fixed", "base", "hand")),
+        "arm.urdf: no joint moves a link that hangs on 'base'",
+    ),
+    "twin joints": (
+        robot(*FORK).replace('"jb"', '"ja"'),
+        "joint 'ja', name: there is another joint of that name in line 5",
+    ),
+    "two parents": (
+        robot(*FORK, joint("jc", "fixed", "a", "b")),
+        "arm.urdf:7: joint 'jc', child: link 'b' hangs on joint 'jb' already",
+    ),
+    "a ring": (
+        robot(link("a"), link("b"), link("c"), joint("ab", "fixed", "a", "b"), joint("ba", "fixed", "b", "a")),
+        "links hang on one another in a ring: 'a', 'b'",
+    ),
+    "two roots": (
+        robot(link("a"), link("b")),
+        "arm.urdf: the base could be any of the links 'a', 'b'; name one as base (--base)",
+    ),
+    "two ends": (
+        robot(*FORK),
+        "the arm could end at any of the links 'a', 'b'; name one as tip: load_urdf(path, tip='a')",
+    ),
+    "no limit": (
+        one(""),
+        "joint 'turn': a revolute joint needs <limit>; a joint that turns without end is of type cont",
+    ),
+    "limits left out": (
+        one('<limit effort="1" velocity="1"/>'),
+        "joint 'turn', limit: the lower limit must be below the upper, got 0 and 0, where one left out is 0",
+    ),
+    "limits reversed": (
+        one('<limit lower="2" upper="1"/>'),
+        "limit: the lower limit must be below the upper, got 2 and 1",
+    ),
+    "negative effort": (
+        one('<limit lower="0" upper="1" effort="-1"/>'),
+        "joint 'turn', limit, effort: expected 0 or more, got -1",
+    ),
+    "negative damping": (one(f'{LIMIT}<dynamics damping="-1"/>'), "dynamics, damping: expected 0 or more, got -1"),
+    "no direction": (
+        one(f'<axis xyz="0 0 -0.0"/>{LIMIT}'),
+        "joint 'turn', axis, xyz: an axis of 0 0 0 has no direction",
+    ),
+    "an axis in two dimensions": (one(f'<axis xyz="0 1"/>{LIMIT}'), "axis, xyz: expected 3 numbers, got 2"),
+    "not a number": (one(f'<axis xyz="0 0 nan"/>{LIMIT}'), "axis, xyz: expected a number, got 'nan'"),
+    "a comma": (one(f'<axis xyz="0,0,1"/>{LIMIT}'), "axis, xyz: expected a number, got '0,0,1'"),
+    "endless": (one('<limit lower="-inf" upper="1"/>'), "limit, lower: expected a number, got '-inf'"),
+    "too large": (one(f'<origin xyz="0 0 1e200"/>{LIMIT}'), "expected a number no larger than 1e+100, got '1e200'"),
+    "given twice": (one(LIMIT + LIMIT), "joint 'turn', limit: given twice, first in line 4"),
+    "a misspelt element": (
+        one().replace("limit", "limits"),
+        "joint 'turn', limits: unknown element; did you mean <limit>?",
+    ),
+    "a misspelt attribute": (one().replace("upper", "uper"), "limit, uper: unknown attribute; did you mean 'upper'?"),
+    "another turn": (
+        one(f'<origin quat_xyzw="0 0 0 1"/>{LIMIT}'),
+        "joint 'turn', origin, quat_xyzw: unknown attribute; known here: xyz and rpy",
+    ),
+    "an entity": (
+        f'<!DOCTYPE r [<!ENTITY file SYSTEM "/etc/hostname">]>{one()}'.replace(LIMIT, "&file;"),
+        "joint 'turn': a revolute joint needs <limit>",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes(mistake: str, read: Callable[..., Arm]) -> None:
+    """Every mistake is told with file, line, element and attribute."""
+    text, message = MISTAKES[mistake]
+
+    with pytest.raises(FileFormatError) as caught:
+        read(text)
+
+    assert message in str(caught.value)
+
+
+BODIES: dict[str, tuple[str, str]] = {
+    "no mass": (MASS.replace('<mass value="2"/>', ""), "arm.urdf:3: link 'hand', inertial: expected <mass> in it"),
+    "no inertia": ('<inertial><mass value="2"/></inertial>', "link 'hand', inertial: expected <inertia> in it"),
+    "a moment left out": (MASS.replace('ixx="1"', ""), "link 'hand', inertial, inertia, ixx: missing"),
+    "a negative mass": (MASS.replace('"2"', '"-2"'), "inertial, mass, value: expected 0 or more, got -2"),
+    "a negative moment": (MASS.replace('ixx="1"', 'ixx="-1"'), "no body has the principal moments -1, 1, 1 kg m²"),
+    "one moment beyond the others": (
+        MASS.replace('ixx="1"', 'ixx="3"'),
+        "link 'hand', inertial, inertia: no body has the principal moments 1, 1, 3 kg m² about its centre of mass",
+    ),
+    "misspelt": (
+        MASS.replace("inertial", "inertail"),
+        "link 'hand', inertail: unknown element; did you mean <inertial>?",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", BODIES)
+def test_mistakes_in_a_body(mistake: str, read: Callable[..., Arm]) -> None:
+    """A body without a mass or with a tensor that none has would make the dynamics wrong, and is refused."""
+    inside, message = BODIES[mistake]
+
+    with pytest.raises(FileFormatError) as caught:
+        read(one().replace('<link name="hand">', f'<link name="hand">{inside}'))
+
+    assert message in str(caught.value)
+
+
+def test_fingers_beside_the_chain(read: Callable[..., Arm]) -> None:
+    """Fingers with mass that move beside the chain are refused by name, with the way out."""
+    with pytest.raises(FileFormatError) as caught:
+        read(ARM_WITH_GRIPPER, tip="camera")
+
+    assert (
+        "joint 'left_slide': 2 joints hang beside the chain, move and have mass to carry: 'left_slide', 'right_slide'. "
+        "An arm has no branches: choose another tip, or lock them at 0: lock=['left_slide', 'right_slide'] "
+        "(--lock left_slide,right_slide)"
+    ) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "message"),
+    [
+        ({"tip": "camrea"}, UnknownNameError, "no link 'camrea'. Did you mean 'camera'?"),
+        ({"base": "bas"}, UnknownNameError, "no link 'bas'. Did you mean 'base'? Known: arm, base, camera"),
+        ({"tip": "camera", "lock": ["left"]}, UnknownNameError, "no joint 'left'. Known: clip, left_slide"),
+        ({"tip": "base"}, FileFormatError, "arm.urdf: no joint moves between the links 'base' and 'base'"),
+        ({"base": "palm", "tip": "arm"}, FileFormatError, "arm.urdf: link 'arm' does not hang on link 'palm'"),
+        ({"tip": 3}, UnknownNameError, "no link '3'"),
+        ({"lock": "left_slide"}, KindError, "lock: expected a list of names of joints, got 'left_slide'"),
+    ],
+)
+def test_wrong_choices(
+    options: dict[str, object], kind: type[Exception], message: str, read: Callable[..., Arm]
+) -> None:
+    """Links and joints that are not there, or not in this order, are told with what there is."""
+    with pytest.raises(kind) as caught:
+        read(ARM_WITH_GRIPPER, **options)
+
+    assert message in str(caught.value)
+
+
+def test_no_such_file(tmp_path: Path) -> None:
+    """A path without a file is told with the nearest name; what is no path is refused."""
+    (tmp_path / "puma.urdf").write_text(one())
+
+    with pytest.raises(FileFormatError, match=r"pumma.urdf: no such file; did you mean '.*puma.urdf'\?"):
+        load_arm(tmp_path / "pumma.urdf")
+    with pytest.raises(KindError, match="path: expected the path of a URDF file, got 3"):
+        load_urdf(3)  # type: ignore[arg-type]
+
+
+def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the library that parses is not installed, the message has the command that installs it."""
+    (tmp_path / "arm.urdf").write_text(one())
+    monkeypatch.setitem(sys.modules, "lxml.etree", None)
+
+    with pytest.raises(
+        MissingExtraError, match=r"reading URDF needs lxml; install it by: pip install 'armwright\[urdf\]'"
+    ):
+        load_arm(tmp_path / "arm.urdf")
+    assert issubclass(MissingExtraError, ImportError)

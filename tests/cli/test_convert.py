@@ -1,0 +1,120 @@
+"""The command convert."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.urdf.reader import load_urdf
+from armwright.kinematics.forward import forward
+from cli_calls import armwright
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "seven_joints.urdf"
+
+
+def test_catalogue_to_urdf(tmp_path: Path) -> None:
+    """An arm of the catalogue becomes a URDF file, and what URDF cannot hold is said."""
+    done = armwright("convert", "puma560", "-o", tmp_path / "new" / "puma.urdf")
+
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[0] == f"puma560: 6 joints written to {tmp_path / 'new' / 'puma.urdf'}"
+    assert "  joint 1: the inertia of the drive, 1.14 kg m², is not in the file" in lines
+    q = np.linspace(-1, 1, 6)
+    again = load_urdf(tmp_path / "new" / "puma.urdf")
+    np.testing.assert_allclose(forward(again, q), forward(load_arm("puma560"), q), atol=1e-12)
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["puma.urdf"]
+
+
+def test_urdf_to_arm_file(tmp_path: Path) -> None:
+    """A URDF file becomes an arm file that is the same arm, and with --json the summary is data."""
+    done = armwright("convert", EXAMPLE, "-o", tmp_path / "seven.toml", "--json")
+
+    assert json.loads(done.stdout) == {
+        "written": str(tmp_path / "seven.toml"),
+        "name": "seven_joints",
+        "joints": 7,
+        "notes": [],
+        "lost": [],
+    }
+    assert load_arm(tmp_path / "seven.toml") == load_urdf(EXAMPLE)
+
+
+def test_part_of_a_chain(tmp_path: Path) -> None:
+    """Base, tip and locked joints are named on the command line."""
+    part = ("--base", "upper_arm", "--tip", "gripper", "--lock", "forearm_roll,wrist_tilt")
+
+    done = armwright("convert", EXAMPLE, "-o", tmp_path / "part.toml", *part)
+
+    assert done.returncode == 0
+    assert load_arm(tmp_path / "part.toml") == load_urdf(
+        EXAMPLE, base="upper_arm", tip="gripper", lock=["forearm_roll", "wrist_tilt"]
+    )
+    assert load_arm(tmp_path / "part.toml").n == 3
+
+
+def test_notes(tmp_path: Path) -> None:
+    """What was not taken as it stands in a URDF file is said."""
+    text = EXAMPLE.read_text(encoding="utf-8").replace('velocity="3.6"', 'velocity="0"')
+    (tmp_path / "slow.urdf").write_text(text, encoding="utf-8")
+
+    said = armwright("convert", tmp_path / "slow.urdf", "-o", tmp_path / "slow.toml").stdout
+
+    assert "\n  joint 'hand_roll': a largest velocity of 0 is taken to say that it is not known\n" in said
+
+
+def test_other_commands_read_urdf() -> None:
+    """A path of a URDF file stands wherever an arm is asked for."""
+    q = "10,20,30,40,50,60,70"
+
+    data = json.loads(armwright("forward", EXAMPLE, "-q", q, "--json").stdout)
+
+    expected = forward(load_urdf(EXAMPLE), np.radians([10, 20, 30, 40, 50, 60, 70]))
+    np.testing.assert_allclose(data["pose"], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (("puma560",), 2, "Missing option '-o'"),
+        (("puma560", "-o", "puma.xml"), 2, "expected a name that ends in .urdf or .toml, got puma.xml"),
+        (("puma560", "-o", "puma.toml", "--tip", "hand"), 2, "only URDF files have links and joints to name"),
+        (("puma560", "-o", "puma.toml", "--lock", "j1"), 2, "only URDF files have links and joints to name"),
+        (("pumma560", "-o", "puma.toml"), 1, "Did you mean 'puma560'?"),
+        ((EXAMPLE, "-o", "seven.toml", "--tip", "tool_pont"), 1, "no link 'tool_pont'. Did you mean 'tool_point'?"),
+        ((EXAMPLE, "-o", "seven.toml", "--lock", "waits"), 1, "no joint 'waits'. Did you mean 'waist'?"),
+        (("no.urdf", "-o", "no.toml"), 1, "no.urdf: no such file"),
+    ],
+)
+def test_mistakes(arguments: tuple[str | Path, ...], status: int, said: str, tmp_path: Path) -> None:
+    """A call that cannot be understood ends with status 2, a name that is not there with 1; nothing is written."""
+    done = armwright("convert", *arguments, cwd=tmp_path, columns=400)
+
+    assert done.returncode == status
+    assert said in " ".join(done.stderr.replace("│", " ").split())
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_file_that_is_read_is_not_replaced(tmp_path: Path) -> None:
+    """A URDF file may hold more than an arm: its shapes would be lost."""
+    (tmp_path / "seven.urdf").write_bytes(EXAMPLE.read_bytes())
+
+    done = armwright("convert", "seven.urdf", "-o", tmp_path / "seven.urdf", cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert "this is the file that is read" in " ".join(done.stderr.replace("│", " ").split())
+    assert (tmp_path / "seven.urdf").read_bytes() == EXAMPLE.read_bytes()
+
+
+def test_cannot_be_written(tmp_path: Path) -> None:
+    """Where a folder has the name of the file, the message says so."""
+    (tmp_path / "puma.toml").mkdir()
+
+    done = armwright("convert", "puma560", "-o", tmp_path / "puma.toml")
+
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"armwright: cannot write '{tmp_path / 'puma.toml'}': ")
+    assert [path.name for path in tmp_path.iterdir()] == ["puma.toml"]
