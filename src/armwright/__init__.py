@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from armwright.kinematics.jacobian import jacobian
     from armwright.kinematics.singularities import singularities
     from armwright.motion.quintic import point_to_point, quintic
+    from armwright.motion.detour import line_or_detour
+    from armwright.motion.straight import straight_line
     from armwright.motion.trajectory import Trajectory
     from armwright.motion.xspline import xspline
 
@@ -48,6 +50,7 @@ _HOME = {
     "inverse_branches": "kinematics.inverse.closed_form",
     "inverse_dynamics": "dynamics.newton_euler",
     "jacobian": "kinematics.jacobian",
+    "line_or_detour": "motion.detour",
     "link_poses": "kinematics.forward",
     "load_arm": "arm.load",
     "load_urdf": "arm.urdf.reader",
@@ -57,6 +60,7 @@ _HOME = {
     "quintic": "motion.quintic",
     "simulate": "dynamics.simulate",
     "singularities": "kinematics.singularities",
+    "straight_line": "motion.straight",
     "terms": "dynamics.terms",
     "xspline": "motion.xspline",
 }
@@ -75,6 +79,7 @@ __all__ = [
     "inverse_branches",
     "inverse_dynamics",
     "jacobian",
+    "line_or_detour",
     "link_poses",
     "load_arm",
     "load_urdf",
@@ -84,6 +89,7 @@ __all__ = [
     "quintic",
     "simulate",
     "singularities",
+    "straight_line",
     "terms",
     "xspline",
 ]

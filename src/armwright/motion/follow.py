@@ -29,7 +29,7 @@ _HALVINGS = 6
 _CORNER_ROOM = 20.0
 # A path that asks a joint for this many times its top speed meets a singularity; it is refused, not crawled along.
 # Accelerations say nothing of it: a short line asks much of them wherever it lies.
-_SLOWEST = 20.0
+SLOWEST = 20.0
 # Turning the hand by this much is allowed where the place may be off by one metre's thousandth: 5 mrad per mm.
 TURN_PER_METRE = 5.0
 
@@ -190,7 +190,7 @@ def _slowing(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> tupl
         "speed": trajectory.segment_peaks(1) / arm.limit("speed"),
         "acceleration": np.sqrt(trajectory.segment_peaks(2) / arm.limit("acceleration")),
     }
-    if needs["speed"].max() > _SLOWEST:
+    if needs["speed"].max() > SLOWEST:
         interval, worst = np.unravel_index(int(needs["speed"].argmax()), needs["speed"].shape)
         k = int(interval) + 1
         raise PathError(

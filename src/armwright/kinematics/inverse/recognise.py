@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from armwright.spatial.rotations import nearest_rotation
 _SWAP = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 
 
+@lru_cache(maxsize=64)  # asked for at every solve, and an arm does not change
 def shoulder_of(arm: Arm) -> Shoulder | None:
     """Return the build of an arm that has a closed-form inverse, or None.
 

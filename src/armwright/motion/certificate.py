@@ -1,0 +1,104 @@
+"""What a planned path is certified to keep: its deviation, and the limits of the joints."""
+
+from typing import Literal, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+
+LimitName: TypeAlias = Literal["speed", "acceleration", "effort"]
+LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "effort")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Certificate:
+    """What holds of a motion along a path.
+
+    Attributes:
+        arm: the arm.
+        deviation_asked: bound of the distance of the hand from the path [m].
+        deviation: upper bound of what that distance is, between samples as well [m].
+        deviation_seen: the largest distance that was seen [m].
+        turn_asked: bound of the angle from the orientation that belongs to the progress on the path [rad].
+        turn: upper bound of what that angle is [rad].
+        turn_seen: the largest angle that was seen [rad].
+        worst_time: when the largest distance was seen [s].
+        worst_place: (3,) where the hand was then, seen from the base [m].
+        knots: number of poses that were solved.
+        looks: how often the hand was looked at in between.
+        peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at the
+            looks.
+        factor: how many times slower the motion is than was asked for, 1 for not at all.
+        because: which limit, and which joint, from 0, that is for; None where nothing had to give way.
+    """
+
+    arm: Arm
+    deviation_asked: float
+    deviation: float
+    deviation_seen: float
+    turn_asked: float
+    turn: float
+    turn_seen: float
+    worst_time: float
+    worst_place: Array
+    knots: int
+    looks: int
+    peaks: dict[LimitName, Array]
+    factor: float
+    because: tuple[LimitName, int] | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the path is kept within what was asked, and all limits are."""
+        return (
+            self.deviation <= self.deviation_asked
+            and self.turn <= self.turn_asked
+            and all(self.use(name)[1] <= 1 + 1e-9 for name in LIMITS)
+        )
+
+    def use(self, name: LimitName) -> tuple[int, float]:
+        """Return the joint, from 0, that comes nearest to a limit, and which part of the limit it uses."""
+        parts = self.peaks[name] / self.arm.limit(name)
+        joint = int(parts.argmax())
+        return joint, float(parts[joint])
+
+    def __str__(self) -> str:
+        """Say it in a few lines."""
+        x, y, z = self.worst_place * 1e3
+        verdict = "holds" if self.holds else "DOES NOT HOLD"
+        within = (
+            f"{verdict}: hand within {self.deviation * 1e3:.4f} mm of the path "
+            f"(asked {self.deviation_asked * 1e3:g} mm), within {self.turn * 1e3:.3f} mrad of its orientation (asked {self.turn_asked * 1e3:g} mrad)"
+        )
+        seen = (
+            f"largest distance seen {self.deviation_seen * 1e3:.4f} mm, at {self.worst_time:.3f} s, "
+            f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base; {self.knots} knots, {self.looks} looks"
+        )
+        lines = [within, seen]
+        uses = [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
+        if uses:
+            lines.append("; ".join(f"joint {j + 1} uses {part:.0%} of its {name}" for name, j, part in uses))
+        if self.because is not None:
+            name, joint = self.because
+            lines.append(f"{self.factor:.2f} times slower than asked, for the {name} of joint {joint + 1}")
+        return "\n".join(lines)
+
+
+def slowing(arm: Arm, peaks: dict[LimitName, Array]) -> tuple[float, tuple[LimitName, int] | None]:
+    """Return by which factor a motion must be slowed to keep speeds and accelerations, at least 1, and for what.
+
+    Args:
+        arm: the arm, with n joints.
+        peaks: largest speeds and accelerations, (n,) each.
+    """
+    needs: dict[LimitName, Array] = {
+        "speed": peaks["speed"] / arm.limit("speed"),
+        "acceleration": np.sqrt(peaks["acceleration"] / arm.limit("acceleration")),
+    }
+    factor, because = 1.0, None
+    for name, need in needs.items():
+        if need.max() > factor * (1 + 1e-12):
+            factor, because = float(need.max()), (name, int(need.argmax()))
+    return factor, because

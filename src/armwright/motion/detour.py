@@ -1,0 +1,266 @@
+"""Ways round what stops a straight line: by a via pose beside it, or along it by damped rates; and their price."""
+
+from collections.abc import Iterator
+from typing import Literal, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arm.positions import one_posture
+from armwright.arrays import Array, ArrayLike
+from armwright.errors import one_of
+from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.inverse.judge import clean_pose
+from armwright.motion.certificate import slowing
+from armwright.motion.deviation import Spline, Ways, deviation_of
+from armwright.motion.follow import TURN_PER_METRE, PathError
+from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.straight import CertifiedLine, Line, straight_line, timed_line
+from armwright.motion.trajectory import Trajectory, join
+from armwright.motion.xspline import xspline
+from armwright.spatial.rotations import rotation_from_vector, rotation_vector
+
+By: TypeAlias = Literal["via", "damped"]
+
+# Via poses that are tried: distances beside the line [m], directions at each, and turns of the hand [rad].
+_BESIDE = (0.02, 0.05, 0.1, 0.2, 0.4)
+_DIRECTIONS = 8
+_TURNS = (0.1, 0.3, 0.6)
+# A way round that takes longer than the line by so many times its duration is worth looking for another.
+_LONG = 2.0
+# A via pose stands no nearer to the ends of the line than this part of it.
+_MARGIN = 0.1
+# Damped rates: steps of the way, how fast what is missing is made up for [1/s], and how long after the end, at most.
+_STEPS = 600
+_MAKE_UP = 20.0
+_AFTER = 1.0
+_LITTLE = 0.1
+# Where a joint rushes the way is run slower: so often, over so many intervals to either side.
+_EASINGS, _AROUND = 3, 20
+# The end is met to this [m], a turn counted as ``TURN_PER_METRE`` says.
+_ARRIVED = 1e-6
+
+
+@attrs.frozen(kw_only=True)
+class Price:
+    """What a way round costs.
+
+    Attributes:
+        distance: largest distance of the hand from the straight line [m].
+        turn: largest angle from the orientation that belongs to the line [rad].
+        time: how much longer it takes than the line by the report's rule would [s].
+    """
+
+    distance: float
+    turn: float
+    time: float
+
+    def __str__(self) -> str:
+        """Say it in mm, mrad and s."""
+        return f"{self.distance * 1e3:.1f} mm off the line, {self.turn * 1e3:.1f} mrad, {self.time:+.2f} s"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Detour:
+    """A motion from the start of a line to its end.
+
+    Attributes:
+        trajectory: of the joints, at rest at both ends.
+        by: ``line`` where the straight line itself can be run, ``via`` or ``damped`` otherwise.
+        obstacle: what stopped the line; None where nothing did.
+        via: (4, 4) the pose that it stops at on the way; None unless by ``via``.
+        price: what it costs.
+        legs: the certified lines it is made of; none by ``damped`` rates, which follow no line.
+    """
+
+    trajectory: Trajectory
+    by: Literal["line", "via", "damped"]
+    obstacle: PathError | None
+    via: Array | None
+    price: Price
+    legs: tuple[CertifiedLine, ...]
+
+
+def line_or_detour(
+    arm: AnyArm,
+    q_start: ArrayLike,
+    X_goal: ArrayLike,
+    *,
+    by: By = "via",
+    deviation: float = 1e-3,
+    speed: float = 100.0,
+    damping: float = 0.05,
+) -> Detour:
+    """Plan a straight line, and where it cannot be run, a way round.
+
+    By ``via``: a stop at a pose beside the line, or at the same place with the hand turned, that two certified lines
+    lead to and from; the nearest that is found. By ``damped``: along the line, where the posture is nearly singular
+    with joint rates that stay bounded, so that the hand leaves the line there and comes back.
+
+    Args:
+        arm: an arm, or a compiled one, which plans faster.
+        q_start: (n,) present joint positions [rad] or [m].
+        X_goal: (4, 4) pose at the end of the line.
+        by: ``via`` or ``damped``.
+        deviation: allowed distance of the hand from a line [m].
+        speed: 1 to 120, 100 is normal.
+        damping: singular value at which damping begins [m]; see ``damped_rates``.
+
+    Raises:
+        PathError: there is no way round either; what stopped the line itself, with place and cause.
+        InvalidValueError: ``by``, deviation or speed are none.
+    """
+    one_of("way round", by, ("via", "damped"))
+    solver = solver_of(arm)
+    q, B = one_posture(solver.arm, q_start, "q_start"), clean_pose(X_goal)
+    try:
+        line = straight_line(arm, q, B, deviation=deviation, speed=speed)
+    except PathError as error:
+        obstacle = error
+    else:
+        free = Price(distance=line.certificate.deviation, turn=line.certificate.turn, time=0.0)
+        return Detour(trajectory=line.trajectory, by="line", obstacle=None, via=None, price=free, legs=(line,))
+    asked = timed_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
+    if asked is None or (by == "damped" and obstacle.cause == "reach"):
+        raise obstacle
+    found = _damped(solver, asked, q, damping, obstacle) if by == "damped" else None
+    if by == "via":
+        found = _by_via(arm, asked, q, obstacle, deviation=deviation, speed=speed)
+    if found is None:
+        raise obstacle
+    return found
+
+
+def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation: float, speed: float) -> Detour | None:
+    """Return the fastest way by one of the nearest via poses; None where none is found."""
+    ways: list[Detour] = []
+    for ring in _rings(line, obstacle.fraction):
+        for via in ring:
+            try:
+                there = straight_line(arm, q, via, deviation=deviation, speed=speed)
+                at_via = there.trajectory(there.trajectory.duration)
+                back = straight_line(arm, at_via, line.B, deviation=deviation, speed=speed)
+            except PathError:
+                continue
+            motion = join([there.trajectory, back.trajectory])
+            place, turn = _apart(line, via)
+            price = Price(distance=place, turn=turn, time=motion.duration - line.duration)
+            ways.append(
+                Detour(trajectory=motion, by="via", obstacle=obstacle, via=via, price=price, legs=(there, back))
+            )
+        best = min(ways, key=lambda way: way.price.time, default=None)
+        # Near the obstacle a way round may still be slow; farther off it is looked for only then.
+        if best is not None and best.price.time < _LONG * line.duration:
+            return best
+    return min(ways, key=lambda way: way.price.time, default=None)
+
+
+def _rings(line: Line, fraction: float) -> Iterator[list[Array]]:
+    """Give via poses for a place on the line, the nearest first: turned on the spot, then beside it."""
+    s = min(max(fraction, _MARGIN), 1 - _MARGIN)
+    X = line.poses(np.array([s]))[0]
+    way = line.B[:3, 3] - line.A[:3, 3]
+    length = float(np.linalg.norm(way))
+    along = way / length if length > 0 else np.array((1.0, 0.0, 0.0))
+    across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    across /= np.linalg.norm(across)
+    third = np.cross(along, across)
+    angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    directions = np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * third
+    for number, distance in enumerate(_BESIDE):
+        ring = [_moved(X, distance * direction, np.zeros(3)) for direction in directions]
+        if number < len(_TURNS):
+            axes = (*directions, along, -along)
+            ring += [_moved(X, np.zeros(3), _TURNS[number] * axis) for axis in axes]
+        yield ring
+
+
+def _moved(X: Array, shift: Array, turn: Array) -> Array:
+    Y = X.copy()
+    Y[:3, :3] = rotation_from_vector(turn) @ X[:3, :3]
+    Y[:3, 3] += shift
+    return Y
+
+
+def _apart(line: Line, X: Array) -> tuple[float, float]:
+    """Return how far a pose is from the nearest place of the line, and turned from the orientation there."""
+    way = line.B[:3, 3] - line.A[:3, 3]
+    square = float(way @ way)
+    s = min(max(float((X[:3, 3] - line.A[:3, 3]) @ way) / square, 0.0), 1.0) if square else 0.5
+    on = line.poses(np.array([s]))[0]
+    turn = rotation_vector(on[:3, :3].T @ X[:3, :3])
+    return float(np.linalg.norm(X[:3, 3] - on[:3, 3])), float(np.linalg.norm(turn))
+
+
+def _damped(solver: Solver, line: Line, q: Array, damping: float, obstacle: PathError) -> Detour | None:
+    """Follow the line by damped rates; None where the end is not met, or a joint passes a limit."""
+    times, postures = _integrated(solver, line, q, damping)
+    if postures is None:
+        return None
+    fractions = line.fractions(np.minimum(times, line.duration))
+    knots = np.concatenate([postures, fractions[:, None]], axis=1)
+    n = solver.arm.n
+    for _ in range(_EASINGS):
+        trajectory = xspline(times, postures)
+        times = np.append(0.0, np.cumsum(np.diff(times) * _easing(solver.arm, trajectory)))
+    c = xspline(times, knots).coefficients
+    trajectory = Trajectory(times=times, coefficients=c[..., :n])
+    lowest, highest = trajectory.extremes(0)
+    if (lowest < solver.arm.limit("lower")).any() or (highest > solver.arm.limit("upper")).any():
+        return None
+    spline = Spline(np.diff(times), c[..., :n], c[..., n])
+    ways = Ways.of_one(line.A, line.B, line.turn, len(spline.lengths))
+    off = deviation_of(solver.arm, solver.forward, ways, spline, allowed=1e-3, allowed_turn=TURN_PER_METRE * 1e-3)
+    factor, _ = slowing(solver.arm, {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2)})
+    trajectory = trajectory.slowed(factor)
+    price = Price(distance=float(off.place.max()), turn=float(off.turn.max()), time=trajectory.duration - line.duration)
+    return Detour(trajectory=trajectory, by="damped", obstacle=obstacle, via=None, price=price, legs=())
+
+
+def _easing(arm: Arm, trajectory: Trajectory) -> Array:
+    """Return how many times longer each interval of a motion should last, changing slowly along it (m,)."""
+    need = np.maximum(
+        (trajectory.segment_peaks(1) / arm.limit("speed")).max(axis=1),
+        np.sqrt((trajectory.segment_peaks(2) / arm.limit("acceleration")).max(axis=1)),
+    )
+    # The largest need of the neighbourhood, averaged over it: nowhere less than is needed.
+    wide = np.pad(np.maximum(need, 1.0), _AROUND, mode="edge")
+    largest = np.lib.stride_tricks.sliding_window_view(wide, 2 * _AROUND + 1).max(axis=-1)
+    weights = np.hanning(2 * _AROUND + 3)[1:-1]
+    smooth = np.convolve(np.pad(largest, _AROUND, mode="edge"), weights / weights.sum(), mode="valid")
+    return np.asarray(smooth)
+
+
+def _integrated(solver: Solver, line: Line, q: Array, damping: float) -> tuple[Array, Array | None]:
+    """Return times (k,) and postures (k, n) from the start to where the end is met; no postures where it is not."""
+    h = line.duration / _STEPS
+    postures, t = [q], 0.0
+    while t < line.duration * (1 + _AFTER):
+        ahead = line.poses(line.fractions(np.minimum([t, t + h], line.duration)))
+        twist = np.concatenate([ahead[1, :3, 3] - ahead[0, :3, 3], _turn(ahead[0], ahead[1])]) / h
+        missing = _missing(solver.forward(q), ahead[0])
+        if t >= line.duration and np.abs(missing * np.repeat((1.0, 1 / TURN_PER_METRE), 3)).max() < _ARRIVED:
+            return np.asarray(h * np.arange(len(postures))), np.array(postures)
+        # What is missing at the end is little, so that bounded rates need no more than a little damping there.
+        damping_now = damping if t < line.duration else _LITTLE * damping
+        rates = damped_rates(solver.arm, q, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates
+        # The middle of the step, so that the way is kept to second order.
+        middle = q + rates * h / 2
+        missing = _missing(
+            solver.forward(middle), line.poses(line.fractions(np.minimum([t + h / 2], line.duration)))[0]
+        )
+        rates = damped_rates(solver.arm, middle, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates
+        q = q + rates * h
+        t += h
+        postures.append(q)
+    return np.empty(0), None
+
+
+def _missing(X: Array, X_asked: Array) -> Array:
+    return np.concatenate([X_asked[:3, 3] - X[:3, 3], _turn(X, X_asked)])
+
+
+def _turn(X_from: Array, X_to: Array) -> Array:
+    """Return the rotation vector from one orientation to another, in base axes."""
+    return np.asarray(rotation_vector(X_to[:3, :3] @ X_from[:3, :3].T))

@@ -1,0 +1,199 @@
+"""How far the hand strays from its path: an upper bound that holds between the looks as well.
+
+The hand is looked at so often on every interval between two knots. Between two looks a time d apart a curve cannot
+leave its chord by more than d²/8 times its greatest acceleration; the distance from a straight way is convex, so it
+is on the chord no more than at the looks. And how much the hand may accelerate follows from the speeds and
+accelerations of the joints, which are known exactly on every interval, and the levers of the arm.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+
+# What the bound may add to what was seen, in parts of what is allowed; looks are taken so often that it does not
+# exceed it, but no more often than the second.
+_ADDED = 0.1
+_LOOKS = (4, 200)
+
+
+class Ways(NamedTuple):
+    """The straight way that belongs to every one of m intervals: from A, by ``shift``, turning by ``turn``.
+
+    Attributes:
+        p_A: (m, 3) place at its start [m].
+        R_A: (m, 3, 3) orientation at its start.
+        shift: (m, 3) from start to end [m].
+        turn: (m, 3) rotation vector from start to end, in the axes at the start [rad].
+    """
+
+    p_A: Array
+    R_A: Array
+    shift: Array
+    turn: Array
+
+    @staticmethod
+    def of_one(A: Array, B: Array, turn: Array, intervals: int) -> "Ways":
+        """Return one way, from pose A to pose B, for all intervals."""
+        parts = A[:3, 3], A[:3, :3], B[:3, 3] - A[:3, 3], turn
+        return Ways(*(np.broadcast_to(part, (intervals, *part.shape)) for part in parts))
+
+
+class Spline(NamedTuple):
+    """Joints, and the progress on the way that belongs to them, as cubics of the time since an interval began.
+
+    Attributes:
+        lengths: (m,) of the intervals [s].
+        joints: (m, 4, n) coefficients of the joint positions.
+        progress: (m, 4) coefficients of the fraction of the way.
+    """
+
+    lengths: Array
+    joints: Array
+    progress: Array
+
+
+class Deviation(NamedTuple):
+    """How far the hand strays on each of m intervals.
+
+    Attributes:
+        place: (m,) upper bound of the distance from the way [m].
+        turn: (m,) upper bound of the angle from the orientation that belongs to the progress on the way [rad].
+        seen: (m,) the largest distance that was seen [m].
+        seen_turn: (m,) the largest angle that was seen [rad].
+        speed: (m, n) the largest speeds of the joints, exactly.
+        acceleration: (m, n) the same of their accelerations.
+        worst: (m,) where the largest distance was seen, as a part of the interval.
+        looks: how often the hand was looked at on an interval.
+    """
+
+    place: Array
+    turn: Array
+    seen: Array
+    seen_turn: Array
+    speed: Array
+    acceleration: Array
+    worst: Array
+    looks: int
+
+
+def deviation_of(
+    arm: Arm, forward: object, ways: Ways, spline: Spline, *, allowed: float, allowed_turn: float
+) -> Deviation:
+    """Return how far a motion strays from straight ways.
+
+    Args:
+        arm: the arm, with n joints.
+        forward: tool poses (..., 4, 4) of joint positions (..., n).
+        ways: where the hand should be.
+        spline: where it is.
+        allowed: the distance that matters [m]; it decides how often the hand is looked at.
+        allowed_turn: the angle that matters [rad].
+    """
+    qd, qdd = _peaks(spline.joints, spline.lengths)
+    pull, spin = _accelerations(arm, ways, spline, qd, qdd)
+    wanted = np.sqrt(np.maximum(pull / allowed, 2 * spin / allowed_turn) / (8 * _ADDED)) * spline.lengths
+    looks = int(min(max(math.ceil(wanted.max()), _LOOKS[0]), _LOOKS[1]))
+    part = np.linspace(0.0, 1.0, looks + 1)
+    t = part * spline.lengths[:, None]
+    c = spline.joints
+    q = ((c[:, None, 3] * t[..., None] + c[:, None, 2]) * t[..., None] + c[:, None, 1]) * t[..., None] + c[:, None, 0]
+    X = forward(q)  # type: ignore[operator]
+    off = _distances(ways, X)
+    s = spline.progress
+    done = ((s[:, 3, None] * t + s[:, 2, None]) * t + s[:, 1, None]) * t + s[:, 0, None]
+    half = _half_sines(ways, done, X)
+    between = (spline.lengths / looks) ** 2 / 8
+    seen, seen_half = off.max(axis=1), half.max(axis=1)
+    return Deviation(
+        place=seen + between * pull,
+        turn=2 * np.arcsin(np.minimum(seen_half + between * spin, 1.0)),
+        seen=seen,
+        seen_turn=2 * np.arcsin(np.minimum(seen_half, 1.0)),
+        speed=qd,
+        acceleration=qdd,
+        worst=part[off.argmax(axis=1)],
+        looks=looks,
+    )
+
+
+def turned(turn: Array, fraction: Array) -> Array:
+    """Return the rotations (m, k, 3, 3) by fractions (m, k) of rotation vectors (m, 3)."""
+    angle = np.sqrt(np.einsum("mi,mi->m", turn, turn))
+    x, y, z = (turn / np.where(angle > 0, angle, 1.0)[:, None]).T
+    o = np.zeros_like(x)
+    K = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1).reshape(-1, 1, 3, 3)
+    phase = (angle[:, None] * fraction)[..., None, None]
+    return np.asarray(np.eye(3) + np.sin(phase) * K + (2 * np.sin(phase / 2) ** 2) * (K @ K))
+
+
+def _distances(ways: Ways, X: Array) -> Array:
+    """Return the distances (m, k) of hands (m, k, 4, 4) from their ways."""
+    come = X[..., :3, 3] - ways.p_A[:, None]
+    square = np.einsum("mi,mi->m", ways.shift, ways.shift)
+    along = (come @ ways.shift[:, :, None])[..., 0] / np.where(square > 0, square, 1.0)[:, None]
+    off = come - np.clip(along, 0.0, 1.0)[..., None] * ways.shift[:, None]
+    return np.asarray(np.sqrt(np.einsum("mki,mki->mk", off, off)))
+
+
+def _half_sines(ways: Ways, done: Array, X: Array) -> Array:
+    """Return sin(angle / 2) of the turn (m, k) from the orientation on the way to that of the hand."""
+    wanted = ways.R_A[:, None] @ turned(ways.turn, done)
+    Q = np.swapaxes(wanted, -1, -2) @ X[..., :3, :3]
+    w = np.sqrt(np.maximum(1 + Q[..., 0, 0] + Q[..., 1, 1] + Q[..., 2, 2], 1e-12)) / 2
+    a, b, c = Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]
+    return np.asarray(np.sqrt(a * a + b * b + c * c) / (4 * w))
+
+
+def _accelerations(arm: Arm, ways: Ways, spline: Spline, qd: Array, qdd: Array) -> tuple[Array, Array]:
+    """Return upper bounds on every interval (m,): of the hand's acceleration, and of that of its turn off the way.
+
+    The hand accelerates by sum J_i qdd_i + sum H_ij qd_i qd_j, where |J_i| is at most the lever r_i of joint i and
+    |H_ij| at most that of the later of two joints that turn. The turn off the way is a unit quaternion; the second
+    derivative of its vector part is at most half the angular acceleration and a quarter of the squared angular speed.
+    """
+    sd, sdd = _peaks(spline.progress[..., None], spline.lengths)
+    turns = np.array([joint.revolute for joint in arm.joints])
+    lever = np.where(turns, _levers(arm, spline), 1.0)
+    n = arm.n
+    later = np.maximum(np.arange(n)[:, None], np.arange(n))
+    both = turns[:, None] & turns
+    # A slide is turned by the joints before it; those beyond it do not change its direction.
+    carried = turns[np.minimum(np.arange(n)[:, None], np.arange(n))] & ~turns[later]
+    H = np.where(both, lever[later], np.where(carried & ~np.eye(n, dtype=bool), 1.0, 0.0))
+    pull = qdd @ lever + np.einsum("mi,ij,mj->m", qd, H, qd)
+    wd = qd @ turns
+    wdd = qdd @ turns + np.einsum("mi,ij,mj->m", qd, np.triu(both, 1).astype(np.float64), qd)
+    angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
+    rate = angle * sd[:, 0]
+    spin = (wdd + angle * sdd[:, 0] + wd * rate) / 2 + (wd + rate) ** 2 / 4
+    return np.asarray(pull), np.asarray(spin)
+
+
+def _peaks(c: Array, lengths: Array) -> tuple[Array, Array]:
+    """Return the largest speeds and accelerations (m, n) of cubics (m, 4, n), exactly."""
+    h = lengths[:, None]
+    start, bend, end = c[:, 1], 2 * c[:, 2], c[:, 1] + (2 * c[:, 2] + 3 * c[:, 3] * h) * h
+    bend_end = bend + 6 * c[:, 3] * h
+    speed = np.maximum(np.abs(start), np.abs(end))
+    # The speed has its own peak where the acceleration changes its sign.
+    inside = bend * bend_end < 0
+    vertex = start - bend**2 / np.where(inside, 12 * c[:, 3], 1.0)
+    speed = np.where(inside, np.maximum(speed, np.abs(vertex)), speed)
+    return speed, np.maximum(np.abs(bend), np.abs(bend_end))
+
+
+def _levers(arm: Arm, spline: Spline) -> Array:
+    """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
+    h = spline.lengths[:, None]
+    c = np.abs(spline.joints)
+    farthest = (((c[:, 3] * h + c[:, 2]) * h + c[:, 1]) * h + c[:, 0]).max(axis=0)
+    parts = [
+        math.hypot(joint.a, abs(joint.d) + (0.0 if joint.revolute else farthest[i]))
+        for i, joint in enumerate(arm.joints)
+    ]
+    tool = float(np.linalg.norm(arm.tool[:3, 3]))
+    return np.asarray(np.cumsum([tool, *parts[::-1]])[:0:-1])

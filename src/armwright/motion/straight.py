@@ -1,0 +1,299 @@
+"""Straight lines with a certificate: knots where they are needed, until the deviation between them is bounded."""
+
+import math
+from typing import NamedTuple
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arm.positions import one_posture
+from armwright.arrays import Array, ArrayLike
+from armwright.errors import InvalidValueError
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.judge import clean_pose
+from armwright.kinematics.inverse.solution import Answer, violations
+from armwright.kinematics.singularities import singularities
+from armwright.motion.certificate import Certificate, LimitName, slowing
+from armwright.motion.chain import chain
+from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned
+from armwright.motion.efforts import effort_peaks, slowing_for_efforts
+from armwright.motion.follow import SLOWEST, TURN_PER_METRE, PathError
+from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, report_speed, report_step
+from armwright.motion.quintic import check_speed
+from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.trajectory import Trajectory, hold, whole_ticks
+from armwright.motion.xspline import xspline
+from armwright.spatial.rotations import rotation_vector
+
+# Part of the time in which the hand gathers speed, and again in which it loses it.
+_RAMP = 0.25
+# Knots to begin with, and at most; rounds of putting knots where they are missing.
+_FEWEST, _MOST, _ROUNDS = 9, 4000, 12
+# Where knots are this part of the duration apart and a joint still rushes, more of them do not help.
+_SHORT = 64
+# The deviation of a spline falls with the fourth power of the step; so many times closer than that are new knots put.
+_CLOSER = 1.1
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class CertifiedLine:
+    """A straight line of the hand, planned.
+
+    Attributes:
+        trajectory: of the joints, at rest at both ends.
+        certificate: what it keeps.
+    """
+
+    trajectory: Trajectory
+    certificate: Certificate
+
+
+class Line(NamedTuple):
+    """A straight way of the hand, and when it is where on it.
+
+    Attributes:
+        A: (4, 4) pose at the start.
+        B: (4, 4) pose at the end.
+        turn: (3,) rotation vector from one to the other, in the axes of A [rad].
+        duration: [s].
+    """
+
+    A: Array
+    B: Array
+    turn: Array
+    duration: float
+
+    def fractions(self, t: Array) -> Array:
+        """Return the fraction of the way at times (k,): the speed rises and falls as the quintic's position does."""
+        u = t / self.duration
+        x = np.minimum(np.minimum(u, 1 - u) / _RAMP, 1.0)
+        ramp = _RAMP * x**4 * (2.5 + x * (x - 3))
+        even = np.where(u < 0.5, u - _RAMP / 2, 1 - u - _RAMP / 2)
+        near = np.where(x < 1, ramp, even) / (1 - _RAMP)
+        return np.where(u < 0.5, near, 1 - near)
+
+    def poses(self, s: Array) -> Array:
+        """Return the poses (k, 4, 4) at fractions (k,) of the way."""
+        X = np.zeros((len(s), 4, 4))
+        X[:, :3, :3] = self.A[:3, :3] @ turned(self.turn[None], s[None])[0]
+        X[:, :3, 3] = self.A[:3, 3] + s[:, None] * (self.B[:3, 3] - self.A[:3, 3])
+        X[:, 3, 3] = 1.0
+        return X
+
+
+def straight_line(
+    arm: AnyArm,
+    q_start: ArrayLike,
+    X_goal: ArrayLike,
+    *,
+    deviation: float = 1e-3,
+    turn: float | None = None,
+    speed: float = 100.0,
+    period: float | None = None,
+) -> CertifiedLine:
+    """Plan a straight line of the hand and certify it.
+
+    Knots are solved on the line and joined by an X-spline in joint space; where the hand strays too far between two
+    of them, more are put in. Then the motion is slowed until the joints keep their limits of speed, acceleration and
+    effort.
+
+    Args:
+        arm: an arm, or a compiled one, which plans some ten times faster.
+        q_start: (n,) present joint positions [rad] or [m].
+        X_goal: (4, 4) pose at the end of the line.
+        deviation: allowed distance of the hand from the line [m].
+        turn: allowed angle from the orientation that belongs to the progress on the line [rad]; 5 mrad for each mm
+            of the deviation when left out.
+        speed: 1 to 120, 100 is normal: by the report's rule, as a LINE of the robot language has it.
+        period: of the servo [s], to end on a whole number of them; any duration when left out.
+
+    Returns:
+        The motion and its certificate.
+
+    Raises:
+        PathError: a pose of the line is out of reach, a joint passes a limit, the posture would have to change on the
+            way, or a singularity keeps the hand from staying within the deviation; with the place and the cause.
+        InvalidValueError: deviation, turn or speed are out of range, or gravity alone takes more than a joint may
+            give.
+    """
+    solver = solver_of(arm)
+    q, A, B = _ends(solver, q_start, X_goal, deviation)
+    turn = TURN_PER_METRE * deviation if turn is None else turn
+    if not turn > 0:
+        raise InvalidValueError(f"turn: expected more than 0 rad, got {turn:g}")
+    line = timed_line(solver.arm, A, B, speed)
+    if line is None:
+        return _nowhere(solver.arm, q, A, deviation, turn)
+    spline, found, times = _refined(solver, line, q, deviation, turn)
+    trajectory = Trajectory(times=times, coefficients=spline.joints)
+    _check_positions(solver.arm, line, trajectory)
+    factor, because = _slowing(arm, solver.arm, line, trajectory, found)
+    trajectory = trajectory.slowed(factor)
+    if period is not None:
+        trajectory = whole_ticks(trajectory, period)
+    stretch = trajectory.duration / times[-1]
+    worst = int(found.place.argmax())
+    time = float(times[worst] + found.worst[worst] * spline.lengths[worst]) * stretch
+    certificate = Certificate(
+        arm=solver.arm,
+        deviation_asked=deviation,
+        deviation=float(found.place.max()),
+        deviation_seen=float(found.seen.max()),
+        turn_asked=turn,
+        turn=float(found.turn.max()),
+        turn_seen=float(found.seen_turn.max()),
+        worst_time=time,
+        worst_place=np.asarray(solver.forward(trajectory(time))[:3, 3]),
+        knots=len(times),
+        looks=found.looks * len(spline.lengths),
+        peaks={
+            "speed": found.speed.max(axis=0) / stretch,
+            "acceleration": found.acceleration.max(axis=0) / stretch**2,
+            "effort": effort_peaks(arm, trajectory).peaks,
+        },
+        factor=factor,
+        because=because,
+    )
+    return CertifiedLine(trajectory=trajectory, certificate=certificate)
+
+
+def _slowing(
+    arm: AnyArm, plain: Arm, line: Line, trajectory: Trajectory, found: Deviation
+) -> tuple[float, tuple[LimitName, int] | None]:
+    """Return how many times slower a line must be run for the joints to keep their limits, and for which of them."""
+    factor, because = slowing(plain, {"speed": found.speed.max(axis=0), "acceleration": found.acceleration.max(axis=0)})
+    if because is not None and because[0] == "speed" and factor > SLOWEST:
+        time = trajectory.times[found.speed[:, because[1]].argmax()]
+        reason = f"joint {because[1] + 1} would have to move {factor:.0f} times as fast as it may"
+        raise _singular(plain, line, trajectory(time), float(line.fractions(np.array([time]))[0]), reason)
+    efforts = slowing_for_efforts(arm, trajectory.slowed(factor))
+    if efforts.joint is not None:
+        return factor * efforts.factor, ("effort", efforts.joint)
+    return factor, because
+
+
+def _ends(solver: Solver, q_start: ArrayLike, X_goal: ArrayLike, deviation: float) -> tuple[Array, Array, Array]:
+    """Return the posture and the pose at the start, and the pose at the end, of a line that the arm can end."""
+    if not 0 < deviation < math.inf:
+        raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation:g}")
+    q = one_posture(solver.arm, q_start, "q_start")
+    B = clean_pose(X_goal)
+    for fault in violations(solver.arm, q):
+        raise PathError("limits", 0, 0.0, f"at the start {fault}")
+    return q, np.asarray(solver.forward(q)), B
+
+
+def timed_line(arm: Arm, A: Array, B: Array, speed: float) -> Line | None:
+    """Return the line from A to B, timed by the report's rule; None where it has no length."""
+    turn = rotation_vector(A[:3, :3].T @ B[:3, :3])
+    length = max(float(np.linalg.norm(B[:3, 3] - A[:3, 3])), TURN_RADIUS * float(np.linalg.norm(turn)))
+    check_speed(speed)
+    if length <= NEGLIGIBLE:
+        return None
+    if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
+        raise InvalidValueError(
+            f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
+        )
+    return Line(A, B, turn, length / report_speed(arm, A[:3, 3], B[:3, 3], speed) / (1 - _RAMP))
+
+
+def _refined(
+    solver: Solver, line: Line, q_start: Array, deviation: float, turn: float
+) -> tuple[Spline, Deviation, Array]:
+    """Put knots on the line until the deviation is within its bounds everywhere."""
+    n = solver.arm.n
+    length = float(np.linalg.norm(line.B[:3, 3] - line.A[:3, 3]))
+    rule = length / report_step(solver.arm, line.A[:3, 3], line.B[:3, 3], deviation)
+    times = np.linspace(0.0, line.duration, min(max(_FEWEST, math.ceil(rule) + 2), _MOST // 4))
+    for _ in range(_ROUNDS):
+        s = line.fractions(times)
+        q = _solved(solver, line, line.poses(s), s, q_start)
+        c = xspline(times, np.concatenate([q, s[:, None]], axis=1)).coefficients
+        spline = Spline(np.diff(times), c[..., :n], c[..., n])
+        ways = Ways.of_one(line.A, line.B, line.turn, len(spline.lengths))
+        found = deviation_of(solver.arm, solver.forward, ways, spline, allowed=deviation, allowed_turn=turn)
+        excess = np.maximum(found.place / deviation, found.turn / turn)
+        if excess.max() <= 1:
+            return spline, found, times
+        _check_rush(solver.arm, line, found, spline.lengths, q)
+        parts = np.where(excess > 1, np.clip(np.ceil(_CLOSER * excess**0.25), 2, 8), 1).astype(int)
+        if parts.sum() > _MOST:
+            break
+        inside = [a + h * np.arange(k) / k for a, h, k in zip(times, spline.lengths, parts, strict=False)]
+        times = np.append(np.concatenate(inside), line.duration)
+    worst = int(excess.argmax())
+    joint = int(np.abs(q[worst + 1] - q[worst]).argmax())
+    raise _singular(solver.arm, line, q[worst], float(s[worst]), f"joint {joint + 1} would have to move at once")
+
+
+def _check_rush(arm: Arm, line: Line, found: Deviation, lengths: Array, q: Array) -> None:
+    """Refuse a line on which a joint rushes, before more knots are put where no number of them would help."""
+    rush = np.where((lengths < line.duration / _SHORT)[:, None], found.speed / arm.limit("speed"), 0.0)
+    if rush.max() > SLOWEST:
+        worst, joint = np.unravel_index(int(rush.argmax()), rush.shape)
+        reason = f"joint {joint + 1} would have to move {rush.max():.0f} times as fast as it may"
+        s = float(line.fractions(np.cumsum(lengths)[worst : worst + 1])[0])
+        raise _singular(arm, line, q[worst], s, reason)
+
+
+def _singular(arm: Arm, line: Line, q: Array, s: float, reason: str) -> PathError:
+    """Return the error for a place where the arm is singular, and say by which factor."""
+    factors = singularities(arm, q).factors
+    name = min(factors, key=lambda factor: abs(factor.value) / factor.scale).name
+    message = f"the hand cannot stay on the line near {_place(line, s)}: the arm is singular there ({name}), {reason}"
+    return PathError("singular", 0, s, message)
+
+
+def _solved(solver: Solver, line: Line, X: Array, s: Array, q_start: Array) -> Array:
+    """Return the postures (k, n) at poses (k, 4, 4), each next to the one before."""
+    q, missed = chain(solver, X, q_start)
+    if missed is not None:
+        solution = inverse(solver.arm, X[missed], q[missed - 1])
+        at = f"on the line near {_place(line, s[missed])}"
+        if solution.answer is Answer.OUT_OF_REACH:
+            raise PathError("reach", 0, float(s[missed]), f"{at}: {solution.explain()}")
+        raise PathError("singular", 0, float(s[missed]), f"{at} the posture would have to change")
+    outside = (q < solver.arm.limit("lower")) | (q > solver.arm.limit("upper"))
+    for k in np.flatnonzero(outside.any(axis=1)):
+        for fault in violations(solver.arm, q[k]):
+            raise PathError("limits", 0, float(s[k]), f"on the line near {_place(line, s[k])} {fault}")
+    return q
+
+
+def _check_positions(arm: Arm, line: Line, trajectory: Trajectory) -> None:
+    """Refuse a spline that swings over a joint limit between knots which keep it."""
+    for q in trajectory.extremes(0):
+        for fault in violations(arm, q):
+            at_knots = trajectory(trajectory.times)[:, fault.joint - 1]
+            s = float(line.fractions(trajectory.times[[np.abs(at_knots - fault.value).argmin()]])[0])
+            raise PathError("limits", 0, s, f"on the line near {_place(line, s)} {fault}")
+
+
+def _nowhere(arm: Arm, q: Array, A: Array, deviation: float, turn: float) -> CertifiedLine:
+    """Return the line from a pose to the same pose."""
+    none = np.zeros(arm.n)
+    return CertifiedLine(
+        trajectory=hold(q, 0.0),
+        certificate=Certificate(
+            arm=arm,
+            deviation_asked=deviation,
+            deviation=0.0,
+            deviation_seen=0.0,
+            turn_asked=turn,
+            turn=0.0,
+            turn_seen=0.0,
+            worst_time=0.0,
+            worst_place=A[:3, 3],
+            knots=1,
+            looks=0,
+            peaks={"speed": none, "acceleration": none, "effort": none},
+            factor=1.0,
+            because=None,
+        ),
+    )
+
+
+def _place(line: Line, s: float) -> str:
+    x, y, z = (line.A[:3, 3] + s * (line.B[:3, 3] - line.A[:3, 3])) * 1e3
+    return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"

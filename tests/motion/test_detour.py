@@ -1,0 +1,105 @@
+"""Ways round what stops a straight line."""
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arrays import Array
+from armwright.errors import UnknownNameError
+from armwright.kinematics.forward import forward
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.jacobian import jacobian
+from armwright.motion.detour import line_or_detour
+from armwright.motion.follow import PathError
+from armwright.motion.straight import straight_line
+from armwright.spatial.rotations import rotation_from_vector
+
+
+@pytest.fixture(scope="module")
+def through_the_wrist() -> tuple[Array, Array]:
+    """A line of the PUMA on which the hand turns about the axis that its nearly straight wrist cannot turn about."""
+    arm = load_arm("puma560")
+    q = np.array([0.3, 1.0, 2.2, 0.4, 0.001, -0.3])
+    J = jacobian(arm, q)
+    axis = np.cross(J[3:, 3], J[3:, 4])
+    poses = []
+    for way in (-0.2, 0.2):
+        X = forward(arm, q).copy()
+        X[:3, :3] = rotation_from_vector(way * axis) @ X[:3, :3]
+        X[:3, 3] += (0.0, 0.2 * way, 0.0)
+        poses.append(X)
+    return inverse(arm, poses[0], q).best.q, poses[1]
+
+
+def test_the_line_names_the_cause(through_the_wrist: tuple[Array, Array]) -> None:
+    """The line itself is refused, with the wrist as its cause and a place on the way."""
+    q, X = through_the_wrist
+
+    with pytest.raises(PathError, match=r"singular there \(wrist\), joint [46] would have to move") as stopped:
+        straight_line(load_arm("puma560"), q, X)
+
+    assert stopped.value.cause == "singular"
+    assert 0 < stopped.value.fraction < 1
+
+
+@pytest.mark.parametrize("by", ["via", "damped"])
+def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
+    """By a via pose and by damped rates the hand gets there, inside all limits, at a price that is told."""
+    arm = load_arm("puma560")
+    q, X = through_the_wrist
+
+    way = line_or_detour(arm, q, X, by=by)  # type: ignore[arg-type]
+
+    assert way.by == by
+    assert way.obstacle is not None
+    motion = way.trajectory
+    np.testing.assert_allclose(motion(0.0), q, atol=1e-12)
+    np.testing.assert_allclose(forward(arm, motion(motion.duration)), X, atol=1e-5)
+    np.testing.assert_allclose(motion([0.0, motion.duration], 1), 0, atol=1e-6)
+    assert (motion.peaks(1) <= arm.limit("speed") * (1 + 1e-9)).all()
+    assert (motion.peaks(2) <= arm.limit("acceleration") * (1 + 1e-9)).all()
+    lowest, highest = motion.extremes(0)
+    assert (lowest >= arm.limit("lower")).all()
+    assert (highest <= arm.limit("upper")).all()
+    places = forward(arm, motion(np.linspace(0, motion.duration, 3000)))[:, :3, 3]
+    A, B = forward(arm, q)[:3, 3], X[:3, 3]
+    s = np.clip((places - A) @ (B - A) / ((B - A) @ (B - A)), 0, 1)
+    off = np.linalg.norm(places - A - s[:, None] * (B - A), axis=-1).max()
+    allowed = 1e-3 if by == "via" else 0.0  # the legs keep their own lines to a millimetre
+    assert off <= way.price.distance + allowed + 1e-9
+    assert "mm off the line" in str(way.price)
+    if by == "via":
+        assert all(leg.certificate.holds for leg in way.legs)
+
+
+def test_a_line_that_needs_none() -> None:
+    """Where the line can be run it is, at no price but its own deviation."""
+    arm = load_arm("puma560")
+    q = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
+    X = forward(arm, q).copy()
+    X[:3, 3] += (0.1, -0.2, -0.1)
+
+    way = line_or_detour(arm, q, X)
+
+    assert way.by == "line"
+    assert way.obstacle is None
+    assert way.price.time == 0
+    assert way.price.distance <= 1e-3
+
+
+def test_no_way_round() -> None:
+    """Where the goal itself cannot be reached there is no way round, and the reason is that of the line."""
+    arm = load_arm("puma560")
+    q = np.array([0.0, 0.3, 0.2, 0.0, 0.8, 0.0])
+    far = forward(arm, q).copy()
+    far[:3, 3] *= 3
+
+    for by in ("via", "damped"):
+        with pytest.raises(PathError, match="out of reach"):
+            line_or_detour(arm, q, far, by=by)  # type: ignore[arg-type]
+
+
+def test_unknown_way() -> None:
+    """A misspelt way gets the nearest one."""
+    with pytest.raises(UnknownNameError, match="Did you mean 'damped'"):
+        line_or_detour(load_arm("puma560"), np.zeros(6), np.eye(4), by="dampd")  # type: ignore[arg-type]
