@@ -17,13 +17,14 @@ from armwright.cell.names import arm_name
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
 from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.solution import violations
 from armwright.spatial.poses import from_noap, pose
 from armwright.spatial.poses import inverse as inverse_pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # The arm of a cell that names none: the report's.
+# Joints that it takes to bring the hand to any place in any orientation.
+_PLACE_AND_TURN = 6
 _REPORT_ARM = "stanford"
 _ARM_NAME = re.compile(r"ARM[-_]([0-9]+)", re.IGNORECASE | re.ASCII)
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
@@ -90,11 +91,10 @@ def _arm(table: Table, folder: Path) -> CellArm:
         arm = load_arm(folder / name if is_path(name) else name)
     except ArmwrightError as error:
         raise table.error("model", str(error)) from error
-    if shoulder_of(arm) is None:
+    if arm.n < _PLACE_AND_TURN:
         raise table.error(
             "model",
-            f"'{arm.name}' has no closed-form inverse kinematics, which moves need; use an arm built like puma560, "
-            "stanford or ur5",
+            f"'{arm.name}' has {arm.n} joints; moves ask for a place and an orientation, which takes six or more",
         )
     if "tool" in table:
         arm = attrs.evolve(arm, tool=_pose(table, "tool"))

@@ -69,8 +69,9 @@ class Certificate:
         x, y, z = self.worst_place * 1e3
         verdict = "holds" if self.holds else "DOES NOT HOLD"
         within = (
-            f"{verdict}: hand within {self.deviation * 1e3:.4f} mm of the path "
-            f"(asked {self.deviation_asked * 1e3:g} mm), within {self.turn * 1e3:.3f} mrad of its orientation (asked {self.turn_asked * 1e3:g} mrad)"
+            f"{verdict}: hand within {self.deviation * 1e3:.4f} mm of the path (asked "
+            f"{self.deviation_asked * 1e3:g} mm), within {self.turn * 1e3:.3f} mrad of its orientation (asked "
+            f"{self.turn_asked * 1e3:g} mrad)"
         )
         seen = (
             f"largest distance seen {self.deviation_seen * 1e3:.4f} mm, at {self.worst_time:.3f} s, "

@@ -8,20 +8,18 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import ArmwrightError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
+from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.solution import Answer, InverseSolution, violations
-from armwright.kinematics.inverse.turns import nearest_turn, travel
-from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, Knots, Path, place_knots
+from armwright.motion.chain import chain
+from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of
+from armwright.motion.path import NEGLIGIBLE, Knots, Path, place_knots
+from armwright.motion.solver import Solver, solver_of
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline import xspline
-from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector
+from armwright.spatial.rotations import rotation_vector
 
 Cause: TypeAlias = Literal["reach", "limits", "singular"]
 
-# How often the path is looked at between two knots, and what is added for the peak that lies between two looks.
-_LOOKS = 16
-_BETWEEN_LOOKS = 1.03
 # The rule's knots are halved at most this often before the path is given up: 1/64 of the rule's step.
 _HALVINGS = 6
 # A path through several frames turns its corners without a stop, so it must round them; and it is gross motion. It
@@ -41,8 +39,8 @@ class Followed:
     Attributes:
         trajectory: of the joints, at rest at both ends.
         knots: number of knots solved.
-        deviation: largest distance of the hand from the path that was found [m].
-        turn_deviation: largest angle from the orientation of the path that was found [rad].
+        deviation: upper bound of the distance of the hand from the path, between samples as well [m].
+        turn_deviation: upper bound of the angle from the orientation that belongs to the progress on the path [rad].
         slowed: why it runs slower than the rule says, or empty.
     """
 
@@ -72,7 +70,7 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     """Return the joint motion along a path, from rest to rest, passing the poses between without a stop.
 
     Args:
-        arm: an arm with a closed-form inverse.
+        arm: any arm; without a closed-form inverse each posture is sought from the one before it.
         path: begins where the hand is at ``q_start``.
         q_start: (n,) present joint positions.
         deviation: allowed distance of the hand from a single straight way [m]; twenty times as much is allowed on a
@@ -92,12 +90,13 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
         return Followed(trajectory=hold(q_start, 0.0), knots=1, deviation=0.0, turn_deviation=0.0, slowed="")
     _check_ends(arm, path)
     allowed = deviation if len(path.poses) == 2 else _CORNER_ROOM * deviation
+    solver = solver_of(arm)
     for halving in range(_HALVINGS + 1):
         knots = place_knots(arm, path, deviation=deviation, speed=speed, finer=2**halving)
-        q = _solve(arm, path, knots, np.asarray(q_start, dtype=np.float64))
+        q = _solve(solver, path, knots, np.asarray(q_start, dtype=np.float64))
         trajectory = xspline(knots.times, q)
-        off, turned = _deviations(arm, path, knots, trajectory)
-        excess = np.maximum(off, turned / TURN_PER_METRE) / allowed
+        found = _deviation(solver, path, knots, trajectory, allowed)
+        excess = np.maximum(found.place, found.turn / TURN_PER_METRE) / allowed
         if excess.max() <= 1:
             break
     else:
@@ -107,8 +106,8 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     return Followed(
         trajectory=trajectory.slowed(factor),
         knots=len(q),
-        deviation=float(off.max()),
-        turn_deviation=float(turned.max()),
+        deviation=float(found.place.max()),
+        turn_deviation=float(found.turn.max()),
         slowed=slowed,
     )
 
@@ -126,53 +125,39 @@ def _check_ends(arm: Arm, path: Path) -> None:
             raise PathError(cause_of(solution), segment, 1.0, solution.explain())
 
 
-def _solve(arm: Arm, path: Path, knots: Knots, q_start: Array) -> Array:
+def _solve(solver: Solver, path: Path, knots: Knots, q_start: Array) -> Array:
     """Solve every knot by the posture nearest to the one before it."""
-    X = knots.poses(path)
-    candidates, singular = inverse_branches(arm, X, q_start)
-    q = np.empty((len(X), arm.n))
-    q[0] = q_start
-    for k in range(1, len(X)):
-        if singular[k].any():
-            # A free joint stays where it was at the last knot, not where it was at the start.
-            candidates[k], _ = inverse_branches(arm, X[k], q[k - 1])
-        q[k] = min(nearest_turn(arm, candidates[k], q[k - 1]), key=lambda posture: travel(arm, q[k - 1], posture))
-        _check_knot(arm, X[k], q[k], knots, k)
+    arm, X = solver.arm, knots.poses(path)
+    q, missed = chain(solver, X, q_start)
+    met = q[:missed]
+    outside = np.any((met < arm.limit("lower")) | (met > arm.limit("upper")), axis=1)
+    for k in np.flatnonzero(outside):
+        for fault in violations(arm, q[k]):
+            raise PathError("limits", knots.segments[k], knots.fractions[k], str(fault))
+    if missed is not None:
+        place = knots.segments[missed], knots.fractions[missed]
+        solution = inverse(arm, X[missed], q[missed - 1])
+        if solution.answer is Answer.OUT_OF_REACH:
+            raise PathError("reach", *place, solution.explain())
+        raise PathError("singular", *place, f"the posture would have to change near {_place(path, knots, missed)}")
     return q
 
 
-def _check_knot(arm: Arm, X: Array, q: Array, knots: Knots, k: int) -> None:
-    place = knots.segments[k], knots.fractions[k]
-    if np.abs(forward(arm, q)[:3, 3] - X[:3, 3]).max() > 1e-9:
-        solution = inverse(arm, X)
-        if solution.answer is Answer.OUT_OF_REACH:
-            raise PathError("reach", *place, solution.explain())
-    for fault in violations(arm, q):
-        raise PathError("limits", *place, str(fault))
-
-
-def _deviations(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> tuple[Array, Array]:
-    """Return the largest deviation in place and turn between every two knots, (m-1,) each."""
-    fine = (np.arange(_LOOKS) + 0.5) / _LOOKS
-    h = np.diff(knots.times)
-    t = knots.times[:-1, None] + fine * h[:, None]
-    X = forward(arm, trajectory(t))
-    segments = np.array(knots.segments[1:])
-    A, B = path.poses[segments], path.poses[segments + 1]
-    R_back = np.swapaxes(A[:, :3, :3], -1, -2)
-    way, turn = B[:, :3, 3] - A[:, :3, 3], rotation_vector(R_back @ B[:, :3, :3])
-    come, turned = X[..., :3, 3] - A[:, None, :3, 3], rotation_vector(R_back[:, None] @ X[..., :3, :3])
-    along, square = np.sum(come * way[:, None], axis=-1), np.sum(way**2, axis=-1)[:, None]
-    s = np.clip(along / np.maximum(square, NEGLIGIBLE**2), 0.0, 1.0)
-    off = np.linalg.norm(come - s[..., None] * way[:, None], axis=-1)
-    # How far the hand has come is read from place and turn together, so that a turn on the spot has its progress too.
-    weight = TURN_RADIUS**2
-    progress = (along + weight * np.sum(turned * turn[:, None], axis=-1)) / (
-        square + weight * np.sum(turn**2, axis=-1)[:, None]
+def _deviation(solver: Solver, path: Path, knots: Knots, trajectory: Trajectory, allowed: float) -> Deviation:
+    """Return how far the hand strays from the path between every two knots: upper bounds."""
+    segments = np.array(knots.segments)
+    # Ways without length have no knots: those that have are counted on, so that the progress goes on as well.
+    number = np.searchsorted(np.unique(segments), segments)
+    progress = xspline(knots.times, (number + np.array(knots.fractions))[:, None]).coefficients[..., 0].copy()
+    progress[:, 0] -= number[1:]
+    A, B = path.poses[segments[1:]], path.poses[segments[1:] + 1]
+    R_A = A[:, :3, :3]
+    turn = rotation_vector(np.swapaxes(R_A, -1, -2) @ B[:, :3, :3])
+    ways = Ways(A[:, :3, 3], R_A, B[:, :3, 3] - A[:, :3, 3], turn)
+    spline = Spline(np.diff(knots.times), trajectory.coefficients, progress)
+    return deviation_of(
+        solver.arm, solver.forward, ways, spline, allowed=allowed, allowed_turn=TURN_PER_METRE * allowed
     )
-    R_path = A[:, None, :3, :3] @ rotation_from_vector(np.clip(progress, 0.0, 1.0)[..., None] * turn[:, None])
-    twisted = angle_between(R_path, X[..., :3, :3])
-    return _BETWEEN_LOOKS * off.max(axis=-1), _BETWEEN_LOOKS * twisted.max(axis=-1)
 
 
 def _check_between(arm: Arm, knots: Knots, trajectory: Trajectory) -> None:

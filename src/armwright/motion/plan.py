@@ -95,7 +95,7 @@ def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manne
     can go on from it, the next nearest is tried.
 
     Args:
-        arm: an arm with a closed-form inverse.
+        arm: any arm; with a closed-form inverse all its postures are known, without one those that are found.
         q_start: (n,) present joint positions.
         goals: the stages.
         manner: speed, deviation, servo period.

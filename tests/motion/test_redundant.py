@@ -1,0 +1,64 @@
+"""Moves of an arm without a closed form: seven joints, solved step by step."""
+
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
+from armwright.errors import InvalidValueError
+from armwright.kinematics.forward import forward
+from armwright.motion.plan import Manner, StageGoal, plan
+from armwright.motion.straight import straight_line
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "seven_joints.urdf"
+START = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 1.0, 0.2])
+
+
+@pytest.fixture(scope="module")
+def seven() -> Arm:
+    """The example of a URDF arm, with what a robot file of that kind does not say."""
+    arm = load_arm(EXAMPLE)
+    joints = [attrs.evolve(j, limits=attrs.evolve(j.limits, acceleration=5.0)) for j in arm.joints]
+    return attrs.evolve(arm, joints=joints, reach=1.0, tool_speed=1.0)
+
+
+def test_line_and_point_to_point(seven: Arm) -> None:
+    """A move there point to point and back along a line ends where it should, and the line is straight."""
+    X = forward(seven, START)
+    Y = X.copy()
+    Y[:3, 3] += (-0.1, 0.15, -0.1)
+
+    there, back = plan(
+        seven,
+        START,
+        [StageGoal(kind="PTP", poses=Y[None]), StageGoal(kind="LINE", poses=X[None])],
+        Manner(deviation=1e-3),
+    )
+
+    np.testing.assert_allclose(forward(seven, there.trajectory(there.trajectory.duration)), Y, atol=1e-6)
+    hand = forward(seven, back.trajectory(np.linspace(0, back.trajectory.duration, 2000)))[:, :3, 3]
+    way = X[:3, 3] - Y[:3, 3]
+    s = np.clip((hand - Y[:3, 3]) @ way / (way @ way), 0, 1)
+    assert np.linalg.norm(hand - Y[:3, 3] - s[:, None] * way, axis=-1).max() <= 1e-3
+    np.testing.assert_allclose(hand[-1], X[:3, 3], atol=1e-6)
+
+
+def test_certified_line(seven: Arm) -> None:
+    """A redundant arm gets its certificate too."""
+    X = forward(seven, START).copy()
+    X[:3, 3] += (-0.05, 0.1, -0.1)
+
+    assert straight_line(seven, START, X, deviation=1e-4).certificate.holds
+
+
+def test_a_robot_file_without_speed() -> None:
+    """An arm whose file says nothing of its hand is refused with what is missing."""
+    arm = load_arm(EXAMPLE)
+    X = forward(arm, START).copy()
+    X[2, 3] -= 0.1
+
+    with pytest.raises(InvalidValueError, match=r"paths in space need its reach and its tool speed \(\[hand\]"):
+        straight_line(arm, START, X)
