@@ -265,7 +265,7 @@ FAULTS = {
     "model without an inverse": (
         '[arms.ARM_1]\nmodel = "ntu-3r"\n',
         2,
-        "arms, ARM_1, model: 'ntu-3r' has 4 joints; moves ask for a place and an orientation",
+        "arms, ARM_1, model: 'ntu-3r' has 3 joints; moves ask for a place and an orientation",
     ),
     "no start": ("[arms.ARM_1]\n", 1, "arms, ARM_1, hand: missing; give the pose of the hand at the start, or the jo"),
     "two starts": (ARM + "posture = [0,0,0.3,0,0,0]\n", 3, "hand: the start is given twice, as hand and as posture"),

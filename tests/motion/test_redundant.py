@@ -14,7 +14,7 @@ from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.motion.straight import straight_line
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "seven_joints.urdf"
-START = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 1.0, 0.2])
+START = np.array([0.1, 0.5, 0.2, 1.2, 0.3, 1.0, 0.2])
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,264 @@
+"""What a motion asks of the motors, and how much slower it must run for them to give it.
+
+Run k times slower, a motion asks of every joint at every place for
+
+    tau(k) = gravity + dry friction + (viscous friction) / k + (inertia, centrifugal and Coriolis efforts) / k²
+
+so the least slowing follows from the roots of a parabola in 1/k, for each look at the motion by itself.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.trajectory import Trajectory
+
+# Looks at a segment at least, and at a whole motion at least.
+_LOOKS_OF_SEGMENT = 5
+_LOOKS = 200
+# From the place of the largest look the peak is sought: so often, with so many looks, each time closer.
+_ZOOMS, _CLOSER = 6, 9
+# A joint that moves at less than this part of its top speed stands: the sign of its speed is rounding.
+_STANDS = 1e-9
+# A limit passed by this part of it is rounding.
+_ROUNDING = 1e-9
+# A motion that must run a million times slower stands still.
+_CRAWL = 1e-6
+_ROUNDS = 8
+
+
+class EffortPeaks(NamedTuple):
+    """The largest efforts of a motion.
+
+    Attributes:
+        peaks: (n,) magnitudes [N m] or [N].
+        times: (n,) when [s].
+    """
+
+    peaks: Array
+    times: Array
+
+
+class EffortSlowing(NamedTuple):
+    """How much slower a motion must run.
+
+    Attributes:
+        factor: times slower; 1 where the efforts are inside their limits as it is.
+        joint: that it is for, from 0; None where nothing has to give way.
+        time: when that joint is at its limit, in the motion as it was given [s].
+    """
+
+    factor: float
+    joint: int | None
+    time: float
+
+
+class _Looks(NamedTuple):
+    """Places of a motion that are looked at: which segments, and which parts of them, (k,) each."""
+
+    segments: Array
+    parts: Array
+
+    def times(self, trajectory: Trajectory) -> Array:
+        at = self.segments.astype(np.intp)
+        return np.asarray(trajectory.times[at] + self.parts * np.diff(trajectory.times)[at])
+
+
+class _Shares(NamedTuple):
+    """The efforts at k looks by how they change when the motion is slowed, (k, n) each."""
+
+    lasting: Array
+    viscous: Array
+    dynamic: Array
+
+    def at(self, u: float) -> Array:
+        """Return the efforts (k, n) of the motion run at the part u of its speed."""
+        return self.lasting + u * (self.viscous + u * self.dynamic)
+
+
+def effort_peaks(arm: AnyArm, trajectory: Trajectory) -> EffortPeaks:
+    """Return the largest effort of every joint during a motion, and when.
+
+    A motion is looked at in 200 places or more, at both ends of every segment among them; around the largest look the
+    peak is sought ever closer. A peak that is narrower than the space between two looks may be missed.
+
+    Args:
+        arm: the arm, or a compiled one, which is faster where there are many segments.
+        trajectory: of its n joints.
+
+    Raises:
+        KindError: ``trajectory`` is no trajectory.
+        ShapeError: it is of another number of joints.
+    """
+    solver = solver_of(arm)
+    checked(solver.arm, trajectory)
+    looks = _spread(trajectory)
+    tau = _efforts(solver, trajectory, looks)
+    peaks, at = _peaks(solver, trajectory, looks, tau)
+    return EffortPeaks(peaks, at.times(trajectory))
+
+
+def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
+    """Return how many times slower a motion must run to keep the effort limits: as little as it can be.
+
+    It holds at all places that ``effort_peaks`` looks at. Use ``trajectory.slowed(found.factor)``.
+
+    Args:
+        arm: the arm, or a compiled one.
+        trajectory: of its n joints.
+
+    Raises:
+        KindError: ``trajectory`` is no trajectory.
+        ShapeError: it is of another number of joints.
+        InvalidValueError: gravity and dry friction alone take more than a joint may give, so that no slowing helps.
+    """
+    solver = solver_of(arm)
+    checked(solver.arm, trajectory)
+    limits = solver.arm.limit("effort")
+    if not np.isfinite(limits).any():
+        return EffortSlowing(1.0, None, 0.0)
+    looks = _spread(trajectory)
+    u, joint, time = 1.0, None, 0.0
+    for _ in range(_ROUNDS):
+        shares = _shares(solver, trajectory, looks)
+        _check_lasting(solver.arm, shares.lasting, looks.times(trajectory))
+        part, binding = _largest_part(shares, limits)
+        if binding is not None and part < u:
+            u, joint, time = part, binding[1], float(looks.times(trajectory)[binding[0]])
+        # What lies between the looks is looked at as well, where the efforts are largest: places stay when slowed.
+        peaks, near = _peaks(solver, trajectory.slowed(1 / u), looks, shares.at(u))
+        if (peaks <= limits * (1 + _ROUNDING)).all():
+            break
+        looks = _Looks(np.append(looks.segments, near.segments), np.append(looks.parts, near.parts))
+    return EffortSlowing(1 / u, joint, time)
+
+
+def checked(arm: Arm, trajectory: Trajectory) -> None:
+    """Refuse what is no motion of an arm.
+
+    Raises:
+        KindError: it is no trajectory.
+        ShapeError: it is of another number of joints.
+    """
+    if not isinstance(trajectory, Trajectory):
+        raise KindError(f"trajectory: expected a Trajectory, got {shown(trajectory)}")
+    joints = trajectory.coefficients.shape[2]
+    if joints != arm.n:
+        raise ShapeError(f"trajectory: expected one of {arm.n} joints, as '{arm.name}' has, got one of {joints}")
+
+
+def refuse_lasting(arm: Arm, joint: int, effort: float, place: str) -> InvalidValueError:
+    """Return the error for a place where holding the arm takes more than a joint, from 0, may give."""
+    unit = "N m" if arm.joints[joint].revolute else "N"
+    return InvalidValueError(
+        f"{place} gravity and dry friction alone ask joint {joint + 1} for {abs(effort):.4g} {unit}, "
+        f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: no slowing helps"
+    )
+
+
+def lasting_efforts(solver: Solver, q: Array, qd: Array) -> Array:
+    """Return what gravity and dry friction take of joints (..., n) that move, however slowly, as ``qd`` does."""
+    still = np.zeros_like(q)
+    return np.asarray(solver.inverse_dynamics(q, still, still) + dry_frictions(solver.arm, qd))
+
+
+def dry_frictions(arm: Arm, qd: Array) -> Array:
+    """Return what dry friction takes of joints (..., n) that move as ``qd`` does."""
+    forward = np.array([motor.coulomb_forward for motor in arm.motors])
+    backward = np.array([motor.coulomb_backward for motor in arm.motors])
+    return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
+
+
+def _spread(trajectory: Trajectory) -> _Looks:
+    """Return looks at all segments, at both ends of each among them."""
+    m = len(trajectory.coefficients)
+    each = max(_LOOKS_OF_SEGMENT, -(-_LOOKS // m) + 1)
+    return _Looks(np.repeat(np.arange(m, dtype=np.float64), each), np.tile(np.linspace(0.0, 1.0, each), m))
+
+
+def _states(trajectory: Trajectory, looks: _Looks) -> tuple[Array, Array, Array]:
+    """Return positions, speeds and accelerations (k, n) at looks: of the segment looked at, at its ends too."""
+    at = looks.segments.astype(np.intp)
+    terms = trajectory.coefficients[at]
+    local = (looks.parts * np.diff(trajectory.times)[at])[:, None]
+    q, qd, qdd = (np.zeros((len(at), terms.shape[2])) for _ in range(3))
+    for power in reversed(range(terms.shape[1])):
+        # Horner's scheme for a polynomial and its derivatives together.
+        qdd = qdd * local + 2 * qd
+        qd = qd * local + q
+        q = q * local + terms[:, power]
+    return q, np.where(np.abs(qd) > _STANDS * _top_speeds(trajectory), qd, 0.0), qdd
+
+
+def _top_speeds(trajectory: Trajectory) -> Array:
+    """Return a speed (n,) that no joint passes, a few times its largest at most."""
+    terms = np.abs(trajectory.coefficients)
+    h = np.diff(trajectory.times)[:, None]
+    value = np.zeros_like(terms[:, 0])
+    for power in reversed(range(1, terms.shape[1])):
+        value = value * h + power * terms[:, power]
+    return np.asarray(value.max(axis=0))
+
+
+def _efforts(solver: Solver, trajectory: Trajectory, looks: _Looks) -> Array:
+    return np.asarray(solver.inverse_dynamics(*_states(trajectory, looks)))
+
+
+def _shares(solver: Solver, trajectory: Trajectory, looks: _Looks) -> _Shares:
+    q, qd, qdd = _states(trajectory, looks)
+    lasting = lasting_efforts(solver, q, qd)
+    viscous = qd * np.array([motor.viscous for motor in solver.arm.motors])
+    return _Shares(lasting, viscous, solver.inverse_dynamics(q, qd, qdd) - lasting - viscous)
+
+
+def _peaks(solver: Solver, trajectory: Trajectory, looks: _Looks, tau: Array) -> tuple[Array, _Looks]:
+    """Return the largest efforts (n,), and where, from the efforts (k, n) at looks."""
+    joints = np.arange(tau.shape[1])
+    best = np.abs(tau).argmax(axis=0)
+    peaks, segments, parts = np.abs(tau)[best, joints], looks.segments[best], looks.parts[best]
+    width = 1.0 / (max(_LOOKS_OF_SEGMENT, -(-_LOOKS // len(trajectory.coefficients)) + 1) - 1)
+    for _ in range(_ZOOMS):
+        near = np.clip(parts[:, None] + np.linspace(-width, width, _CLOSER), 0.0, 1.0)
+        found = _Looks(np.repeat(segments, _CLOSER), near.ravel())
+        of_joint = np.abs(_efforts(solver, trajectory, found)).reshape(len(joints), _CLOSER, -1)[joints, :, joints]
+        best = of_joint.argmax(axis=1)
+        better = of_joint[joints, best] > peaks
+        peaks = np.where(better, of_joint[joints, best], peaks)
+        parts = np.where(better, near[joints, best], parts)
+        width *= 2.0 / (_CLOSER - 1)
+    return peaks, _Looks(segments, parts)
+
+
+def _check_lasting(arm: Arm, lasting: Array, times: Array) -> None:
+    """Refuse a motion where what lasts however slow it is takes more than there is."""
+    use = np.abs(lasting) / arm.limit("effort")
+    if use.max() > 1 - _ROUNDING:
+        k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
+        raise refuse_lasting(arm, joint, float(lasting[k, joint]), f"at {times[k]:.3f} s")
+
+
+def _largest_part(shares: _Shares, limits: Array) -> tuple[float, tuple[int, int] | None]:
+    """Return at which part of its speed, 1 at most, a motion keeps the limits, and which look and joint decide."""
+    u, binding = 1.0, None
+    while True:
+        tau = shares.at(u)
+        over = np.argwhere(np.abs(tau) > limits * (1 + _ROUNDING))
+        if not len(over):
+            return u, binding
+        k, j = over.T
+        side = np.sign(tau[k, j])
+        # Of side (lasting + viscous u + dynamic u²) = limit the root below u, up from which the limit is passed.
+        a, b, c = side * shares.dynamic[k, j], side * shares.viscous[k, j], side * shares.lasting[k, j] - limits[j]
+        root = np.sqrt(np.maximum(b * b - 4 * a * c, 0.0))
+        stable = b >= 0
+        below = np.where(stable, -2 * c / np.where(stable, b + root, 1.0), (root - b) / np.where(stable, 1.0, 2 * a))
+        worst = int(below.argmin())
+        u, binding = float(below[worst]), (int(k[worst]), int(j[worst]))
+        if u < _CRAWL:
+            raise InvalidValueError(
+                f"joint {binding[1] + 1} would have to move {1 / u:.3g} times slower to keep its effort"
+            )
