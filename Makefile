@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test bench examples clean
+.PHONY: help demo test bench edges examples clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -17,6 +17,10 @@ $(VENV)/test: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,urdf]'
 	@touch $@ $(VENV)/core
+
+$(VENV)/bench: pyproject.toml $(VENV)/test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	@touch $@
 
 demo: $(VENV)/core   ## Run the report's stacking program and write its report page
 	$(BIN)/armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out/stacking
@@ -34,8 +38,11 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/portable.rlo --cell examples/stanford_cell.toml -o out/portable
 	$(BIN)/armwright run examples/gearbox.rlo --cell examples/puma_cell.toml -o out/gearbox
 
-bench: $(VENV)/test   ## Measure against the peers, one core each
+bench: $(VENV)/bench  ## Measure against the peers, one core each
 	PYTHONPATH=tests $(BIN)/python benchmarks/run.py
+
+edges: $(VENV)/bench  ## Measure inverse kinematics at its edges, beside the peers (6 minutes)
+	PYTHONPATH=tests $(BIN)/python benchmarks/inverse_edges.py
 
 clean:            ## Remove what was built
 	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

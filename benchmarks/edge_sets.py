@@ -8,9 +8,10 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Limits
 from armwright.arrays import Array
 from armwright.kinematics.forward import forward
-from armwright.kinematics.jacobian import jacobian
-from armwright.kinematics.singularities import factor_names, singularity_factors
 from armwright.kinematics.inverse.recognise import closed_form_of
+from armwright.kinematics.inverse.shoulder import Shoulder
+from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.singularities import determinant_factors, factor_names
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 
@@ -114,9 +115,9 @@ def _right_angle(arm: Arm, rng: np.random.Generator) -> EdgeSet:
 
 def _singular(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
     """Sets at and beside each zero of each factor of the determinant."""
-    sets = []
-    for k, (factor, joint) in enumerate(zip(factor_names(closed_form_of(arm)), (1, 2, 4), strict=True)):
-        exact = np.array([_zero(arm, rng, k, joint) for _ in range(_FEW)])
+    sets, shoulder = [], closed_form_of(arm)
+    for k, (factor, joint) in enumerate(zip(factor_names(shoulder), (1, 2, 4), strict=True)):
+        exact = np.array([_zero(arm, shoulder, rng, k, joint) for _ in range(_FEW)])
         for decade in DECADES:
             shift = decade * np.eye(arm.n)[joint]
             q = exact if not decade else np.concatenate([exact + shift, exact - shift])
@@ -125,22 +126,24 @@ def _singular(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
     return sets
 
 
-def _zero(arm: Arm, rng: np.random.Generator, factor: int, joint: int) -> Array:
+def _zero(arm: Arm, shoulder: Shoulder, rng: np.random.Generator, factor: int, joint: int) -> Array:
     """Return a posture at which one factor vanishes, by the choice of one joint, and the others do not."""
-    span = np.linspace(-3.0, 3.0, 61) if arm.joints[joint].revolute else np.linspace(-1.2, 1.2, 61)
+    span = np.linspace(-3.0, 3.0, 60) if arm.joints[joint].revolute else np.linspace(-1.2, 1.2, 60)
     while True:
         q = _random(arm, rng, 1)[0]
 
-        def value(x: float, q: Array = q) -> float:
-            return float(singularity_factors(arm, np.where(np.arange(6) == joint, x, q))[factor])
+        def factors(x: float, q: Array = q) -> list[float]:
+            return determinant_factors(shoulder, shoulder.angles([*q[:joint].tolist(), x, *q[joint + 1 :].tolist()]))
 
-        values = [value(x) for x in span]
+        values = [factors(x)[factor] for x in span.tolist()]
         crossings = [i for i in range(len(span) - 1) if values[i] * values[i + 1] < 0]
         if not crossings:
             continue
         i = rng.choice(crossings)
-        q[joint] = brentq(value, span[i], span[i + 1], xtol=1e-16, rtol=8.9e-16)
-        if np.delete(np.abs(singularity_factors(arm, q)), factor).min() > _APART:
+        q[joint] = brentq(lambda x: factors(x)[factor], span[i], span[i + 1], xtol=1e-16, rtol=8.9e-16)
+        # A boom drawn in brings the wrist onto the first axis as well: there the others are looked at further out.
+        aside = 0.0 if arm.joints[joint].revolute else 0.5
+        if np.delete(np.abs(factors(q[joint] + aside)), factor).min() > _APART:
             return q
 
 
@@ -203,4 +206,6 @@ def _out_of_reach(arm: Arm, rng: np.random.Generator) -> EdgeSet:
             wrist = np.array((rho * np.cos(turn), rho * np.sin(turn), height + rng.uniform(-0.5, 0.5)))
         poses.append(pose(R, wrist + hand * R[:, 2]))
     X = np.array(poses)
-    return EdgeSet(name="out of reach by 0.01 to 80 mm", arm=arm, q=np.zeros((len(X), 6)), X=X, reachable=False, own=False)
+    return EdgeSet(
+        name="out of reach by 0.01 to 80 mm", arm=arm, q=np.zeros((len(X), 6)), X=X, reachable=False, own=False
+    )

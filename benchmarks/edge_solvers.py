@@ -5,6 +5,9 @@ from typing import Protocol
 
 import attrs
 import numpy as np
+from eaik.IK_DH import DhRobot
+from roboticstoolbox import DHRobot, PrismaticDH, RevoluteDH
+from roboticstoolbox.models.DH import Puma560
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
@@ -24,14 +27,14 @@ class Reply:
     Attributes:
         rows: (k, 6) the postures that it returns.
         claimed: (k,) whether it says that they meet the pose.
-        reached: whether it says that the pose can be reached.
+        reached: whether it says that the pose can be reached; None where it looks inside the limits only.
         inside: whether it says that a posture is inside the limits; None where it knows no limits.
         errors: (k, 2) the residuals that it reports [m] and [rad]; None where it reports none for each row.
     """
 
     rows: Array
     claimed: Array
-    reached: bool
+    reached: bool | None
     inside: bool | None = None
     errors: Array | None = None
 
@@ -57,9 +60,11 @@ class Armwright:
         self.arm = load_arm(name)
 
     def model(self, q: Array) -> Array:
+        """Return its own forward pose of a posture, (4, 4)."""
         return forward(self.arm, q)
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:
+        """Ask for a pose."""
         solution = inverse(arm, X, near)
         reached = solution.answer is not Answer.OUT_OF_REACH
         return Reply(
@@ -77,17 +82,17 @@ class Eaik:
     one = False
 
     def __init__(self, name: str) -> None:
-        from eaik.IK_DH import DhRobot
-
         joints = load_arm(name).joints
         if any(not joint.revolute or joint.theta for joint in joints):
             raise NotImplementedError("no slides")
         self.robot = DhRobot(*(np.array([getattr(joint, key) for joint in joints]) for key in ("alpha", "a", "d")))
 
     def model(self, q: Array) -> Array:
+        """Return its own forward pose of a posture, (4, 4)."""
         return self.robot.fwdKin(q)
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:  # noqa: ARG002
+        """Ask for a pose."""
         found = self.robot.IK(X)
         rows = np.array(found.Q).reshape(-1, 6)
         claimed = ~np.array(found.is_LS, dtype=bool)
@@ -95,10 +100,8 @@ class Eaik:
 
 
 @functools.cache
-def _toolbox(name: str) -> object:
-    """The arm in the Robotics Toolbox, of the same Denavit-Hartenberg numbers."""
-    from roboticstoolbox import DHRobot, PrismaticDH, RevoluteDH
-
+def _toolbox(name: str) -> DHRobot:
+    """Return the arm in the Robotics Toolbox, of the same Denavit-Hartenberg numbers."""
     links = [
         RevoluteDH(d=joint.d, a=joint.a, alpha=joint.alpha, offset=joint.theta)
         if joint.revolute
@@ -108,8 +111,8 @@ def _toolbox(name: str) -> object:
     return DHRobot(links, name=name)
 
 
-def _limit(robot: object, arm: Arm) -> None:
-    for link, joint in zip(robot.links, arm.joints, strict=True):  # type: ignore[attr-defined]
+def _limit(robot: DHRobot, arm: Arm) -> None:
+    for link, joint in zip(robot.links, arm.joints, strict=True):
         link.qlim = [joint.limits.lower, joint.limits.upper]
 
 
@@ -120,12 +123,14 @@ class ToolboxAnalytic:
 
     def __init__(self, name: str) -> None:
         self.robot = _toolbox(name)
-        self.solver = self.robot.analytic_ik()  # type: ignore[attr-defined]
+        self.solver = self.robot.analytic_ik()
 
     def model(self, q: Array) -> Array:
-        return self.robot.fkine(q).A  # type: ignore[attr-defined]
+        """Return its own forward pose of a posture, (4, 4)."""
+        return self.robot.fkine(q).A
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:
+        """Ask for a pose."""
         _limit(self.robot, arm)
         inside = self.solver.solve(X)
         everything = self.solver.solve(X, joint_limits=False)
@@ -133,7 +138,7 @@ class ToolboxAnalytic:
         if near is not None:
             # From a posture it gives the nearest one, turned to it.
             nearest = self.solver.ikine(X, q0=near)
-            rows = np.concatenate([np.asarray(nearest.q).reshape(-1, 6), rows[:0]]) if nearest.success else rows[:0]
+            rows = np.asarray(nearest.q).reshape(-1, 6) if nearest.success else rows[:0]
         return Reply(
             rows=rows,
             claimed=np.ones(len(rows), dtype=bool),
@@ -148,11 +153,9 @@ class ToolboxPuma:
     one = False
     # Its x axes 1, 3, 4 and 5 point the other way: twists and lengths change their signs, and angles count from there.
     _shift = np.array((np.pi, -np.pi, np.pi, 0.0, 0.0, -np.pi))
-    _configurations = [a + b + c for a in "lr" for b in "ud" for c in "nf"]
+    _configurations = tuple(a + b + c for a in "lr" for b in "ud" for c in "nf")
 
     def __init__(self, name: str) -> None:
-        from roboticstoolbox.models.DH import Puma560
-
         if name != "puma560":
             raise NotImplementedError("PUMA only")
         self.robot = Puma560()
@@ -162,9 +165,11 @@ class ToolboxPuma:
         self.robot.links[3].d = load_arm(name).joints[3].d
 
     def model(self, q: Array) -> Array:
+        """Return its own forward pose of a posture, (4, 4)."""
         return self.robot.fkine(q + self._shift).A
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:  # noqa: ARG002
+        """Ask for a pose."""
         found = [self.robot.ikine_a(X, configuration) for configuration in self._configurations]
         rows = np.array([one.q - self._shift for one in found if np.isfinite(one.q).all()]).reshape(-1, 6)
         claimed = np.array([one.success for one in found if np.isfinite(one.q).all()], dtype=bool)
@@ -180,17 +185,19 @@ class ToolboxNumeric:
         self.robot = _toolbox(name)
 
     def model(self, q: Array) -> Array:
-        return self.robot.fkine(q).A  # type: ignore[attr-defined]
+        """Return its own forward pose of a posture, (4, 4)."""
+        return self.robot.fkine(q).A
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:
+        """Ask for a pose."""
         _limit(self.robot, arm)
         # Its residual is half the square of the error.
-        found = self.robot.ikine_LM(X, q0=near, tol=1e-13, seed=0)  # type: ignore[attr-defined]
+        found = self.robot.ikine_LM(X, q0=near, tol=1e-13, seed=0)
         rows = np.asarray(found.q).reshape(-1, 6) if found.success else np.empty((0, 6))
         return Reply(
             rows=rows,
             claimed=np.ones(len(rows), dtype=bool),
-            reached=bool(found.success),
+            reached=None,
             inside=bool(found.success),
         )
 
@@ -214,7 +221,6 @@ def solvers(name: str) -> dict[str, Solver]:
         except NotImplementedError:
             continue
         for q in np.random.default_rng(0).uniform(-1.5, 1.5, size=(100, arm.n)):
-            apart = np.abs(solver.model(q) - forward(arm, q)).max()
-            assert apart < _SAME_MODEL, f"{title} has another model of '{name}': {apart}"
+            np.testing.assert_allclose(solver.model(q), forward(arm, q), atol=_SAME_MODEL, err_msg=title)
         found[title] = solver
     return found

@@ -46,7 +46,9 @@ def compare(name: str) -> list[list[str]]:
             for pose in poses:
                 robot.ikine_a(pose)
 
-        works, counts, titles = [*works, toolbox], [*counts, SLOW], [*titles, "roboticstoolbox, `ikine_a` (one solution)"]
+        works.append(toolbox)
+        counts.append(SLOW)
+        titles.append("roboticstoolbox, `ikine_a` (one solution)")
     times = [t / n for t, n in zip(in_turn(*works, *own), [*counts, ROWS, ROWS], strict=True)]
     return [
         [f"`{name}`", title, microseconds(t), microseconds(times[-2]), microseconds(times[-1]), f"{t / times[-2]:.0f}"]

@@ -9,6 +9,7 @@ import roboticstoolbox as rtb
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.dynamics.compiled import compile_arm
+from armwright.kinematics.forward import link_poses
 from oracles.with_pinocchio import pinocchio_model
 
 ROWS = 200_000
@@ -39,7 +40,6 @@ def compare(name: str) -> list[list[str]]:
     robot = toolbox_robot(arm)
     chain = robot.ets()
     out = np.empty((ROWS, 4, 4)), np.empty((ROWS, 6, arm.n))
-    last = model.njoints - 1
 
     def pinocchio() -> None:
         for row in q[:FEW]:
@@ -61,7 +61,6 @@ def compare(name: str) -> list[list[str]]:
             chain.fkine(row)
             chain.jacob0(row)
 
-    assert last == arm.n
     np.testing.assert_allclose(robot.fkine(q[0]).A, arm_pose(arm, q[0]), atol=1e-12)
     times = in_turn(pinocchio, pinocchio_least, toolbox, toolbox_chain, lambda: fast(q, out=out), lambda: fast(q))
     each = [x / n for x, n in zip(times, (FEW, FEW, SLOW, FEW, ROWS, ROWS), strict=True)]
@@ -71,16 +70,15 @@ def compare(name: str) -> list[list[str]]:
         "roboticstoolbox, `DHRobot.fkine`, `.jacob0`",
         "roboticstoolbox, `ETS.fkine`, `.jacob0`",
     )
+    own, fresh = each[4:]
     return [
-        [f"`{name}`", peer, microseconds(each[i]), microseconds(each[4]), microseconds(each[5]), f"{each[i] / each[4]:.0f}"]
-        for i, peer in enumerate(peers)
+        [f"`{name}`", peer, *map(microseconds, (taken, own, fresh)), f"{taken / own:.0f}"]
+        for peer, taken in zip(peers, each, strict=False)
     ]
 
 
 def arm_pose(arm: Arm, q: np.ndarray) -> np.ndarray:
     """Return the pose of the last link: what roboticstoolbox calls the end, base and tool left out."""
-    from armwright.kinematics.forward import link_poses  # noqa: PLC0415
-
     return np.linalg.inv(arm.base) @ link_poses(arm, q)[-2]
 
 

@@ -30,12 +30,11 @@ def main() -> None:
     if sys.argv[1:]:
         return
     versions = ", ".join(f"{peer} {version(peer)}" for peer in PEERS)
-    head = [
-        "# Measured",
+    how = (
         f"By `make bench` on {processor()}, Python {platform.python_version()}, {versions}. Everything on one core; "
-        f"the peer and armwright in turn in one process, on the same numbers; medians of {REPEATS} rounds.",
-    ]
-    (HERE / "results.md").write_text("\n\n".join([*head, *sections]) + "\n", encoding="utf-8")
+        f"the peer and armwright in turn in one process, on the same numbers; medians of {REPEATS} rounds."
+    )
+    (HERE / "results.md").write_text("\n\n".join(["# Measured", how, *sections]) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

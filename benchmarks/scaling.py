@@ -98,9 +98,7 @@ def memory() -> list[list[str]]:
     """Return the greatest memory of a process that does nothing else."""
     rows = []
     for size in (1, 1_000_000):
-        done = subprocess.run(
-            [sys.executable, "-c", _MEMORY, str(size)], stdout=subprocess.PIPE, text=True, check=True
-        )
+        done = subprocess.run([sys.executable, "-c", _MEMORY, str(size)], stdout=subprocess.PIPE, text=True, check=True)
         before, after = (int(x) / 1024 for x in done.stdout.split())
         arrays = 2 * size * 6 * 8 / 2**20
         rows.append([f"{size}", f"{before:.0f}", f"{after:.0f}", f"{arrays:.0f}"])
@@ -119,7 +117,8 @@ if __name__ == "__main__":
     section(
         "Growth with the number of joints",
         f"Inverse dynamics of random arms with nothing at a right angle, {ROWS} rows, with `out=`; the first call "
-        "with an empty cache.",
+        "with an empty cache. From 8 joints on the code of a kernel, which is one straight line, outgrows the 32 KiB "
+        "of a first-level instruction cache (23 KiB for 6 joints, 34 for 8, 44 for 12), and its fetching bounds the speed.",
         table(
             ["joints", "operations", "Pinocchio, µs per row", "armwright, µs per row", "ratio", "first call, s"],
             by_joints(),

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.arm.load import read_arm
+from armwright.arm.load import read_arm, read_load
 from armwright.cell.reader import read_cell
 from armwright.errors import FileFormatError
 
@@ -140,3 +140,14 @@ def check_explained(message: str) -> None:
         assert UNITS.sub("", key) in stems or re.search(rf"`\[\[{key}\]\]`|`\[joint\.{key}\]`|`{key}\.", ARMS), key
         for unit in UNITS.findall(key):
             assert f"_{''.join(unit)}`" in ARMS, key
+
+
+def test_load_of_the_page(tmp_path: Path) -> None:
+    """The load on the page on arms is read, every quantity in SI units."""
+    (tmp_path / "part.toml").write_text(example(ARMS.partition("## A load in the hand")[2]), encoding="utf-8")
+
+    load = read_load(tmp_path / "part.toml")
+
+    assert load.mass == 1.8
+    np.testing.assert_allclose(load.com, (0, 0, 0.05))
+    np.testing.assert_array_equal(load.inertia, 0.003 * np.eye(3))

@@ -15,6 +15,7 @@ from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
 from armwright.kinematics.inverse.solution import Answer, InverseSolution
 from armwright.kinematics.jacobian import jacobian
 from armwright.kinematics.singularities import singularity_factors
+from armwright.spatial.poses import pose
 from oracles.arms import random_postures
 from oracles.with_pinocchio import pinocchio_model
 
@@ -24,6 +25,16 @@ REGULAR = 1e-3  # smallest singular value of a well-conditioned posture [m]
 ELBOW = math.atan2(0.433, -0.02)  # the PUMA's elbow is straight where tan q3 = d4 / a3
 # With q3 a right angle the PUMA's wrist centre is above its shoulder where (a2 + d4)·c2 = a3·s2.
 UPRIGHT = math.atan2(0.432 + 0.433, -0.02)
+
+
+def _upright(arm: Arm, q: tuple[float, ...]) -> float:
+    """The q2 at which the shoulder factor, A cos q2 + B sin q2, vanishes."""
+    A, B = (singularity_factors(arm, (q[0], q2, *q[2:]))[0] for q2 in (0.0, math.pi / 2))
+    return math.atan2(-A, B)
+
+
+# The UR5's wrist is above the axis of joint 1, seen in the plane of the arm, where A cos q2 + B sin q2 = 0.
+LEANING = (0.3, 0.0, 0.8, 0.6, 0.5, 0.7)
 # Postures in which one factor of the determinant vanishes, and the joint that leads away from there.
 SINGULAR = {
     "PUMA wrist": ("puma560", (0.3, 0.4, 0.5, 0.6, 0.0, 0.7), 5),
@@ -36,6 +47,7 @@ SINGULAR = {
     "UR5 wrist": ("ur5", (0.3, -1.0, 0.8, 0.6, 0.0, 0.7), 5),
     "UR5 elbow stretched": ("ur5", (0.3, -1.0, 0.0, 0.6, 0.5, 0.7), 3),
     "UR5 elbow folded": ("ur5", (0.3, -1.0, math.pi, 0.6, 0.5, 0.7), 3),
+    "UR5 shoulder": ("ur5", (0.3, _upright(load_arm("ur5"), LEANING), *LEANING[2:]), 2),
 }
 
 
@@ -264,3 +276,123 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
     assert counts[Answer.SOLVED] > 20
     assert counts[Answer.OUT_OF_REACH] > 20
     assert counts[Answer.OUT_OF_LIMITS] > 2
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+def test_right_angle_of_joint_2(name: str, rng: np.random.Generator) -> None:
+    """With joint 2 at 90 degrees exactly and all others anywhere the posture is found again, and none comes twice."""
+    arm = load_arm(name)
+    for q in random_postures(arm, rng, 40):
+        q[1] = np.pi / 2
+        if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] < REGULAR:
+            continue
+        solution = inverse(arm, forward(arm, q), q)
+
+        assert solution.answer is Answer.SOLVED
+        assert np.abs(solution.best.q - q).max() < POSTURE
+        assert _apart(solution) > 1e-6
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5"])
+def test_whole_turns(name: str, rng: np.random.Generator) -> None:
+    """An arm that stands beyond half a turn, where its limits have room for it, is told to stay there."""
+    arm = load_arm(name)
+    beyond = [q for q in random_postures(arm, rng, 400) if (np.abs(q) > np.pi).any()][:40]
+    assert len(beyond) == 40
+    for q in beyond:
+        if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] > REGULAR:
+            assert np.abs(inverse(arm, forward(arm, q), q).best.q - q).max() < POSTURE
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford"])
+def test_made_outside_the_limits(name: str, rng: np.random.Generator) -> None:
+    """A pose made outside the limits has that posture among its branches, not allowed unless a turn brings it inside.
+
+    It is called out of limits where no branch is inside by any whole turns, and solved where one is.
+    """
+    arm = load_arm(name)
+    turn = 2 * np.pi * np.array([joint.revolute for joint in arm.joints])[:, None] * np.arange(-2, 3)
+    lower, upper = arm.limit("lower")[:, None], arm.limit("upper")[:, None]
+    answers = dict.fromkeys(Answer, 0)
+    for q in random_postures(_wide(name), rng, 100):
+        X = forward(arm, q)
+        solution = inverse(arm, X)
+        images = inverse_branches(arm, X)[0][..., None] + turn
+        allowed = ((images >= lower) & (images <= upper)).any(axis=-1).all(axis=-1)
+
+        assert solution.answer is (Answer.SOLVED if allowed.any() else Answer.OUT_OF_LIMITS)
+        assert any(np.abs(np.angle(np.exp(1j * (branch.q - q)))).max() < 1e-6 for branch in solution)
+        answers[solution.answer] += 1
+    assert min(answers[Answer.SOLVED], answers[Answer.OUT_OF_LIMITS]) > 5
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("short", [1e-5, 1e-3, 0.05])
+def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Generator) -> None:
+    """A wrist that would be nearer to the axis than the plane of the arm is out of reach by just what it is nearer.
+
+    The nearest pose has the same orientation, and is reached.
+    """
+    side, height, hand = {
+        "puma560": (0.149, 0.0, 0.0),
+        "stanford": (0.15367, 0.4125, 0.26289),
+        "ur5": (0.10915, 0.089159, 0.0823),
+    }[name]
+    arm = _wide(name)
+    for R in (forward(arm, q)[:3, :3] for q in random_postures(arm, rng, 5)):
+        turn, rho = rng.uniform(-np.pi, np.pi), side - short
+        # On the ring of the wrist's reach in every arm: half a metre up.
+        wrist = np.array((rho * np.cos(turn), rho * np.sin(turn), height + 0.5))
+        X = pose(R, wrist + hand * R[:, 2])
+
+        solution = inverse(arm, X)
+
+        assert solution.answer is Answer.OUT_OF_REACH
+        assert solution.allowed == ()
+        assert solution.distance == pytest.approx(short, abs=1e-9)
+        assert solution.turn < RESIDUAL
+        np.testing.assert_allclose(solution.nearest_pose[:3, :3], R, atol=RESIDUAL)
+        assert inverse(arm, solution.nearest_pose).answer is not Answer.OUT_OF_REACH
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("room", [0.1, 1e-2, 1e-4, 1e-6])
+def test_free_joint_with_little_room(name: str, room: float, rng: np.random.Generator) -> None:
+    """With joint 5 straight and joint 6 held to a hair's breadth, the one posture in a free family is found.
+
+    Joints 4 and 6 are free together, or all of 2, 3, 4 and 6; that joint 6 has room for a part of the family only,
+    and next to none, does not put the pose out of limits.
+    """
+    wide = _wide(name)
+    for q in random_postures(wide, rng, 5):
+        q[4] = 0.0
+        held = Limits(lower=q[5] - 0.3 * room, upper=q[5] + 0.7 * room)
+        arm = attrs.evolve(wide, joints=[*wide.joints[:5], attrs.evolve(wide.joints[5], limits=held)])
+        X = forward(arm, q)
+
+        solution = inverse(arm, X)
+
+        assert solution.answer in (Answer.SOLVED, Answer.SINGULAR)
+        assert any(branch.free and branch.allowed for branch in solution)
+        assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
+
+
+@pytest.mark.parametrize("case", [case for case in SINGULAR if "wrist" in case or "drawn" in case])
+def test_a_free_family_is_free(case: str) -> None:
+    """The free joints of a branch are those that the idle motion moves, and the hand stays while they move far."""
+    name, q, _ = SINGULAR[case]
+    arm = _wide(name)
+    X = forward(arm, q)
+    chooser = 2 if "drawn" in case else 6 if name == "ur5" else 4
+    families = []
+    for way in (0.0, 0.4, 0.8):
+        near = np.array(q) + way * np.eye(6)[chooser - 1]
+        branch = inverse(arm, X, near).best
+        idle = np.linalg.svd(jacobian(arm, branch.q))[2][-1]
+
+        assert max(branch.position_error, branch.rotation_error) < RESIDUAL
+        assert set(np.flatnonzero(np.abs(idle) > 1e-6) + 1) == set(branch.free)
+        assert branch.q[chooser - 1] == pytest.approx(near[chooser - 1])
+        families.append(branch.q)
+    moved = np.abs(families[2] - families[0]) > 1e-3
+    assert set(np.flatnonzero(moved) + 1) == set(branch.free)

@@ -1,6 +1,6 @@
 """Inverse kinematics: in closed form where the arm has one, else step by step; judged and sorted."""
 
-from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.kinematics.inverse.branches import BRANCHES, Branches, branches, merged
+from armwright.kinematics.inverse.family import moved_inside
 from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, judge, typed_poses
 from armwright.kinematics.inverse.numeric import numeric_inverse
 from armwright.kinematics.inverse.reach import nearest_centre
@@ -28,8 +29,6 @@ _FREE = {
     "parallel": ((1, 2, 3, 4, 5, 6), (2, 4), (2, 3, 4, 6)),
 }
 _CHOOSERS = {"spherical": (1, 2, 4), "parallel": (1, 2, 6)}
-# Places of a free joint that are tried for one inside the limits.
-_TRIED = 721
 
 
 def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> tuple[Array, Flags]:
@@ -141,9 +140,7 @@ def _closed(arm: Arm, shoulder: Shoulder, X: Array, near: Array) -> InverseSolut
         choosers = [joint for joint, is_free in zip(_CHOOSERS[kind], free[i], strict=True) if is_free]
         for joint in choosers:
             if violations(arm, q):
-                q = _moved_inside(
-                    arm, q, near, lambda near: _postures(arm, shoulder, target, near)[0], joint=joint, branch=int(i)
-                )
+                q = moved_inside(arm, q, near, partial(_members, arm, shoulder, target, int(i)), joint=joint)
         together = [joints for joints, is_free in zip(_FREE[kind], free[i], strict=True) if is_free]
         angles = np.array(shoulder.angles(q.tolist()))
         candidates.append(
@@ -154,29 +151,9 @@ def _closed(arm: Arm, shoulder: Shoulder, X: Array, near: Array) -> InverseSolut
     return judge(arm, X, candidates, near, apart=_SAME_POSTURE, X_near=X_near)
 
 
-def _moved_inside(
-    arm: Arm, q: Array, near: Array, solve: Callable[[Array], Array], *, joint: int, branch: int
-) -> Array:
-    """Move a free joint on from ``near``, as little as it must, until all joints are inside their limits.
-
-    Args:
-        arm: the arm.
-        q: (n,) the posture with that joint near, which comes back when no other place of it helps.
-        near: (n,) where the arm is.
-        solve: returns the postures (k, 8, n) for places (k, n) of the arm.
-        joint: number of the free joint, from 1.
-        branch: which of the eight.
-    """
-    limits, start = arm.joints[joint - 1].limits, near[joint - 1]
-    lower, upper = max(limits.lower, start - np.pi), min(limits.upper, start + np.pi)
-    if lower > upper:
-        return q
-    tried = np.linspace(lower, upper, _TRIED)
-    tried = tried[np.abs(tried - start).argsort()]
-    starts = np.tile(near, (_TRIED, 1))
-    starts[:, joint - 1] = tried
-    members = (nearest_image(arm, member, near) for member in solve(starts)[:, branch])
-    return next((member for member in members if not violations(arm, member)), q)
+def _members(arm: Arm, shoulder: Shoulder, X_BT: Array, branch: int, near: Array) -> Array:
+    """Return the postures (k, 6) of one branch that places of the arm (k, 6) lead to, where a joint is free."""
+    return np.asarray(_postures(arm, shoulder, X_BT, near)[0][:, branch])
 
 
 def _nearest_pose(shoulder: Shoulder, X_BT: Array) -> Array:
