@@ -13,7 +13,7 @@ from pathlib import Path
 from measure import REPEATS, processor
 
 HERE = Path(__file__).parent
-ALL = ("dynamics", "kinematics", "inverse_kinematics", "one_call", "scaling", "latency", "simulation")
+ALL = ("dynamics", "kinematics", "inverse_kinematics", "one_call", "scaling", "latency", "simulation", "motion_lines")
 PEERS = ("pin", "roboticstoolbox-python", "eaik", "numpy", "numba", "scipy")
 
 

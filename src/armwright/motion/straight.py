@@ -16,7 +16,7 @@ from armwright.kinematics.inverse.solution import Answer, violations
 from armwright.kinematics.singularities import singularities
 from armwright.motion.certificate import Certificate, LimitName, slowing
 from armwright.motion.chain import chain
-from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned
+from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned, turning_points
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
 from armwright.motion.follow import SLOWEST, TURN_PER_METRE, PathError
 from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, report_speed, report_step
@@ -128,7 +128,12 @@ def straight_line(
     spline, found, times = _refined(solver, line, q, deviation, turn)
     trajectory = Trajectory(times=times, coefficients=spline.joints)
     _check_positions(solver.arm, line, trajectory)
-    factor, because = _slowing(arm, solver.arm, line, trajectory, found)
+    factor, because = _slowing(solver.arm, line, trajectory, found)
+    efforts = _efforts(solver, spline, found.looks, factor)
+    if (efforts > solver.arm.limit("effort")).any():
+        slower = slowing_for_efforts(arm, trajectory.slowed(factor))
+        factor, because = factor * slower.factor, because if slower.joint is None else ("effort", slower.joint)
+        efforts = effort_peaks(arm, trajectory.slowed(factor)).peaks
     trajectory = trajectory.slowed(factor)
     if period is not None:
         trajectory = whole_ticks(trajectory, period)
@@ -150,7 +155,7 @@ def straight_line(
         peaks={
             "speed": found.speed.max(axis=0) / stretch,
             "acceleration": found.acceleration.max(axis=0) / stretch**2,
-            "effort": effort_peaks(arm, trajectory).peaks,
+            "effort": efforts,
         },
         factor=factor,
         because=because,
@@ -159,18 +164,25 @@ def straight_line(
 
 
 def _slowing(
-    arm: AnyArm, plain: Arm, line: Line, trajectory: Trajectory, found: Deviation
+    arm: Arm, line: Line, trajectory: Trajectory, found: Deviation
 ) -> tuple[float, tuple[LimitName, int] | None]:
-    """Return how many times slower a line must be run for the joints to keep their limits, and for which of them."""
-    factor, because = slowing(plain, {"speed": found.speed.max(axis=0), "acceleration": found.acceleration.max(axis=0)})
+    """Return how many times slower a line must be run to keep speeds and accelerations, and for which of them."""
+    factor, because = slowing(arm, {"speed": found.speed.max(axis=0), "acceleration": found.acceleration.max(axis=0)})
     if because is not None and because[0] == "speed" and factor > SLOWEST:
         time = trajectory.times[found.speed[:, because[1]].argmax()]
         reason = f"joint {because[1] + 1} would have to move {factor:.0f} times as fast as it may"
-        raise _singular(plain, line, trajectory(time), float(line.fractions(np.array([time]))[0]), reason)
-    efforts = slowing_for_efforts(arm, trajectory.slowed(factor))
-    if efforts.joint is not None:
-        return factor * efforts.factor, ("effort", efforts.joint)
+        raise _singular(arm, line, trajectory(time), float(line.fractions(np.array([time]))[0]), reason)
     return factor, because
+
+
+def _efforts(solver: Solver, spline: Spline, looks: int, factor: float) -> Array:
+    """Return the largest efforts (n,) at the looks of a motion run so many times slower."""
+    t = (np.linspace(0.0, 1.0, looks + 1) * spline.lengths[:, None])[..., None]
+    a, b, c, d = (spline.joints[:, None, power] for power in range(4))
+    q = ((d * t + c) * t + b) * t + a
+    qd = ((3 * d * t + 2 * c) * t + b) / factor
+    qdd = (6 * d * t + 2 * c) / factor**2
+    return np.asarray(np.abs(solver.inverse_dynamics(q, qd, qdd)).max(axis=(0, 1)))
 
 
 def _ends(solver: Solver, q_start: ArrayLike, X_goal: ArrayLike, deviation: float) -> tuple[Array, Array, Array]:
@@ -263,10 +275,13 @@ def _solved(solver: Solver, line: Line, X: Array, s: Array, q_start: Array) -> A
 
 def _check_positions(arm: Arm, line: Line, trajectory: Trajectory) -> None:
     """Refuse a spline that swings over a joint limit between knots which keep it."""
-    for q in trajectory.extremes(0):
-        for fault in violations(arm, q):
-            at_knots = trajectory(trajectory.times)[:, fault.joint - 1]
-            s = float(line.fractions(trajectory.times[[np.abs(at_knots - fault.value).argmin()]])[0])
+    c, lengths = trajectory.coefficients, np.diff(trajectory.times)
+    t = turning_points(c, lengths)
+    q = ((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0]
+    outside = ((q < arm.limit("lower")) | (q > arm.limit("upper"))).any(axis=(0, 2))
+    for k in np.flatnonzero(outside):
+        s = float(line.fractions(trajectory.times[k : k + 1])[0])
+        for fault in (*violations(arm, q[0, k]), *violations(arm, q[1, k])):
             raise PathError("limits", 0, s, f"on the line near {_place(line, s)} {fault}")
 
 
