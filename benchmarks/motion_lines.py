@@ -2,9 +2,10 @@
 
 from measure import in_turn, progress, section, table  # isort: skip - sets the threads first
 
+from itertools import pairwise
+
 import numpy as np
 import roboticstoolbox as rtb
-from kinematics import toolbox_robot
 from spatialmath import SE3
 
 from armwright.arm.load import load_arm
@@ -12,6 +13,7 @@ from armwright.arrays import Array
 from armwright.dynamics.compiled import compile_arm
 from armwright.kinematics.forward import forward
 from armwright.motion.straight import straight_line
+from kinematics import toolbox_robot
 
 DEVIATION = 1e-4
 START = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
@@ -21,7 +23,7 @@ WAY = (0.1, -0.4, -0.28)
 def deviation_of_samples(q: Array, X: Array, Y: Array) -> float:
     """Return how far the hand strays from the line when the joints go straight from sample to sample [m]."""
     t = np.linspace(0, 1, 20)[:, None]
-    between = np.concatenate([a + t * (b - a) for a, b in zip(q, q[1:], strict=False)])
+    between = np.concatenate([a + t * (b - a) for a, b in pairwise(q)])
     come, way = forward(load_arm("puma560"), between)[:, :3, 3] - X[:3, 3], Y[:3, 3] - X[:3, 3]
     s = np.clip(come @ way / (way @ way), 0, 1)
     return float(np.linalg.norm(come - s[:, None] * way, axis=-1).max())

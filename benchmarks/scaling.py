@@ -118,7 +118,8 @@ if __name__ == "__main__":
         "Growth with the number of joints",
         f"Inverse dynamics of random arms with nothing at a right angle, {ROWS} rows, with `out=`; the first call "
         "with an empty cache. From 8 joints on the code of a kernel, which is one straight line, outgrows the 32 KiB "
-        "of a first-level instruction cache (23 KiB for 6 joints, 34 for 8, 44 for 12), and its fetching bounds the speed.",
+        "of a first-level instruction cache (23 KiB for 6 joints, 34 for 8, 44 for 12), and fetching it takes longer "
+        "than running it.",
         table(
             ["joints", "operations", "Pinocchio, µs per row", "armwright, µs per row", "ratio", "first call, s"],
             by_joints(),

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
     from armwright.kinematics.jacobian import jacobian
     from armwright.kinematics.singularities import singularities
-    from armwright.motion.quintic import point_to_point, quintic
     from armwright.motion.detour import line_or_detour
+    from armwright.motion.quintic import point_to_point, quintic
     from armwright.motion.straight import straight_line
     from armwright.motion.trajectory import Trajectory
     from armwright.motion.xspline import xspline

@@ -15,8 +15,8 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.inverse.closed_form import BRANCHES
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.shoulder import first_three
-from armwright.tracing.emit import LANES, emit
 from armwright.tracing.cache import cache_folder
+from armwright.tracing.emit import LANES, emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import atan2, cos, sin
 from oracles.arms import random_arm, random_postures

@@ -41,8 +41,8 @@ class CompiledArm:
 
     They are called like the plain functions of the same names, without the arm, and give the same numbers but for
     rounding. A configuration has the same bits alone, in any batch and on any number of threads. Each takes
-    ``threads=``, how many cores to use (all, when left out), and ``out=``, arrays to fill: see ``Kernel.function``. Angles of more than a
-    turn get no warning here.
+    ``threads=``, how many cores to use (all, when left out), and ``out=``, arrays to fill: see ``Kernel.function``.
+    Angles of more than a turn get no warning here.
 
     Attributes:
         arm: the arm, with n joints.

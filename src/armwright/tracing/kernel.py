@@ -66,8 +66,8 @@ class Kernel:
         """Return the function that evaluates the equation for one configuration or many.
 
         It takes one array (..., *shape) per input, leading axes are broadcast; by name only, ``threads``, how many
-        cores to use, all there are when left out, on which the bits do not depend; and ``out``, an array to fill, or a tuple of them for several
-        outputs. It returns an array (..., *shape), or a tuple of them. It raises
+        cores to use, all there are when left out, on which the bits do not depend; and ``out``, an array to fill, or
+        a tuple of them for several outputs. It returns an array (..., *shape), or a tuple of them. It raises
 
         - ShapeError: a last axis, or the leading axes do not fit, or ``out`` does not.
         - InvalidValueError: a number is NaN or infinite, or there are fewer than one ``threads``.
