@@ -2,32 +2,28 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import armwright
 
 README = (Path(__file__).parents[1] / "README.md").read_text()
 
 
-def _block(start: str) -> str:
-    lines = README.split("\n")
-    first = next(i for i, line in enumerate(lines) if line.strip() == start)
-    block = []
-    for line in lines[first:]:
-        if line.strip() and not line.startswith("    "):
-            break
-        block.append(line[4:])
-    return "\n".join(block)
+def _section(title: str) -> str:
+    """Return the indented lines of a section."""
+    section = README.split(f"## {title}\n")[1].split("\n## ")[0]
+    return "\n".join(line[4:] for line in section.split("\n") if line.startswith("    "))
 
 
-def test_python_example_runs() -> None:
-    """The Python lines of the README run, and find the posture they started from."""
-    scope: dict[str, object] = {}
+def test_python_examples_run() -> None:
+    """The Python lines of the README run, find the posture they started from, and their line holds."""
+    scope: dict[str, Any] = {}
 
-    exec(_block("import armwright"), scope)
+    exec(_section("From Python"), scope)
 
-    solution = scope["solution"]
-    assert isinstance(solution, armwright.kinematics.inverse.solution.InverseSolution)
-    assert abs(solution.best.q - scope["q"]).max() < 1e-9
+    assert abs(scope["solution"].best.q - scope["q"]).max() < 1e-9
+    assert scope["line"].certificate.holds
+    assert scope["round_it"].by == "line"
 
 
 def test_links_lead_somewhere() -> None:
