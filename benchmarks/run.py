@@ -13,8 +13,19 @@ from pathlib import Path
 from measure import REPEATS, processor
 
 HERE = Path(__file__).parent
-ALL = ("dynamics", "kinematics", "inverse_kinematics", "one_call", "scaling", "latency", "simulation", "motion_lines")
-PEERS = ("pin", "roboticstoolbox-python", "eaik", "numpy", "numba", "scipy")
+ALL = (
+    "dynamics",
+    "kinematics",
+    "inverse_kinematics",
+    "one_call",
+    "scaling",
+    "latency",
+    "simulation",
+    "motion_lines",
+    "motion_knots",
+    "motion_online",
+)
+PEERS = ("pin", "roboticstoolbox-python", "eaik", "ruckig", "toppra", "numpy", "numba", "scipy")
 
 
 def main() -> None:

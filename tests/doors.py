@@ -21,6 +21,7 @@ from armwright.kinematics.singularities import singularity_factors
 PUMA = armwright.load_arm("puma560")
 Q = (0.1, 0.6, 0.2, 0.3, 0.9, 0.1)
 OTHER = (0.2, 0.5, 0.3, 0.2, 0.8, 0.2)
+REST = (0.0,) * 6
 
 Door = Callable[[Any], Any]
 # Functions of arrays (..., 6), by the argument that is handed in.
@@ -70,8 +71,15 @@ ONE: dict[str, Door] = {
     "point_to_point: q_start": lambda x: armwright.point_to_point(PUMA, x, OTHER).coefficients,
     "point_to_point: q_goal": lambda x: armwright.point_to_point(PUMA, OTHER, x).coefficients,
     "quintic: q_goal": lambda x: armwright.quintic(OTHER, x, 1.0).coefficients,
+    "cubic: q_goal": lambda x: armwright.cubic(OTHER, x, 1.0).coefficients,
+    "cubic: end": lambda x: armwright.cubic(Q, OTHER, 1.0, end=x).coefficients,
+    "trapezoid: q_goal": lambda x: armwright.trapezoid(OTHER, x, 1.0, 1.0).coefficients,
     "xspline: start": lambda x: armwright.xspline([0, 1], [Q, OTHER], x).coefficients,
     "xspline: end": lambda x: armwright.xspline([0, 1], [Q, OTHER], end=x).coefficients,
+    "retarget: q": lambda x: armwright.retarget(PUMA, x, REST, REST, OTHER).coefficients,
+    "retarget: qd": lambda x: armwright.retarget(PUMA, Q, x, REST, OTHER).coefficients,
+    "retarget: qdd": lambda x: armwright.retarget(PUMA, Q, REST, x, OTHER, brake=True).coefficients,
+    "retarget: q_goal": lambda x: armwright.retarget(PUMA, Q, REST, REST, x).coefficients,
     "pd: kp": lambda x: pd(PUMA, standing(Q), x, 1.0)(0.0, np.zeros(6), np.zeros(6)),
     "computed_torque: kd": lambda x: computed_torque(PUMA, standing(Q), 1.0, x)(0.0, np.zeros(6), np.zeros(6)),
 }

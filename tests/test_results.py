@@ -23,6 +23,8 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "terms": lambda: armwright.terms(PUMA, Q, Q, Q),
     "simulate": lambda: armwright.simulate(PUMA, Q, duration=2e-3),
     "quintic": lambda: armwright.quintic(Q, OTHER, 1.0),
+    "sampled": lambda: armwright.quintic(Q, OTHER, 1.0).sampled(0.1),
+    "continuity": lambda: armwright.continuity(armwright.quintic(Q, OTHER, 1.0)),
 }
 
 

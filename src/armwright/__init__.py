@@ -31,11 +31,20 @@ if TYPE_CHECKING:
     from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
     from armwright.kinematics.jacobian import jacobian
     from armwright.kinematics.singularities import singularities
+    from armwright.motion.blends import blend_timing, blended, via_deviations, via_distances
+    from armwright.motion.continuity import continuity
+    from armwright.motion.cubic import cubic, cubic_through
     from armwright.motion.detour import line_or_detour
+    from armwright.motion.efforts import effort_peaks, slowing_for_efforts
+    from armwright.motion.online import replace_goal, retarget
     from armwright.motion.quintic import point_to_point, quintic
     from armwright.motion.straight import straight_line
-    from armwright.motion.trajectory import Trajectory
-    from armwright.motion.xspline import xspline
+    from armwright.motion.time_optimal import time_optimal
+    from armwright.motion.trajectory import Trajectory, hold, join
+    from armwright.motion.trapezoid import trapezoid
+    from armwright.motion.xspline import xspline, xspline_along
+    from armwright.motion.xspline_online import xspline_kernel
+
 
 _HOME = {
     "Arm": "arm.model",
@@ -43,13 +52,21 @@ _HOME = {
     "Trajectory": "motion.trajectory",
     "UnitWarning": "errors",
     "arm_names": "arm.load",
+    "blend_timing": "motion.blends",
+    "blended": "motion.blends",
     "compile_arm": "dynamics.compiled",
+    "continuity": "motion.continuity",
+    "cubic": "motion.cubic",
+    "cubic_through": "motion.cubic",
+    "effort_peaks": "motion.efforts",
     "forward": "kinematics.forward",
     "forward_dynamics": "dynamics.forward_dynamics",
+    "hold": "motion.trajectory",
     "inverse": "kinematics.inverse.closed_form",
     "inverse_branches": "kinematics.inverse.closed_form",
     "inverse_dynamics": "dynamics.newton_euler",
     "jacobian": "kinematics.jacobian",
+    "join": "motion.trajectory",
     "line_or_detour": "motion.detour",
     "link_poses": "kinematics.forward",
     "load_arm": "arm.load",
@@ -58,11 +75,20 @@ _HOME = {
     "payload": "dynamics.payload",
     "point_to_point": "motion.quintic",
     "quintic": "motion.quintic",
+    "replace_goal": "motion.online",
+    "retarget": "motion.online",
     "simulate": "dynamics.simulate",
     "singularities": "kinematics.singularities",
+    "slowing_for_efforts": "motion.efforts",
     "straight_line": "motion.straight",
     "terms": "dynamics.terms",
+    "time_optimal": "motion.time_optimal",
+    "trapezoid": "motion.trapezoid",
+    "via_deviations": "motion.blends",
+    "via_distances": "motion.blends",
     "xspline": "motion.xspline",
+    "xspline_along": "motion.xspline",
+    "xspline_kernel": "motion.xspline_online",
 }
 
 __all__ = [
@@ -72,13 +98,21 @@ __all__ = [
     "UnitWarning",
     "__version__",
     "arm_names",
+    "blend_timing",
+    "blended",
     "compile_arm",
+    "continuity",
+    "cubic",
+    "cubic_through",
+    "effort_peaks",
     "forward",
     "forward_dynamics",
+    "hold",
     "inverse",
     "inverse_branches",
     "inverse_dynamics",
     "jacobian",
+    "join",
     "line_or_detour",
     "link_poses",
     "load_arm",
@@ -87,11 +121,20 @@ __all__ = [
     "payload",
     "point_to_point",
     "quintic",
+    "replace_goal",
+    "retarget",
     "simulate",
     "singularities",
+    "slowing_for_efforts",
     "straight_line",
     "terms",
+    "time_optimal",
+    "trapezoid",
+    "via_deviations",
+    "via_distances",
     "xspline",
+    "xspline_along",
+    "xspline_kernel",
 ]
 
 

@@ -10,18 +10,24 @@ so the least slowing follows from the roots of a parabola in 1/k, for each look 
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.trajectory import Trajectory
 
 # Looks at a segment at least, and at a whole motion at least.
-_LOOKS_OF_SEGMENT = 5
-_LOOKS = 200
-# From the place of the largest look the peak is sought: so often, with so many looks, each time closer.
-_ZOOMS, _CLOSER = 6, 9
+_LOOKS_OF_SEGMENT = 9
+_LOOKS = 600
+# Looks at the ends of a segment are inside it by this part of it: there a joint that starts has its dry friction.
+_INSIDE = 1e-8
+# Where a joint turns back is found by so many halvings of the space between two looks.
+_HALVINGS = 16
+# From so many of the largest looks the peak is sought: so often, with so many looks, each time closer.
+_TOPS, _ZOOMS, _CLOSER = 6, 6, 9
 # A joint that moves at less than this part of its top speed stands: the sign of its speed is rounding.
 _STANDS = 1e-9
 # A limit passed by this part of it is rounding.
@@ -60,12 +66,12 @@ class EffortSlowing(NamedTuple):
 class _Looks(NamedTuple):
     """Places of a motion that are looked at: which segments, and which parts of them, (k,) each."""
 
-    segments: Array
+    segments: npt.NDArray[np.intp]
     parts: Array
 
     def times(self, trajectory: Trajectory) -> Array:
-        at = self.segments.astype(np.intp)
-        return np.asarray(trajectory.times[at] + self.parts * np.diff(trajectory.times)[at])
+        """Return when they are in a motion, (k,) [s]."""
+        return np.asarray(trajectory.times[self.segments] + self.parts * np.diff(trajectory.times)[self.segments])
 
 
 class _Shares(NamedTuple):
@@ -83,8 +89,9 @@ class _Shares(NamedTuple):
 def effort_peaks(arm: AnyArm, trajectory: Trajectory) -> EffortPeaks:
     """Return the largest effort of every joint during a motion, and when.
 
-    A motion is looked at in 200 places or more, at both ends of every segment among them; around the largest look the
-    peak is sought ever closer. A peak that is narrower than the space between two looks may be missed.
+    A motion is looked at in 600 places or more, at both ends of every segment and wherever a joint turns back among
+    them; around the largest looks the peak is sought ever closer. A peak that is narrower than the space between two
+    looks may be missed.
 
     Args:
         arm: the arm, or a compiled one, which is faster where there are many segments.
@@ -96,7 +103,7 @@ def effort_peaks(arm: AnyArm, trajectory: Trajectory) -> EffortPeaks:
     """
     solver = solver_of(arm)
     checked(solver.arm, trajectory)
-    looks = _spread(trajectory)
+    looks = _spread(solver.arm, trajectory)
     tau = _efforts(solver, trajectory, looks)
     peaks, at = _peaks(solver, trajectory, looks, tau)
     return EffortPeaks(peaks, at.times(trajectory))
@@ -121,7 +128,7 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     limits = solver.arm.limit("effort")
     if not np.isfinite(limits).any():
         return EffortSlowing(1.0, None, 0.0)
-    looks = _spread(trajectory)
+    looks = _spread(solver.arm, trajectory)
     u, joint, time = 1.0, None, 0.0
     for _ in range(_ROUNDS):
         shares = _shares(solver, trajectory, looks)
@@ -137,18 +144,18 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     return EffortSlowing(1 / u, joint, time)
 
 
-def checked(arm: Arm, trajectory: Trajectory) -> None:
-    """Refuse what is no motion of an arm.
+def checked(arm: Arm, trajectory: Trajectory, what: str = "trajectory") -> None:
+    """Refuse what is no motion of an arm, and call it by the name of the argument.
 
     Raises:
         KindError: it is no trajectory.
         ShapeError: it is of another number of joints.
     """
     if not isinstance(trajectory, Trajectory):
-        raise KindError(f"trajectory: expected a Trajectory, got {shown(trajectory)}")
+        raise KindError(f"{what}: expected a Trajectory, got {shown(trajectory)}")
     joints = trajectory.coefficients.shape[2]
     if joints != arm.n:
-        raise ShapeError(f"trajectory: expected one of {arm.n} joints, as '{arm.name}' has, got one of {joints}")
+        raise ShapeError(f"{what}: expected one of {arm.n} joints, as '{arm.name}' has, got one of {joints}")
 
 
 def refuse_lasting(arm: Arm, joint: int, effort: float, place: str) -> InvalidValueError:
@@ -173,35 +180,40 @@ def dry_frictions(arm: Arm, qd: Array) -> Array:
     return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
 
 
-def _spread(trajectory: Trajectory) -> _Looks:
-    """Return looks at all segments, at both ends of each among them."""
-    m = len(trajectory.coefficients)
-    each = max(_LOOKS_OF_SEGMENT, -(-_LOOKS // m) + 1)
-    return _Looks(np.repeat(np.arange(m, dtype=np.float64), each), np.tile(np.linspace(0.0, 1.0, each), m))
+def _spread(arm: Arm, trajectory: Trajectory) -> _Looks:
+    """Return looks at all segments, at both ends of each among them, and where joints turn back.
+
+    There their dry friction jumps, so that they are looked at just before and just after.
+    """
+    m, each = len(trajectory.coefficients), _each(trajectory)
+    parts = np.linspace(_INSIDE, 1 - _INSIDE, each)
+    looks = _Looks(np.repeat(np.arange(m), each), np.tile(parts, m))
+    rubs = np.array([motor.coulomb_forward + motor.coulomb_backward > 0 for motor in arm.motors])
+    speeds = _states(trajectory, looks)[1].reshape(m, each, -1)
+    segment, before, joint = np.nonzero((speeds[:, 1:] * speeds[:, :-1] < 0) & rubs)
+    low, high, sign = parts[before], parts[before + 1], np.sign(speeds[segment, before, joint])
+    for _ in range(_HALVINGS if len(joint) else 0):
+        middle = (low + high) / 2
+        speed = _states(trajectory, _Looks(segment, middle))[1][np.arange(len(joint)), joint]
+        early = speed * sign > 0
+        low, high = np.where(early, middle, low), np.where(early, high, middle)
+    return _Looks(np.concatenate([looks.segments, segment, segment]), np.concatenate([looks.parts, low, high]))
+
+
+def _each(trajectory: Trajectory) -> int:
+    """Return how often a segment is looked at."""
+    return max(_LOOKS_OF_SEGMENT, -(-_LOOKS // len(trajectory.coefficients)) + 1)
 
 
 def _states(trajectory: Trajectory, looks: _Looks) -> tuple[Array, Array, Array]:
     """Return positions, speeds and accelerations (k, n) at looks: of the segment looked at, at its ends too."""
-    at = looks.segments.astype(np.intp)
-    terms = trajectory.coefficients[at]
-    local = (looks.parts * np.diff(trajectory.times)[at])[:, None]
-    q, qd, qdd = (np.zeros((len(at), terms.shape[2])) for _ in range(3))
-    for power in reversed(range(terms.shape[1])):
-        # Horner's scheme for a polynomial and its derivatives together.
-        qdd = qdd * local + 2 * qd
-        qd = qd * local + q
-        q = q * local + terms[:, power]
-    return q, np.where(np.abs(qd) > _STANDS * _top_speeds(trajectory), qd, 0.0), qdd
-
-
-def _top_speeds(trajectory: Trajectory) -> Array:
-    """Return a speed (n,) that no joint passes, a few times its largest at most."""
-    terms = np.abs(trajectory.coefficients)
+    terms = trajectory.coefficients[looks.segments]
+    local = (looks.parts * np.diff(trajectory.times)[looks.segments])[:, None]
+    q, qd, qdd = (evaluate(derivative(terms, order), local) for order in range(3))
+    # No joint is faster than this, and few are many times slower.
     h = np.diff(trajectory.times)[:, None]
-    value = np.zeros_like(terms[:, 0])
-    for power in reversed(range(1, terms.shape[1])):
-        value = value * h + power * terms[:, power]
-    return np.asarray(value.max(axis=0))
+    fastest = evaluate(np.abs(derivative(trajectory.coefficients, 1)), h).max(axis=0)
+    return q, np.where(np.abs(qd) > _STANDS * fastest, qd, 0.0), qdd
 
 
 def _efforts(solver: Solver, trajectory: Trajectory, looks: _Looks) -> Array:
@@ -217,20 +229,27 @@ def _shares(solver: Solver, trajectory: Trajectory, looks: _Looks) -> _Shares:
 
 def _peaks(solver: Solver, trajectory: Trajectory, looks: _Looks, tau: Array) -> tuple[Array, _Looks]:
     """Return the largest efforts (n,), and where, from the efforts (k, n) at looks."""
-    joints = np.arange(tau.shape[1])
-    best = np.abs(tau).argmax(axis=0)
-    peaks, segments, parts = np.abs(tau)[best, joints], looks.segments[best], looks.parts[best]
-    width = 1.0 / (max(_LOOKS_OF_SEGMENT, -(-_LOOKS // len(trajectory.coefficients)) + 1) - 1)
+    n = tau.shape[1]
+    size = np.abs(tau)
+    edge = np.full((1, n), -1.0)
+    tops = (size >= np.concatenate([edge, size[:-1]])) & (size >= np.concatenate([size[1:], edge]))
+    best = np.argsort(np.where(tops, -size, 0.0), axis=0, kind="stable")[:_TOPS]
+    joints = np.broadcast_to(np.arange(n), best.shape).ravel()
+    best = best.ravel()
+    peaks, segments, parts = size[best, joints], looks.segments[best], looks.parts[best]
+    rows = np.arange(len(joints))
+    width = 1.0 / (_each(trajectory) - 1)
     for _ in range(_ZOOMS):
-        near = np.clip(parts[:, None] + np.linspace(-width, width, _CLOSER), 0.0, 1.0)
-        found = _Looks(np.repeat(segments, _CLOSER), near.ravel())
-        of_joint = np.abs(_efforts(solver, trajectory, found)).reshape(len(joints), _CLOSER, -1)[joints, :, joints]
+        near = np.clip(parts[:, None] + np.linspace(-width, width, _CLOSER), _INSIDE, 1 - _INSIDE)
+        found = np.abs(_efforts(solver, trajectory, _Looks(np.repeat(segments, _CLOSER), near.ravel())))
+        of_joint = found.reshape(len(rows), _CLOSER, n)[rows, :, joints]
         best = of_joint.argmax(axis=1)
-        better = of_joint[joints, best] > peaks
-        peaks = np.where(better, of_joint[joints, best], peaks)
-        parts = np.where(better, near[joints, best], parts)
+        better = of_joint[rows, best] > peaks
+        peaks = np.where(better, of_joint[rows, best], peaks)
+        parts = np.where(better, near[rows, best], parts)
         width *= 2.0 / (_CLOSER - 1)
-    return peaks, _Looks(segments, parts)
+    largest = peaks.reshape(-1, n).argmax(axis=0) * n + np.arange(n)
+    return peaks[largest], _Looks(segments[largest], parts[largest])
 
 
 def _check_lasting(arm: Arm, lasting: Array, times: Array) -> None:
@@ -257,7 +276,7 @@ def _largest_part(shares: _Shares, limits: Array) -> tuple[float, tuple[int, int
         stable = b >= 0
         below = np.where(stable, -2 * c / np.where(stable, b + root, 1.0), (root - b) / np.where(stable, 1.0, 2 * a))
         worst = int(below.argmin())
-        u, binding = float(below[worst]), (int(k[worst]), int(j[worst]))
+        u, binding = min(float(below[worst]), u * (1 - _ROUNDING)), (int(k[worst]), int(j[worst]))
         if u < _CRAWL:
             raise InvalidValueError(
                 f"joint {binding[1] + 1} would have to move {1 / u:.3g} times slower to keep its effort"

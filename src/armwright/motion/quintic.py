@@ -6,17 +6,14 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
-from armwright.arrays import LARGEST, Array, ArrayLike, floats, joint_array, number, one_per_joint
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.arrays import Array, ArrayLike, joint_array, number
+from armwright.errors import InvalidValueError
+from armwright.motion.knots import NOWHERE, check_duration, two_ends
 from armwright.motion.trajectory import Trajectory, hold
 
 # RLO and VAL count speed in percent of normal; 120 is all the arm allows.
 TOP_SPEED = 120.0
 LOWEST_SPEED = 1.0
-# A way of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
-_NOWHERE = 1e-12
-# A motion shorter than a billionth of a second is a slip of the unit; powers of its time would not be numbers [s].
-_SHORTEST = 1e-9
 # Peaks of 10 u³ - 15 u⁴ + 6 u⁵ on [0, 1]: of its first and of its second derivative.
 PEAK_SPEED = 15 / 8
 PEAK_ACCELERATION = 10 / math.sqrt(3)
@@ -38,13 +35,9 @@ def quintic(q_start: ArrayLike, q_goal: ArrayLike, duration: float) -> Trajector
     Source:
         Mujtaba (1980); TR-83-008, "point to point motion".
     """
-    duration = number(duration, "duration")
-    if not _SHORTEST <= duration <= LARGEST:
-        raise InvalidValueError(f"duration: expected more than 0 s, {_SHORTEST:g} s at least, got {duration}")
-    start = floats(q_start, "q_start", LARGEST)
-    if start.ndim != 1 or not start.size:
-        raise ShapeError(f"q_start: expected shape (n,), got {start.shape}")
-    way = one_per_joint(q_goal, len(start), "q_goal") - start
+    duration = check_duration(duration)
+    start, goal = two_ends(q_start, q_goal)
+    way = goal - start
     powers = np.array((0.0, 0.0, 0.0, 10 / duration**3, -15 / duration**4, 6 / duration**5))
     coefficients = powers[:, None] * way
     coefficients[0] += start
@@ -80,7 +73,7 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
     speed = check_speed(speed)
     start, goal = one_posture(arm, q_start, "q_start"), one_posture(arm, q_goal, "q_goal")
     way = goal - start
-    if np.abs(way).max() <= _NOWHERE:
+    if np.abs(way).max() <= NOWHERE:
         return hold(start, 0.0)
     shortest = shortest_duration(arm, way)
     if shortest == 0:

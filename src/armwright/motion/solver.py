@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
 from armwright.arm.model import Arm
+from armwright.arm.positions import known_arm
 from armwright.arrays import Array
 from armwright.dynamics.compiled import CompiledArm
 from armwright.dynamics.newton_euler import inverse_dynamics
@@ -36,5 +37,5 @@ def solver_of(arm: AnyArm) -> Solver:
     if isinstance(arm, CompiledArm):
         closed = shoulder_of(arm.arm) is not None
         return Solver(arm.arm, arm.forward, arm.inverse_dynamics, arm.inverse_branches if closed else None)
-    branches = partial(inverse_branches, arm) if shoulder_of(arm) is not None else None
+    branches = partial(inverse_branches, arm) if shoulder_of(known_arm(arm)) is not None else None
     return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches)

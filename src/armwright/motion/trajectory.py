@@ -2,13 +2,20 @@
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from numbers import Integral
 
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, number
+from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, number, read_only
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.motion.polynomials import derivative, extremes, shifted
+
+# Nobody reads more samples than this; a shorter period is a slip of the unit.
+_MOST_SAMPLES = 100_000_000
+# The hair's breadth keeps a duration that is a whole number of ticks but for rounding from gaining one.
+_HAIR = 1e-9
 
 
 def _times(value: ArrayLike) -> Array:
@@ -27,6 +34,27 @@ def _coefficients(value: ArrayLike) -> Array:
         raise ShapeError(f"coefficients: expected (segments, powers, joints), got shape {coefficients.shape}")
     coefficients.setflags(write=False)
     return coefficients
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Samples:
+    """A motion at k times.
+
+    Attributes:
+        times: (k,) [s].
+        q: (k, n) joint positions [rad] or [m].
+        qd: (k, n) speeds.
+        qdd: (k, n) accelerations.
+        jerk: (k, n) their rates.
+    """
+
+    times: Array = attrs.field(converter=read_only)
+    q: Array = attrs.field(converter=read_only)
+    qd: Array = attrs.field(converter=read_only)
+    qdd: Array = attrs.field(converter=read_only)
+    jerk: Array = attrs.field(converter=read_only)
+
+    __reduce__ = by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -75,7 +103,7 @@ class Trajectory:
         inside = np.clip(t, 0.0, self.duration)
         segment = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.coefficients) - 1)
         local = (inside - self.times[segment])[..., None]
-        terms = self._derivative(order)[segment]
+        terms = derivative(self.coefficients, order)[segment]
         value = np.zeros((*t.shape, self.coefficients.shape[2]))
         for power in reversed(range(terms.shape[-2])):
             value = value * local + terms[..., power, :]
@@ -87,14 +115,14 @@ class Trajectory:
         """Return the smallest and largest value of every joint, (n,) each, exactly and not by sampling.
 
         Args:
-            order: 0 position, 1 speed, 2 acceleration.
+            order: 0 position, 1 speed, 2 acceleration, 3 jerk.
         """
-        lowest, highest = self._segment_extremes(order)
+        lowest, highest = extremes(derivative(self.coefficients, order), np.diff(self.times))
         return lowest.min(axis=0), highest.max(axis=0)
 
     def segment_peaks(self, order: int) -> Array:
         """Return the largest magnitude of a derivative on every segment for every joint, (m, n), exactly."""
-        lowest, highest = self._segment_extremes(order)
+        lowest, highest = extremes(derivative(self.coefficients, order), np.diff(self.times))
         return np.maximum(np.abs(lowest), np.abs(highest))
 
     def peaks(self, order: int) -> Array:
@@ -102,7 +130,7 @@ class Trajectory:
         return np.asarray(self.segment_peaks(order).max(axis=0))
 
     def slowed(self, factor: float) -> "Trajectory":
-        """Return the same path run ``factor`` times slower.
+        """Return the same path run ``factor`` times slower; faster below 1.
 
         Raises:
             KindError: the factor is no number.
@@ -114,42 +142,56 @@ class Trajectory:
         powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
         return Trajectory(times=self.times * factor, coefficients=self.coefficients * powers[:, None])
 
-    def _segment_extremes(self, order: int) -> tuple[Array, Array]:
-        """Return the smallest and largest value on every segment for every joint, (m, n) each."""
-        terms, slopes = self._derivative(order), self._derivative(order + 1)
-        shape = len(terms), terms.shape[2]
-        lengths = np.diff(self.times)
-        lowest, highest = np.full(shape, np.inf), np.full(shape, -np.inf)
-        for local in (np.zeros(shape), np.broadcast_to(lengths[:, None], shape), *_roots(slopes, lengths)):
-            value = np.zeros(shape)
-            for power in reversed(range(terms.shape[1])):
-                value = value * local + terms[:, power, :]
-            lowest, highest = np.minimum(lowest, value), np.maximum(highest, value)
-        return lowest, highest
+    def retimed(self, duration: float) -> "Trajectory":
+        """Return the same path run in another time, which is met to the last bit.
 
-    def _derivative(self, order: int) -> Array:
-        terms = self.coefficients
-        for _ in range(order):
-            powers = np.arange(1, terms.shape[1], dtype=np.float64)
-            terms = terms[:, 1:, :] * powers[:, None] if terms.shape[1] > 1 else np.zeros_like(terms[:, :1, :])
-        return terms
+        Args:
+            duration: [s].
 
+        Raises:
+            KindError: the duration is no number.
+            InvalidValueError: it is not above 0, or the motion has no duration that could change.
+        """
+        duration = number(duration, "duration")
+        if not 0 < duration <= LARGEST:
+            raise InvalidValueError(f"duration: expected more than 0 s, got {duration}")
+        if self.duration == 0:
+            raise InvalidValueError(
+                f"a motion of 0 s cannot be run in {duration:g} s; hold(q, {duration:g}) stands still"
+            )
+        slow = self.slowed(duration / self.duration)
+        times = np.append(np.minimum(slow.times[:-1], duration), duration)
+        return Trajectory(times=times, coefficients=slow.coefficients)
 
-def _roots(terms: Array, lengths: Array) -> list[Array]:
-    """Return times (m, n) inside each segment among which are all roots of the polynomials (m, k, n)."""
-    segments, count, joints = terms.shape
-    if count == 1:
-        return []
-    if count == 2:
-        c, b = terms[:, 0], terms[:, 1]
-        return [np.clip(np.where(b != 0, -c / np.where(b != 0, b, 1.0), 0.0), 0.0, lengths[:, None])]
-    found = np.zeros((count - 1, segments, joints))
-    for i in range(segments):
-        for j in range(joints):
-            roots = np.roots(np.trim_zeros(terms[i, ::-1, j], "f"))
-            real = roots.real[np.abs(roots.imag) <= 1e-6 * (1 + np.abs(roots))]
-            found[: len(real), i, j] = np.clip(real, 0.0, lengths[i])
-    return list(found)
+    def reversed(self) -> "Trajectory":
+        """Return the way back: at time t where this motion is at the time t before its end."""
+        signs = (-1.0) ** np.arange(self.coefficients.shape[1])
+        back = shifted(self.coefficients, np.diff(self.times))[::-1] * signs[:, None]
+        return Trajectory(times=self.duration - self.times[::-1], coefficients=back)
+
+    def sampled(self, period: float) -> Samples:
+        """Return the motion at every tick of a servo, from the start on, and at its very end.
+
+        Args:
+            period: of the servo [s]. The last step is shorter where the duration is no whole number of periods:
+                ``whole_ticks`` makes it one.
+
+        Raises:
+            KindError: the period is no number.
+            InvalidValueError: it is not above 0, or so short that there would be more than 1e8 samples.
+        """
+        period = number(period, "period")
+        if not 0 < period <= LARGEST:
+            raise InvalidValueError(f"period: expected more than 0 s, got {period}")
+        if self.duration / period > _MOST_SAMPLES:
+            raise InvalidValueError(
+                f"period: {period:g} s cuts {self.duration:g} s into {self.duration / period:.3g} samples, "
+                f"{_MOST_SAMPLES:.0e} are allowed"
+            )
+        before = math.ceil(self.duration / period - _HAIR)
+        times = np.append(period * np.arange(before), self.duration)
+        q, qd, qdd, jerk = (self(times, order) for order in range(4))
+        return Samples(times=times, q=q, qd=qd, qdd=qdd, jerk=jerk)
 
 
 def hold(q: ArrayLike, duration: float) -> Trajectory:
@@ -157,13 +199,46 @@ def hold(q: ArrayLike, duration: float) -> Trajectory:
     return Trajectory(times=(0.0, duration), coefficients=floats(q, "q")[None, None, :])
 
 
-def join(parts: Sequence[Trajectory]) -> Trajectory:
-    """Return trajectories run one after the other."""
+def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
+    """Return trajectories run one after the other.
+
+    Args:
+        parts: one at least, of the same joints, each beginning where the one before ends.
+        gap: how far the end of a part and the start of the next may be apart [rad] or [m]. Speeds may jump: see
+            ``continuity``.
+
+    Raises:
+        KindError: a part is no trajectory.
+        ShapeError: there is none, or their joints differ in number.
+        InvalidValueError: a part begins elsewhere than the one before it ends.
+    """
+    for part in parts:
+        if not isinstance(part, Trajectory):
+            raise KindError(f"join: expected trajectories, got {shown(part)}")
+    if not parts:
+        raise ShapeError("join: expected one trajectory at least, got none")
+    for i, (last, part) in enumerate(pairwise(parts), 1):
+        _check_meeting(last, part, i, gap)
     powers = max(part.coefficients.shape[1] for part in parts)
     padded = [np.pad(p.coefficients, ((0, 0), (0, powers - p.coefficients.shape[1]), (0, 0))) for p in parts]
     starts = np.cumsum([0.0, *(part.duration for part in parts)])
     times = np.concatenate([[0.0], *(part.times[1:] + start for part, start in zip(parts, starts[:-1], strict=True))])
     return Trajectory(times=times, coefficients=np.concatenate(padded))
+
+
+def _check_meeting(last: Trajectory, part: Trajectory, number_of_last: int, gap: float) -> None:
+    """Refuse two parts of which the second does not begin where the first ends."""
+    where = f"join: part {number_of_last + 1}"
+    joints, before = part.coefficients.shape[2], last.coefficients.shape[2]
+    if joints != before:
+        raise ShapeError(f"{where} moves {joints} joints, part {number_of_last} before it {before}")
+    apart = np.abs(part(0.0) - last(last.duration))
+    if not apart.max() <= gap:
+        j = int(apart.argmax())
+        raise InvalidValueError(
+            f"{where} begins with joint {j + 1} at {part(0.0)[j]:.6g}, part {number_of_last} ends with it at "
+            f"{last(last.duration)[j]:.6g}: {apart[j]:.3g} apart, {gap:g} is allowed"
+        )
 
 
 def whole_ticks(trajectory: Trajectory, period: float) -> Trajectory:
@@ -175,6 +250,5 @@ def whole_ticks(trajectory: Trajectory, period: float) -> Trajectory:
     """
     if trajectory.duration == 0:
         return trajectory
-    # The hair's breadth keeps a duration that is a whole number of ticks but for rounding from gaining one.
-    ticks = max(1, math.ceil(trajectory.duration / period - 1e-9))
-    return trajectory.slowed(ticks * period / trajectory.duration)
+    ticks = max(1, math.ceil(trajectory.duration / period - _HAIR))
+    return trajectory.retimed(ticks * period)

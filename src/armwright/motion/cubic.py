@@ -1,0 +1,103 @@
+"""Cubics: from rate to rate in a given time, and through points with rates given or estimated."""
+
+import numpy as np
+
+from armwright.arrays import LARGEST, Array, ArrayLike, exactly, one_per_joint
+from armwright.motion.knots import check_duration, limit_per_joint, one_way, timed_points, two_ends
+from armwright.motion.trajectory import Trajectory
+from armwright.tracing.scalar import Scalar
+
+# Peaks of 3 u² - 2 u³ on [0, 1]: of its first and of its second derivative.
+PEAK_SPEED = 3 / 2
+PEAK_ACCELERATION = 6.0
+
+
+def hermite(q_last: Scalar, m_last: Scalar, q: Scalar, m: Scalar, h: Scalar) -> tuple[Scalar, ...]:
+    """Return the four coefficients of the cubic with positions q and rates m at both ends of a time h [s].
+
+    Scalars may be floats, arrays, or nodes of a graph.
+    """
+    slope = (q - q_last) / h
+    return q_last, m_last, (3 * slope - 2 * m_last - m) / h, (m_last + m - 2 * slope) / (h * h)
+
+
+def cubic(
+    q_start: ArrayLike,
+    q_goal: ArrayLike,
+    duration: float,
+    start: ArrayLike | None = None,
+    end: ArrayLike | None = None,
+) -> Trajectory:
+    """Return the cubic from one posture to another; at rest at both ends, unless rates are given.
+
+    Args:
+        q_start: (n,) joint positions [rad] or [m].
+        q_goal: (n,) joint positions.
+        duration: [s], a billionth or more.
+        start: (n,) rate at the start; 0 when left out.
+        end: (n,) rate at the end; 0 when left out.
+
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: positions or rates are not (n,).
+        InvalidValueError: a number is NaN or infinite, or the duration too short.
+
+    Source:
+        Craig, "Introduction to Robotics", cubic polynomials.
+    """
+    duration = check_duration(duration)
+    here, goal = two_ends(q_start, q_goal)
+    rates = [
+        np.zeros(len(here)) if rate is None else one_per_joint(rate, len(here), what)
+        for rate, what in ((start, "start"), (end, "end"))
+    ]
+    coefficients = np.stack(hermite(here, rates[0], goal, rates[1], duration))
+    return Trajectory(times=(0.0, duration), coefficients=coefficients[None])
+
+
+def shortest_cubic(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) -> float:
+    """Return the shortest time of a cubic from rest to rest inside limits [s].
+
+    Args:
+        way: (n,) of the joints [rad] or [m].
+        speed: (n,) limits, or one for all; infinite where there is none.
+        acceleration: (n,) limits, or one for all.
+
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: the limits do not fit the way.
+        InvalidValueError: a limit is not above 0.
+    """
+    way = np.abs(one_way(way))
+    by_speed: Array = PEAK_SPEED * way / limit_per_joint(speed, len(way), "speed")
+    by_acceleration: Array = np.sqrt(PEAK_ACCELERATION * way / limit_per_joint(acceleration, len(way), "acceleration"))
+    return float(max(by_speed.max(), by_acceleration.max()))
+
+
+def cubic_through(times: ArrayLike, points: ArrayLike, rates: ArrayLike | None = None) -> Trajectory:
+    """Return cubics through points: position and speed continuous, the acceleration may jump at a point.
+
+    Args:
+        times: (k,) of the points, rising from 0 [s].
+        points: (k, n) joint positions.
+        rates: (k, n) at the points. When left out, a joint rests at both ends, and where it turns back; elsewhere it
+            has the mean of the slopes of the ways before and after. ``xspline`` chooses better rates, which follow
+            a curve to the fourth order.
+
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: fewer than two points, or shapes that do not fit.
+        InvalidValueError: times do not rise from 0, or a number is not finite.
+
+    Source:
+        Craig, "Introduction to Robotics", cubic polynomials for a path with via points.
+    """
+    t, q = timed_points("cubics", times, points)
+    h = np.diff(t)[:, None]
+    if rates is None:
+        slopes = np.diff(q, axis=0) / h
+        m = np.zeros_like(q)
+        m[1:-1] = np.where(slopes[:-1] * slopes[1:] > 0, (slopes[:-1] + slopes[1:]) / 2, 0.0)
+    else:
+        m = exactly(rates, q.shape, "rates", LARGEST)
+    return Trajectory(times=t, coefficients=np.stack(hermite(q[:-1], m[:-1], q[1:], m[1:], h), axis=1))

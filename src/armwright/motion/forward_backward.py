@@ -1,0 +1,145 @@
+"""The largest x = s'² along a path under bounds |a u + b x + c| <= 1 with u = s'' constant on every interval.
+
+Two passes: backward, from the end, the largest x from which the end can still be reached; forward, from the start, the
+largest u that stays below them. Standing still, x = u = 0, keeps all bounds, so there is always a way.
+"""
+
+import importlib
+import logging
+import math
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.errors import ArmwrightError, MissingExtraError
+
+# The largest x there is, where nothing binds. The solver of toppra loses its way among numbers so far apart.
+MOST = 1e12
+_MOST_OF_TOPPRA = 1e3
+# A coefficient of u this much smaller than the largest is 0.
+_NONE = 1e-12
+# Bounds may be passed by this much: rounding.
+_ROUNDING = 1e-12
+_ROUNDS = 100
+
+
+class Bounds(NamedTuple):
+    """Bounds |a u + b x + c| <= 1 on each of N intervals, x at its start; (N, rows) each, with |c| < 1."""
+
+    a: Array
+    b: Array
+    c: Array
+
+
+def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array:
+    """Return the largest x at the ends of the intervals (N + 1,).
+
+    Args:
+        bounds: on every interval.
+        lengths: (N,) of the intervals.
+        rests: whether x may be anything at the start and at the end; else it is 0.
+
+    Source:
+        Pham & Pham, "A new approach to time-optimal path parameterization based on reachability analysis" (2018).
+    """
+    count = len(lengths)
+    sides = [_sides(*rows) for rows in zip(*bounds, strict=True)]
+    reachable = np.zeros(count + 1)
+    reachable[-1] = MOST if rests[1] else 0.0
+    for i in reversed(range(count)):
+        reachable[i] = _largest(sides[i], 2 * float(lengths[i]), float(reachable[i + 1]))
+    x = np.zeros(count + 1)
+    x[0] = reachable[0] if rests[0] else 0.0
+    for i, (most, at, lean) in enumerate((side.most, side.at, side.lean) for side in sides):
+        u = float((at[:most] - lean[:most] * x[i]).min(initial=math.inf))
+        x[i + 1] = max(0.0, min(reachable[i + 1], x[i] + 2 * lengths[i] * u))
+    return x
+
+
+class _Sides(NamedTuple):
+    """Bounds of one interval: at - lean x, of which the first ``most`` bound u from above and the rest from below.
+
+    Attributes:
+        at: (k,) bounds of u at x = 0.
+        lean: (k,) by how much they fall with x.
+        most: how many are from above.
+        top: what bounds x alone.
+    """
+
+    at: Array
+    lean: Array
+    most: int
+    top: float
+
+
+def _sides(a: Array, b: Array, c: Array) -> _Sides:
+    weight = np.abs(a).max(initial=0.0)
+    on_u = np.abs(a) > _NONE * weight
+    steep = np.abs(b[~on_u]) > 0
+    b_alone, c_alone = b[~on_u][steep], c[~on_u][steep]
+    top = float(((1 - np.sign(b_alone) * c_alone) / np.abs(b_alone)).min(initial=MOST))
+    a, b, c = a[on_u], b[on_u], c[on_u]
+    side = np.sign(a)
+    upper, lower, lean = (side - c) / a, (-side - c) / a, b / a
+    return _Sides(np.concatenate([upper, lower]), np.concatenate([lean, lean]), len(a), top)
+
+
+def _largest(sides: _Sides, twice: float, reachable: float) -> float:
+    """Return the largest x of an interval from which some u leads to an x between 0 and ``reachable`` at its end.
+
+    The room for u, between its least upper and its greatest lower bound, is a concave function of x that is 0 or more
+    at x = 0: Newton's steps from the right never pass its root.
+    """
+    most = sides.most
+    upper, upper_lean = np.append(sides.at[:most], reachable / twice), np.append(sides.lean[:most], 1 / twice)
+    lower, lower_lean = np.append(sides.at[most:], 0.0), np.append(sides.lean[most:], 1 / twice)
+    x = sides.top
+    for _ in range(_ROUNDS):
+        highs, lows = upper - upper_lean * x, lower - lower_lean * x
+        i, j = int(highs.argmin()), int(lows.argmax())
+        room, size = float(highs[i] - lows[j]), abs(highs[i]) + abs(lows[j])
+        slope = float(upper_lean[i] - lower_lean[j])
+        if room >= -_ROUNDING * size or slope <= 0:
+            break
+        x = min(x, max(0.0, float(upper[i] - lower[j]) / slope))
+    return x
+
+
+def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array:
+    """Return the same as ``largest_squares``, found by toppra and its solver of linear programs.
+
+    Raises:
+        ArmwrightError: its solver gives up, as it does for some problems that have a solution.
+        MissingExtraError: toppra is not installed.
+    """
+    try:
+        algorithm, constraint = (importlib.import_module(f"toppra.{name}") for name in ("algorithm", "constraint"))
+    except ImportError as error:
+        raise MissingExtraError("by='toppra' needs toppra; install it by: pip install 'armwright[optimal]'") from error
+    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what goes wrong is told by errors
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    rows = bounds.a.shape[1]
+    params = (
+        *(np.concatenate([array, array[-1:]]) for array in bounds),
+        np.concatenate([np.eye(rows), -np.eye(rows)]),
+        np.ones(2 * rows),
+        None,
+        np.tile((0.0, _MOST_OF_TOPPRA), (len(s), 1)),
+    )
+    limits = constraint.LinearConstraint()
+    limits.identical = True
+    limits.compute_constraint_params = lambda *_arguments: params
+    run = algorithm.TOPPRA([limits], SimpleNamespace(path_interval=s[[0, -1]]), gridpoints=s, solver_wrapper="seidel")
+    sets = run.compute_controllable_sets(0.0, math.sqrt(_MOST_OF_TOPPRA) if rests[1] else 0.0)
+    sd = None
+    if not np.isnan(sets).any():
+        run.compute_controllable_sets = lambda *_ends: sets  # an end that is left free is not among its arguments
+        _, sd, _ = run.compute_parameterization(math.sqrt(sets[0, 1]) if rests[0] else 0.0, 0.0)
+    if sd is None or np.isnan(sd).any():
+        raise ArmwrightError(
+            "toppra's solver of linear programs gave up, as it does for some problems that have a solution: leave "
+            "by= out, or ask for another number of intervals"
+        )
+    return np.asarray(sd**2, dtype=np.float64)

@@ -1,0 +1,87 @@
+"""What profiles are given: points and when they are passed, two ends, limits; checked once for all of them."""
+
+import numpy as np
+
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, one_per_joint
+from armwright.errors import InvalidValueError, ShapeError
+
+# A motion shorter than a billionth of a second is a slip of the unit; powers of its time would not be numbers [s].
+SHORTEST = 1e-9
+# A way of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
+NOWHERE = 1e-12
+
+
+def timed_points(title: str, times: ArrayLike, points: ArrayLike, what: str = "points") -> tuple[Array, Array]:
+    """Return times (k,) that rise, and points (k, n), two at least.
+
+    Raises:
+        KindError: one is something else than real numbers.
+        ShapeError: fewer than two, or shapes that do not fit.
+        InvalidValueError: the times do not rise, or a number is NaN or infinite.
+    """
+    t, q = floats(times, "times", LARGEST), floats(points, what, LARGEST)
+    if t.ndim != 1 or q.ndim != 2 or len(t) != len(q) or len(t) < 2 or not q.size:
+        raise ShapeError(f"{title}: expected k times and (k, n) {what} with k at least 2, got {t.shape} and {q.shape}")
+    falls = np.flatnonzero(np.diff(t) <= 0)
+    if len(falls):
+        i = int(falls[0])
+        raise InvalidValueError(
+            f"{title}: times must rise, got {t[i]:g} s and then {t[i + 1]:g} s at {what[:-1]} {i + 1}"
+        )
+    return t, q
+
+
+def two_ends(q_start: ArrayLike, q_goal: ArrayLike) -> tuple[Array, Array]:
+    """Return two postures (n,).
+
+    Raises:
+        KindError: one is something else than real numbers.
+        ShapeError: they are not (n,), both of them.
+        InvalidValueError: a number is NaN or infinite.
+    """
+    start = one_way(q_start, "q_start")
+    return start, one_per_joint(q_goal, len(start), "q_goal")
+
+
+def one_way(value: ArrayLike, what: str = "way") -> Array:
+    """Return one number per joint (n,), at least one.
+
+    Raises:
+        KindError: the value is something else than real numbers.
+        ShapeError: it is not (n,).
+        InvalidValueError: a number is NaN or infinite.
+    """
+    way = floats(value, what, LARGEST)
+    if way.ndim != 1 or not way.size:
+        raise ShapeError(f"{what}: expected shape (n,), got {way.shape}")
+    return way
+
+
+def check_duration(duration: float) -> float:
+    """Return ``duration`` if a motion can last so long.
+
+    Raises:
+        KindError: it is no number.
+        InvalidValueError: it is shorter than a billionth of a second, or no number that counts.
+    """
+    duration = number(duration, "duration")
+    if not SHORTEST <= duration <= LARGEST:
+        raise InvalidValueError(f"duration: expected more than 0 s, {SHORTEST:g} s at least, got {duration}")
+    return duration
+
+
+def limit_per_joint(value: ArrayLike, joints: int, what: str) -> Array:
+    """Return limits (n,) above 0; infinite where a joint has none. One number stands for all joints.
+
+    Raises:
+        KindError: the value is something else than real numbers.
+        ShapeError: it is neither one number nor (n,).
+        InvalidValueError: a limit is NaN, 0 or below.
+    """
+    given = floats(value, what, np.inf)
+    limits = np.full(joints, given) if given.ndim == 0 else given
+    if limits.shape != (joints,):
+        raise ShapeError(f"{what}: expected one number, or {joints}, one per joint, got shape {given.shape}")
+    for j in np.flatnonzero(~(limits > 0)):
+        raise InvalidValueError(f"{what}: expected more than 0, got {limits[j]:g} for joint {j + 1}")
+    return limits

@@ -1,0 +1,183 @@
+"""The fastest run along a piece of a path: bounds on s'' and s'² place by place.
+
+With x = s'² and u = s'', speeds, accelerations and efforts of the joints are
+
+    qd² = q'² x,    qdd = q' u + q'' x,    tau = M q' u + (M q'' + h(q, q')) x + gravity + friction
+
+linear in u and x but for the viscous friction, which goes with the root of x. On every interval of the grid u is
+constant, so x at a later place of it is x + 2 u (s - s_i), linear too: the bounds hold at its start, its middle and
+its end.
+"""
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError
+from armwright.motion.efforts import dry_frictions, refuse_lasting
+from armwright.motion.forward_backward import MOST, Bounds, by_toppra, largest_squares
+from armwright.motion.joint_path import Grid
+from armwright.motion.solver import Solver
+
+SolverName: TypeAlias = Literal["armwright", "toppra"]
+
+# Parts of an interval at which the bounds hold.
+_PARTS = (0.0, 0.5, 1.0)
+# So far inside of an interval a joint that starts or ends there moves.
+_EDGE = 1e-3
+# The root of x is replaced by its tangent at the last solution: at x no smaller than this part of the largest.
+_FLOOR = 1e-6
+# Between those parts a limit may be passed. There the bounds are drawn tighter by as much as is seen at these parts,
+# and all is solved again: so many times at most, until no limit is passed by more than this and the time stays. Efforts
+# cost more and are seen at every fourth.
+_SEEN = np.linspace(0.0, 1.0, 33)
+_EVERY = 4
+_ROUNDS, _PASSED, _SETTLED = 8, 1e-4, 1e-5
+# More than this part of a limit taken by gravity and dry friction is all of it.
+_ALL = 1 - 1e-6
+
+
+class _Rows(NamedTuple):
+    """Bounds |a u + b x + c| <= 1 on every interval, (N, rows) each, and what goes with the root of x.
+
+    Attributes:
+        a: of u.
+        b: of x.
+        c: constant.
+        viscous: of the root of x at the place of the row.
+        ahead: (N, rows) how far that place is from the start of the interval, twice: x there is x + ahead u.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    viscous: Array
+    ahead: Array
+
+    def without_viscous(self) -> Bounds:
+        """Leave the root of x out."""
+        return Bounds(self.a, self.b, self.c)
+
+    def by_tangent(self, x: Array, lengths: Array) -> Bounds:
+        """Put a tangent in the place of the root of x: at a solution (N + 1,), or where standing still keeps it."""
+        u = np.diff(x) / (2 * lengths)
+        there = np.sqrt(np.maximum(x[:-1, None] + self.ahead * u[:, None], _FLOOR * x.max()))
+        weight = np.abs(self.viscous)
+        room = 2 * (_ALL - np.sign(self.viscous) * self.c)
+        root = np.where(weight * there > room, room / np.where(weight > 0, weight, 1.0), there)
+        slope = self.viscous / (2 * root)
+        return Bounds(self.a + slope * self.ahead, self.b + slope, self.c + self.viscous * root / 2)
+
+
+def fastest(
+    solver: Solver,
+    grid: Grid,
+    rests: tuple[bool, bool],
+    place: Callable[[float], str],
+    *,
+    efforts: bool,
+    by: SolverName,
+) -> Array:
+    """Return s' at the ends of the N intervals of a grid, (N + 1,), for the fastest run from rest to rest.
+
+    Args:
+        solver: the arm.
+        grid: of the path.
+        rests: whether the joints stand at the start and at the end whatever s' is, so that it need not be 0.
+        place: says where a parameter, as it was given, is on the path.
+        efforts: whether the efforts count.
+        by: who solves it.
+
+    Raises:
+        InvalidValueError: no run however slow keeps the efforts, or any run however fast.
+        MissingExtraError: toppra is not installed.
+    """
+    solve = by_toppra if by == "toppra" else largest_squares
+    rows = _rows(solver, grid, place, efforts=efforts)
+    bounds = rows.without_viscous()
+    x = solve(bounds, grid.lengths, rests)
+    for k in np.flatnonzero(x[1:-1] > MOST / 2):
+        raise InvalidValueError(f"{place(float(grid.origins[k + 1]))} nothing limits how fast the joints may be")
+    before = 0.0
+    for _ in range(_ROUNDS if rows.viscous.any() else 0):
+        bounds = rows.by_tangent(x, grid.lengths)
+        x = solve(bounds, grid.lengths, rests)
+        duration = float((2 * grid.lengths / (np.sqrt(x[1:]) + np.sqrt(x[:-1]))).sum())
+        if abs(duration - before) <= _SETTLED * duration:
+            break
+        before = duration
+    for _ in range(_ROUNDS):
+        use = _use(solver, grid, x, efforts=efforts)[:, None]
+        if use.max() <= 1 + _PASSED:
+            break
+        tighter = np.maximum(use, 1.0)
+        bounds = bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter)
+        x = solve(bounds, grid.lengths, rests)
+    return np.sqrt(x)
+
+
+def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
+    """Return by how much the limits are used on every interval (N,), 1 for just, at x (N + 1,)."""
+    arm = solver.arm
+    u = np.diff(x) / (2 * grid.lengths)
+    x = x[:-1]
+    use = np.zeros(len(x))
+    for number, part in enumerate(_SEEN):
+        there = np.maximum(x + 2 * part * grid.lengths * u, 0.0)[:, None]
+        rate, bend = grid.at(part, 1), grid.at(part, 2)
+        qd, qdd = rate * np.sqrt(there), rate * u[:, None] + bend * there
+        uses = [(qd / arm.limit("speed")) ** 2, np.abs(qdd) / arm.limit("acceleration")]
+        if efforts and number % _EVERY == 0 and np.isfinite(arm.limit("effort")).any():
+            uses.append(np.abs(solver.inverse_dynamics(grid.at(part, 0), qd, qdd)) / arm.limit("effort"))
+        use = np.maximum(use, np.max(uses, axis=(0, 2)))
+    return use
+
+
+def _rows(solver: Solver, grid: Grid, place: Callable[[float], str], *, efforts: bool) -> _Rows:
+    """Write down the bounds of all limits that there are."""
+    arm = solver.arm
+    speed, acceleration, effort = (arm.limit(name) for name in ("speed", "acceleration", "effort"))
+    viscous = np.array([motor.viscous for motor in arm.motors])
+    least, most = _dry_frictions(solver, grid)
+    found: list[_Rows] = []
+    for part in _PARTS:
+        rate, bend = grid.at(part, 1), grid.at(part, 2)
+        ahead = np.broadcast_to((2 * part * grid.lengths)[:, None], rate.shape)
+        none = np.zeros_like(rate)
+        found.append(_limited(speed**2, _Rows(none, rate**2, none, none, ahead)))
+        found.append(_limited(acceleration, _Rows(rate, bend, none, none, ahead)))
+        if efforts and np.isfinite(effort).any():
+            q = grid.at(part, 0)
+            gravity = np.asarray(solver.inverse_dynamics(q, none, none))
+            a = solver.inverse_dynamics(q, none, rate) - gravity
+            b = solver.inverse_dynamics(q, rate, bend) - gravity - viscous * rate - dry_frictions(arm, rate)
+            lasting = gravity + np.where(gravity > 0, most, least)
+            use = np.abs(lasting) / effort
+            if use.max() > _ALL:
+                k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
+                raise refuse_lasting(arm, joint, float(lasting[k, joint]), place(float(grid.origins[k])))
+            # Where a joint turns back on an interval, its dry friction is either; so much less is left on both sides.
+            left = effort - (most - least) / 2
+            found.append(_limited(left, _Rows(a, b, gravity + (most + least) / 2, viscous * rate, ahead)))
+    return _Rows(*(np.concatenate(arrays, axis=1) for arrays in zip(*found, strict=True)))
+
+
+def _dry_frictions(solver: Solver, grid: Grid) -> tuple[Array, Array]:
+    """Return the least and the most that dry friction takes of the joints on the intervals (N, n)."""
+    seen = np.stack([dry_frictions(solver.arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
+    return seen.min(axis=0), seen.max(axis=0)
+
+
+def _limited(limits: Array, rows: _Rows) -> _Rows:
+    """Return the bounds of the joints that have a limit, in parts of it, for x at the start of the intervals.
+
+    Args:
+        limits: (n,) or (N, n) of the joints.
+        rows: what is limited, (N, n) each, for x at the place of the row.
+    """
+    has = np.isfinite(limits).reshape(-1, limits.shape[-1])[0]
+    a, b, c, viscous = ((array / limits)[:, has] for array in rows[:4])
+    ahead = rows.ahead[:, has]
+    return _Rows(a + b * ahead, b, c, viscous, ahead)

@@ -1,0 +1,135 @@
+"""Many polynomials at once: values, derivatives, shifts, and their largest and smallest values.
+
+Coefficients are (m, k, n): of m segments and n joints, of the powers 0 to k-1 of the time since the segment began.
+"""
+
+import math
+
+import numpy as np
+
+from armwright.arrays import Array
+
+# A leading coefficient below this part of the largest is left out to find where roots are; Newton's method, on the
+# whole polynomial, then puts them right.
+_FADED = 1e-12
+_POLISHES = 3
+
+
+def evaluate(terms: Array, t: Array) -> Array:
+    """Return values (m, n) at times t that broadcast with (m, n)."""
+    value = np.zeros(np.broadcast_shapes(t.shape, terms[:, 0].shape))
+    for power in reversed(range(terms.shape[1])):
+        value = value * t + terms[:, power]
+    return value
+
+
+def derivative(terms: Array, order: int) -> Array:
+    """Return the coefficients of a derivative; those of 0 where nothing is left."""
+    for _ in range(order):
+        powers = np.arange(1, terms.shape[1], dtype=np.float64)
+        terms = terms[:, 1:] * powers[:, None] if terms.shape[1] > 1 else np.zeros_like(terms[:, :1])
+    return terms
+
+
+def shifted(terms: Array, by: Array) -> Array:
+    """Return the coefficients of the same polynomials around places ``by`` (m,)."""
+    count = terms.shape[1]
+    moved = np.zeros_like(terms)
+    for power in range(count):
+        for higher in reversed(range(power, count)):
+            moved[:, power] = moved[:, power] * by[:, None] + math.comb(higher, power) * terms[:, higher]
+    return moved
+
+
+def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
+    """Return the smallest and the largest value (m, n) on each segment, by the roots of the derivative.
+
+    Args:
+        terms: (m, k, n) coefficients.
+        lengths: (m,) of the segments.
+    """
+    first, last = terms[:, 0], evaluate(terms, lengths[:, None])
+    lowest, highest = np.minimum(first, last), np.maximum(first, last)
+    for t in turning_times(terms, lengths):
+        value = evaluate(terms, t)
+        lowest, highest = np.minimum(lowest, value), np.maximum(highest, value)
+    return lowest, highest
+
+
+def turning_times(terms: Array, lengths: Array) -> list[Array]:
+    """Return times (m, n) inside the segments among which are all at which a polynomial turns back.
+
+    A polynomial whose slope has no two Bernstein coefficients of opposite signs rises or falls all along, and is not
+    looked at further.
+    """
+    segments, count, joints = terms.shape
+    if count < 3:
+        return []
+    # By the part of the segment that has passed, so that coefficients compare.
+    slopes = terms[:, 1:] * (np.arange(1, count) * lengths[:, None] ** np.arange(1, count))[..., None]
+    rows = np.swapaxes(slopes, 1, 2).reshape(-1, count - 1)
+    control = rows @ _bernstein(count - 2)
+    turns = np.flatnonzero((control.min(axis=1) < 0) & (control.max(axis=1) > 0))
+    if not len(turns):
+        return []
+    parts = np.zeros((len(rows), count - 2))
+    parts[turns] = _roots(rows[turns] / np.abs(rows[turns]).max(axis=1, keepdims=True))
+    times = parts.reshape(segments, joints, -1) * lengths[:, None, None]
+    return list(np.moveaxis(times, -1, 0))
+
+
+def _bernstein(degree: int) -> Array:
+    """Return the matrix that takes coefficients of powers to Bernstein coefficients on [0, 1]."""
+    return np.array([[math.comb(i, j) / math.comb(degree, j) for i in range(degree + 1)] for j in range(degree + 1)])
+
+
+def _roots(rows: Array) -> Array:
+    """Return points (r, d) of [0, 1] among which are all roots there of the polynomials (r, d + 1) of degree d."""
+    found = np.zeros((len(rows), rows.shape[1] - 1))
+    kept = np.abs(rows) > _FADED
+    degrees = rows.shape[1] - 1 - kept[:, ::-1].argmax(axis=1)
+    for degree in np.unique(degrees):
+        of = np.flatnonzero(degrees == degree)
+        if degree <= 2:
+            found[of, : min(2, found.shape[1])] = _of_parabola(rows[of])[:, : found.shape[1]]
+        else:
+            found[of, :degree] = _eigenvalues(rows[of, : degree + 1])
+    found = np.clip(found, 0.0, 1.0)
+    for _ in range(_POLISHES if rows.shape[1] > 3 else 0):
+        found = _newton(rows, found)
+    return found
+
+
+def _of_parabola(rows: Array) -> Array:
+    """Return the roots (r, 2) of a parabola, or of a line, without loss of digits; 0 for one that is not there."""
+    c, b, a = (rows[:, i] if i < rows.shape[1] else np.zeros(len(rows)) for i in range(3))
+    q = -(b + np.copysign(np.sqrt(np.maximum(b * b - 4 * a * c, 0.0)), b)) / 2
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.stack([np.where(q != 0, c / q, 0.0), np.where(a != 0, q / a, 0.0)], axis=1)
+
+
+def _eigenvalues(rows: Array) -> Array:
+    """Return the real parts (r, d) of the roots, the eigenvalues of companion matrices.
+
+    Two roots that meet may come out as a pair of complex numbers around their place, so no imaginary part is too
+    large: whatever is found is only a place to look at.
+    """
+    degree = rows.shape[1] - 1
+    companions = np.zeros((len(rows), degree, degree))
+    companions[:, range(1, degree), range(degree - 1)] = 1.0
+    companions[:, :, -1] = -rows[:, :-1] / rows[:, -1:]
+    return np.asarray(np.linalg.eigvals(companions).real)
+
+
+def _newton(rows: Array, x: Array) -> Array:
+    """Return x (r, d) after a step of Newton's method towards roots, where the step is one for the better."""
+    value, slope = np.zeros_like(x), np.zeros_like(x)
+    for power in reversed(range(rows.shape[1])):
+        slope = slope * x + value
+        value = value * x + rows[:, power, None]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ahead = np.clip(np.where(slope != 0, x - value / slope, x), 0.0, 1.0)
+    there = np.zeros_like(x)
+    for power in reversed(range(rows.shape[1])):
+        there = there * ahead + rows[:, power, None]
+    return np.where(np.abs(there) < np.abs(value), ahead, x)

@@ -1,0 +1,219 @@
+"""The fastest run along a given path: always some joint at a limit of speed, acceleration or effort."""
+
+import math
+from collections.abc import Callable
+from numbers import Integral
+from typing import get_args
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arm.positions import positions
+from armwright.arrays import Array, ArrayLike
+from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, shown
+from armwright.kinematics.inverse.solution import violations
+from armwright.motion.certificate import LIMITS, LimitName
+from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
+from armwright.motion.joint_path import Grid, gridded, pieces_of, through_knots
+from armwright.motion.phase_plane import SolverName, fastest
+from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.trajectory import Trajectory, hold, join
+
+# A joint that uses this part of a limit is at it.
+_BINDS = 0.98
+# Times of a motion at which it is asked which limit binds.
+_LOOKS = 2000
+_FEWEST, _MOST = 10, 20_000
+
+
+@attrs.frozen(kw_only=True)
+class Binding:
+    """A limit that keeps a motion from being faster.
+
+    Attributes:
+        limit: speed, acceleration or effort.
+        joint: whose, from 0.
+        share: of the time in which it binds, 0 to 1.
+    """
+
+    limit: LimitName
+    joint: int
+    share: float
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class TimeOptimal:
+    """The fastest run along a path.
+
+    Attributes:
+        arm: the arm.
+        trajectory: on exactly the same path, from rest to rest; accelerations jump.
+        duration_before: of the motion that gave the path [s]; None where knots did.
+        stops: number of places on the way at which the arm stands: corners of the path, and rests of a given motion.
+        peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at the
+            looks of ``effort_peaks``.
+        bindings: which limit of which joint binds for which share of the time, largest share first.
+        factor: how many times slower it is than the run on the grid, so that the limits hold in between as well.
+    """
+
+    arm: Arm
+    trajectory: Trajectory
+    duration_before: float | None
+    stops: int
+    peaks: dict[LimitName, Array]
+    bindings: tuple[Binding, ...]
+    factor: float
+
+    def share(self, limit: LimitName) -> float:
+        """Return the share of the time in which a limit binds, of whatever joint."""
+        return sum(binding.share for binding in self.bindings if binding.limit == limit)
+
+    def __str__(self) -> str:
+        """Say it in a few lines."""
+        before = "" if self.duration_before is None else f" instead of {self.duration_before:.3f} s"
+        stops = f", with {self.stops} stops on the way" if self.stops else ""
+        lines = [f"{self.trajectory.duration:.3f} s{before}{stops}"]
+        lines += [f"{one.share:.0%} of the time: {one.limit} of joint {one.joint + 1}" for one in self.bindings]
+        return "\n".join(lines)
+
+
+def time_optimal(
+    arm: AnyArm,
+    path: Trajectory | ArrayLike,
+    *,
+    efforts: bool = True,
+    intervals: int = 300,
+    by: SolverName = "armwright",
+) -> TimeOptimal:
+    """Return the fastest run along a path of the joints, from rest to rest, inside all limits.
+
+    Only the places of a given motion count, not its times. With s' the speed along the path, the largest s' is found
+    that keeps the limits on a grid, s'' constant between its points; q(s(t)) is then a polynomial of twice the degree
+    on every interval, on exactly the same path. By what the limits are still passed between the places that were
+    looked at, all of it is run slower. Accelerations jump: let the servo smooth them, or allow it less than it can.
+
+    Args:
+        arm: the arm, or a compiled one, which is faster on fine grids.
+        path: a motion of its n joints; or (k, n) knots to pass through on an X-spline, two at least.
+        efforts: whether the limits of the efforts count.
+        intervals: of the grid, on all of the path; twice as many come half as near to the shortest time there is.
+        by: who finds the largest s' on the grid: ``armwright``, or ``toppra``, which gives up on some paths.
+
+    Returns:
+        The motion, what binds it, and its durations. Where the path has a corner, or a given motion jumps in its
+        rates, the arm stops.
+
+    Raises:
+        KindError: the path is neither a trajectory nor numbers.
+        ShapeError: it is not one of n joints, or there are fewer than two knots.
+        InvalidValueError: a joint passes its range or jumps, two knots are the same; a joint that moves has no
+            limit that counts; gravity and dry friction alone take more than a joint may give.
+        UnknownNameError: nobody of that name finds it.
+        ArmwrightError: toppra gave up.
+        MissingExtraError: toppra was asked for and is not installed.
+
+    Source:
+        Bobrow, Dubowsky & Gibson (1985); Pham & Pham, "A new approach to time-optimal path parameterization based on
+        reachability analysis" (2018).
+    """
+    solver = solver_of(arm)
+    geometry, place = _geometry(solver.arm, path)
+    intervals = _whole(intervals)
+    one_of("solver", by, get_args(SolverName))
+    pieces = pieces_of(solver.arm, geometry)
+    _check_path(solver.arm, geometry, efforts=efforts)
+    before = path.duration if isinstance(path, Trajectory) else None
+    whole = sum(piece.path.duration for piece in pieces)
+    runs = []
+    for piece in pieces:
+        grid = gridded(solver.arm, piece, math.ceil(intervals * piece.path.duration / whole))
+        runs.append(_composed(grid, fastest(solver, grid, piece.rests, place, efforts=efforts, by=by)))
+    run = join(runs) if runs else hold(geometry(0.0), 0.0)
+    speeds, accelerations = run.peaks(1), run.peaks(2)
+    by_acceleration = math.sqrt(float((accelerations / solver.arm.limit("acceleration")).max()))
+    factor = max(1.0, float((speeds / solver.arm.limit("speed")).max()), by_acceleration)
+    if efforts:
+        factor *= slowing_for_efforts(arm, run.slowed(factor)).factor
+    run = run.slowed(factor)
+    efforts_found = effort_peaks(arm, run).peaks
+    return TimeOptimal(
+        arm=solver.arm,
+        trajectory=run,
+        duration_before=before,
+        stops=max(0, len(pieces) - 1),
+        peaks={"speed": speeds / factor, "acceleration": accelerations / factor**2, "effort": efforts_found},
+        bindings=_bindings(solver, run, efforts=efforts) if runs else (),
+        factor=factor,
+    )
+
+
+def _geometry(arm: Arm, path: Trajectory | ArrayLike) -> tuple[Trajectory, Callable[[float], str]]:
+    """Return a path as a trajectory, and what says where one of its parameters is."""
+    if isinstance(path, Trajectory):
+        checked(arm, path, "path")
+        return path, lambda s: f"at {s:.3f} s of the motion as it was given"
+    knots = positions(arm, path, "path", callers=2)
+    if knots.ndim != 2 or len(knots) < 2:
+        raise ShapeError(f"path: expected a Trajectory, or (k, {arm.n}) knots with k at least 2, got {knots.shape}")
+    spline = through_knots(arm, knots)
+
+    def between(s: float) -> str:
+        knot = min(int(np.searchsorted(spline.times, s, side="right")), len(knots) - 1)
+        return f"between knots {knot} and {knot + 1}"
+
+    return spline, between
+
+
+def _whole(intervals: int) -> int:
+    if isinstance(intervals, bool) or not isinstance(intervals, Integral):
+        raise KindError(f"intervals: expected a whole number, got {shown(intervals)}")
+    if not _FEWEST <= intervals <= _MOST:
+        raise InvalidValueError(f"intervals: expected {_FEWEST} to {_MOST}, got {intervals}")
+    return int(intervals)
+
+
+def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
+    """Refuse a path that leaves the range of a joint, and joints that nothing limits."""
+    for extreme in path.extremes(0):
+        for fault in violations(arm, extreme):
+            raise InvalidValueError(f"path: {fault}")
+    counting = LIMITS if efforts else LIMITS[:2]
+    limited = np.any([np.isfinite(arm.limit(name)) for name in counting if name != "speed"], axis=0)
+    for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
+        raise InvalidValueError(
+            f"arm '{arm.name}': joint {j + 1} moves and has no limit of {' or '.join(counting[1:])}, so there is no "
+            "fastest run"
+        )
+
+
+def _composed(grid: Grid, sd: Array) -> Trajectory:
+    """Return q(s(t)) with s' as given at the ends of the intervals and s'' constant on each."""
+    durations = 2 * grid.lengths / (sd[1:] + sd[:-1])
+    half = np.diff(sd) / durations / 2
+    count = grid.local.shape[1]
+    terms = np.zeros((len(durations), 2 * count - 1, grid.local.shape[2]))
+    for power in range(count):
+        # (s' t + s''/2 t²) to this power, by the binomial theorem.
+        for i in range(power + 1):
+            weight = math.comb(power, i) * sd[:-1] ** (power - i) * half**i
+            terms[:, power + i] += weight[:, None] * grid.local[:, power]
+    return Trajectory(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=terms)
+
+
+def _bindings(solver: Solver, run: Trajectory, *, efforts: bool) -> tuple[Binding, ...]:
+    """Return which limits bind, by looking at the motion at even times."""
+    t = (np.arange(_LOOKS) + 0.5) / _LOOKS * run.duration
+    states = run(t), run(t, 1), run(t, 2)
+    values = {"speed": states[1], "acceleration": states[2]}
+    if efforts:
+        values["effort"] = np.asarray(solver.inverse_dynamics(*states))
+    uses = np.stack([np.abs(values[name]) / solver.arm.limit(name) for name in values], axis=1)
+    flat = uses.reshape(_LOOKS, -1)
+    counts = np.bincount(flat.argmax(axis=1)[flat.max(axis=1) >= _BINDS], minlength=flat.shape[1])
+    found = [
+        Binding(limit=LIMITS[k // solver.arm.n], joint=int(k % solver.arm.n), share=float(counts[k] / _LOOKS))
+        for k in np.argsort(-counts, kind="stable")
+        if counts[k]
+    ]
+    return tuple(found)

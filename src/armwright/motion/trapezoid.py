@@ -1,0 +1,119 @@
+"""Point to point in the shortest time that speed and acceleration allow: the trapezoid of speed."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arrays import Array, ArrayLike
+from armwright.errors import InvalidValueError
+from armwright.motion.knots import NOWHERE, check_duration, limit_per_joint, one_way, two_ends
+from armwright.motion.trajectory import Trajectory, hold
+
+# A duration that falls short of the shortest by this part of it is the shortest.
+_ROUNDING = 1e-12
+# A triangle has no time at constant speed; rounding must not give it some.
+_TRIANGLE = 1e-15
+
+
+class _Limits(NamedTuple):
+    """Limits of the part of the way that has been made, and the joints that set them, from 0."""
+
+    speed: float
+    acceleration: float
+    joints: tuple[int, int]
+
+
+def trapezoid(
+    q_start: ArrayLike, q_goal: ArrayLike, speed: ArrayLike, acceleration: ArrayLike, duration: float | None = None
+) -> Trajectory:
+    """Return the motion that speeds up evenly, runs at constant speed and slows down evenly, from rest to rest.
+
+    All joints do so together, so that they move along a straight line of the joint space; the one that needs longest
+    is at its limit. Where the way is so short that no joint reaches its speed, the trapezoid is a triangle. Its
+    acceleration jumps: the quintic's does not.
+
+    Args:
+        q_start: (n,) joint positions [rad] or [m].
+        q_goal: (n,) joint positions.
+        speed: (n,) limits, or one for all; infinite where there is none.
+        acceleration: (n,) limits, or one for all; some joint that moves must have one.
+        duration: [s]; the shortest when left out. With more time it speeds up as hard, but to a lower speed.
+
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: positions or limits are not (n,).
+        InvalidValueError: a number is NaN, a position infinite, a limit not above 0 or missing, or the duration too
+            short for the limits of a joint.
+    """
+    start, goal = two_ends(q_start, q_goal)
+    way = goal - start
+    limits = _limits(way, speed, acceleration)
+    asked = None if duration is None else check_duration(duration)
+    if limits is None:
+        return hold(start, asked or 0.0)
+    shortest = _shortest(limits)
+    if asked is None:
+        asked = shortest
+    elif asked < shortest * (1 - _ROUNDING):
+        raise InvalidValueError(_too_short(way, limits, asked, shortest))
+    a = limits.acceleration
+    # The speed v at which 1 = v (T - v / a), without loss of digits, and the time to reach it.
+    square = asked**2 - 4 / a
+    root = math.sqrt(square) if square > _TRIANGLE * asked**2 else 0.0
+    v = min(2 / (asked + root), limits.speed)
+    rise = min(v / a, asked / 2)
+    times = (0.0, rise, asked - rise, asked)
+    risen = a * rise**2 / 2
+    profile = np.array([[0, 0, a / 2], [risen, v, 0], [1 - risen, v, -a / 2]])
+    coefficients = profile[:, :, None] * way
+    coefficients[:, 0] += start
+    if times[2] - times[1] <= _ROUNDING * asked:
+        return Trajectory(times=(0.0, rise, asked), coefficients=coefficients[[0, 2]])
+    return Trajectory(times=times, coefficients=coefficients)
+
+
+def shortest_trapezoid(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) -> float:
+    """Return the shortest time of a trapezoid inside limits [s].
+
+    Args:
+        way: (n,) of the joints [rad] or [m].
+        speed: (n,) limits, or one for all; infinite where there is none.
+        acceleration: (n,) limits, or one for all; some joint that moves must have one.
+
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: the limits do not fit the way.
+        InvalidValueError: a number is NaN, or a limit not above 0 or missing.
+    """
+    limits = _limits(one_way(way), speed, acceleration)
+    return 0.0 if limits is None else _shortest(limits)
+
+
+def _limits(way: Array, speed: ArrayLike, acceleration: ArrayLike) -> _Limits | None:
+    """Return how fast the part of the way from 0 to 1 may change; None where there is no way."""
+    speeds = limit_per_joint(speed, len(way), "speed")
+    accelerations = limit_per_joint(acceleration, len(way), "acceleration")
+    if np.abs(way).max() <= NOWHERE:
+        return None
+    with np.errstate(divide="ignore"):
+        by_speed, by_acceleration = speeds / np.abs(way), accelerations / np.abs(way)
+    joints = int(by_speed.argmin()), int(by_acceleration.argmin())
+    v, a = float(by_speed.min()), float(by_acceleration.min())
+    if not math.isfinite(a):
+        raise InvalidValueError("acceleration: no joint that moves has a limit, so the speed would jump")
+    return _Limits(v, a, joints)
+
+
+def _shortest(limits: _Limits) -> float:
+    v, a, _ = limits
+    return 1 / v + v / a if v * v < a else 2 / math.sqrt(a)
+
+
+def _too_short(way: Array, limits: _Limits, asked: float, shortest: float) -> str:
+    v, a, (fastest, hardest) = limits
+    j = fastest if v * v < a else hardest
+    return (
+        f"duration: {asked:g} s is too short for joint {j + 1}, whose way of {abs(way[j]):.6g} takes {shortest:.6g} s "
+        f"inside the limits"
+    )

@@ -1,0 +1,172 @@
+"""What a motion asks of the motors, and the least slowing that lets them give it."""
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.dynamics.compiled import compile_arm
+from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.motion.efforts import _largest_part, _Shares, effort_peaks, slowing_for_efforts
+from armwright.motion.quintic import PEAK_ACCELERATION, quintic
+from armwright.motion.trajectory import Trajectory, hold
+from armwright.motion.xspline import xspline
+
+PUMA = load_arm("puma560")
+# Looks are so close that a peak between them is missed by no more than this part of it.
+SEEN = 1e-3
+ROUNDING = 1e-9
+
+
+def block(effort: float, **motor: float) -> Arm:
+    """2 kg on a level rail."""
+    return Arm(
+        name="block",
+        joints=[Joint(kind="prismatic", limits=Limits(effort=effort))],
+        links=[Link(mass=2.0)],
+        motors=[Motor(**motor)],
+        gravity=(0.0, -STANDARD_GRAVITY, 0.0),
+    )
+
+
+def lift(effort: float) -> Arm:
+    """3 kg on an upward slide."""
+    return Arm(
+        name="lift", joints=[Joint(kind="prismatic", limits=Limits(effort=effort))], links=[Link(mass=3.0)]
+    )  # fmt: skip
+
+
+def wild(rng: np.random.Generator, duration: float) -> Trajectory:
+    """An X-spline of the PUMA through twelve random places."""
+    return xspline(np.linspace(0, duration, 12), rng.uniform(-0.8, 0.8, (12, 6)))
+
+
+def test_a_block_is_pushed() -> None:
+    """The largest force on a block that slides without friction is its mass by the largest acceleration."""
+    peaks, times = effort_peaks(block(np.inf), quintic([0.0], [3.0], 2.0))
+
+    assert peaks[0] == pytest.approx(2 * PEAK_ACCELERATION * 3 / 2**2, rel=1e-9)
+    # The acceleration of a quintic peaks at (1 ± 1/sqrt 3)/2 of its time.
+    assert abs(times[0] / 2 - 0.5) == pytest.approx(1 / np.sqrt(12), abs=1e-3)
+
+
+def test_acceleration_that_jumps_is_seen_from_both_sides() -> None:
+    """Where the acceleration jumps from 1 to -3 m/s², the force is 6 N, just after the jump and to the end."""
+    stops = Trajectory(times=(0.0, 3.0, 4.0), coefficients=np.array([[[0], [0], [0.5]], [[4.5], [3], [-1.5]]]))
+
+    assert effort_peaks(block(np.inf), stops).peaks[0] == pytest.approx(6.0)
+    assert effort_peaks(lift(np.inf), stops).peaks[0] == pytest.approx(3 * (STANDARD_GRAVITY + 1))
+
+
+def test_standing_costs_no_friction() -> None:
+    """At the end of a motion, where only rounding is left of the speed, dry friction takes nothing."""
+    brake = Trajectory(times=(0.0, 1.0), coefficients=np.array([[[0.1], [0.3], [-0.15]]]))
+    last = np.nextafter(1.0, 2.0)
+    past = attrs.evolve(brake, times=(0.0, last))
+
+    assert effort_peaks(block(np.inf, coulomb_backward=5.0), past).peaks[0] == pytest.approx(2 * 0.3)
+
+
+def test_peaks_of_an_arm(rng: np.random.Generator) -> None:
+    """Twenty thousand samples of a PUMA's motion find nothing larger, but for a thousandth."""
+    for _ in range(5):
+        move = wild(rng, 6.0)
+        t = np.linspace(0, move.duration, 20001)[1:-1]
+        dense = np.abs(inverse_dynamics(PUMA, move(t), move(t, 1), move(t, 2))).max(axis=0)
+
+        np.testing.assert_array_less(dense, effort_peaks(PUMA, move).peaks * (1 + SEEN))
+
+
+def test_least_slowing(rng: np.random.Generator) -> None:
+    """Slowed as it is told, a PUMA just keeps its efforts; a thousandth faster it does not."""
+    for _ in range(5):
+        move = wild(rng, 3.0)
+
+        found = slowing_for_efforts(PUMA, move)
+
+        assert found.factor > 1
+        use = effort_peaks(PUMA, move.slowed(found.factor)).peaks / PUMA.limit("effort")
+        assert use.max() <= 1 + 2 * ROUNDING
+        assert int(use.argmax()) == found.joint
+        faster = effort_peaks(PUMA, move.slowed(found.factor / 1.001)).peaks / PUMA.limit("effort")
+        assert faster.max() > 1
+
+
+def test_slowing_of_a_block() -> None:
+    """Without friction the force falls with the square of the slowing, with viscous friction alone in proportion."""
+    move = quintic([0.0], [3.0], 2.0)
+    peak = 2 * PEAK_ACCELERATION * 3 / 2**2
+
+    assert slowing_for_efforts(block(peak / 4), move).factor == pytest.approx(2.0, rel=1e-9)
+    light = attrs.evolve(block(10.0, viscous=20.0), links=[Link()])
+    assert slowing_for_efforts(light, move).factor == pytest.approx(20 * 15 / 8 * 3 / 2 / 10, rel=1e-6)
+
+
+def test_nothing_to_slow() -> None:
+    """A motion inside the limits stays as it is, and so does one of an arm whose limits are not known."""
+    move = quintic([0.0], [3.0], 2.0)
+
+    assert slowing_for_efforts(block(1000.0), move) == (1.0, None, 0.0)
+    assert slowing_for_efforts(block(np.inf), move) == (1.0, None, 0.0)
+    assert slowing_for_efforts(lift(1000.0), hold([0.0], 1.0)).factor == 1
+
+
+def test_what_no_slowing_helps() -> None:
+    """What gravity and dry friction take they take at any speed: joint, time, effort and limit are named."""
+    with pytest.raises(
+        InvalidValueError,
+        match=r"at \d\.\d{3} s gravity and dry friction alone ask joint 1 for 29\.42 N, 29 N are allowed: no slowing",
+    ):
+        slowing_for_efforts(lift(29.0), quintic([0.0], [1.0], 1.0))
+    with pytest.raises(InvalidValueError, match="ask joint 1 for 6 N, 5 N are allowed"):
+        slowing_for_efforts(block(5.0, coulomb_forward=6.0), quintic([0.0], [1.0], 1.0))
+
+
+def test_the_way_back_of_a_lift() -> None:
+    """A lift falls on its way down: fast enough it must be pulled down, beyond -limit as well as beyond limit."""
+    down = quintic([1.0], [0.0], 0.2)
+
+    found = slowing_for_efforts(lift(40.0), down)
+
+    # The push down at the start, 3 (a - g), and the catch at the end, 3 (a + g): the catch decides.
+    allowed = 40 / 3 - STANDARD_GRAVITY
+    assert found.factor == pytest.approx(np.sqrt(PEAK_ACCELERATION / 0.2**2 / allowed), rel=1e-9)
+    assert found.time == pytest.approx(0.2 * (0.5 + 1 / np.sqrt(12)), abs=1e-3)
+
+
+def test_largest_part_of_the_speed(rng: np.random.Generator) -> None:
+    """Of random shares: at the part found all limits hold, and no part of a thousand above it holds them all."""
+    for _ in range(300):
+        shares = _Shares(*(rng.normal(size=(4, 3)) * size for size in (0.4, 3.0, 3.0)))
+        shares = shares._replace(lasting=np.clip(shares.lasting, -0.95, 0.95))
+        limits = np.ones(3)
+
+        part, binding = _largest_part(shares, limits)
+
+        assert np.abs(shares.at(part)).max() <= 1 + 1e-8
+        for above in np.linspace(part, 1.0, 1000)[1:]:
+            assert part == 1 or np.abs(shares.at(above)).max() > 1
+        if binding is not None:
+            assert abs(shares.at(part)[binding]) == pytest.approx(1)
+
+
+def test_compiled_arms_give_the_same(rng: np.random.Generator) -> None:
+    """A compiled arm finds the same peaks and the same slowing."""
+    move = wild(rng, 3.0)
+    plain, compiled = (slowing_for_efforts(arm, move) for arm in (PUMA, compile_arm(PUMA)))
+
+    assert compiled.factor == pytest.approx(plain.factor, rel=1e-9)
+    assert compiled.joint == plain.joint
+
+
+def test_bad_input() -> None:
+    """An arm by its name, a motion that is none, a motion of other joints: each is refused by name."""
+    move = quintic([0.0], [1.0], 1.0)
+    with pytest.raises(KindError, match="arm: expected an Arm"):
+        effort_peaks("puma560", move)  # type: ignore[arg-type]
+    with pytest.raises(KindError, match="trajectory: expected a Trajectory, got 3"):
+        slowing_for_efforts(PUMA, 3)  # type: ignore[arg-type]
+    with pytest.raises(ShapeError, match="trajectory: expected one of 6 joints, as 'puma560' has, got one of 1"):
+        effort_peaks(PUMA, move)

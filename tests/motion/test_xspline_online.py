@@ -1,0 +1,135 @@
+"""The X-spline while its knots come in: from Python, from compiled loops, and what it does with bad knots."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.motion.trajectory import Trajectory
+from armwright.motion.xspline import xspline
+from armwright.motion.xspline_online import begin, finish, push, xspline_kernel
+
+# Fused operations round once where plain ones round twice.
+ROUNDING = 1e-11
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile into one folder of the tests' own."""
+    monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path_factory.getbasetemp() / "kernels"))
+
+
+def walk(rng: np.random.Generator, knots: int, joints: int) -> tuple[Array, Array]:
+    """Steps and knots of a wandering motion."""
+    return rng.uniform(0.1, 0.3, size=knots - 1), np.cumsum(rng.normal(size=(knots, joints)), axis=0)
+
+
+def test_segments_are_those_of_the_whole(rng: np.random.Generator) -> None:
+    """Pushed one by one, knots give the segments that they give all together; each needs only the next knot."""
+    h, q = walk(rng, 20, 6)
+    start, end = rng.normal(size=(2, 6))
+    segments = []
+
+    state = begin(q[0], q[1], h[0], start)
+    for knot, step in zip(q[2:], h[1:], strict=True):
+        state, segment = push(state, knot, step)
+        segments.append(segment)
+    segments.append(finish(state, end))
+
+    times = np.concatenate([[0.0], np.cumsum(h)])
+    whole = xspline(times, q, start, end)
+    np.testing.assert_allclose(segments, whole.coefficients, rtol=ROUNDING, atol=1e-9)
+    np.testing.assert_allclose(Trajectory(times=times, coefficients=np.array(segments))(times), q, atol=1e-10)
+
+
+def test_two_knots(rng: np.random.Generator) -> None:
+    """With no knot between them, two knots are joined by one cubic, from rest to rest."""
+    h, q = walk(rng, 2, 3)
+
+    segment = finish(begin(q[0], q[1], h[0]))
+
+    np.testing.assert_allclose(segment, xspline([0, h[0]], q).coefficients[0], rtol=1e-12)
+
+
+def test_memory_is_constant(rng: np.random.Generator) -> None:
+    """A planner of n joints is 3 n + 1 numbers, however many knots went through it."""
+    h, q = walk(rng, 50, 4)
+    state = begin(q[0], q[1], h[0])
+    for knot, step in zip(q[2:], h[1:], strict=True):
+        state, _ = push(state, knot, step)
+        assert state.shape == (13,)
+
+
+@pytest.mark.parametrize("joints", [1, 6])
+def test_pushed_from_a_compiled_loop(joints: int, rng: np.random.Generator) -> None:
+    """A compiled loop that pushes knots, the planner filled in place, gets the segments of the plain functions."""
+    h, q = walk(rng, 40, joints)
+    one = xspline_kernel(joints).one
+
+    @njit
+    def plan(state: Array, knots: Array, steps: Array, segments: Array) -> int:
+        lost = 0
+        for i in range(len(knots)):
+            lost += one(state, knots[i], steps[i : i + 1], state, segments[i])
+        return lost
+
+    state, segments = begin(q[0], q[1], h[0]), np.empty((38, 4, joints))
+    assert plan(state, q[2:], h[1:], segments) == 0
+
+    np.testing.assert_allclose(
+        [*segments, finish(state)], xspline(np.append(0.0, np.cumsum(h)), q).coefficients, rtol=ROUNDING, atol=1e-9
+    )
+
+
+def test_compiled_from_python(rng: np.random.Generator) -> None:
+    """The function of the kernel is called like the plain one, for one planner or for rows of them."""
+    h, q = walk(rng, 3, 6)
+    fast = xspline_kernel(6).function("push")
+    states = np.stack([begin(q[0], q[1], step) for step in (0.1, 0.2, 0.3)])
+
+    after, segments = fast(states, q[2], [h[1]])
+
+    for i, state in enumerate(states):
+        plain, segment = push(state, q[2], h[1])
+        np.testing.assert_allclose(after[i], plain, rtol=ROUNDING, atol=1e-12)
+        np.testing.assert_allclose(segments[i], segment, rtol=ROUNDING, atol=1e-9)
+        one, of_one = fast(state, q[2], [h[1]])
+        np.testing.assert_array_equal(one, after[i])
+        np.testing.assert_array_equal(of_one, segments[i])
+
+
+def test_status_of_bad_knots() -> None:
+    """A compiled push answers 0 for what it can use, and another number for a knot or a step that is none."""
+    one = xspline_kernel(2).one
+    state, knot = begin([0.0, 0.0], [1.0, 2.0], 0.1), np.ones(2)
+    after, segment = np.empty(7), np.empty((4, 2))
+
+    assert one(state, knot, np.array([0.1]), after, segment) == 0
+    for step in (0.0, -0.1, np.nan, np.inf):
+        assert one(state, knot, np.array([step]), after, segment) != 0
+    assert one(state, np.array([0.0, np.nan]), np.array([0.1]), after, segment) != 0
+    assert one(state, np.ones(3), np.array([0.1]), after, segment) != 0
+
+
+def test_bad_knots_are_refused() -> None:
+    """Steps that do not rise, knots of other joints, planners that are none: each with what came."""
+    state = begin([0.0, 0.0], [1.0, 2.0], 0.1)
+    with pytest.raises(InvalidValueError, match="step: expected more than 0 s, got 0"):
+        push(state, [1.0, 2.0], 0.0)
+    with pytest.raises(InvalidValueError, match="step: expected more than 0 s, got nan"):
+        begin([0.0], [1.0], np.nan)
+    with pytest.raises(ShapeError, match="knot: expected 2 numbers"):
+        push(state, [1.0, 2.0, 3.0], 0.1)
+    with pytest.raises(ShapeError, match=r"state: expected a planner, shape \(3 n \+ 1,\), got \(6,\)"):
+        push(state[:-1], [1.0, 2.0], 0.1)
+    with pytest.raises(InvalidValueError, match="knot: every number must be finite, got nan"):
+        push(state, [1.0, np.nan], 0.1)
+    with pytest.raises(InvalidValueError, match="the last step: expected more than 0 s, got -1"):
+        finish(np.append(state[:-1], -1.0))
+    with pytest.raises(InvalidValueError, match="step: expected more than 0 s, got -1"):
+        xspline_kernel(2).function("push")(state, [1.0, 2.0], [-1.0])
+    with pytest.raises(InvalidValueError, match="joints: expected 1 or more, got 0"):
+        xspline_kernel(0)
+    with pytest.raises(KindError, match=r"joints: expected a whole number from 1, got 2\.5"):
+        xspline_kernel(2.5)  # type: ignore[arg-type]
