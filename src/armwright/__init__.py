@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from armwright.motion.cubic import cubic, cubic_through
     from armwright.motion.detour import line_or_detour
     from armwright.motion.efforts import effort_peaks, slowing_for_efforts
+    from armwright.motion.limit_use import limit_use, slowing_for_limits
+    from armwright.motion.moves import cartesian_move, joint_move, stopping_move
     from armwright.motion.online import replace_goal, retarget
     from armwright.motion.quintic import point_to_point, quintic
     from armwright.motion.straight import straight_line
@@ -45,7 +47,6 @@ if TYPE_CHECKING:
     from armwright.motion.xspline import xspline, xspline_along
     from armwright.motion.xspline_online import xspline_kernel
 
-
 _HOME = {
     "Arm": "arm.model",
     "ArmwrightError": "errors",
@@ -54,6 +55,7 @@ _HOME = {
     "arm_names": "arm.load",
     "blend_timing": "motion.blends",
     "blended": "motion.blends",
+    "cartesian_move": "motion.moves",
     "compile_arm": "dynamics.compiled",
     "continuity": "motion.continuity",
     "cubic": "motion.cubic",
@@ -67,6 +69,8 @@ _HOME = {
     "inverse_dynamics": "dynamics.newton_euler",
     "jacobian": "kinematics.jacobian",
     "join": "motion.trajectory",
+    "joint_move": "motion.moves",
+    "limit_use": "motion.limit_use",
     "line_or_detour": "motion.detour",
     "link_poses": "kinematics.forward",
     "load_arm": "arm.load",
@@ -80,6 +84,8 @@ _HOME = {
     "simulate": "dynamics.simulate",
     "singularities": "kinematics.singularities",
     "slowing_for_efforts": "motion.efforts",
+    "slowing_for_limits": "motion.limit_use",
+    "stopping_move": "motion.moves",
     "straight_line": "motion.straight",
     "terms": "dynamics.terms",
     "time_optimal": "motion.time_optimal",
@@ -100,6 +106,7 @@ __all__ = [
     "arm_names",
     "blend_timing",
     "blended",
+    "cartesian_move",
     "compile_arm",
     "continuity",
     "cubic",
@@ -113,6 +120,8 @@ __all__ = [
     "inverse_dynamics",
     "jacobian",
     "join",
+    "joint_move",
+    "limit_use",
     "line_or_detour",
     "link_poses",
     "load_arm",
@@ -126,6 +135,8 @@ __all__ = [
     "simulate",
     "singularities",
     "slowing_for_efforts",
+    "slowing_for_limits",
+    "stopping_move",
     "straight_line",
     "terms",
     "time_optimal",

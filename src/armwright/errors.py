@@ -62,6 +62,10 @@ class OutputError(ArmwrightError, OSError):
     """A result could not be written; nothing half-written was left behind."""
 
 
+class RotationWarning(UserWarning):
+    """A matrix typed as a rotation is nearly one; the nearest rotation has been taken."""
+
+
 class UnitWarning(UserWarning):
     """A number looks as if it were in another unit: degrees where radians belong."""
 

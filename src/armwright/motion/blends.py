@@ -23,7 +23,7 @@ MISS = 3 / 16
 _ROUNDING = 1e-12
 
 
-class _Plan(NamedTuple):
+class BlendPlan(NamedTuple):
     """Ways and blends between k points.
 
     Attributes:
@@ -70,7 +70,7 @@ def blended(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends: Ends
         Paul, "Manipulator Cartesian path control" (1979); for the ends Craig, "Introduction to Robotics", linear
         functions with blends for a path with via points.
     """
-    plan = _plan(times, points, blend, ends)
+    plan = blend_plan(times, points, blend, ends)
     b = plan.blend[:, None]
     change = plan.after - plan.before
     count, joints = plan.points.shape
@@ -102,7 +102,7 @@ def via_deviations(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, end
     Raises:
         ArmwrightError: as for ``blended``.
     """
-    plan = _plan(times, points, blend, ends)
+    plan = blend_plan(times, points, blend, ends)
     deviations = MISS * plan.blend[:, None] * (plan.after - plan.before)
     deviations[[0, -1]] = 0.0
     return np.asarray(deviations)
@@ -126,7 +126,7 @@ def via_distances(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends
     Raises:
         ArmwrightError: as for ``blended``.
     """
-    plan = _plan(times, points, blend, ends)
+    plan = blend_plan(times, points, blend, ends)
     distances = np.zeros(len(plan.centres))
     if len(distances) > 2:
         b, v = plan.blend[1:-1, None], plan.before[1:-1]
@@ -194,8 +194,8 @@ def blend_timing(
     return np.concatenate([[0.0], np.cumsum(lasting)]), blend
 
 
-def _plan(times: ArrayLike, points: ArrayLike, blend: ArrayLike, ends: Ends) -> _Plan:
-    """Check what is asked for, and return the rates of the ways."""
+def blend_plan(times: ArrayLike, points: ArrayLike, blend: ArrayLike, ends: Ends) -> BlendPlan:
+    """Return when blends are, and the rates of the ways between them; arguments and errors as of ``blended``."""
     t, q = timed_points("blends", times, points)
     one_of("kind of ends", ends, ("rest", "running"))
     if t[0] != 0:
@@ -216,7 +216,7 @@ def _plan(times: ArrayLike, points: ArrayLike, blend: ArrayLike, ends: Ends) -> 
         centres[0] += b[0]
         centres[-1] -= b[-1]
     before, after = _rates(np.diff(q, axis=0) / np.diff(centres)[:, None], ends)
-    return _Plan(centres, b, q, before, after, float(t[-1]))
+    return BlendPlan(centres, b, q, before, after, float(t[-1]))
 
 
 def _check_room(t: Array, b: Array) -> None:

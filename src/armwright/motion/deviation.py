@@ -93,7 +93,7 @@ def deviation_of(
         allowed: the distance that matters [m]; it decides how often the hand is looked at.
         allowed_turn: the angle that matters [rad].
     """
-    qd, qdd = _peaks(spline.joints, spline.lengths)
+    qd, qdd = cubic_peaks(spline.joints, spline.lengths)
     pull, spin = _accelerations(arm, ways, spline, qd, qdd)
     wanted = np.sqrt(np.maximum(pull / allowed, 2 * spin / allowed_turn) / (8 * _ADDED)) * spline.lengths
     looks = int(min(max(math.ceil(wanted.max()), _LOOKS[0]), _LOOKS[1]))
@@ -141,8 +141,12 @@ def _distances(ways: Ways, X: Array) -> Array:
 
 def _half_sines(ways: Ways, done: Array, X: Array) -> Array:
     """Return sin(angle / 2) of the turn (m, k) from the orientation on the way to that of the hand."""
-    wanted = ways.R_A[:, None] @ turned(ways.turn, done)
-    Q = np.swapaxes(wanted, -1, -2) @ X[..., :3, :3]
+    return half_sines(ways.R_A[:, None] @ turned(ways.turn, done), X[..., :3, :3])
+
+
+def half_sines(R_A: Array, R_B: Array) -> Array:
+    """Return sin(angle / 2) (...) of the turns from rotations (..., 3, 3) to others, small ones to all digits."""
+    Q = np.swapaxes(R_A, -1, -2) @ R_B
     w = np.sqrt(np.maximum(1 + Q[..., 0, 0] + Q[..., 1, 1] + Q[..., 2, 2], 1e-12)) / 2
     a, b, c = Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]
     return np.asarray(np.sqrt(a * a + b * b + c * c) / (4 * w))
@@ -151,13 +155,46 @@ def _half_sines(ways: Ways, done: Array, X: Array) -> Array:
 def _accelerations(arm: Arm, ways: Ways, spline: Spline, qd: Array, qdd: Array) -> tuple[Array, Array]:
     """Return upper bounds on every interval (m,): of the hand's acceleration, and of that of its turn off the way.
 
-    The hand accelerates by sum J_i qdd_i + sum H_ij qd_i qd_j, where |J_i| is at most the lever r_i of joint i and
-    |H_ij| at most that of the later of two joints that turn. The turn off the way is a unit quaternion; the second
-    derivative of its vector part is at most half the angular acceleration and a quarter of the squared angular speed.
+    The turn off the way is a unit quaternion; the second derivative of its vector part is at most half the angular
+    acceleration and a quarter of the squared angular speed.
     """
-    sd, sdd = _peaks(spline.progress[..., None], spline.lengths)
+    sd, sdd = cubic_peaks(spline.progress[..., None], spline.lengths)
+    hand = hand_bounds(arm, spline.joints, spline.lengths, qd, qdd)
+    angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
+    rate = angle * sd[:, 0]
+    spin = (hand.spin_change + angle * sdd[:, 0] + hand.spin * rate) / 2 + (hand.spin + rate) ** 2 / 4
+    return hand.pull, np.asarray(spin)
+
+
+class HandBounds(NamedTuple):
+    """Upper bounds of how the hand moves on m intervals, (m,) each.
+
+    Attributes:
+        pull: acceleration [m/s²].
+        spin: angular speed [rad/s].
+        spin_change: angular acceleration [rad/s²].
+    """
+
+    pull: Array
+    spin: Array
+    spin_change: Array
+
+
+def hand_bounds(arm: Arm, joints: Array, lengths: Array, qd: Array, qdd: Array) -> HandBounds:
+    """Return upper bounds of how the hand moves on intervals.
+
+    The hand accelerates by sum J_i qdd_i + sum H_ij qd_i qd_j, where |J_i| is at most the lever r_i of joint i and
+    |H_ij| at most that of the later of two joints that turn.
+
+    Args:
+        arm: the arm, with n joints.
+        joints: (m, 4, n) coefficients of the joint positions.
+        lengths: (m,) of the intervals [s].
+        qd: (m, n) the largest speeds of the joints on them.
+        qdd: (m, n) the largest accelerations.
+    """
     turns = np.array([joint.revolute for joint in arm.joints])
-    lever = np.where(turns, _levers(arm, spline), 1.0)
+    lever = np.where(turns, _levers(arm, joints, lengths), 1.0)
     n = arm.n
     later = np.maximum(np.arange(n)[:, None], np.arange(n))
     both = turns[:, None] & turns
@@ -165,15 +202,11 @@ def _accelerations(arm: Arm, ways: Ways, spline: Spline, qd: Array, qdd: Array) 
     carried = turns[np.minimum(np.arange(n)[:, None], np.arange(n))] & ~turns[later]
     H = np.where(both, lever[later], np.where(carried & ~np.eye(n, dtype=bool), 1.0, 0.0))
     pull = qdd @ lever + np.einsum("mi,ij,mj->m", qd, H, qd)
-    wd = qd @ turns
-    wdd = qdd @ turns + np.einsum("mi,ij,mj->m", qd, np.triu(both, 1).astype(np.float64), qd)
-    angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
-    rate = angle * sd[:, 0]
-    spin = (wdd + angle * sdd[:, 0] + wd * rate) / 2 + (wd + rate) ** 2 / 4
-    return np.asarray(pull), np.asarray(spin)
+    spin_change = qdd @ turns + np.einsum("mi,ij,mj->m", qd, np.triu(both, 1).astype(np.float64), qd)
+    return HandBounds(np.asarray(pull), np.asarray(qd @ turns), np.asarray(spin_change))
 
 
-def _peaks(c: Array, lengths: Array) -> tuple[Array, Array]:
+def cubic_peaks(c: Array, lengths: Array) -> tuple[Array, Array]:
     """Return the largest speeds and accelerations (m, n) of cubics (m, 4, n), exactly."""
     h = lengths[:, None]
     start, bend, end = c[:, 1], 2 * c[:, 2], c[:, 1] + (2 * c[:, 2] + 3 * c[:, 3] * h) * h
@@ -197,10 +230,10 @@ def turning_points(c: Array, lengths: Array) -> Array:
     return np.clip(np.nan_to_num(times, nan=0.0, posinf=0.0, neginf=0.0), 0.0, lengths[:, None])
 
 
-def _levers(arm: Arm, spline: Spline) -> Array:
+def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
     """Return the largest distance (n,) of the tool from the frame before each joint, slides as far out as they go."""
-    h = spline.lengths[:, None]
-    c = np.abs(spline.joints)
+    h = lengths[:, None]
+    c = np.abs(joints)
     farthest = (((c[:, 3] * h + c[:, 2]) * h + c[:, 1]) * h + c[:, 0]).max(axis=0)
     parts = [
         math.hypot(joint.a, abs(joint.d) + (0.0 if joint.revolute else farthest[i]))

@@ -1,0 +1,231 @@
+"""Joints that carry the hand along a path planned in time, on one branch, with a bounded deviation."""
+
+import math
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solution import Violation, violations
+from armwright.kinematics.inverse.turns import travel
+from armwright.kinematics.singularities import singularities
+from armwright.motion.blends import Ends
+from armwright.motion.chain import chain
+from armwright.motion.deviation import HandBounds, cubic_peaks, half_sines, hand_bounds
+from armwright.motion.follow import SLOWEST, TURN_PER_METRE, Cause, PathError, cause_of
+from armwright.motion.hand_path import HandPath
+from armwright.motion.polynomials import evaluate
+from armwright.motion.postures import Posture
+from armwright.motion.solver import Solver
+from armwright.motion.trajectory import Trajectory
+from armwright.motion.xspline import xspline
+
+Counts: TypeAlias = npt.NDArray[np.intp]
+
+# Knots to begin with: so far apart at most [s], and so many on each blend and each straight way at least.
+_STEP, _FEWEST = 0.02, 4
+# Rounds of putting knots where they are missing; the deviation falls with the fourth power of the step.
+_ROUNDS, _CLOSER, _MOST = 8, 1.1, 500_000
+# Whole turns; a limit passed by this part of one is not passed.
+_TURN, _NONE = 2 * math.pi, 1e-9
+# What the bound may add to what was seen, in parts of what is allowed; looks between two knots for it, at most.
+_ADDED, _LOOKS = 0.1, 64
+
+
+class Carried(NamedTuple):
+    """A motion of the joints that carries the hand along its path.
+
+    Attributes:
+        label: branch of its postures.
+        trajectory: of the joints.
+        deviation: upper bound of the distance of the hand from where it is planned to be [m].
+        turn: upper bound of the angle from the planned orientation [rad].
+    """
+
+    label: str
+    trajectory: Trajectory
+    deviation: float
+    turn: float
+
+
+class _Stop(NamedTuple):
+    """What stops a branch: why, and at which time [s]."""
+
+    cause: Cause
+    why: str
+    time: float
+
+
+def carry(solver: Solver, hand: HandPath, times: Array, near: Array, *, ends: Ends, deviation: float) -> Carried:
+    """Solve a path of the hand for the joints.
+
+    The branch is chosen once and kept: of the postures inside the limits at the start the nearest that leads to the
+    end inside them.
+
+    Args:
+        solver: the arm.
+        hand: the path.
+        times: (k,) of its poses [s]; they tell places in errors.
+        near: (n,) present joint positions.
+        ends: whether the joints rest at both ends or run.
+        deviation: allowed distance of the hand from where it is planned to be [m]; the orientation may be off by
+            ``TURN_PER_METRE`` times as many radians.
+
+    Raises:
+        PathError: no branch carries through: what stops each of them, where.
+    """
+    arm = solver.arm
+    t = _first_knots(hand)
+    stops: dict[str, _Stop] = {}
+    for start in _starts(arm, hand(0.0), near):
+        found = _carried(solver, hand, t, start, ends=ends, deviation=deviation)
+        if isinstance(found, Carried):
+            return found
+        stops[start.label] = found
+    first = next(iter(stops.values()))
+    way = int(np.clip(np.searchsorted(times, first.time, side="right") - 1, 0, len(times) - 2))
+    fraction = float(np.clip((first.time - times[way]) / (times[way + 1] - times[way]), 0.0, 1.0))
+    reasons = "; ".join(f"{label}: {_place(hand, times, stop.time)} {stop.why}" for label, stop in stops.items())
+    raise PathError(first.cause, way, fraction, f"no branch carries the hand to its last pose. {reasons}")
+
+
+def _starts(arm: Arm, X: Array, near: Array) -> list[Posture]:
+    """Return a posture of every branch that is inside the limits at the first pose, nearest first."""
+    solution = inverse(arm, X, near)
+    if not solution.allowed:
+        raise PathError(cause_of(solution), 0, 0.0, f"pose 1: {solution.explain()}")
+    starts = [Posture(branch.label, branch.q) for branch in solution.allowed]
+    return sorted(starts, key=lambda posture: travel(arm, near, posture.q))
+
+
+def _first_knots(hand: HandPath) -> Array:
+    lengths = np.diff(hand.knots)
+    parts = np.maximum(np.ceil(lengths / _STEP), _FEWEST).astype(np.intp)
+    return _divided(hand.knots, parts)
+
+
+def _divided(times: Array, parts: Counts) -> Array:
+    """Return times with every interval divided into so many parts."""
+    h = np.repeat(np.diff(times) / parts, parts)
+    place = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    return np.append(np.repeat(times[:-1], parts) + place * h, times[-1])
+
+
+def _carried(
+    solver: Solver, hand: HandPath, t: Array, start: Posture, *, ends: Ends, deviation: float
+) -> Carried | _Stop:
+    """Follow one branch: what it comes to, or what stops it."""
+    arm = solver.arm
+    for _ in range(_ROUNDS):
+        X = hand(t)
+        q, missed = chain(solver, X, start.q)
+        q = _turned_inside(arm, q, missed)
+        if (stop := _stopped(arm, q, missed, X, t)) is not None:
+            return stop
+        still = np.zeros(arm.n)
+        rates = (still, still) if ends == "rest" else (_rate(t, q), _rate(t[::-1], q[::-1]))
+        trajectory = xspline(t, q, *rates)
+        speed, acceleration = cubic_peaks(trajectory.coefficients, np.diff(t))
+        bounds = hand_bounds(arm, trajectory.coefficients, np.diff(t), speed, acceleration)
+        place, turn = _deviations(solver, hand, trajectory, bounds, deviation)
+        excess = np.maximum(place, turn / TURN_PER_METRE) / deviation
+        if excess.max() <= 1:
+            return _swings_out(arm, trajectory) or Carried(
+                start.label, trajectory, float(place.max()), float(turn.max())
+            )
+        # Where a joint rushes past a singularity, more knots do not help.
+        if (speed / arm.limit("speed")).max() > SLOWEST:
+            break
+        parts = np.where(excess > 1, np.clip(np.ceil(_CLOSER * excess**0.25), 2, 8), 1).astype(np.intp)
+        if parts.sum() > _MOST:
+            break
+        t = _divided(t, parts)
+    worst = int(excess.argmax())
+    joint = int((speed[worst] / arm.limit("speed")).argmax())
+    factors = singularities(arm, q[worst]).factors
+    name = min(factors, key=lambda factor: abs(factor.value) / factor.scale).name if factors else "posture"
+    rush = float(speed[worst, joint] / arm.limit("speed")[joint])
+    why = f"the arm is singular ({name}): joint {joint + 1} would have to move {rush:.0f} times as fast as it may"
+    return _Stop("singular", why, float(t[worst]))
+
+
+def _turned_inside(arm: Arm, q: Array, missed: int | None) -> Array:
+    """Turn joints by as few whole turns as bring all of their way inside the limits, where any do."""
+    lowest, highest = q[:missed].min(axis=0), q[:missed].max(axis=0)
+    least, most = (arm.limit("lower") - lowest) / _TURN, (arm.limit("upper") - highest) / _TURN
+    turns = np.where(least > _NONE, np.ceil(least), np.where(most < -_NONE, np.floor(most), 0.0))
+    fits = (turns >= least - _NONE) & (turns <= most + _NONE) & [joint.revolute for joint in arm.joints]
+    return np.asarray(q + _TURN * np.where(fits, turns, 0.0))
+
+
+def _stopped(arm: Arm, q: Array, missed: int | None, X: Array, t: Array) -> _Stop | None:
+    """Return what keeps the joints from following poses, if anything does."""
+    met = q[:missed]
+    outside = np.flatnonzero(((met < arm.limit("lower")) | (met > arm.limit("upper"))).any(axis=1))
+    for k in outside:
+        faults = violations(arm, q[k])
+        if faults:
+            return _Stop("limits", _beyond(faults[0], arm, met), float(t[k]))
+    if missed is None:
+        return None
+    solution = inverse(arm, X[missed], q[missed - 1])
+    if solution.allowed:
+        return _Stop("singular", "the posture would have to change", float(t[missed]))
+    return _Stop(cause_of(solution), solution.explain(), float(t[missed]))
+
+
+def _beyond(fault: Violation, arm: Arm, q: Array) -> str:
+    """Say which joint passes its limit, and by how much on the whole way."""
+    j = fault.joint - 1
+    past = max(float(q[:, j].max() - arm.limit("upper")[j]), float(arm.limit("lower")[j] - q[:, j].min()))
+    unit, scale = ("deg", math.degrees(1.0)) if fault.revolute else ("mm", 1e3)
+    return f"joint {fault.joint} would pass its limit {fault.limit * scale:.1f} {unit}, by {past * scale:.1f} {unit}"
+
+
+def _swings_out(arm: Arm, trajectory: Trajectory) -> _Stop | None:
+    """Return the limit that the joints pass between two knots which keep it, if there is one."""
+    for extreme in trajectory.extremes(0):
+        for fault in violations(arm, extreme):
+            looks = trajectory(trajectory.times)[:, fault.joint - 1]
+            nearest = int(np.abs(looks - fault.value).argmin())
+            return _Stop("limits", str(fault), float(trajectory.times[nearest]))
+    return None
+
+
+def _deviations(
+    solver: Solver, hand: HandPath, trajectory: Trajectory, bounds: HandBounds, allowed: float
+) -> tuple[Array, Array]:
+    """Return upper bounds of the distance and of the angle between hand and path on every interval, (m,) each.
+
+    Both are 0 at the knots. Between two looks a time d apart a curve leaves its chord by no more than d²/8 times its
+    greatest acceleration; that of the difference is no greater than those of hand and path together.
+    """
+    h = np.diff(trajectory.times)
+    pull = bounds.pull + hand.acceleration()
+    path_spin, path_change = hand.spin()
+    # The second derivative of the vector part of a unit quaternion: half the acceleration, a quarter of the speed².
+    spin = (bounds.spin_change + path_change + bounds.spin * path_spin) / 2 + (bounds.spin + path_spin) ** 2 / 4
+    wanted = np.sqrt(np.maximum(pull, 2 * spin / TURN_PER_METRE) / (8 * _ADDED * allowed)) * h
+    looks = int(min(max(math.ceil(wanted.max()), 2), _LOOKS))
+    part = (np.arange(looks + 1) / looks)[:, None]
+    t = (trajectory.times[:-1] + part * h).clip(0.0, trajectory.duration)
+    q = np.stack([evaluate(trajectory.coefficients, (p * h)[:, None]) for p in part])
+    X, wanted_X = solver.forward(q), hand(t)
+    off = np.linalg.norm(X[..., :3, 3] - wanted_X[..., :3, 3], axis=-1).max(axis=0)
+    half = half_sines(wanted_X[..., :3, :3], X[..., :3, :3]).max(axis=0)
+    between = (h / looks) ** 2 / 8
+    return off + between * pull, 2 * np.arcsin(np.minimum(half + between * spin, 1.0))
+
+
+def _rate(t: Array, q: Array) -> Array:
+    """Return the rate (n,) at the first of four equally spaced knots or more: that of the cubic through them."""
+    return np.asarray((-11 * q[0] + 18 * q[1] - 9 * q[2] + 2 * q[3]) / (6 * (t[1] - t[0])))
+
+
+def _place(hand: HandPath, times: Array, t: float) -> str:
+    x, y, z = hand(t)[:3, 3] * 1e3
+    way = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
+    return f"at {t:.3f} s, between poses {way + 1} and {way + 2}, ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base,"

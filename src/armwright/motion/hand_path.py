@@ -1,0 +1,153 @@
+"""Where the hand is planned to be: places and orientations through poses, straight with blends, over time."""
+
+from typing import Literal, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, ArrayLike, floats
+from armwright.motion.blends import BlendPlan, Ends, blend_plan, blended
+from armwright.motion.trajectory import Trajectory
+from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector, rotation_vector
+
+Orientation: TypeAlias = Literal["geodesic", "zyz"]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class HandPath:
+    """Poses of the hand as a function of time.
+
+    Attributes:
+        place: (x, y, z) [m].
+        turns: the orientation by turns about one fixed axis from pose to pose; None where it is by ``angles``.
+        angles: the orientation by ZYZ angles [rad]; None where it is by ``turns``.
+    """
+
+    place: Trajectory
+    turns: "Turns | None"
+    angles: Trajectory | None
+
+    @property
+    def knots(self) -> Array:
+        """When blends begin and end [s], start and end among them."""
+        return self.place.times
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """Return poses (..., 4, 4) at times (...)."""
+        t = floats(t, "t")
+        if self.angles is not None:
+            return pose(from_zyz(self.angles(t)), self.place(t))
+        assert self.turns is not None  # noqa: S101 - one of the two is there
+        return pose(self.turns(t), self.place(t))
+
+    def slowed(self, factor: float) -> "HandPath":
+        """Return the same path run ``factor`` times slower."""
+        return HandPath(
+            place=self.place.slowed(factor),
+            turns=None if self.turns is None else self.turns.slowed(factor),
+            angles=None if self.angles is None else self.angles.slowed(factor),
+        )
+
+    def acceleration(self) -> float:
+        """Return an upper bound of the acceleration of the place [m/s²]."""
+        return float(np.linalg.norm(self.place.peaks(2)))
+
+    def spin(self) -> tuple[float, float]:
+        """Return upper bounds of the angular speed [rad/s] and of the angular acceleration [rad/s²]."""
+        if self.turns is not None:
+            return self.turns.spin()
+        assert self.angles is not None  # noqa: S101 - one of the two is there
+        phi, theta, psi = self.angles.peaks(1)
+        # Each angle turns about an axis of length 1 that the angles before it carry round.
+        return phi + theta + psi, float(self.angles.peaks(2).sum() + phi * theta + phi * psi + theta * psi)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Turns:
+    """Orientations through k poses: about one fixed axis from pose to pose, with a blend around each pose.
+
+    Around each pose the rotation vector of the turn from it is blended, so that rate and its change are continuous.
+    Between the blends of two poses, on one and the same fixed axis either way, the next pose takes over.
+
+    Attributes:
+        R: (k, 3, 3) orientations of the poses.
+        plan: times, blends, and the rates of the rotation vector before and after each pose, in its own axes.
+    """
+
+    R: Array
+    plan: BlendPlan
+
+    def __call__(self, t: Array) -> Array:
+        """Return rotations (..., 3, 3) at times (...)."""
+        c, b = self.plan.centres, self.plan.blend
+        inside = np.clip(t, 0.0, self.plan.end)
+        handed_over = (c[:-1] + b[:-1] + c[1:] - b[1:]) / 2
+        i = np.searchsorted(handed_over, inside)
+        since, width = (inside - c[i])[..., None], b[i][..., None]
+        before, after = self.plan.before[i], self.plan.after[i]
+        h = np.clip(since + width, 0.0, 2 * width)
+        safe = np.where(width > 0, width, 1.0)
+        blend = before * (h - width) + (after - before) * h**3 * (1 / (4 * safe**2) - h / (16 * safe**3))
+        turn = np.where(since <= -width, before * since, np.where(since >= width, after * since, blend))
+        return np.asarray(self.R[i] @ rotation_from_vector(turn))
+
+    def slowed(self, factor: float) -> "Turns":
+        """Return the same turns run ``factor`` times slower."""
+        p = self.plan
+        slow = BlendPlan(
+            p.centres * factor, p.blend * factor, p.points, p.before / factor, p.after / factor, p.end * factor
+        )
+        return Turns(R=self.R, plan=slow)
+
+    def spin(self) -> tuple[float, float]:
+        """Return upper bounds of the angular speed [rad/s] and of the angular acceleration [rad/s²]."""
+        rates = np.linalg.norm(np.concatenate([self.plan.before, self.plan.after]), axis=-1)
+        change = np.linalg.norm(self.plan.after - self.plan.before, axis=-1)
+        blend = self.plan.blend
+        peak = np.where(blend > 0, 0.75 * change / np.where(blend > 0, blend, 1.0), 0.0)
+        # The angular velocity is T(v) v' of the rotation vector v, where T shrinks, and changes by less than |v'|.
+        return float(rates.max()), float(peak.max() + rates.max() ** 2)
+
+
+def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, orientation: Orientation) -> HandPath:
+    """Plan places and orientations through poses.
+
+    Args:
+        poses: (k, 4, 4) with exact rotations.
+        times: as for ``blended``.
+        blend: as for ``blended``.
+        ends: as for ``blended``.
+        orientation: ``geodesic`` turns about one fixed axis from pose to pose, ``zyz`` blends the ZYZ Euler angles.
+
+    Raises:
+        ArmwrightError: as for ``blended``.
+
+    Source:
+        Paul, "Manipulator Cartesian path control" (1979); for ``zyz`` the project on the PUMA's trajectories, 3.2.
+    """
+    place = blended(times, poses[:, :3, 3], blend, ends=ends)
+    R = poses[:, :3, :3]
+    if orientation == "zyz":
+        return HandPath(place=place, turns=None, angles=blended(times, zyz_angles(R), blend, ends=ends))
+    plan = blend_plan(times, poses[:, :3, 3], blend, ends)
+    # A turn is the same vector in the axes of the pose before it and of that after it.
+    ways = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
+    still = np.zeros((1, 3))
+    first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
+    plan = plan._replace(before=np.concatenate([first, ways]), after=np.concatenate([ways, last]))
+    return HandPath(place=place, turns=Turns(R=R, plan=plan), angles=None)
+
+
+def zyz_angles(R: Array) -> Array:
+    """Return ZYZ angles (k, 3) of orientations, each next to those before it.
+
+    Where theta is 0 or pi at the first pose, phi is what the second pose has; later on it stays as it was.
+    """
+    angles = [to_zyz(R[0])]
+    for each in R[1:]:
+        angles.append(next_zyz(each, angles[-1]))
+    if len(R) > 1:
+        angles[0] = next_zyz(R[0], angles[1])
+    return np.array(angles)

@@ -1,0 +1,59 @@
+"""Which part of its limits a motion uses, and how much slower it must run to keep them all."""
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.motion.certificate import LimitName, slowing
+from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
+from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.trajectory import Trajectory
+
+
+def limit_use(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
+    """Return which part of its limits of speed, acceleration and effort each joint uses at most.
+
+    Args:
+        arm: the arm, or a compiled one, which is faster.
+        trajectory: of its n joints.
+
+    Returns:
+        (n,) by the name of the limit, 1 for all of it, 0 where there is none. Speeds and accelerations exactly, efforts
+        as ``effort_peaks`` finds them.
+
+    Raises:
+        KindError: ``trajectory`` is no trajectory.
+        ShapeError: it is of another number of joints.
+    """
+    model = solver_of(arm).arm
+    checked(model, trajectory)
+    limit = model.limit("effort")
+    efforts = effort_peaks(arm, trajectory).peaks if np.isfinite(limit).any() else np.zeros(model.n)
+    return {
+        "speed": trajectory.peaks(1) / model.limit("speed"),
+        "acceleration": trajectory.peaks(2) / model.limit("acceleration"),
+        "effort": efforts / limit,
+    }
+
+
+def slowing_for_limits(arm: AnyArm, trajectory: Trajectory) -> tuple[float, tuple[LimitName, int] | None]:
+    """Return how many times slower a motion must run to keep its limits of speed, acceleration and effort.
+
+    Args:
+        arm: the arm, or a compiled one, which is faster.
+        trajectory: of its n joints.
+
+    Returns:
+        The factor, 1 where it keeps them as it is; and the limit and the joint, from 0, that it is for, None for none.
+
+    Raises:
+        KindError: ``trajectory`` is no trajectory.
+        ShapeError: it is of another number of joints.
+        InvalidValueError: gravity and dry friction alone take more than a joint may give, so that no slowing helps.
+    """
+    model = solver_of(arm).arm
+    checked(model, trajectory)
+    factor, because = slowing(model, {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2)})
+    efforts = slowing_for_efforts(arm, trajectory.slowed(factor))
+    if efforts.joint is None:
+        return factor, because
+    return factor * efforts.factor, ("effort", efforts.joint)

@@ -1,0 +1,334 @@
+"""Joint moves and Cartesian moves through poses, by straight ways with blends: of the joints, or of the hand."""
+
+import warnings
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arm.positions import one_posture
+from armwright.arrays import Array, ArrayLike, floats, number, of_shape
+from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.judge import typed_poses
+from armwright.kinematics.inverse.turns import middle
+from armwright.motion.blends import Ends, blend_timing, blended, via_distances
+from armwright.motion.detour import By, Detour, line_or_detour
+from armwright.motion.follow import PathError
+from armwright.motion.follow_hand import carry
+from armwright.motion.hand_path import HandPath, Orientation, hand_path
+from armwright.motion.limit_use import slowing_for_limits
+from armwright.motion.path import NEGLIGIBLE, Path
+from armwright.motion.postures import postures_at, postures_through
+from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.trajectory import Trajectory, join
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import nearest_rotation
+
+# A matrix this far from a rotation is not worth a warning.
+_ROUNDING = 1e-9
+# Blends without a time of their own take this part of the shortest time between two poses.
+_BLEND = 0.2
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Move:
+    """A move through poses.
+
+    Attributes:
+        arm: the arm.
+        poses: (k, 4, 4) poses of the tool, their rotations made exact.
+        times: (k,) when they are passed [s].
+        postures: (k, n) joint positions at the poses.
+        label: branch of the postures; several, joined by arrows, where it changes from pose to pose.
+        trajectory: of the joints.
+        misses: (k,) shortest distance at which the planned path passes each pose: of the hand [m] for a Cartesian move,
+            in joint space for a joint move; the ends are met, and so is every pose that is stopped at.
+        hand: where the hand is planned to be; None where no path of it is planned.
+        deviation: upper bound of the distance of the hand from there [m]; 0 where none is planned.
+        turn: upper bound of the angle from the planned orientation [rad].
+        detours: the ways from pose to pose of a move that stops at each of them; else none.
+    """
+
+    arm: Arm
+    poses: Array
+    times: Array
+    postures: Array
+    label: str
+    trajectory: Trajectory
+    misses: Array
+    hand: HandPath | None = None
+    deviation: float = 0.0
+    turn: float = 0.0
+    detours: tuple[Detour, ...] = ()
+
+    def slowed(self, factor: float) -> "Move":
+        """Return the same move run ``factor`` times slower."""
+        return attrs.evolve(
+            self,
+            times=self.times * factor,
+            trajectory=self.trajectory.slowed(factor),
+            hand=None if self.hand is None else self.hand.slowed(factor),
+        )
+
+
+def joint_move(
+    arm: AnyArm,
+    poses: ArrayLike,
+    times: ArrayLike | None = None,
+    *,
+    blend: ArrayLike | None = None,
+    near: ArrayLike | None = None,
+    ends: Ends = "rest",
+) -> Move:
+    """Plan a move on which every joint goes straight from pose to pose, with blends.
+
+    One branch is kept through all poses where it is inside the limits there; otherwise the postures are those of the
+    shortest way.
+
+    Args:
+        arm: the arm, or a compiled one.
+        poses: (k, 4, 4) two or more tool poses; rotations typed with a few digits are made exact, with a warning.
+        times: (k,) when they are passed, rising from 0 [s], whatever the limits say; as fast as the limits of speed,
+            acceleration and effort allow when left out.
+        blend: how long before and after each pose the joints are off their straight ways [s], one number or (k,);
+            a fifth of the shortest time between two poses when left out. Only with ``times``.
+        near: (n,) present joint positions, for the choice of the first posture; the middle of the limits when left out.
+        ends: ``rest`` starts and stops, ``running`` begins and ends at full speed.
+
+    Raises:
+        PathError: a pose has no posture inside the limits.
+        ArmwrightError: poses, times or blends are none, or blends overlap.
+
+    Source:
+        Paul (1981) ch. 5; the project on the PUMA's trajectories, section 3.1.
+    """
+    solver = solver_of(arm)
+    X = exact_poses(poses)
+    postures = postures_through(solver.arm, X, _near(solver.arm, near))
+    q = np.array([posture.q for posture in postures])
+    if times is None:
+        _refuse_blend(blend)
+        t, b = blend_timing(q, solver.arm.limit("speed"), solver.arm.limit("acceleration"), ends=ends)
+    else:
+        t, b = _timing(times, blend, len(X))
+    labels = [posture.label for posture in postures]
+    move = Move(
+        arm=solver.arm,
+        poses=X,
+        times=t,
+        postures=q,
+        label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
+        trajectory=blended(t, q, b, ends=ends),
+        misses=via_distances(t, q, b, ends=ends),
+    )
+    return move if times is not None else _inside_limits(arm, move)
+
+
+def cartesian_move(
+    arm: AnyArm,
+    poses: ArrayLike,
+    times: ArrayLike | None = None,
+    *,
+    blend: ArrayLike | None = None,
+    near: ArrayLike | None = None,
+    ends: Ends = "rest",
+    orientation: Orientation = "geodesic",
+    deviation: float = 1e-4,
+) -> Move:
+    """Plan a move on which the hand goes straight from pose to pose, with blends.
+
+    Places and orientations are planned, the joints solved on them and joined by an X-spline, with as many knots as the
+    deviation asks for. The branch is chosen once and kept: of the postures inside the limits at the first pose the
+    nearest that carries through.
+
+    Args:
+        arm: the arm, or a compiled one, which plans faster.
+        poses: (k, 4, 4) two or more tool poses; rotations typed with a few digits are made exact, with a warning.
+        times: (k,) when they are passed, rising from 0 [s], whatever the limits say; when left out, by the arm's speed
+            of the tool, slower where the limits of speed, acceleration and effort ask for it.
+        blend: how long before and after each pose the hand is off its straight ways [s], one number or (k,); a fifth
+            of the shortest time between two poses when left out.
+        near: (n,) present joint positions, for the choice of the first posture; the middle of the limits when left out.
+        ends: ``rest`` starts and stops, ``running`` begins and ends at full speed.
+        orientation: ``geodesic`` turns about one fixed axis from pose to pose, ``zyz`` blends the ZYZ Euler angles.
+        deviation: allowed distance of the hand from where it is planned to be [m]; the orientation may be off by 5
+            mrad for each mm of it.
+
+    Raises:
+        PathError: no branch carries through: what stops each of them, with the time, the place, and the joint.
+        ArmwrightError: poses, times or blends are none, or blends overlap.
+
+    Source:
+        Paul (1981) ch. 5; the project on the PUMA's trajectories, section 3.2.
+    """
+    one_of("orientation", orientation, ("geodesic", "zyz"))
+    solver, X = solver_of(arm), exact_poses(poses)
+    t, b = _timing(_tool_times(solver.arm, X) if times is None else times, blend, len(X))
+    hand = hand_path(X, t, b, ends=ends, orientation=orientation)
+    move = along(solver, X, hand, t, b, near=near, ends=ends, deviation=deviation)
+    return move if times is not None else _inside_limits(arm, move)
+
+
+def along(
+    solver: Solver,
+    X: Array,
+    hand: HandPath,
+    times: Array,
+    blend: ArrayLike,
+    *,
+    near: ArrayLike | None = None,
+    ends: Ends = "rest",
+    deviation: float = 1e-4,
+) -> Move:
+    """Return the move along a path of the hand; arguments and errors as of ``cartesian_move``."""
+    if not 0 < number(deviation, "deviation") < np.inf:
+        raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation:g}")
+    found = carry(solver, hand, times, _near(solver.arm, near), ends=ends, deviation=deviation)
+    return Move(
+        arm=solver.arm,
+        poses=X,
+        times=times,
+        postures=found.trajectory(times),
+        label=found.label,
+        trajectory=found.trajectory,
+        misses=via_distances(times, X[:, :3, 3], blend, ends=ends),
+        hand=hand,
+        deviation=found.deviation,
+        turn=found.turn,
+    )
+
+
+def stopping_move(
+    arm: AnyArm,
+    poses: ArrayLike,
+    *,
+    by: By = "via",
+    near: ArrayLike | None = None,
+    deviation: float = 1e-3,
+    speed: float = 100.0,
+) -> Move:
+    """Plan certified straight lines from pose to pose with a stop at each, and ways round what stops a line.
+
+    Args:
+        arm: the arm, or a compiled one, which plans faster.
+        poses: (k, 4, 4) two or more tool poses; rotations typed with a few digits are made exact, with a warning.
+        by: ``via`` or ``damped``, as for ``line_or_detour``.
+        near: (n,) present joint positions, for the choice of the first posture; the middle of the limits when left out.
+        deviation: allowed distance of the hand from a line [m].
+        speed: 1 to 120, 100 is normal.
+
+    Returns:
+        The move; its ``detours`` tell of every way how it is run, and at which price.
+
+    Raises:
+        PathError: there is no way between two poses, from no posture at the first one: what stops the nearest.
+        ArmwrightError: poses, ``by``, deviation or speed are none.
+    """
+    solver, X = solver_of(arm), exact_poses(poses)
+    first: PathError | None = None
+    for start in postures_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
+        try:
+            legs = _legs(arm, start.q, X, by=by, deviation=deviation, speed=speed)
+        except PathError as error:
+            first = first or error
+        else:
+            return _stopping(solver.arm, X, start.q, legs)
+    assert first is not None  # noqa: S101 - there is a posture at the first pose
+    raise first
+
+
+def exact_poses(poses: ArrayLike) -> Array:
+    """Return poses (k, 4, 4), two at least, with exact rotations; a warning names those typed with few digits.
+
+    Raises:
+        KindError: they are something else than real numbers.
+        ShapeError: they are not (k, 4, 4), or fewer than two.
+        InvalidValueError: one is no pose, not even one typed with two digits.
+    """
+    X = of_shape(poses, (4, 4), "poses")
+    if X.ndim != 3 or len(X) < 2:
+        raise ShapeError(f"poses: expected two or more, shape (k, 4, 4), got {X.shape}")
+    for i, one in enumerate(X, 1):
+        try:
+            typed_poses(one)
+        except InvalidValueError as refused:
+            raise InvalidValueError(f"pose {i}: {str(refused).removeprefix('pose: ')}") from None
+    R = nearest_rotation(X[:, :3, :3])
+    changes = np.abs(R - X[:, :3, :3]).max(axis=(1, 2))
+    for i in np.flatnonzero(changes > _ROUNDING).tolist():
+        warnings.warn(
+            f"pose {i + 1}: its rotation is none, by {changes[i]:.2g}; the nearest one is taken",
+            RotationWarning,
+            stacklevel=3,
+        )
+    return pose(R, X[:, :3, 3])
+
+
+def _near(arm: Arm, near: ArrayLike | None) -> Array:
+    return middle(arm) if near is None else one_posture(arm, near, "near")
+
+
+def _timing(times: ArrayLike, blend: ArrayLike | None, count: int) -> tuple[Array, Array]:
+    t = floats(times, "times")
+    if t.shape != (count,):
+        raise ShapeError(f"times: expected {count}, one per pose, got shape {t.shape}")
+    if blend is None:
+        return t, np.full(count, _BLEND * max(float(np.diff(t).min()), 0.0))
+    b = floats(blend, "blend")
+    if b.shape not in ((), (count,)):
+        raise ShapeError(f"blend: expected one number, or {count}, one per pose, got shape {b.shape}")
+    return t, np.array(np.broadcast_to(b, (count,)))
+
+
+def _tool_times(arm: Arm, X: Array) -> Array:
+    """Return when poses are passed at the arm's speed of the tool."""
+    lengths = Path(poses=X).lengths()
+    for i in np.flatnonzero(lengths <= NEGLIGIBLE):
+        raise InvalidValueError(f"poses {i + 1} and {i + 2} are the same; leave one out, or give times")
+    if not np.isfinite(arm.tool_speed):
+        raise InvalidValueError(
+            f"arm '{arm.name}': times are needed, as its tool has no speed of its own ([hand] in the arm file)"
+        )
+    return np.concatenate([[0.0], np.cumsum(lengths / arm.tool_speed)])
+
+
+def _refuse_blend(blend: ArrayLike | None) -> None:
+    if blend is not None:
+        raise InvalidValueError("blend: only with times; without them the limits of acceleration tell the blends")
+
+
+def _inside_limits(arm: AnyArm, move: Move) -> Move:
+    factor, _ = slowing_for_limits(arm, move.trajectory)
+    return move if factor == 1 else move.slowed(factor)
+
+
+def _legs(arm: AnyArm, q: Array, X: Array, *, by: By, deviation: float, speed: float) -> list[Detour]:
+    """Return a way from every pose to the next, from rest to rest."""
+    legs: list[Detour] = []
+    for i, goal in enumerate(X[1:]):
+        try:
+            legs.append(line_or_detour(arm, q, goal, by=by, deviation=deviation, speed=speed))
+        except PathError as error:
+            raise PathError(error.cause, i, error.fraction, f"from pose {i + 1} to pose {i + 2}: {error}") from error
+        q = legs[-1].trajectory(legs[-1].trajectory.duration)
+    return legs
+
+
+def _stopping(arm: Arm, X: Array, q_start: Array, legs: Sequence[Detour]) -> Move:
+    times = np.concatenate([[0.0], np.cumsum([leg.trajectory.duration for leg in legs])])
+    postures = np.array([q_start, *(leg.trajectory(leg.trajectory.duration) for leg in legs)])
+    labels = [inverse(arm, each, q).best.label for each, q in zip(X, postures, strict=True)]
+    return Move(
+        arm=arm,
+        poses=X,
+        times=times,
+        postures=postures,
+        label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
+        trajectory=join([leg.trajectory for leg in legs]),
+        misses=np.zeros(len(X)),
+        deviation=max(leg.price.distance for leg in legs),
+        turn=max(leg.price.turn for leg in legs),
+        detours=tuple(legs),
+    )

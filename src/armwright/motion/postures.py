@@ -1,0 +1,80 @@
+"""Which posture to take at each of several poses: one branch kept where it can be, else the shortest way."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.turns import images
+from armwright.motion.follow import PathError, cause_of
+
+
+class Posture(NamedTuple):
+    """Joint positions (n,) inside the limits, and the branch that they belong to."""
+
+    label: str
+    q: Array
+
+
+def postures_at(arm: Arm, X: Array, near: Array) -> list[list[Posture]]:
+    """Return the postures inside the limits at every pose, whole turns included.
+
+    Args:
+        arm: the arm.
+        X: (k, 4, 4) poses.
+        near: (n,) joint positions near which the first ones are sought; without a closed form it decides what is found.
+
+    Raises:
+        PathError: a pose has none; ``segment`` is the way that leads to it, from 0.
+    """
+    layers: list[list[Posture]] = []
+    for i, each in enumerate(X):
+        solution = inverse(arm, each, near)
+        if not solution.allowed:
+            raise PathError(cause_of(solution), max(i - 1, 0), min(i, 1.0), f"pose {i + 1}: {solution.explain()}")
+        layers.append([Posture(branch.label, q) for branch in solution.allowed for q in images(arm, branch.q)])
+        near = layers[-1][0].q
+    return layers
+
+
+def postures_through(arm: Arm, X: Array, near: Array) -> list[Posture]:
+    """Return a posture for every pose: of one branch where it is inside the limits throughout, else of any.
+
+    Of all such ways the shortest is taken, measured by the sum of the times that the joints need for it.
+
+    Args:
+        arm: the arm.
+        X: (k, 4, 4) poses.
+        near: (n,) where the arm comes from.
+
+    Raises:
+        PathError: a pose has no posture inside the limits.
+    """
+    layers = postures_at(arm, X, near)
+    kept = set.intersection(*({posture.label for posture in layer} for layer in layers))
+    if kept:
+        one = [[[p for p in layer if p.label == label] for layer in layers] for label in sorted(kept)]
+        ways = [_shortest(arm, near, same) for same in one]
+        return min(ways, key=lambda way: way[0])[1]
+    return _shortest(arm, near, layers)[1]
+
+
+def _shortest(arm: Arm, near: Array, layers: Sequence[Sequence[Posture]]) -> tuple[float, list[Posture]]:
+    """Return the shortest way through one posture of every layer, and its length."""
+    speed = arm.limit("speed")
+    weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
+    places, lengths, came = near[None], np.zeros(1), []
+    for layer in layers:
+        here = np.array([posture.q for posture in layer])
+        ways = lengths[:, None] + np.linalg.norm((here - places[:, None]) * weight, axis=-1)
+        came.append(ways.argmin(axis=0))
+        places, lengths = here, ways.min(axis=0)
+    last = int(lengths.argmin())
+    length, chosen = float(lengths[last]), []
+    for layer, best in zip(reversed(layers), reversed(came), strict=True):
+        chosen.append(layer[last])
+        last = int(best[last])
+    return length, chosen[::-1]
