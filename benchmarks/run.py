@@ -22,6 +22,7 @@ ALL = (
     "latency",
     "simulation",
     "motion_lines",
+    "motion_path",
     "motion_knots",
     "motion_online",
 )
