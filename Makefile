@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test bench edges examples clean
+.PHONY: help demo test bench edges examples pictures clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -37,6 +37,9 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/twelve_moves.rlo --cell examples/stanford_cell.toml -o out/twelve_moves
 	$(BIN)/armwright run examples/portable.rlo --cell examples/stanford_cell.toml -o out/portable
 	$(BIN)/armwright run examples/gearbox.rlo --cell examples/puma_cell.toml -o out/gearbox
+
+pictures: $(VENV)/core  ## Draw the pictures of the physics pages
+	$(BIN)/python docs/pictures/make.py
 
 bench: $(VENV)/bench  ## Measure against the peers, one core each
 	PYTHONPATH=tests $(BIN)/python benchmarks/run.py

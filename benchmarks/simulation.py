@@ -24,7 +24,7 @@ def main() -> None:
         rows.append([title, f"{taken:.2f}", f"{DURATION / taken:.1f}"])
     section(
         "Simulation",
-        f"`puma560` released at q = 0 with its viscous and dry friction, {DURATION:g} s of motion.",
+        f"`puma560` released at q = 0 with its dry friction, {DURATION:g} s of motion.",
         table(["integrator", "s", "times real time"], rows),
     )
 

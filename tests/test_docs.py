@@ -1,4 +1,4 @@
-"""What the pages on file formats say is true."""
+"""What the pages say is true."""
 
 import re
 from collections.abc import Callable
@@ -7,11 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import armwright
 from armwright.arm.load import read_arm, read_load
 from armwright.cell.reader import read_cell
+from armwright.dynamics.integrators import Adaptive
+from armwright.dynamics.simulation import JointState, Status
 from armwright.errors import FileFormatError
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector
+from armwright.study.stanford_torque import joint_table, torques
 
 DOCS = Path(__file__).parents[1] / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
 CELLS, ARMS = (DOCS / "cells.md").read_text(encoding="utf-8"), (DOCS / "arms.md").read_text(encoding="utf-8")
 
 
@@ -151,3 +158,99 @@ def test_load_of_the_page(tmp_path: Path) -> None:
     assert load.mass == 1.8
     np.testing.assert_allclose(load.com, (0, 0, 0.05))
     np.testing.assert_array_equal(load.inertia, 0.003 * np.eye(3))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(DOCS)))
+def test_links_and_pictures_are_there(page: Path) -> None:
+    """Every file that a page links to, or shows as a picture, is there."""
+    for target in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
+
+
+def test_pictures_are_shown_and_small() -> None:
+    """Every drawing is on some page, which says in words what it shows, and takes less than 200 kB."""
+    shown = {
+        (page.parent / target).resolve()
+        for page in PAGES
+        for target in re.findall(r"!\[[^\]]{40,}\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
+    }
+    drawings = set((DOCS / "pictures").resolve().glob("*.svg"))
+
+    assert len(drawings) >= 2
+    assert drawings <= shown
+    assert all(drawing.stat().st_size < 200_000 for drawing in drawings)
+
+
+def test_tests_that_the_physics_pages_name() -> None:
+    """Who follows a page to a test finds it."""
+    tests = Path(__file__).parent
+    modules = {path.name for path in tests.rglob("test_*.py")}
+    functions = {name for path in tests.rglob("test_*.py") for name in re.findall(r"def (test_\w+)", path.read_text())}
+    for page in (DOCS / "physics").glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        for path in re.findall(r"`tests/([\w/]+\.py)`", text):
+            assert (tests / path).exists(), path
+        for name in re.findall(r"`(test_\w+)(?:\.py)?`", text):
+            assert f"{name}.py" in modules or name in functions, name
+
+
+def test_names_of_the_translation() -> None:
+    """Every function in our column of the table can be had from the package."""
+    rows = re.findall(r"^\|[^|]+\|([^|]+)\|", (DOCS / "translation.md").read_text(encoding="utf-8"), re.MULTILINE)
+    names = {name for row in rows for name in re.findall(r"(?<![\w.])([a-z]\w*)\(", row)}
+
+    assert len(names) > 12
+    assert names <= set(armwright.__all__)
+
+
+def test_postures_of_the_picture() -> None:
+    """The pose on the page on kinematics has eight postures; of each pair of wrists joint 4 allows one."""
+    text = (DOCS / "physics" / "kinematics.md").read_text(encoding="utf-8")
+    found = re.search(r"inverse puma560 --xyz (\S+) --rpy ([^`]+)`", text)
+    assert found is not None
+    place, turn = (np.array([float(x) for x in numbers.split(",")]) for numbers in found.groups())
+    roll, pitch, yaw = (
+        rotation_from_vector(angle * axis) for angle, axis in zip(np.radians(turn), np.eye(3), strict=True)
+    )
+
+    solution = armwright.inverse(armwright.load_arm("puma560"), pose(yaw @ pitch @ roll, place / 1e3))
+
+    assert len(solution.branches) == 8
+    assert len({branch.label.rpartition(",")[0] for branch in solution.allowed}) == len(solution.allowed) == 4
+    assert {violation.joint for branch in solution for violation in branch.violations} == {4}
+
+
+def test_energy_of_the_picture() -> None:
+    """The numbers below the picture of the released arm are those of the motion, and the account balances."""
+    text = (DOCS / "physics" / "dynamics.md").read_text(encoding="utf-8")
+    found = armwright.simulate(
+        armwright.load_arm("puma560"),
+        np.radians((0, -60, 60, 0, 30, 0)),
+        duration=6.0,
+        integrator=Adaptive(rtol=1e-9, atol=1e-11),
+        period=0.01,
+    )
+
+    assert found.status is Status.FINISHED
+    assert found.at_rest()
+    assert np.abs(found.imbalance).max() < 2e-10
+    height = found.energy[0] - found.potential.min()
+    heat, impact = found.heat[-1].sum(), found.impact[-1]
+    assert f"Of its {height:.1f} J of height" in text
+    assert f"dry friction takes {heat:.1f} J and the two stops {impact:.1f} J" in text
+    moves = {joint: [e.t for e in found.events if e.joint == joint and e.after == JointState.MOVES] for joint in (0, 2)}
+    assert f"Joint 3 is dragged along after {moves[2][0]:.2f} s and joint 1 after {moves[0][0]:.2f} s" in text
+    assert f"at {found.events[-1].t:.2f} s all is held" in text
+
+
+def test_numbers_of_the_study() -> None:
+    """What the page on dynamics says of Bejczy's model and of the load is what the study finds."""
+    text = (DOCS / "physics" / "dynamics.md").read_text(encoding="utf-8")
+    rows = joint_table(torques())
+
+    *most, last = [f"{100 * row.bejczy:.0f}" for row in rows]
+    load = [f"{100 * row.load:.0f}" for row in rows]
+    assert f"{', '.join(most)} and {last} %" in text
+    assert f"joints 4 and 5 by {load[3]} and {load[4]} %, those of the others by {load[2]} % at most" in text
+    assert max((rows[i] for i in (0, 1, 2, 5)), key=lambda row: row.load).joint == 3
+    assert f"Joint 5 then needs {rows[4].peak_loaded:.1f} N m, and its motor has {rows[4].limit:g}" in text

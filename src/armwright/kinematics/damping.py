@@ -37,7 +37,7 @@ def damped_rates(
 
     Along a direction in which the arm moves the hand well, with a singular value s of ``damping`` or more, the twist
     is met exactly. Below that the gain is 2 s / (s² + damping²) instead of 1 / s: it goes on from 1 / damping
-    smoothly and falls to 0 with s. So no gain passes 1 / damping and
+    without a jump and falls to 0 with s. So no gain passes 1 / damping and
 
         |rates| ≤ |twist| / damping,
 
@@ -65,7 +65,7 @@ def damped_rates(
     Source:
         Nakamura & Hanafusa (1986), with the damping of Chiaverini (1997) that depends on the singular values, taken for
         each direction by itself (Maciejewski & Klein 1988, numerical filtering): damping² · (1 - s²/damping²) / 2 in
-        the damped inverse s / (s² + ...) is the gain above, and the least that keeps the bound.
+        the damped inverse s / (s² + ...) is the gain above.
     """
     known_axes(frame)
     damping, length = number(damping, "damping"), number(length, "length")

@@ -1,0 +1,236 @@
+"""The pictures of the physics pages, drawn from what the package computes; `make pictures` runs this."""  # noqa: INP001
+
+import io
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from armwright import inverse, link_poses, load_arm, simulate
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.dynamics.integrators import Adaptive
+from armwright.dynamics.simulation import Event, JointState, Simulation
+from armwright.kinematics.inverse.solution import Branch
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector
+
+HERE = Path(__file__).parent
+INK, FAINT, GRID, ALARM = "#1f2933", "#7b8794", "#e4e7eb", "#c62828"
+# Fixed names of the parts, no date: a picture changes only when its numbers do. White behind, for dark pages too.
+STYLE = {
+    "svg.hashsalt": "armwright",
+    "figure.facecolor": "white",
+    "font.size": 9,
+    "text.color": INK,
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "path.simplify_threshold": 0.5,
+}
+
+
+def write(figure: Figure, name: str) -> None:
+    """Write a figure beside this script."""
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    (HERE / name).write_text(text.getvalue(), encoding="utf-8")
+
+
+# The eight postures.
+
+# The hand, pointing forward and down: where the wrist centre is [m], and roll, pitch and yaw [deg].
+PLACE, TURN = (0.36, 0.02, -0.05), (120, -25, 90)
+# From where the arm is seen: around from the front, and up [rad].
+AROUND, UP = np.radians(-62), np.radians(22)
+FLOOR = -0.45  # below the shoulder [m]
+COLOURS = {"left": ("#1d6fa5", "#8fc1e3"), "right": ("#b45309", "#f3b26b")}
+POSTURES = ("up, no-flip", "up, flip", "down, no-flip", "down, flip")
+
+
+def seen(p: Array) -> Array:
+    """Return where points (..., 3) are on the picture: right, up, and towards who looks (..., 3)."""
+    c, s, cu, su = np.cos(AROUND), np.sin(AROUND), np.cos(UP), np.sin(UP)
+    return p @ np.array([[-s, c, 0], [-su * c, -su * s, cu], [cu * c, cu * s, su]]).T
+
+
+def bars(arm: Arm, q: Array) -> list[tuple[Array, Array, float, int]]:
+    """Return the arm as straight bars: ends [m], width [points], and a part: column, arm, hand, axis of joint 5."""
+    X = link_poses(arm, q)
+    shoulder, elbow, wrist = X[1, :3, 3], X[2, :3, 3], X[4, :3, 3]
+    # The table has the shoulder's offset beside joint 3; built it is beside joint 2. The axes are the same.
+    side = arm.joints[2].d * X[2, :3, 2]
+    R, pin = X[6, :3, :3], X[4, :3, 2]
+    palm = wrist + 0.10 * R[:, 2]
+    fingers = [(palm + w * R[:, 0], palm + w * R[:, 0] + 0.07 * R[:, 2], 3.5, 2) for w in (-0.04, 0.04)]
+    return [
+        (np.array((0, 0, FLOOR)), shoulder, 18, 0),
+        (shoulder - 0.3 * side, shoulder + side, 15, 0),
+        (shoulder + side, elbow + side, 13, 1),
+        (elbow + side, wrist, 10, 1),
+        (wrist, wrist + 0.13 * pin, 2.5, 3),
+        (wrist + 0.13 * pin, wrist + 0.13 * pin, 6.5, 3),
+        (wrist, palm, 5.5, 2),
+        (palm - 0.04 * R[:, 0], palm + 0.04 * R[:, 0], 4, 2),
+        *fingers,
+    ]
+
+
+def floor(axes: Axes) -> None:
+    """Draw the floor: lines 0.2 m apart."""
+    marks = 0.2 * np.arange(-2, 3)
+    for x in marks:
+        for ends in ([(x, marks[0], FLOOR), (x, marks[-1], FLOOR)], [(marks[0], x, FLOOR), (marks[-1], x, FLOOR)]):
+            points = seen(np.array(ends))
+            axes.plot(points[:, 0], points[:, 1], color=GRID, linewidth=0.7, zorder=0)
+
+
+def draw_posture(axes: Axes, arm: Arm, branch: Branch) -> None:
+    """Draw the arm in one posture; pale where it is outside the limits."""
+    dark, light = COLOURS[branch.label.split(",")[0]]
+    fills = ("#d3d9df", light, "#52606d", dark)
+    strength = 1.0 if branch.allowed else 0.45
+    floor(axes)
+    parts = bars(arm, branch.q)
+    for start, end, width, _ in parts:
+        shadow = seen(np.array([start, end]) * (1, 1, 0) + (0, 0, FLOOR))
+        axes.plot(shadow[:, 0], shadow[:, 1], color=GRID, linewidth=0.7 * width, solid_capstyle="round", zorder=1)
+    # What is nearer hides what is farther away.
+    parts.sort(key=lambda part: float(seen((part[0] + part[1]) / 2)[2]))
+    for order, (start, end, width, part) in enumerate(parts, 2):
+        points = seen(np.array([start, end]))
+        pale = mpl.colors.to_rgb(fills[part])
+        fill = tuple(1 - strength * (1 - x) for x in pale)
+        edge = tuple(1 - strength * (1 - x) for x in mpl.colors.to_rgb(INK))
+        for colour, extra in ((edge, 1.4), (fill, 0.0)):
+            axes.plot(
+                points[:, 0], points[:, 1], color=colour, linewidth=width + extra, solid_capstyle="round", zorder=order
+            )
+    axes.set(xlim=(-0.33, 0.57), ylim=(-0.59, 0.45), aspect="equal")
+    axes.axis("off")
+
+
+def write_angles(axes: Axes, branch: Branch) -> None:
+    """Write the joint angles below the arm, three and three, those outside their limits in red."""
+    outside = {violation.joint for violation in branch.violations}
+    for i, angle in enumerate(np.degrees(branch.q)):
+        red = i + 1 in outside
+        axes.text(
+            0.5 + 0.26 * (i % 3 - 1),
+            -0.02 - 0.09 * (i // 3),
+            f"{angle:.0f}°".replace("-", "−"),
+            transform=axes.transAxes,
+            ha="center",
+            va="top",
+            fontsize=8.5,
+            color=ALARM if red else INK,
+            fontweight="bold" if red else "normal",
+        )
+
+
+def postures() -> Figure:
+    """Draw all postures in which the PUMA holds its hand in one pose."""
+    arm = load_arm("puma560")
+    roll, pitch, yaw = (
+        rotation_from_vector(angle * axis) for angle, axis in zip(np.radians(TURN), np.eye(3), strict=True)
+    )
+    branches = {branch.label: branch for branch in inverse(arm, pose(yaw @ pitch @ roll, PLACE))}
+    figure = Figure(figsize=(7.2, 5.45))
+    edges = {"left": 0, "right": 1, "top": 0.95, "bottom": 0.085, "hspace": 0.33, "wspace": 0.05}
+    rows = figure.subplots(2, 4, gridspec_kw=edges)
+    for row, side in zip(rows, COLOURS, strict=True):
+        for axes, name in zip(row, POSTURES, strict=True):
+            branch = branches[f"{side}, {name}"]
+            draw_posture(axes, arm, branch)
+            write_angles(axes, branch)
+            axes.set_title(branch.label, fontsize=9.5, fontweight="bold", color=COLOURS[side][0], pad=2)
+    return figure
+
+
+# The released arm.
+
+RELEASED = np.radians((0, -60, 60, 0, 30, 0))
+DURATION = 6.0  # s
+# What the energy becomes: colour, colour of its name, and where its name stands [s], [part of all].
+SHARES = {
+    "height": ("#1d6fa5", "white", 0.28, 0.35),
+    "motion": ("#f0a13c", INK, 1.21, 0.62),
+    "taken by the stops": ("#6b7785", "white", 3.6, 0.34),
+    "taken by friction": ("#d3d9df", INK, 3.6, 0.82),
+}
+HELD, MOVING = "#e4e7eb", "#f0a13c"
+
+
+def impacts(found: Simulation) -> list[Event]:
+    """Return the events in which a joint meets a stop."""
+    return [event for event in found.events if event.after in (JointState.LOWER_STOP, JointState.UPPER_STOP)]
+
+
+def draw_energies(axes: Axes, found: Simulation) -> None:
+    """Stack what the energy of the start has become."""
+    height = found.potential - found.potential.min()
+    parts = (height, found.kinetic, found.impact, found.heat.sum(axis=-1))
+    axes.stackplot(found.t, *parts, colors=[colour for colour, *_ in SHARES.values()], linewidth=0)
+    tops = np.cumsum(parts, axis=0)
+    for top in tops[:-1]:
+        axes.plot(found.t, top, color="white", linewidth=0.8)
+    axes.plot(found.t, tops[-1], color=INK, linewidth=1.4)
+    whole = tops[-1, 0]
+    for name, (_, ink, t, part) in SHARES.items():
+        axes.text(t, part * whole, name, color=ink, ha="center", va="center", fontsize=10.5)
+    for event in impacts(found):
+        axes.annotate(
+            f"joint {event.joint + 1} meets its stop",
+            (event.t, whole),
+            xytext=(6 if event.t > 1.6 else -6, 8),
+            textcoords="offset points",
+            ha="left" if event.t > 1.6 else "right",
+            fontsize=8.5,
+        )
+    axes.set(ylabel="energy, J", xlim=(0, DURATION), ylim=(0, 1.1 * whole))
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def draw_joints(axes: Axes, found: Simulation) -> None:
+    """Draw when every joint moves, one strip for each."""
+    for joint in range(found.q.shape[1]):
+        axes.barh(joint + 1, DURATION, height=0.7, color=HELD, linewidth=0)
+        events = [event for event in found.events if event.joint == joint]
+        times = [0.0, *(event.t for event in events), DURATION]
+        states = [JointState.MOVES, *(event.after for event in events)]
+        for start, end, state in zip(times[:-1], times[1:], states, strict=True):
+            if state == JointState.MOVES and end > start:
+                axes.barh(joint + 1, end - start, left=start, height=0.7, color=MOVING, edgecolor=MOVING, linewidth=0.6)
+    axes.text(0.12, 2, "moves", va="center", fontsize=8.5)
+    axes.text(0.12, 4, "held by dry friction", va="center", fontsize=8.5)
+    axes.set(xlabel="time, s", ylabel="joint", ylim=(6.6, 0.4), yticks=range(1, 7))
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+
+
+def released() -> Figure:
+    """Draw where the energy of a PUMA goes whose drives are switched off."""
+    how = Adaptive(rtol=1e-9, atol=1e-11)
+    found = simulate(load_arm("puma560"), RELEASED, duration=DURATION, integrator=how, period=0.0125)
+    figure = Figure(figsize=(7.2, 5.0), layout="constrained")
+    energies, joints = figure.subplots(2, 1, sharex=True, height_ratios=(2.3, 1))
+    draw_energies(energies, found)
+    draw_joints(joints, found)
+    for axes in (energies, joints):
+        for event in impacts(found):
+            axes.axvline(event.t, color=INK, linewidth=0.7, linestyle=(0, (3, 2)))
+    return figure
+
+
+def main() -> None:
+    """Draw all pictures."""
+    with mpl.rc_context(STYLE):
+        write(postures(), "postures.svg")
+        write(released(), "released.svg")
+
+
+if __name__ == "__main__":
+    main()
