@@ -13,7 +13,7 @@ REFERENCE = {"base": pin.LOCAL_WORLD_ALIGNED, "tool": pin.LOCAL}
 
 
 def test_what_the_arms_are() -> None:
-    """There are a thousand of two to nine joints, and twenty of one, with both kinds of joint and products of inertia, in all ways."""
+    """There are a thousand of two to nine joints and twenty of one, slides among them, with products of inertia."""
     arms = [case.arm for case in thousand_arms()]
     joints = [joint for arm in arms for joint in arm.joints]
 
