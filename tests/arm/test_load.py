@@ -179,7 +179,10 @@ MISTAKES = {
         TURN + "\n" + TURN + "[joint.link]\nmass = 1\n",
         "7: joint 2, link, mass: unknown key; known here: com_cm, com_m, com_mm, inertia_about, inertia_kgm2, mass_kg",
     ),
-    "an angle without its unit": (TURN + "alpha = 90\n", "3: joint 1, alpha: unknown key; known here: "),
+    "an angle without its unit": (
+        TURN + "alpha = 90\n",
+        "3: joint 1, alpha: the key must tell the unit: alpha_deg or alpha_rad",
+    ),
     "a length in an angle's place": (
         TURN + "[joint.limits]\nlower_m = 0.1\n",
         "4: joint 1, limits, lower_m: unknown key; known here: ",
@@ -245,6 +248,14 @@ MISTAKES = {
     "a turn twice": (
         "[tool]\nrpy_deg = [0, 0, 90]\nrotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n" + TURN,
         "3: tool, rotation: the turn is given twice, as rpy and as rotation",
+    ),
+    "a turn three ways": (
+        "[tool]\nquaternion_wxyz = [1, 0, 0, 0]\nzyz_deg = [0, 0, 90]\nrpy_rad = [0, 0, 1]\n" + TURN,
+        "3: tool, zyz_deg: the turn is given twice, as rpy and as zyz",
+    ),
+    "a long quaternion": (
+        "[tool]\nquaternion_wxyz = [1, 1, 0, 0]\n" + TURN,
+        "2: tool, quaternion_wxyz: expected a quaternion of length 1, got one of length 1.41",
     ),
     "two rows": (
         "[base]\nrotation = [[1, 0, 0], [0, 1, 0]]\n" + TURN,
@@ -330,3 +341,18 @@ def test_any_slip(name: str, at: float, gone: int, slip: str, tmp_path: Path) ->
         assert "arm.toml:" in str(error)  # noqa: PT017 - either way is right
     else:
         assert len(arm.links) == len(arm.motors) == arm.n
+
+
+def test_turns_written_differently(read: Callable[[str], Arm]) -> None:
+    """Roll, pitch and yaw, ZYZ angles, rows and a quaternion say the same turn: z to x, by a right angle about y."""
+    ways = (
+        "rpy_deg = [0, 90, 0]",
+        "zyz_deg = [0, 90, 0]",
+        "zyz_rad = [0, 1.5707963267948966, 0]",
+        "rotation = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]",
+        "quaternion_wxyz = [0.71, 0, 0.71, 0]",
+    )
+
+    for way in ways:
+        tool = read(f"[tool]\n{way}\n" + TURN).tool
+        np.testing.assert_allclose(tool[:3, :3], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], atol=1e-12)

@@ -5,23 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from armwright.arm.dh import about_com, from_modified, turn
+from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, vector_in
 from armwright.arm.urdf.reader import load_urdf
-from armwright.arrays import Array
 from armwright.errors import KindError, UnknownNameError, shown
 from armwright.files.document import Document, Table
-from armwright.spatial.poses import pose
-from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 _CATALOGUE = Path(__file__).parent / "catalogue"
-# Keys carry their unit: factors to SI by the ending of the key.
-_ANGLE = {"deg": math.pi / 180, "rad": 1.0}
-_LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-# Rotations typed with two digits are off by up to 0.018; they are made exact. More is a mistake. Those that are
-# computed are off by rounding, and are kept as they are.
-_TYPED_ROTATION = 2e-2
-_COMPUTED_ROTATION = 1e-12
 
 
 def arm_names() -> tuple[str, ...]:
@@ -74,7 +65,7 @@ def read_arm(path: Path | str) -> Arm:
         links.append(_link(table.table("link")))
         motors.append(_motor(table.table("motor"), joints[-1].revolute))
         table.finish()
-    base, tool = _pose(top.table("base")), _pose(top.table("tool"))
+    base, tool = pose_in(top.table("base")), pose_in(top.table("tool"))
     if convention == "modified":
         before, joints, links = from_modified(joints, links)
         base = base @ before
@@ -89,8 +80,8 @@ def read_arm(path: Path | str) -> Arm:
         base=base,
         tool=tool,
         gravity=gravity.vector("m_per_s2", 3, default=(0.0, 0.0, -STANDARD_GRAVITY)),
-        reach=_unit(hand, "reach", _LENGTH, default=math.inf, positive=True),
-        tool_speed=_unit(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
+        reach=number_in(hand, "reach", LENGTH, default=math.inf, positive=True),
+        tool_speed=number_in(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
         source=top.text("source", default=""),
     )
     for table in (hand, gravity, top):
@@ -115,14 +106,14 @@ def read_load(path: Path | str) -> Link:
 def _joint(table: Table) -> Joint:
     kind = table.choice("kind", ("revolute", "prismatic"))
     limits = table.table("limits")
-    units = _ANGLE if kind == "revolute" else _LENGTH
+    units = ANGLE if kind == "revolute" else LENGTH
     effort = {"Nm": 1.0} if kind == "revolute" else {"N": 1.0}
     values = {
-        "lower": _unit(limits, "lower", units, default=-math.inf),
-        "upper": _unit(limits, "upper", units, default=math.inf),
-        "speed": _unit(limits, "speed", _per(units, "per_s"), default=math.inf, positive=True),
-        "acceleration": _unit(limits, "acceleration", _per(units, "per_s2"), default=math.inf, positive=True),
-        "effort": _unit(limits, "effort", effort, default=math.inf, positive=True),
+        "lower": number_in(limits, "lower", units, default=-math.inf),
+        "upper": number_in(limits, "upper", units, default=math.inf),
+        "speed": number_in(limits, "speed", per(units, "per_s"), default=math.inf, positive=True),
+        "acceleration": number_in(limits, "acceleration", per(units, "per_s2"), default=math.inf, positive=True),
+        "effort": number_in(limits, "effort", effort, default=math.inf, positive=True),
     }
     limits.finish()
     if not values["lower"] < values["upper"]:
@@ -130,17 +121,17 @@ def _joint(table: Table) -> Joint:
         raise limits.error(None, f"the lower limit must be below the upper, got {lower} and {upper}")
     return Joint(
         kind="revolute" if kind == "revolute" else "prismatic",
-        theta=_unit(table, "theta", _ANGLE, default=0.0),
-        d=_unit(table, "d", _LENGTH, default=0.0),
-        a=_unit(table, "a", _LENGTH, default=0.0),
-        alpha=_unit(table, "alpha", _ANGLE, default=0.0),
+        theta=number_in(table, "theta", ANGLE, default=0.0),
+        d=number_in(table, "d", LENGTH, default=0.0),
+        a=number_in(table, "a", LENGTH, default=0.0),
+        alpha=number_in(table, "alpha", ANGLE, default=0.0),
         limits=Limits(**values),
     )
 
 
 def _link(table: Table) -> Link:
     mass = table.number("mass_kg", default=0.0, lower=0.0)
-    com = _vector(table, "com", _LENGTH, default=np.zeros(3))
+    com = vector_in(table, "com", LENGTH, default=np.zeros(3))
     numbers = table.vector("inertia_kgm2", (3, 6), default=np.zeros(3))
     about = table.choice("inertia_about", ("com", "frame"), default="com")
     table.finish()
@@ -178,59 +169,6 @@ def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001
     return motor
 
 
-def _pose(table: Table) -> Array:
-    """Read a pose: a place, and a turn as roll, pitch and yaw about fixed x, y, z or as the rows of a rotation."""
-    place = _vector(table, "xyz", _LENGTH, default=np.zeros(3))
-    angles = _vector(table, "rpy", _ANGLE, default=np.zeros(3))
-    R = turn(2, angles[2]) @ turn(1, angles[1]) @ turn(0, angles[0])
-    if "rotation" in table:
-        if _given(table, "rpy", _ANGLE):
-            raise table.error("rotation", "the turn is given twice, as rpy and as rotation")
-        R = _rotation(table)
-    table.allow("rotation")
-    table.finish()
-    return pose(R, place)
-
-
-def _rotation(table: Table) -> Array:
-    rows = table.vectors("rotation", 3)
-    if len(rows) != 3:
-        raise table.error("rotation", f"expected 3 rows of 3 numbers, got {len(rows)}")
-    error = float(orthonormality_error(rows))
-    if error > _TYPED_ROTATION:
-        raise table.error("rotation", f"expected the rows of a rotation, got a matrix that is off by {error:.2g}")
-    return np.array(rows) if error < _COMPUTED_ROTATION else nearest_rotation(rows)
-
-
 def _written(kind: str, position: float) -> str:
     """Write a position as arm files do."""
     return f"{math.degrees(position):g}°" if kind == "revolute" else f"{position * 1e3:g} mm"
-
-
-def _per(units: dict[str, float], time: str) -> dict[str, float]:
-    return {f"{unit}_{time}": factor for unit, factor in units.items()}
-
-
-def _given(table: Table, name: str, units: dict[str, float]) -> str | None:
-    """Return the ending with which a quantity is given; refuse two."""
-    given = [unit for unit in units if f"{name}_{unit}" in table]
-    if len(given) > 1:
-        raise table.error(f"{name}_{given[1]}", f"{name} is given twice, in {given[0]} and in {given[1]}")
-    return given[0] if given else None
-
-
-def _unit(table: Table, name: str, units: dict[str, float], *, default: float, positive: bool = False) -> float:
-    unit = _given(table, name, units)
-    if unit is None:
-        table.allow(*(f"{name}_{unit}" for unit in units))
-        return default
-    read = table.positive if positive else table.number
-    return read(f"{name}_{unit}") * units[unit]
-
-
-def _vector(table: Table, name: str, units: dict[str, float], *, default: Array) -> Array:
-    unit = _given(table, name, units)
-    if unit is None:
-        table.allow(*(f"{name}_{unit}" for unit in units))
-        return default
-    return table.vector(f"{name}_{unit}", 3) * units[unit]
