@@ -37,6 +37,8 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/twelve_moves.rlo --cell examples/stanford_cell.toml -o out/twelve_moves
 	$(BIN)/armwright run examples/portable.rlo --cell examples/stanford_cell.toml -o out/portable
 	$(BIN)/armwright run examples/gearbox.rlo --cell examples/puma_cell.toml -o out/gearbox
+	$(BIN)/armwright move joint puma560 examples/puma_poses.toml -o out/joint
+	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 
 pictures: $(VENV)/core  ## Draw the pictures of the physics pages
 	$(BIN)/python docs/pictures/make.py

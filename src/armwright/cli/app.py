@@ -14,6 +14,7 @@ from armwright.cli.convert import convert
 from armwright.cli.forward import forward, jacobian
 from armwright.cli.inverse import inverse
 from armwright.cli.kernel import kernel
+from armwright.cli.move import move
 from armwright.cli.run import run
 from armwright.cli.show import show
 from armwright.cli.simulate import simulate
@@ -42,6 +43,7 @@ app.command()(jacobian)
 app.command()(torque)
 app.command()(singularity)
 app.command()(simulate)
+app.command()(move)
 app.command()(study)
 app.command()(kernel)
 

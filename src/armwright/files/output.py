@@ -9,7 +9,7 @@ from pathlib import Path
 from armwright.errors import OutputError
 
 
-def write_folder(folder: Path, files: Mapping[str, str | Iterable[str]]) -> None:
+def write_folder(folder: Path, files: Mapping[str, str | bytes | Iterable[str]]) -> None:
     """Write files into a folder, all of them or none.
 
     They are written beside the folder first and moved in when all are whole, so an error, a full disk or an
@@ -17,7 +17,7 @@ def write_folder(folder: Path, files: Mapping[str, str | Iterable[str]]) -> None
 
     Args:
         folder: made where it is missing, with its parents.
-        files: by name: the text, or pieces of it that are written as they come.
+        files: by name: the text, or pieces of it that are written as they come; or bytes.
 
     Raises:
         OutputError: the folder or a file cannot be written; the text says which and why.
@@ -66,7 +66,13 @@ def write_file(path: Path, text: str | Iterable[str]) -> None:
         raise
 
 
-def _write(path: Path, text: str | Iterable[str]) -> None:
+def _write(path: Path, text: str | bytes | Iterable[str]) -> None:
+    if isinstance(text, bytes):
+        with path.open("wb") as binary:
+            binary.write(text)
+            binary.flush()
+            os.fsync(binary.fileno())
+        return
     with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
         file.writelines([text] if isinstance(text, str) else text)
         file.flush()

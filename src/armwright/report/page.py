@@ -17,7 +17,8 @@ from armwright.report.markup import run_html
 from armwright.report.tracks import axes, check_rows, instants, numbers, path, per_joint, poses, rotations, skeleton
 
 Severity: TypeAlias = Literal["error", "warning", "note"]
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE"]
+StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "JOINT", "HAND"]
+TextKind: TypeAlias = Literal["Program", "Poses"]
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
 
 _SAME = attrs.cmp_using(eq=np.array_equal)
@@ -74,7 +75,7 @@ class Stage:
         t1: when it ended [s].
         line: line of the program, from 1.
         arm: name of the arm.
-        kind: ``PTP``, ``LINE`` or ``SPLINE``.
+        kind: ``PTP``, ``LINE`` or ``SPLINE`` of a program; ``JOINT`` or ``HAND`` of a move through poses.
         to: the frames it goes to, the last one its goal.
         speed: what the program asked for, 100 being normal.
         peak_speed: n largest joint speeds [rad/s] or [m/s].
@@ -264,6 +265,7 @@ class RunPage:
         stages: pieces of motion, in order.
         arms: records of the arms.
         animation: what the view shows; None where there is nothing to see.
+        text_kind: what the text is, ``Program`` or ``Poses``.
     """
 
     title: str
@@ -279,6 +281,7 @@ class RunPage:
     stages: tuple[Stage, ...] = attrs.field(default=(), converter=_all)
     arms: tuple[ArmRecord, ...] = attrs.field(default=(), converter=_all)
     animation: Animation | None = None
+    text_kind: TextKind = "Program"
 
     def __attrs_post_init__(self) -> None:
         """Refuse a duration that is none, and stages of arms or joints that are not there."""

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell, CellArm, base_name
@@ -16,25 +15,21 @@ from armwright.program.recording import Effect as RunEffect
 from armwright.program.recording import Recording, RunStage, Stream
 from armwright.report.page import (
     Animation,
-    ArmFigure,
     ArmRecord,
     Effect,
     FrameTrack,
-    JointInfo,
     Message,
     RunPage,
     Stage,
     TreeChange,
 )
+from armwright.report.sticks import joints_of, sticks, thinned
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
-# Enough for a screen: rows of the charts, and instants of the animation.
-_CHART_ROWS = 1500
+# Enough for a screen: instants of the animation.
 _FRAMES_PER_SECOND = 30.0
 _MOST_INSTANTS = 1200
-# The thickness of a drawn arm, as part of its reach, at the base and at the hand.
-_THICK, _THIN = 0.045, 0.016
 
 
 def page_of(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], command: str) -> RunPage:
@@ -87,32 +82,17 @@ def _stage(run: RunStage, line: int) -> Stage:
 
 def _record(stream: Stream, cell: Cell) -> ArmRecord:
     place = cell.arms[stream.arm]
-    stride = max(1, math.ceil(len(stream.t) / _CHART_ROWS))
-    rows = np.unique(np.append(np.arange(0, len(stream.t), stride), len(stream.t) - 1))
+    rows = thinned(len(stream.t))
     return ArmRecord(
         name=stream.arm,
         model=place.arm.name,
-        joints=[_joint(place.arm, i) for i in range(place.arm.n)],
+        joints=joints_of(place.arm),
         t=stream.t[rows],
         q=stream.q[rows],
         qd=stream.qd[rows],
         qdd=stream.qdd[rows],
         tau=stream.tau[rows],
         hand=_poses_in_world(place, stream.q[rows])[:, -1, :3, 3],
-    )
-
-
-def _joint(arm: Arm, i: int) -> JointInfo:
-    joint = arm.joints[i]
-    limits = joint.limits
-    return JointInfo(
-        name=f"joint {i + 1}",
-        kind=joint.kind,
-        lower=limits.lower,
-        upper=limits.upper,
-        speed=limits.speed,
-        acceleration=limits.acceleration,
-        effort=limits.effort,
     )
 
 
@@ -125,7 +105,7 @@ def _animation(recording: Recording, code: Code) -> Animation:
     return Animation(
         fps=fps,
         t=t,
-        arms={name: _figure(arms[name], poses, _grip(recording.effects, name, t)) for name, poses in links.items()},
+        arms={name: sticks(arms[name].arm, poses, _grip(recording.effects, name, t)) for name, poses in links.items()},
         frames=_tracks(recording, code, t, hands),
         tree=_tree_changes(recording, code),
     )
@@ -138,33 +118,6 @@ def _sampled(stream: Stream, t: Array) -> Array:
 
 def _poses_in_world(place: CellArm, q: Array) -> Array:
     return np.asarray(place.base @ link_poses(place.arm, q))
-
-
-def _figure(place: CellArm, poses: Array, grip: Array) -> ArmFigure:
-    """Draw an arm along its Denavit-Hartenberg steps: first along z, then along x, so that offsets show."""
-    origins, z_axes = poses[:, :, :3, 3], poses[:, :, :3, 2]
-    points = [_foot(origins[:, 0]), origins[:, 0]]
-    for i in range(1, place.arm.n + 1):
-        before, after, z = origins[:, i - 1], origins[:, i], z_axes[:, i - 1]
-        along = np.sum((after - before) * z, axis=-1, keepdims=True)
-        points += [before + along * z, after]
-    points.append(origins[:, -1])
-    reach = place.arm.reach if math.isfinite(place.arm.reach) else float(np.ptp(origins, axis=(0, 1)).max())
-    n = place.arm.n
-    return ArmFigure(
-        points=np.stack(points, axis=1),
-        hand_axes=np.swapaxes(poses[:, -1, :3, :3], -1, -2).reshape(len(poses), 9),
-        grip=grip,
-        joint_axes=np.concatenate([origins[:, :n], z_axes[:, :n]], axis=-1),
-        radii=np.linspace(_THICK, _THIN, len(points) - 1) * reach,
-    )
-
-
-def _foot(origin: Array) -> Array:
-    """Return the point on the floor below a base that stands above it, on which it is drawn to rest."""
-    foot = origin.copy()
-    foot[:, 2] = np.minimum(origin[:, 2], 0.0)
-    return foot
 
 
 def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:

@@ -2,11 +2,15 @@
 
 const byId = (id) => document.getElementById(id);
 
-// Comments are { ... } over any number of lines, and // to the end of one.
+// Comments of a program are { ... } over any number of lines, and // to the end of one; those of a file of poses # to
+// the end of a line.
+const COMMENTS = { Program: /(\{[^}]*\}?|\/\/[^\r\n]*)/, Poses: /(#[^\r\n]*)/ };
+
 function codeLines(text) {
   const lines = [[]];
-  for (const part of text.split(/(\{[^}]*\}?|\/\/[^\r\n]*)/)) {
-    const comment = part.startsWith("{") || part.startsWith("//");
+  const parts = text.split(COMMENTS[data.text_kind]);
+  for (const [place, part] of parts.entries()) {
+    const comment = place % 2 === 1;
     part.split(/\r\n|\r|\n/).forEach((piece, i) => {
       if (i) lines.push([]);
       if (piece) lines.at(-1).push(comment ? make("span", { className: "comment", textContent: piece }) : piece);
@@ -38,6 +42,8 @@ function programLine(pieces, i) {
 
 function fillProgram() {
   byId("program-name").textContent = data.program_name;
+  byId("program-title").textContent = data.text_kind;
+  if (data.text_kind !== "Program") byId("program-empty").textContent = "No file.";
   const empty = !data.program_text.trim();
   byId("program-empty").hidden = !empty;
   if (!empty) byId("program").append(...codeLines(data.program_text).map(programLine));

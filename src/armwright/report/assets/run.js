@@ -8,9 +8,10 @@ function fillHeader() {
   const facts = [
     ["Duration", `${number(data.duration, 2)} s`],
     ["Cell", data.cell_name],
-    ["Program", data.program_name],
+    [data.text_kind, data.program_name],
     ["Command", data.command, "code"],
   ];
+  if (!data.cell_name) facts.splice(1, 1);
   const arms = data.arms.map((arm) => `${arm.name} (${arm.model})`).join(", ");
   if (arms) facts.splice(1, 0, ["Arms", arms]);
   byId("facts").append(

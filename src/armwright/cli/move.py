@@ -1,0 +1,292 @@
+"""``armwright move``: an arm goes through poses, joint by joint or along straight ways of its hand."""
+
+import enum
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armwright.cli.forward import ArmName, Json
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from armwright.motion.certificate import LimitName
+    from armwright.motion.moves import Move
+    from armwright.motion.poses_file import PosesFile
+    from armwright.report.moved import Moved
+
+# Bounds of the options [ms], [mm].
+_PERIOD_MS, _DEVIATION_MM = (0.01, 1000.0), (1e-4, 100.0)
+# A limit passed by this part of it is rounding.
+_ROUNDING = 1e-9
+
+
+class Kind(enum.StrEnum):
+    """What goes straight from pose to pose."""
+
+    JOINT = "joint"
+    CARTESIAN = "cartesian"
+
+
+class Orientation(enum.StrEnum):
+    """How the hand turns from pose to pose."""
+
+    GEODESIC = "geodesic"
+    ZYZ = "zyz"
+
+
+class Ends(enum.StrEnum):
+    """How a move begins and ends."""
+
+    REST = "rest"
+    RUNNING = "running"
+
+
+class Around(enum.StrEnum):
+    """How to go round what stops a straight way."""
+
+    VIA = "via"
+    DAMPED = "damped"
+
+
+def move(  # noqa: PLR0917 - Typer reads one parameter per option
+    kind: Annotated[Kind, typer.Argument(help="What goes straight from pose to pose: joints or hand.")],
+    arm: ArmName,
+    poses: Annotated[Path, typer.Argument(help="File of poses, TOML or JSON (docs/poses.md).", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for the results; none are kept without it.")
+    ] = None,
+    near: Annotated[
+        str | None, typer.Option(help="Present posture, degrees and mm: 10,20,30. It decides the branch.")
+    ] = None,
+    ends: Annotated[Ends, typer.Option(help="Start and stop, or begin and end at full speed.")] = Ends.REST,
+    orientation: Annotated[
+        Orientation | None, typer.Option(help="Turn about one axis from pose to pose, or blend ZYZ Euler angles.")
+    ] = None,
+    deviation_mm: Annotated[
+        float | None, typer.Option(help="Allowed distance of the hand from its planned path; 0.1.", show_default=False)
+    ] = None,
+    around: Annotated[
+        Around | None,
+        typer.Option(help="Stop at every pose and go round what stops a line: by a pose beside it, or damped rates."),
+    ] = None,
+    keep_limits: Annotated[
+        bool, typer.Option("--keep-limits", help="Run slower where the file's times ask too much.")
+    ] = False,
+    servo_ms: Annotated[float, typer.Option(help="Servo period of motion.csv.")] = 2.0,
+    film: Annotated[bool, typer.Option(help="Draw move.gif, and move.mp4 where ffmpeg is installed.")] = True,
+    as_json: Json = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")] = False,
+) -> None:
+    """Move an arm through the poses of a file.
+
+    A joint move takes every joint straight from posture to posture; a Cartesian one takes the hand straight from pose
+    to pose, on one branch of postures from start to end, and says how near it keeps to that. Poses without times are
+    passed as fast as the limits of speed, acceleration and effort allow. Writes motion.csv (every servo tick, SI),
+    move.json, figures, report.html (a page that opens from the disk and shows the arm moving), and a film.
+
+    **Example:** `armwright move joint puma560 examples/puma_poses.toml -o out/joint`
+    """
+    import json
+
+    from armwright.files.output import write_folder
+    from armwright.motion.limit_use import limit_use, slowing_for_limits
+
+    _check_options(kind, orientation=orientation, deviation_mm=deviation_mm, around=around, servo_ms=servo_ms)
+    planned, file = _planned(
+        kind, arm, poses, near=near, ends=ends, orientation=orientation, deviation_mm=deviation_mm, around=around
+    )
+    notes = list(file.notes)
+    factor, because = slowing_for_limits(planned.arm, planned.trajectory)
+    if because is not None and factor > 1 + _ROUNDING:
+        what = f"{factor:.2f} times slower, for the {because[0]} of joint {because[1] + 1}"
+        notes.append(f"run {what}" if keep_limits else f"the limits would hold {what}: --keep-limits does that")
+        planned = planned.slowed(factor) if keep_limits else planned
+    for note in notes:
+        print(f"armwright: {poses}: {note}", file=sys.stderr)
+    uses = limit_use(planned.arm, planned.trajectory)
+    if output is not None:
+        write_folder(output, _files(_moved(planned, file, poses, servo_ms * 1e-3, notes), uses, film=film, quiet=quiet))
+    if as_json:
+        print(json.dumps(_summary(planned, file, uses), indent=2, ensure_ascii=False))
+    elif not quiet:
+        _print(planned, file, uses)
+        if output is not None:
+            print(f"report: {output / 'report.html'}")
+
+
+def _check_options(
+    kind: Kind, *, orientation: Orientation | None, deviation_mm: float | None, around: Around | None, servo_ms: float
+) -> None:
+    """Refuse options out of range, and those that do not belong to the kind of move."""
+    for name, given in (("--orientation", orientation), ("--deviation-mm", deviation_mm), ("--around", around)):
+        if kind is Kind.JOINT and given is not None:
+            raise typer.BadParameter("only a cartesian move has one", param_hint=name)
+    if orientation is not None and around is not None:
+        raise typer.BadParameter("lines with stops turn about one axis; leave it out", param_hint="--orientation")
+    for name, value, (lower, upper) in (
+        ("--servo-ms", servo_ms, _PERIOD_MS),
+        ("--deviation-mm", _DEVIATION_MM[0] if deviation_mm is None else deviation_mm, _DEVIATION_MM),
+    ):
+        if not lower <= value <= upper:
+            raise typer.BadParameter(f"expected {lower:g} to {upper:g}, got {value:g}", param_hint=name)
+
+
+def _planned(
+    kind: Kind,
+    name: str,
+    poses: Path,
+    *,
+    near: str | None,
+    ends: Ends,
+    orientation: Orientation | None,
+    deviation_mm: float | None,
+    around: Around | None,
+) -> "tuple[Move, PosesFile]":
+    """Read arm and poses and plan the move."""
+    from armwright.arm.load import load_arm
+    from armwright.cli.joints import joint_values
+    from armwright.errors import ArmwrightError
+    from armwright.motion.follow import PathError
+    from armwright.motion.moves import cartesian_move, joint_move, stopping_move
+    from armwright.motion.poses_file import read_poses
+
+    arm, file = load_arm(name), read_poses(poses)
+    start = None if near is None else joint_values(arm, near, "--near")
+    deviation = (0.1 if deviation_mm is None else deviation_mm) * 1e-3
+    timed: dict[str, Any] = {"times": file.times, "blend": file.blend, "near": start, "ends": ends.value}
+    if kind is Kind.JOINT:
+        return joint_move(arm, file.poses, **timed), file
+    if around is not None:
+        return stopping_move(arm, file.poses, by=around.value, near=start, deviation=deviation), file
+    timed["orientation"] = (orientation or Orientation.GEODESIC).value
+    try:
+        return cartesian_move(arm, file.poses, **timed, deviation=deviation), file
+    except PathError as error:
+        hint = "" if error.cause == "reach" else "; `--around via` looks for a way round"
+        raise ArmwrightError(f"{poses}: {error}{hint}") from error
+
+
+def _moved(planned: "Move", file: "PosesFile", poses: Path, period: float, notes: "Iterable[str]") -> "Moved":
+    import shlex
+
+    from armwright.dynamics.newton_euler import inverse_dynamics
+    from armwright.report.moved import Moved
+    from armwright.report.page import Message
+
+    samples = planned.trajectory.sampled(period)
+    return Moved(
+        move=planned,
+        file=file,
+        name=poses.name,
+        samples=samples,
+        tau=inverse_dynamics(planned.arm, samples.q, samples.qd, samples.qdd),
+        command=shlex.join(["armwright", *sys.argv[1:]]),
+        notes=tuple(Message(severity="note", text=note) for note in notes),
+    )
+
+
+def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: bool) -> dict[str, Any]:
+    """Return the files of a move by name."""
+    import json
+
+    from armwright.kinematics.forward import forward
+    from armwright.report import move_figures
+    from armwright.report.moved import motion_csv, move_page
+    from armwright.report.page import run_page
+
+    planned, samples = moved.move, moved.samples
+    X = forward(planned.arm, samples.q)
+    moments = dict(zip(moved.file.names, planned.times.tolist(), strict=True))
+    places = {name: pose[:3, 3] for name, pose in zip(moved.file.names, planned.poses, strict=True)}
+    title = moved.file.title or f"{planned.arm.name} through {moved.name}"
+    joints = move_figures.joint_panels(samples, [joint.revolute for joint in planned.arm.joints])
+    hand = move_figures.hand_panels(samples.times, X)
+    files: dict[str, Any] = {
+        "motion.csv": motion_csv(samples, moved.tau),
+        "move.json": json.dumps(_summary(planned, moved.file, uses), indent=2, ensure_ascii=False) + "\n",
+        "joints.svg": move_figures.panels(f"{title}: joints", samples.times, joints, marks=moments),
+        "hand.svg": move_figures.panels(f"{title}: hand", samples.times, hand, marks=moments, columns=2),
+        "path.svg": move_figures.path_in_space(f"{title}: path of the hand, approach vectors", X, places),
+        "report.html": run_page(move_page(moved)),
+    }
+    return {**files, **_films(planned, quiet=quiet)} if film else files
+
+
+def _films(planned: "Move", *, quiet: bool) -> dict[str, bytes]:
+    """Draw the films, with a progress bar when a person watches."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    from armwright.report.movie import films
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal:
+        return films(planned)
+    with Progress(
+        TextColumn("drawing the film"), BarColumn(), MofNCompleteColumn(), console=console, transient=True
+    ) as bar:
+        task = bar.add_task("")
+        return films(planned, lambda done, total: bar.update(task, completed=done, total=total))
+
+
+def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> dict[str, Any]:
+    """Return a move in short, as plain data in SI units."""
+    passed = zip(file.names, planned.times.tolist(), planned.postures.tolist(), planned.misses.tolist(), strict=True)
+    return {
+        "arm": planned.arm.name,
+        "duration": planned.trajectory.duration,
+        "branch": planned.label,
+        "poses": [{"name": name, "time": t, "q": q, "missed_by": miss} for name, t, q, miss in passed],
+        "deviation": planned.deviation,
+        "turn_deviation": planned.turn,
+        "of_limits": {name: use.tolist() for name, use in uses.items()},
+        "ways": [
+            {
+                "by": way.by,
+                "stopped_by": None if way.obstacle is None else str(way.obstacle),
+                "off_the_line": way.price.distance,
+                "turned_off": way.price.turn,
+                "longer_by": way.price.time,
+            }
+            for way in planned.detours
+        ],
+    }
+
+
+def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from armwright.cli.joints import units
+
+    console = Console(markup=False, highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("pose", overflow="fold")
+    revolute = [joint.revolute for joint in planned.arm.joints]
+    names = [f"j{i + 1} {'deg' if turns else 'mm'}" for i, turns in enumerate(revolute)]
+    for name in ("s", *names, *(["missed mm"] if planned.hand else [])):
+        table.add_column(name, justify="right")
+    scale = units(planned.arm)
+    for i, pose in enumerate(file.names):
+        shown = [f"{q:.1f}" for q in planned.postures[i] / scale]
+        missed = [f"{planned.misses[i] * 1e3:.1f}"] if planned.hand else []
+        table.add_row(pose, f"{planned.times[i]:.3f}", *shown, *missed, end_section=i == len(file.names) - 1)
+    for limit, use in uses.items():
+        parts = [Text(f"{part:.0%}", style="bold red" if part > 1 + _ROUNDING else "") for part in use]
+        table.add_row(limit, "", *parts)
+    console.print(table)
+    console.print("speed, acceleration and effort in parts of their limits")
+    console.print(f"{planned.arm.name}: {planned.trajectory.duration:.3f} s, {planned.label}")
+    if planned.hand:
+        console.print(
+            f"hand within {planned.deviation * 1e3:.4f} mm and {planned.turn * 1e3:.3f} mrad of its planned path"
+        )
+    for i, way in enumerate(planned.detours):
+        leg = f"{file.names[i]} to {file.names[i + 1]}"
+        how = "a line" if way.by == "line" else f"no line, {way.obstacle}; round it by {way.by}"
+        console.print(f"{leg}: {how}: {way.price}")

@@ -1,0 +1,183 @@
+"""Printed figures of a move: joints and hand over time, and the path of the hand in space with its approach vectors."""
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.motion.hand_path import zyz_angles
+from armwright.motion.trajectory import Samples
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
+# Approach vectors along a path, and their length as a part of its extent.
+_ARROWS, _ARROW_LENGTH = 26, 0.16
+
+
+class Panel(NamedTuple):
+    """Curves over a common axis.
+
+    Attributes:
+        title: what they show; may be empty.
+        unit: of the curves.
+        lines: (m,) values by the name of the curve.
+    """
+
+    title: str
+    unit: str
+    lines: Mapping[str, Array]
+
+
+def panels(
+    title: str, t: Array, shown: Sequence[Panel], *, marks: Mapping[str, float] | None = None, columns: int = 1
+) -> str:
+    """Draw panels of curves over time, one above the other.
+
+    Args:
+        title: of the figure.
+        t: (m,) times [s].
+        shown: the panels, from above, column by column.
+        marks: moments to name above the panels, such as those of poses [s].
+        columns: number of columns.
+
+    Returns:
+        An SVG file's text.
+    """
+    rows = -(-len(shown) // columns)
+    figure = _figure((6.8 * columns, 1.1 + 2.1 * rows))
+    grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for axis, panel in zip(grid.T.flat, shown, strict=False):
+        draw_curves(axis, t, panel)
+        for moment in (marks or {}).values():
+            axis.axvline(moment, color="0.6", linewidth=0.7, linestyle=":", zorder=0)
+    for axis in grid[0]:
+        for name, moment in (marks or {}).items():
+            # Above the name of the panel.
+            above = {"xytext": (0, 17), "textcoords": "offset points", "ha": "center", "va": "bottom", "color": "0.4"}
+            axis.annotate(name, (moment, 1), xycoords=("data", "axes fraction"), **above)
+    for axis in grid[-1]:
+        axis.set_xlabel("time, s")
+    figure.suptitle(title)
+    return _svg(figure)
+
+
+def path_in_space(title: str, X: Array, marks: Mapping[str, Array]) -> str:
+    """Draw the path of the hand with its approach vectors.
+
+    Args:
+        title: of the figure.
+        X: (m, 4, 4) poses along the path.
+        marks: (3,) places to name [m].
+
+    Returns:
+        An SVG file's text.
+    """
+    figure = _figure((6.4, 5.6))
+    draw_path(figure.add_subplot(projection="3d"), X, marks)
+    figure.suptitle(title)
+    return _svg(figure)
+
+
+def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapping[str, Array]) -> str:
+    """Draw three panels over time and the path in space in a square.
+
+    Args:
+        title: of the figure.
+        t: (m,) times [s].
+        three: the panels: left above, right above, left below.
+        X: (k, 4, 4) poses along the path, drawn right below.
+        marks: (3,) places to name [m].
+
+    Returns:
+        An SVG file's text.
+    """
+    figure = _figure((10.4, 7.6))
+    for place, panel in enumerate(three):
+        axis = figure.add_subplot(2, 2, place + 1)
+        draw_curves(axis, t, panel)
+        axis.set_xlabel("time, s")
+    draw_path(figure.add_subplot(2, 2, 4, projection="3d"), X, marks)
+    figure.suptitle(title)
+    return _svg(figure)
+
+
+def joint_panels(samples: Samples, revolute: Sequence[bool]) -> list[Panel]:
+    """Return positions, speeds and accelerations of joints: angles in degrees, slides in cm."""
+    names = [f"joint {i + 1}" for i in range(len(revolute))]
+    scale = np.where(revolute, 180 / np.pi, 100.0)
+    unit = "deg" if all(revolute) else "cm" if not any(revolute) else "deg, cm"
+    quantities = {"position": ("", samples.q), "speed": ("/s", samples.qd), "acceleration": ("/s²", samples.qdd)}
+    return [
+        Panel(name, unit + per, dict(zip(names, (values * scale).T, strict=True)))
+        for name, (per, values) in quantities.items()
+    ]
+
+
+def hand_panels(t: Array, X: Array) -> list[Panel]:
+    """Return place and ZYZ angles of the hand (m, 4, 4), and their rates and accelerations, by differences."""
+    places = X[:, :3, 3] * 100
+    angles = np.degrees(zyz_angles(X[:, :3, :3]))
+    found = []
+    for unit, names, values in (("cm", "xyz", places), ("deg", ("phi", "theta", "psi"), angles)):
+        rate = np.gradient(values, t, axis=0, edge_order=2)
+        what = "place" if unit == "cm" else "ZYZ angles"
+        for title, per, curve in (
+            (what, "", values),
+            (f"speed of the {what}", "/s", rate),
+            (f"acceleration of the {what}", "/s²", np.gradient(rate, t, axis=0, edge_order=2)),
+        ):
+            found.append(Panel(title, unit + per, dict(zip(names, curve.T, strict=True))))
+    return found
+
+
+def draw_curves(axis: "Axes", t: Array, panel: Panel) -> None:
+    """Draw the curves of a panel."""
+    for (name, values), style in zip(panel.lines.items(), _STYLES * 4, strict=False):
+        axis.plot(t, values, linestyle=style, label=name, linewidth=1.4)
+    axis.set(ylabel=panel.unit, xlim=(float(t[0]), float(t[-1])))
+    axis.set_title(panel.title, loc="left", fontsize="medium")
+    axis.grid(visible=True, alpha=0.3)
+    axis.legend(loc="center left", bbox_to_anchor=(1.005, 0.5), fontsize="small", frameon=False)
+
+
+def draw_path(axis: Any, X: Array, marks: Mapping[str, Array]) -> None:
+    """Draw a path in space with its approach vectors."""
+    p = X[:, :3, 3] * 100
+    some = np.unique(np.linspace(0, len(X) - 1, _ARROWS).astype(int))
+    extent = float(np.ptp(p, axis=0).max()) or 1.0
+    a = X[some, :3, 2] * _ARROW_LENGTH * extent
+    axis.plot(*p.T, linewidth=2.0, color="C0")
+    axis.quiver(*p[some].T, *a.T, color="C1", linewidth=1.0, arrow_length_ratio=0.25)
+    for name, place in marks.items():
+        x, y, z = place * 100
+        axis.plot([x], [y], [z], "o", color="C3", markersize=5)
+        axis.text(x, y, z, f"  {name}", color="C3")
+    tips = p[some] + a
+    low, high = np.minimum(p.min(axis=0), tips.min(axis=0)), np.maximum(p.max(axis=0), tips.max(axis=0))
+    middle, half = (low + high) / 2, max(float((high - low).max()) / 2, 1e-3)
+    # Equal scales, so that right angles look like right angles.
+    for set_limits, centre in zip((axis.set_xlim, axis.set_ylim, axis.set_zlim), middle, strict=True):
+        set_limits(centre - half, centre + half)
+    axis.set_box_aspect((1, 1, 1))
+    axis.set(xlabel="x, cm", ylabel="y, cm", zlabel="z, cm")
+
+
+def _figure(size: tuple[float, float]) -> "Figure":
+    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
+
+    return Figure(figsize=size, layout="constrained")
+
+
+def _svg(figure: "Figure") -> str:
+    import matplotlib as mpl  # noqa: PLC0415
+
+    text = io.StringIO()
+    # Without a date and with fixed names of its parts, a figure changes only when its numbers do.
+    with mpl.rc_context({"svg.hashsalt": "armwright"}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()

@@ -1,0 +1,132 @@
+"""The page of a move through poses: the arm moving, the poses it passes, and the charts of its joints."""
+
+from collections.abc import Iterator
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.forward import forward, link_poses
+from armwright.motion.moves import Move
+from armwright.motion.poses_file import PosesFile
+from armwright.motion.trajectory import Samples
+from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, Stage
+from armwright.report.sticks import joints_of, sticks, thinned
+from armwright.spatial.poses import to_noap
+from armwright.version import __version__
+
+# Looks at the way of the hand from pose to pose.
+_LOOKS = 200
+# Instants of the animation: so many for a short move, but no more per second than a screen shows, nor in all.
+_INSTANTS, _FPS, _MOST = 240, (30.0, 60.0), 1200
+_ARM = "ARM"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Moved:
+    """A move that was planned, and all that is told of it.
+
+    Attributes:
+        move: the move.
+        file: the poses, as they were given.
+        name: of that file.
+        samples: the motion at the ticks of a servo.
+        tau: (k, n) efforts there, drives included [N m] or [N].
+        command: the command line.
+        notes: warnings and remarks.
+    """
+
+    move: Move
+    file: PosesFile
+    name: str
+    samples: Samples
+    tau: Array
+    command: str
+    notes: tuple[Message, ...]
+
+
+def move_page(moved: Moved) -> RunPage:
+    """Return the page of a move."""
+    move, samples = moved.move, moved.samples
+    rows = thinned(len(samples.times))
+    return RunPage(
+        title=moved.file.title or f"{move.arm.name} through {moved.name}",
+        program_name=moved.name,
+        program_text=moved.file.text,
+        text_kind="Poses",
+        cell_name="",
+        generated_by=f"armwright {__version__}",
+        command=moved.command,
+        duration=move.trajectory.duration,
+        messages=moved.notes,
+        effects=_effects(move, moved.file),
+        stages=_stages(moved),
+        arms=[
+            ArmRecord(
+                name=_ARM,
+                model=move.arm.name,
+                joints=joints_of(move.arm),
+                t=samples.times[rows],
+                q=samples.q[rows],
+                qd=samples.qd[rows],
+                qdd=samples.qdd[rows],
+                tau=moved.tau[rows],
+                hand=forward(move.arm, samples.q[rows])[:, :3, 3],
+            )
+        ],
+        animation=_animation(move, moved.file),
+    )
+
+
+def motion_csv(samples: Samples, tau: Array) -> Iterator[str]:
+    """Give the lines of motion.csv: time, and per joint position, speed, acceleration and effort, in SI."""
+    n = samples.q.shape[1]
+    yield ",".join(["t", *(f"{name}{i + 1}" for name in ("q", "qd", "qdd", "tau") for i in range(n))]) + "\n"
+    table = np.concatenate([samples.times[:, None], samples.q, samples.qd, samples.qdd, tau], axis=1)
+    line = ",".join(["%.12g"] * table.shape[1]) + "\n"
+    # Adding 0 turns -0 into 0, which reads better.
+    yield from (line % tuple(row) for row in (table + 0.0).tolist())
+
+
+def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
+    for i, (name, t, line) in enumerate(zip(file.names, move.times.tolist(), file.lines, strict=True)):
+        met = move.misses[i] == 0
+        passed = "met" if met else f"passed {move.misses[i] * 1e3:.1f} mm beside" if move.hand else "passed beside"
+        yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {passed}")
+
+
+def _stages(moved: Moved) -> Iterator[Stage]:
+    move, file, samples = moved.move, moved.file, moved.samples
+    for i, (t0, t1) in enumerate(zip(move.times[:-1].tolist(), move.times[1:].tolist(), strict=True)):
+        hand = forward(move.arm, move.trajectory(np.linspace(t0, t1, _LOOKS)))[:, :3, 3]
+        during = (samples.times >= t0 - 1e-12) & (samples.times <= t1 + 1e-12)
+        if not during.any():  # a way shorter than a tick
+            during = np.abs(samples.times - (t0 + t1) / 2) == np.abs(samples.times - (t0 + t1) / 2).min()
+        detour = move.detours[i] if move.detours else None
+        planned = move.hand is not None or detour is not None
+        yield Stage(
+            t0=t0,
+            t1=t1,
+            line=file.lines[i + 1],
+            arm=_ARM,
+            kind="HAND" if planned else "JOINT",
+            to=(file.names[i + 1],),
+            speed=100.0,
+            peak_speed=np.abs(samples.qd[during]).max(axis=0).tolist(),
+            peak_effort=np.abs(moved.tau[during]).max(axis=0).tolist(),
+            hand_length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
+            deviation=detour.price.distance if detour else move.deviation if planned else None,
+            note=f"by {detour.by}: {detour.price}" if detour and detour.by != "line" else "",
+        )
+
+
+def _animation(move: Move, file: PosesFile) -> Animation:
+    duration = move.trajectory.duration
+    fps = min(max(_INSTANTS / duration, _FPS[0]), _FPS[1], _MOST / duration)
+    t = np.append(np.arange(int(np.ceil(duration * fps))) / fps, duration)
+    poses = link_poses(move.arm, move.trajectory(t))
+    tracks = [
+        FrameTrack(name=name, poses=to_noap(np.tile(X, (len(t), 1, 1))))
+        for name, X in zip(file.names, move.poses, strict=True)
+    ]
+    return Animation(fps=fps, t=t, arms={_ARM: sticks(move.arm, poses, np.ones(len(t)))}, frames=tracks)

@@ -1,0 +1,90 @@
+"""A move as a film: the arm of sticks and the path of its hand, as GIF or MP4."""
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.kinematics.forward import link_poses
+from armwright.motion.moves import Move
+from armwright.report.sticks import skeleton_of
+
+if TYPE_CHECKING:
+    from matplotlib.animation import AbstractMovieWriter
+    from matplotlib.figure import Figure
+
+# Pictures per second, as many as there are at most; a longer move is shown faster.
+_FPS, _MOST = 20, 90
+_SIZE, _DPI = (4.8, 4.4), 100
+# Length of the approach vector, as a part of half the scene.
+_APPROACH = 0.25
+
+
+def films(move: Move, watch: Callable[[int, int], None] = lambda _done, _of: None) -> dict[str, bytes]:
+    """Return films of a move by the name of their file: a GIF, and an MP4 where ffmpeg is installed.
+
+    Args:
+        move: the move.
+        watch: told how many pictures of how many are drawn.
+    """
+    from matplotlib.animation import FFMpegWriter, PillowWriter  # noqa: PLC0415
+
+    count = int(np.clip(np.ceil(move.trajectory.duration * _FPS), 24, _MOST))
+    X = link_poses(move.arm, move.trajectory(np.linspace(0, move.trajectory.duration, count)))
+    points = skeleton_of(move.arm, X)
+    writers: dict[str, AbstractMovieWriter] = {"move.gif": PillowWriter(fps=_FPS)}
+    if shutil.which("ffmpeg"):
+        writers["move.mp4"] = FFMpegWriter(fps=_FPS)
+    figure, show = _stage(points, X[:, -1], move)
+    with tempfile.TemporaryDirectory() as folder:
+        for name, writer in writers.items():
+            writer.setup(figure, str(Path(folder) / name), dpi=_DPI)
+        for i in range(count):
+            show(i)
+            for writer in writers.values():
+                writer.grab_frame()
+            watch(i + 1, count)
+        for writer in writers.values():
+            writer.finish()
+        return {name: (Path(folder) / name).read_bytes() for name in writers}
+
+
+def _stage(points: Array, hand: Array, move: Move) -> "tuple[Figure, Callable[[int], None]]":
+    """Return a figure with the arm in it, and what moves it to one of m instants.
+
+    Args:
+        points: (m, k, 3) the corners of the arm [m].
+        hand: (m, 4, 4) poses of the hand.
+        move: the move.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=_SIZE)
+    FigureCanvasAgg(figure)
+    axis: Any = figure.add_axes((0, 0, 1, 1), projection="3d")
+    cm = points * 100
+    low, high = cm.min(axis=(0, 1)), cm.max(axis=(0, 1))
+    middle, half = (low + high) / 2, float((high - low).max()) / 2
+    for set_limits, centre in zip((axis.set_xlim, axis.set_ylim, axis.set_zlim), middle, strict=True):
+        set_limits(centre - half, centre + half)
+    axis.set_box_aspect((1, 1, 1))
+    axis.tick_params(labelsize=7)
+    axis.plot(*(move.poses[:, :3, 3] * 100).T, "o", color="C3", markersize=5)
+    (trail,) = axis.plot([], [], [], color="C1", linewidth=1.6)
+    (arm,) = axis.plot([], [], [], "-o", color="C0", linewidth=4.5, markersize=4, solid_capstyle="round")
+    (approach,) = axis.plot([], [], [], color="C2", linewidth=2.5)
+    clock = axis.text2D(0.03, 0.94, "", transform=axis.transAxes)
+    tips = cm[:, -1] + hand[:, :3, 2] * _APPROACH * half
+
+    def show(i: int) -> None:
+        arm.set_data_3d(*cm[i].T)
+        trail.set_data_3d(*cm[: i + 1, -1].T)
+        approach.set_data_3d(*np.stack([cm[i, -1], tips[i]], axis=1))
+        clock.set_text(f"{move.trajectory.duration * i / (len(cm) - 1):.2f} s")
+
+    return figure, show

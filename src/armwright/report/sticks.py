@@ -1,0 +1,76 @@
+"""An arm as the page draws it: a figure of sticks, and what its joints are."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.report.page import ArmFigure, JointInfo
+
+# Enough rows for the charts of a screen.
+_CHART_ROWS = 1500
+# The thickness of a drawn arm, as part of its reach, at the base and at the hand.
+_THICK, _THIN = 0.045, 0.016
+
+
+def joints_of(arm: Arm) -> list[JointInfo]:
+    """Return what the page says of the joints of an arm."""
+    return [
+        JointInfo(
+            name=f"joint {i + 1}",
+            kind=joint.kind,
+            lower=joint.limits.lower,
+            upper=joint.limits.upper,
+            speed=joint.limits.speed,
+            acceleration=joint.limits.acceleration,
+            effort=joint.limits.effort,
+        )
+        for i, joint in enumerate(arm.joints)
+    ]
+
+
+def sticks(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
+    """Draw an arm along its Denavit-Hartenberg steps: first along z, then along x, so that offsets show.
+
+    Args:
+        arm: the arm, with n joints.
+        poses: (M, n + 2, 4, 4) of its frames in the world, as ``link_poses`` has them.
+        grip: (M,) how far the fingers are open, 0 to 1.
+    """
+    points = skeleton_of(arm, poses)
+    origins, z_axes = poses[:, : arm.n, :3, 3], poses[:, : arm.n, :3, 2]
+    reach = arm.reach if math.isfinite(arm.reach) else float(np.ptp(poses[..., :3, 3], axis=(0, 1)).max())
+    return ArmFigure(
+        points=points,
+        hand_axes=np.swapaxes(poses[:, -1, :3, :3], -1, -2).reshape(len(poses), 9),
+        grip=grip,
+        joint_axes=np.concatenate([origins, z_axes], axis=-1),
+        radii=np.linspace(_THICK, _THIN, points.shape[1] - 1) * reach,
+    )
+
+
+def skeleton_of(arm: Arm, poses: Array) -> Array:
+    """Return the corners (M, K, 3) of the sticks, from the floor to the hand; arguments as of ``sticks``."""
+    origins, z_axes = poses[:, :, :3, 3], poses[:, :, :3, 2]
+    points = [_foot(origins[:, 0]), origins[:, 0]]
+    for i in range(1, arm.n + 1):
+        before, after, z = origins[:, i - 1], origins[:, i], z_axes[:, i - 1]
+        along = np.sum((after - before) * z, axis=-1, keepdims=True)
+        points += [before + along * z, after]
+    points.append(origins[:, -1])
+    return np.stack(points, axis=1)
+
+
+def thinned(count: int) -> npt.NDArray[np.intp]:
+    """Return the rows of so many that a chart shows, the last one among them."""
+    stride = max(1, math.ceil(count / _CHART_ROWS))
+    return np.unique(np.append(np.arange(0, count, stride), count - 1))
+
+
+def _foot(origin: Array) -> Array:
+    """Return the point on the floor below a base that stands above it, on which it is drawn to rest."""
+    foot = origin.copy()
+    foot[:, 2] = np.minimum(origin[:, 2], 0.0)
+    return foot

@@ -1,0 +1,117 @@
+"""``armwright move`` as a user calls it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.kinematics.forward import forward
+from cli_calls import armwright
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+POSES = EXAMPLES / "puma_poses.toml"
+POST = EXAMPLES / "round_the_post.toml"
+FILES = {"motion.csv", "move.json", "report.html", "joints.svg", "hand.svg", "path.svg"}
+
+
+def test_joint_move(tmp_path: Path) -> None:
+    """A joint move writes its files; the motion starts and ends at rest at the first and the last pose."""
+    done = armwright("move", "joint", "puma560", POSES, "-o", tmp_path / "out", "--no-film")
+
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
+    assert "left, down, no-flip -> left, down, no-flip -> left, down, flip" in done.stdout
+    assert "line 10: the rotation of pose A is none, by 0.00096; the nearest is taken" in done.stderr
+    assert "the limits would hold 5.81 times slower, for the acceleration of joint 2: --keep-limits" in done.stderr
+    rows = np.loadtxt(tmp_path / "out" / "motion.csv", delimiter=",", skiprows=1)
+    assert rows.shape == (501, 25)
+    hand = forward(load_arm("puma560"), rows[[0, -1], 1:7])[:, :3, 3]
+    np.testing.assert_allclose(hand, [[0.05, -0.55, -0.6], [0.6, 0.15, -0.3]], atol=1e-9)
+    np.testing.assert_allclose(rows[[0, -1], 7:13], 0, atol=1e-9)
+    summary = json.loads((tmp_path / "out" / "move.json").read_text())
+    assert [pose["name"] for pose in summary["poses"]] == ["A", "B", "C"]
+    assert max(summary["of_limits"]["acceleration"]) == pytest.approx(5.81**2, rel=1e-2)
+
+
+def test_limits_kept() -> None:
+    """With --keep-limits the move runs just so much slower that no limit is passed."""
+    done = armwright("move", "joint", "puma560", POSES, "--keep-limits", "--json")
+
+    found = json.loads(done.stdout)
+    largest = max(max(parts) for parts in found["of_limits"].values())
+    assert largest == pytest.approx(1.0, abs=1e-6)
+    assert found["duration"] == pytest.approx(5.811, abs=1e-3)
+
+
+def test_cartesian_move(tmp_path: Path) -> None:
+    """A Cartesian move keeps the hand where it says, on one branch, and inside the limits without times."""
+    done = armwright("move", "cartesian", "puma560", POST, "-o", tmp_path, "--no-film", "--deviation-mm", "0.05")
+
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "hand within 0.0" in done.stdout
+    assert (FILES - {path.name for path in tmp_path.iterdir()}) == set()
+    summary = json.loads((tmp_path / "move.json").read_text())
+    assert summary["branch"] == "left, down, no-flip"
+    assert 0 < summary["deviation"] <= 0.05e-3
+    assert max(max(parts) for parts in summary["of_limits"].values()) <= 1 + 1e-9
+
+
+def test_film(tmp_path: Path) -> None:
+    """The film is a GIF of many pictures."""
+    image = pytest.importorskip("PIL.Image")
+
+    done = armwright("move", "joint", "puma560", POSES, "-o", tmp_path, "-q")
+
+    assert done.returncode == 0, done.stderr
+    with image.open(tmp_path / "move.gif") as film:
+        assert film.n_frames >= 20
+
+
+def test_no_branch(tmp_path: Path) -> None:
+    """Where no branch carries through it is said why, in one line and with a way out, and nothing is written."""
+    done = armwright("move", "cartesian", "puma560", POSES, "-o", tmp_path / "out")
+
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert "no branch carries the hand to its last pose. left, down, no-flip: at 0." in done.stderr
+    assert "between poses 2 and 3" in done.stderr
+    assert done.stderr.endswith("`--around via` looks for a way round\n")
+    assert not (tmp_path / "out").exists()
+
+
+def test_way_round() -> None:
+    """Damped rates lead past it; price and reason are told."""
+    done = armwright("move", "cartesian", "puma560", POSES, "--around", "damped")
+
+    assert done.returncode == 0, done.stderr
+    assert "A to B: a line: " in done.stdout
+    said = " ".join(done.stdout.split())
+    assert "B to C: no line, on the line near (" in said
+    assert "round it by damped: " in said
+    assert " mm off the line, " in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        (("joint", "puma56", POSES), 1, "no arm 'puma56'. Did you mean 'puma560'?"),
+        (("joint", "puma560", EXAMPLES / "puma_pose.toml"), 1, "no such file; did you mean "),
+        (("slide", "puma560", POSES), 2, "'slide' is not one of 'joint', 'cartesian'"),
+        (("joint", "puma560", POSES, "--orientation", "zyz"), 2, "only a cartesian move has one"),
+        (("joint", "puma560", POSES, "--near", "1,2"), 2, "expected 6 finite numbers, got 2"),
+        (("joint", "puma560", POSES, "--servo-ms", "0"), 2, "expected 0.01 to 1000, got 0"),
+        (("cartesian", "puma560", POST, "--deviation-mm", "-1"), 2, "expected 0.0001 to 100, got -1"),
+        (("cartesian", "puma560", POST, "--around", "via", "--orientation", "zyz"), 2, "turn about one axis"),
+    ],
+)
+def test_mistakes(arguments: tuple[Any, ...], status: int, said: str) -> None:
+    """A mistake gets one message that says what to do, and no traceback."""
+    done = armwright("move", *arguments, columns=200)
+
+    assert done.returncode == status
+    assert said in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr
