@@ -34,6 +34,21 @@ def test_study_verdicts() -> None:
     assert wrong == {"b4", "k2", "b20", "k3 / b5"}
 
 
+def test_moves_of_the_puma(tmp_path: Path) -> None:
+    """The study of the PUMA's moves leaves ten figures, a film and its tables, and says what stops which move."""
+    done = armwright("study", "puma-moves", "-o", tmp_path, columns=200)
+
+    assert done.returncode == 0, done.stderr
+    numbers = (5, 6, 7, 10, 16, 17, 18, 19, 22, 23)
+    names = {f"figure{number:02d}.svg" for number in numbers}
+    assert {path.name for path in tmp_path.iterdir()} - {"figure25.mp4"} == names | {"figure25.gif", "tables.json"}
+    for name in names:
+        assert ET.parse(tmp_path / name).getroot().tag.endswith("svg")
+    tables = json.loads((tmp_path / "tables.json").read_text())
+    assert [row["inverse"] for row in tables["moves"]] == [3, 501, 501, 501]
+    assert "no branch carries the hand to its last pose" in done.stdout
+
+
 def test_unknown_study() -> None:
     """A misspelt study gets the nearest name."""
     done = armwright("study", "stanford-torqe")

@@ -1,0 +1,179 @@
+"""The project on the PUMA's trajectories: its formulas, its figures, and what its moves ask of the joints."""
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arrays import Array
+from armwright.errors import UnknownNameError
+from armwright.kinematics.forward import forward
+from armwright.motion.blends import via_distances
+from armwright.study import puma_moves
+from armwright.study.puma_moves import (
+    BLEND,
+    CURVES,
+    PRINTED_PLACES_CM,
+    PRINTED_Q,
+    PRINTED_ROTATIONS,
+    SAMPLES,
+    TIMES,
+    AngleRow,
+    MoveRow,
+    PostureRow,
+    angle_table,
+    courses,
+    joints_along,
+    missed_at_b,
+    move_table,
+    path_of,
+    posture_table,
+    sample_times,
+    study_poses,
+    way_round_table,
+)
+
+ROUNDING = 1e-12
+
+
+@pytest.fixture(scope="module")
+def postures() -> dict[str, PostureRow]:
+    return {row.pose: row for row in posture_table()}
+
+
+@pytest.fixture(scope="module")
+def angles() -> dict[str, AngleRow]:
+    return {row.pose: row for row in angle_table()}
+
+
+@pytest.fixture(scope="module")
+def moves() -> dict[str, MoveRow]:
+    return {row.way: row for row in move_table()}
+
+
+def of_the_project(A: Array, B: Array, C: Array, t: float) -> tuple[Array, Array, Array]:
+    """Position, speed and acceleration by the three formulas of the project's programs."""
+    if t < 0.3:
+        return (B - A) * t / 0.5 + A, (B - A) / 0.5, 0 * A
+    if t > 0.7:
+        return B + (C - B) * (t - 0.5) / 0.5, (C - B) / 0.5, 0 * A
+    h = (t - 0.5 + 0.2) / 0.4
+    a0 = (B - A) * 0.3 / 0.5 + A
+    a1 = (B - a0) / 0.5
+    # The project writes (B - a0)/0.5 for 2 t_acc (B - A)/T: both are 0.8 (B - A).
+    a3 = 2 * (a0 - B) + 0.8 * (C - B)
+    a4 = -0.5 * a3
+    return (
+        a0 + a1 * h + a3 * h**3 + a4 * h**4,
+        (a1 + 3 * a3 * h**2 + 4 * a4 * h**3) / 0.4,
+        (6 * a3 * h + 12 * a4 * h**2) / 0.16,
+    )
+
+
+def test_the_projects_formulas() -> None:
+    """Every sample of figures 5 to 7 and 16 to 18 is what the project's own formulas give."""
+    q, places = np.array(PRINTED_Q), np.array(PRINTED_PLACES_CM, dtype=np.float64)
+    turns = np.array([row.matlab for row in angle_table()])
+    for number, (way, order) in CURVES.items():
+        shown = [curve for course in courses(number) for curve in course.curves.values()]
+        points = q if way == "joint" else np.concatenate([places, turns], axis=1)
+        expected = np.array([of_the_project(*points, t)[order] for t in sample_times()]).T
+        np.testing.assert_allclose(shown, expected, rtol=ROUNDING, atol=1e-8)
+
+
+def test_no_other_figures_have_curves() -> None:
+    """A figure of the project without curves is refused."""
+    with pytest.raises(UnknownNameError, match="no figure '10'"):
+        courses(10)
+    with pytest.raises(UnknownNameError, match="no Cartesian move 'joint'"):
+        path_of("joint")
+
+
+def test_samples() -> None:
+    """There are 501 samples, 2 ms apart, over one second."""
+    t = sample_times()
+
+    assert (len(t), t[0], t[-1]) == (SAMPLES, 0.0, 1.0)
+    assert np.diff(t).max() == pytest.approx(0.002)
+
+
+def test_printed_postures(postures: dict[str, PostureRow]) -> None:
+    """A comes out to the printed digits; B and C as far as two digits of their rotations reach, beside the wrist."""
+    assert postures["A"].farthest < 0.5e-4
+    assert postures["B"].farthest < 1.0
+    assert postures["C"].farthest < 0.3
+    for printed, R, place in zip(PRINTED_Q, PRINTED_ROTATIONS, PRINTED_PLACES_CM, strict=True):
+        X = forward(load_arm("puma560"), np.radians(printed))
+        np.testing.assert_allclose(X[:3, 3] * 100, place, atol=5e-4)
+        # Rounded to two digits, as the project prints them; one of C's is off by two units of the last one.
+        np.testing.assert_allclose(X[:3, :3], R, atol=0.011)
+
+
+def test_no_branch_for_all(postures: dict[str, PostureRow]) -> None:
+    """A can be held with the wrist one way only, C with the other: every move must turn it over."""
+    assert postures["A"].allowed == ("left, down, no-flip",)
+    assert postures["C"].allowed == ("left, down, flip",)
+
+
+def test_matlab_angles(angles: dict[str, AngleRow]) -> None:
+    """MATLAB's angles of A, where theta is half a turn, and the nearest ones, which turn far less on the way to B."""
+    np.testing.assert_allclose(angles["A"].matlab, (0, -180, 180 - np.degrees(np.arctan(0.77 / 0.64))), atol=1e-9)
+    way = {
+        name: np.abs(np.subtract(getattr(angles["B"], name), getattr(angles["A"], name))).sum()
+        for name in ("matlab", "nearest")
+    }
+    assert way["nearest"] < way["matlab"] / 2
+
+
+def test_missed_by_the_formula() -> None:
+    """At B the joint move is off by 3/16 · blend · (change of the rate), which is where its curve is."""
+    B = puma_moves.joint_trajectory()(0.5) - np.radians(PRINTED_Q[1])
+
+    np.testing.assert_allclose(missed_at_b(), B, atol=ROUNDING)
+
+
+def test_the_two_kinds_of_move(moves: dict[str, MoveRow]) -> None:
+    """The project's discussion in numbers: the joint move solves 3 postures and swings out wide, the Cartesian 501."""
+    joint, seed, nearest, geodesic = moves.values()
+
+    assert (joint.inverse, seed.inverse) == (3, 501)
+    # The hand of a Cartesian move leaves the straight ways by its blend alone, and no more than it misses B.
+    miss = via_distances(TIMES, study_poses()[:, :3, 3], BLEND, ends="running")[1]
+    for row in (seed, nearest, geodesic):
+        assert 0 < row.off <= miss
+        assert row.length < joint.length
+        assert joint.off > 3 * row.off
+    assert geodesic.turn <= nearest.turn < seed.turn / 2
+    assert joint.joints < geodesic.joints < nearest.joints < seed.joints
+
+
+def test_what_the_wrist_would_have_to_do(moves: dict[str, MoveRow]) -> None:
+    """In a Cartesian move joints of the wrist would run many times over their limits; the joint move just its own."""
+    joint, *cartesian = moves.values()
+
+    assert joint.stopped == ""
+    assert 1 < joint.speed.part < 2
+    for row in cartesian:
+        assert row.speed.part > 30
+        assert row.speed.joint in {4, 6}
+        assert "no branch carries the hand to its last pose" in row.stopped
+
+
+@pytest.mark.parametrize("way", ["seed", "zyz", "geodesic"])
+def test_joints_follow_the_hand(way: str) -> None:
+    """Without limits the joints put the hand at every one of the 501 poses."""
+    X = path_of(way)(sample_times())  # type: ignore[arg-type]
+
+    q = joints_along(way)(sample_times())  # type: ignore[arg-type]
+    found = forward(load_arm("puma560"), np.remainder(q, 2 * np.pi))
+
+    np.testing.assert_allclose(found, X, atol=1e-7)
+
+
+def test_ways_round() -> None:
+    """No via pose helps, as the wrist must be turned over; damped rates get there, at a price."""
+    via, damped = way_round_table()
+
+    assert not via.found
+    assert "joint 4 would stand at" in via.said
+    assert damped.found
+    assert "mm off the line" in damped.said
