@@ -35,7 +35,7 @@ def main() -> None:
     fast = compile_arm(arm)
     poses = wavy(forward(arm, START))
     move = cartesian_move(fast, poses, TIMES)
-    if move.hand is None:
+    if move.hand is None or move.certificate is None:
         raise SystemExit("a Cartesian move plans a path of the hand")
     samples = move.hand(move.trajectory.times)
     robot = toolbox_robot(arm)
@@ -51,8 +51,9 @@ def main() -> None:
     section(
         "A Cartesian move through a thousand poses",
         f"`puma560`, 0.5 m, 20 s. armwright: `cartesian_move`, blends of place and orientation at every pose, "
-        f"{len(samples)} knots, the hand within {move.deviation * 1e3:.4f} mm of its planned path, a bound that holds "
-        "between the knots. roboticstoolbox: `ikine_LM` from one of these knots to the next, and nothing else.",
+        f"{len(samples)} knots, the hand within {move.certificate.deviation * 1e3:.4f} mm of its planned path, a bound "
+        "that holds between the knots. roboticstoolbox: `ikine_LM` from one of these knots to the next, and nothing "
+        "else.",
         table(
             ["planner", "ms", "ratio"],
             [

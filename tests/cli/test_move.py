@@ -52,11 +52,12 @@ def test_cartesian_move(tmp_path: Path) -> None:
 
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    assert "hand within 0.0" in done.stdout
+    assert "certificate holds: hand within 0.0" in done.stdout
     assert (FILES - {path.name for path in tmp_path.iterdir()}) == set()
     summary = json.loads((tmp_path / "move.json").read_text())
     assert summary["branch"] == "left, down, no-flip"
-    assert 0 < summary["deviation"] <= 0.05e-3
+    assert 0 < summary["certificate"]["deviation"] <= 0.05e-3
+    assert summary["certificate"]["holds"]
     assert max(max(parts) for parts in summary["of_limits"].values()) <= 1 + 1e-9
 
 

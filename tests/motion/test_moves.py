@@ -144,13 +144,17 @@ def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str,
         run += 1
         t = np.linspace(0, 3, 20_000)
         assert move.hand is not None
+        assert move.certificate is not None
         hand, planned = forward(arm.arm, move.trajectory(t)), move.hand(t)
         off = np.linalg.norm(hand[:, :3, 3] - planned[:, :3, 3], axis=-1).max()
         turn = angle_between(planned[:, :3, :3], hand[:, :3, :3]).max()
-        assert off <= move.deviation + ROUNDING
-        assert move.deviation <= deviation
-        assert turn <= move.turn + 1e-7  # angles near 0 are found to the root of the rounding
-        assert move.turn <= 5e3 * deviation
+        certificate = move.certificate
+        assert 0.99 * certificate.deviation_seen - ROUNDING <= off <= certificate.deviation + ROUNDING
+        assert certificate.deviation <= deviation
+        # Angles near 0 are found to the root of the rounding.
+        assert 0.99 * certificate.turn_seen - 1e-7 <= turn <= certificate.turn + 1e-7
+        assert certificate.turn <= 5 * deviation
+        assert np.linalg.norm(move.hand(certificate.worst_time)[:3, 3] - certificate.worst_place) < ROUNDING
         lowest, highest = move.trajectory.extremes(0)
         assert (lowest >= arm.arm.limit("lower") - ROUNDING).all()
         assert (highest <= arm.arm.limit("upper") + ROUNDING).all()
@@ -186,6 +190,25 @@ def test_times_by_the_tool(puma: CompiledArm) -> None:
     assert max(use.max() for use in uses.values()) == pytest.approx(1.0, abs=1e-6)
     assert move.hand is not None
     np.testing.assert_allclose(move.hand(move.times)[:, :3, 3], X[:, :3, 3], atol=ROUNDING)
+    assert move.certificate is not None
+    assert move.certificate.holds
+    assert move.certificate.factor > 1
+    assert "times slower than asked, for the acceleration of joint" in str(move.certificate)
+
+
+def test_a_certificate_that_does_not_hold(puma: CompiledArm) -> None:
+    """Times that ask too much are kept, and the certificate says which limit is passed and by how much."""
+    X = np.repeat(forward(puma.arm, [0.6, 0.2, 0.6, 0.3, 0.9, 0.1])[None], 2, axis=0)
+    X[1, :3, 3] += (0.0, -0.3, 0.0)
+
+    certificate = cartesian_move(puma, X, [0, 0.5]).certificate
+
+    assert certificate is not None
+    assert not certificate.holds
+    assert str(certificate).startswith("DOES NOT HOLD: hand within 0.0")
+    joint, part = certificate.use("acceleration")
+    assert part > 10
+    assert f"joint {joint + 1} uses {part:.0%} of its acceleration" in str(certificate)
 
 
 def test_seven_joints() -> None:
@@ -213,7 +236,8 @@ def test_stops_and_ways_round(puma: CompiledArm, by: str) -> None:
     np.testing.assert_allclose(forward(puma.arm, move.trajectory(move.times)), X, atol=1e-5)
     uses = limit_use(puma, move.trajectory)
     assert max(use.max() for use in uses.values()) <= 1 + 1e-6
-    assert move.deviation == max(leg.price.distance for leg in move.detours)
+    assert len(move.detours) == 1
+    assert move.detours[0].by == by
 
 
 @pytest.mark.filterwarnings("ignore::armwright.errors.RotationWarning")

@@ -17,7 +17,7 @@ from armwright.motion.straight import CertifiedLine, straight_line
 from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector
 
 ARMS = ("puma560", "stanford", "ur5")
-LINES = 400  # on each arm; about half of them can be run
+LINES = 1000  # on each arm; about half of them can be run
 ROUNDING = 1e-9
 
 

@@ -12,7 +12,7 @@ from armwright.cli.forward import ArmName, Json
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from armwright.motion.certificate import LimitName
+    from armwright.motion.certificate import Certificate, LimitName
     from armwright.motion.moves import Move
     from armwright.motion.poses_file import PosesFile
     from armwright.report.moved import Moved
@@ -240,8 +240,7 @@ def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -
         "duration": planned.trajectory.duration,
         "branch": planned.label,
         "poses": [{"name": name, "time": t, "q": q, "missed_by": miss} for name, t, q, miss in passed],
-        "deviation": planned.deviation,
-        "turn_deviation": planned.turn,
+        "certificate": None if planned.certificate is None else _certificate(planned.certificate),
         "of_limits": {name: use.tolist() for name, use in uses.items()},
         "ways": [
             {
@@ -253,6 +252,23 @@ def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -
             }
             for way in planned.detours
         ],
+    }
+
+
+def _certificate(found: "Certificate") -> dict[str, Any]:
+    return {
+        "holds": found.holds,
+        "deviation_asked": found.deviation_asked,
+        "deviation": found.deviation,
+        "deviation_seen": found.deviation_seen,
+        "turn_asked": found.turn_asked,
+        "turn": found.turn,
+        "turn_seen": found.turn_seen,
+        "worst_time": found.worst_time,
+        "worst_place": found.worst_place.tolist(),
+        "knots": found.knots,
+        "looks": found.looks,
+        "slower": found.factor,
     }
 
 
@@ -282,10 +298,8 @@ def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> 
     console.print(table)
     console.print("speed, acceleration and effort in parts of their limits")
     console.print(f"{planned.arm.name}: {planned.trajectory.duration:.3f} s, {planned.label}")
-    if planned.hand:
-        console.print(
-            f"hand within {planned.deviation * 1e3:.4f} mm and {planned.turn * 1e3:.3f} mrad of its planned path"
-        )
+    if planned.certificate:
+        console.print(f"certificate {planned.certificate}")
     for i, way in enumerate(planned.detours):
         leg = f"{file.names[i]} to {file.names[i + 1]}"
         how = "a line" if way.by == "line" else f"no line, {way.obstacle}; round it by {way.by}"

@@ -16,7 +16,7 @@ from armwright.arrays import Array
 
 # What the bound may add to what was seen, in parts of what is allowed; looks are taken so often that it does not
 # exceed it, but no more often than the second.
-_ADDED = 0.1
+_ADDED = 0.25
 _LOOKS = (4, 200)
 
 

@@ -41,14 +41,32 @@ class Carried(NamedTuple):
     Attributes:
         label: branch of its postures.
         trajectory: of the joints.
-        deviation: upper bound of the distance of the hand from where it is planned to be [m].
-        turn: upper bound of the angle from the planned orientation [rad].
+        strays: how far the hand is off on every interval between two knots.
     """
 
     label: str
     trajectory: Trajectory
-    deviation: float
-    turn: float
+    strays: "Strays"
+
+
+class Strays(NamedTuple):
+    """How far the hand is from where it is planned to be, on m intervals between knots, (m,) each.
+
+    Attributes:
+        place: upper bound of the distance [m].
+        turn: upper bound of the angle from the planned orientation [rad].
+        seen: the largest distance that was seen [m].
+        seen_turn: the largest angle that was seen [rad].
+        times: when the largest distance was seen [s].
+        looks: how often the hand was looked at on an interval.
+    """
+
+    place: Array
+    turn: Array
+    seen: Array
+    seen_turn: Array
+    times: Array
+    looks: int
 
 
 class _Stop(NamedTuple):
@@ -130,12 +148,10 @@ def _carried(
         trajectory = xspline(t, q, *rates)
         speed, acceleration = cubic_peaks(trajectory.coefficients, np.diff(t))
         bounds = hand_bounds(arm, trajectory.coefficients, np.diff(t), speed, acceleration)
-        place, turn = _deviations(solver, hand, trajectory, bounds, deviation)
-        excess = np.maximum(place, turn / TURN_PER_METRE) / deviation
+        strays = _strays(solver, hand, trajectory, bounds, deviation)
+        excess = np.maximum(strays.place, strays.turn / TURN_PER_METRE) / deviation
         if excess.max() <= 1:
-            return _swings_out(arm, trajectory) or Carried(
-                start.label, trajectory, float(place.max()), float(turn.max())
-            )
+            return _swings_out(arm, trajectory) or Carried(start.label, trajectory, strays)
         # Where a joint rushes past a singularity, more knots do not help.
         if (speed / arm.limit("speed")).max() > SLOWEST:
             break
@@ -195,10 +211,8 @@ def _swings_out(arm: Arm, trajectory: Trajectory) -> _Stop | None:
     return None
 
 
-def _deviations(
-    solver: Solver, hand: HandPath, trajectory: Trajectory, bounds: HandBounds, allowed: float
-) -> tuple[Array, Array]:
-    """Return upper bounds of the distance and of the angle between hand and path on every interval, (m,) each.
+def _strays(solver: Solver, hand: HandPath, trajectory: Trajectory, bounds: HandBounds, allowed: float) -> Strays:
+    """Return how far the hand strays from its path on every interval.
 
     Both are 0 at the knots. Between two looks a time d apart a curve leaves its chord by no more than d²/8 times its
     greatest acceleration; that of the difference is no greater than those of hand and path together.
@@ -214,10 +228,17 @@ def _deviations(
     t = (trajectory.times[:-1] + part * h).clip(0.0, trajectory.duration)
     q = np.stack([evaluate(trajectory.coefficients, (p * h)[:, None]) for p in part])
     X, wanted_X = solver.forward(q), hand(t)
-    off = np.linalg.norm(X[..., :3, 3] - wanted_X[..., :3, 3], axis=-1).max(axis=0)
+    off = np.linalg.norm(X[..., :3, 3] - wanted_X[..., :3, 3], axis=-1)
     half = half_sines(wanted_X[..., :3, :3], X[..., :3, :3]).max(axis=0)
     between = (h / looks) ** 2 / 8
-    return off + between * pull, 2 * np.arcsin(np.minimum(half + between * spin, 1.0))
+    return Strays(
+        place=off.max(axis=0) + between * pull,
+        turn=2 * np.arcsin(np.minimum(half + between * spin, 1.0)),
+        seen=off.max(axis=0),
+        seen_turn=2 * np.arcsin(np.minimum(half, 1.0)),
+        times=t[off.argmax(axis=0), np.arange(len(h))],
+        looks=looks,
+    )
 
 
 def _rate(t: Array, q: Array) -> Array:

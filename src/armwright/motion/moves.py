@@ -14,14 +14,16 @@ from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import typed_poses
 from armwright.kinematics.inverse.turns import middle
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
+from armwright.motion.certificate import Certificate, LimitName
 from armwright.motion.detour import By, Detour, line_or_detour
-from armwright.motion.follow import PathError
+from armwright.motion.efforts import effort_peaks
+from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.follow_hand import carry
 from armwright.motion.hand_path import HandPath, Orientation, hand_path
 from armwright.motion.limit_use import slowing_for_limits
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.postures import postures_at, postures_through
-from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.trajectory import Trajectory, join
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import nearest_rotation
@@ -46,8 +48,7 @@ class Move:
         misses: (k,) shortest distance at which the planned path passes each pose: of the hand [m] for a Cartesian move,
             in joint space for a joint move; the ends are met, and so is every pose that is stopped at.
         hand: where the hand is planned to be; None where no path of it is planned.
-        deviation: upper bound of the distance of the hand from there [m]; 0 where none is planned.
-        turn: upper bound of the angle from the planned orientation [rad].
+        certificate: how near the hand keeps to that, and which part of the limits is used; None where none is planned.
         detours: the ways from pose to pose of a move that stops at each of them; else none.
     """
 
@@ -59,17 +60,26 @@ class Move:
     trajectory: Trajectory
     misses: Array
     hand: HandPath | None = None
-    deviation: float = 0.0
-    turn: float = 0.0
+    certificate: Certificate | None = None
     detours: tuple[Detour, ...] = ()
 
     def slowed(self, factor: float) -> "Move":
         """Return the same move run ``factor`` times slower."""
+        slow = self.trajectory.slowed(factor)
+        certificate = self.certificate
+        if certificate is not None:
+            certificate = attrs.evolve(
+                certificate,
+                worst_time=certificate.worst_time * factor,
+                peaks=_peaks(self.arm, slow),
+                factor=certificate.factor * factor,
+            )
         return attrs.evolve(
             self,
             times=self.times * factor,
-            trajectory=self.trajectory.slowed(factor),
+            trajectory=slow,
             hand=None if self.hand is None else self.hand.slowed(factor),
+            certificate=certificate,
         )
 
 
@@ -167,12 +177,12 @@ def cartesian_move(
     solver, X = solver_of(arm), exact_poses(poses)
     t, b = _timing(_tool_times(solver.arm, X) if times is None else times, blend, len(X))
     hand = hand_path(X, t, b, ends=ends, orientation=orientation)
-    move = along(solver, X, hand, t, b, near=near, ends=ends, deviation=deviation)
+    move = along(arm, X, hand, t, b, near=near, ends=ends, deviation=deviation)
     return move if times is not None else _inside_limits(arm, move)
 
 
 def along(
-    solver: Solver,
+    arm: AnyArm,
     X: Array,
     hand: HandPath,
     times: Array,
@@ -182,10 +192,29 @@ def along(
     ends: Ends = "rest",
     deviation: float = 1e-4,
 ) -> Move:
-    """Return the move along a path of the hand; arguments and errors as of ``cartesian_move``."""
+    """Return the move along a path of the hand, with its certificate; arguments and errors as of ``cartesian_move``."""
     if not 0 < number(deviation, "deviation") < np.inf:
         raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation:g}")
+    solver = solver_of(arm)
     found = carry(solver, hand, times, _near(solver.arm, near), ends=ends, deviation=deviation)
+    strays = found.strays
+    worst = int(strays.seen.argmax())
+    certificate = Certificate(
+        arm=solver.arm,
+        deviation_asked=deviation,
+        deviation=float(strays.place.max()),
+        deviation_seen=float(strays.seen.max()),
+        turn_asked=TURN_PER_METRE * deviation,
+        turn=float(strays.turn.max()),
+        turn_seen=float(strays.seen_turn.max()),
+        worst_time=float(strays.times[worst]),
+        worst_place=hand(strays.times[worst])[:3, 3],
+        knots=len(found.trajectory.times),
+        looks=strays.looks * len(strays.seen),
+        peaks=_peaks(arm, found.trajectory),
+        factor=1.0,
+        because=None,
+    )
     return Move(
         arm=solver.arm,
         poses=X,
@@ -195,8 +224,7 @@ def along(
         trajectory=found.trajectory,
         misses=via_distances(times, X[:, :3, 3], blend, ends=ends),
         hand=hand,
-        deviation=found.deviation,
-        turn=found.turn,
+        certificate=certificate,
     )
 
 
@@ -303,8 +331,22 @@ def _refuse_blend(blend: ArrayLike | None) -> None:
 
 
 def _inside_limits(arm: AnyArm, move: Move) -> Move:
-    factor, _ = slowing_for_limits(arm, move.trajectory)
-    return move if factor == 1 else move.slowed(factor)
+    """Return a move slowed as much as its limits ask for."""
+    factor, because = slowing_for_limits(arm, move.trajectory)
+    if factor == 1:
+        return move
+    slow = move.slowed(factor)
+    return (
+        slow
+        if slow.certificate is None
+        else attrs.evolve(slow, certificate=attrs.evolve(slow.certificate, because=because))
+    )
+
+
+def _peaks(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
+    limited = np.isfinite(solver_of(arm).arm.limit("effort")).any()
+    efforts = effort_peaks(arm, trajectory).peaks if limited else np.zeros(trajectory.coefficients.shape[2])
+    return {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2), "effort": efforts}
 
 
 def _legs(arm: AnyArm, q: Array, X: Array, *, by: By, deviation: float, speed: float) -> list[Detour]:
@@ -331,7 +373,5 @@ def _stopping(arm: Arm, X: Array, q_start: Array, legs: Sequence[Detour]) -> Mov
         label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
         trajectory=join([leg.trajectory for leg in legs]),
         misses=np.zeros(len(X)),
-        deviation=max(leg.price.distance for leg in legs),
-        turn=max(leg.price.turn for leg in legs),
         detours=tuple(legs),
     )

@@ -103,19 +103,18 @@ def _stages(moved: Moved) -> Iterator[Stage]:
         if not during.any():  # a way shorter than a tick
             during = np.abs(samples.times - (t0 + t1) / 2) == np.abs(samples.times - (t0 + t1) / 2).min()
         detour = move.detours[i] if move.detours else None
-        planned = move.hand is not None or detour is not None
         yield Stage(
             t0=t0,
             t1=t1,
             line=file.lines[i + 1],
             arm=_ARM,
-            kind="HAND" if planned else "JOINT",
+            kind="HAND" if move.hand or detour else "JOINT",
             to=(file.names[i + 1],),
             speed=100.0,
             peak_speed=np.abs(samples.qd[during]).max(axis=0).tolist(),
             peak_effort=np.abs(moved.tau[during]).max(axis=0).tolist(),
             hand_length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
-            deviation=detour.price.distance if detour else move.deviation if planned else None,
+            deviation=detour.price.distance if detour else move.certificate.deviation if move.certificate else None,
             note=f"by {detour.by}: {detour.price}" if detour and detour.by != "line" else "",
         )
 

@@ -60,13 +60,12 @@ SAMPLES = 501
 
 def study_poses() -> Array:
     """Return the poses A, B, C (3, 4, 4), their printed rotations made exact."""
-    places = [[x / 100 for x in place] for place in PRINTED_PLACES_CM]
-    return np.asarray(pose(nearest_rotation(PRINTED_ROTATIONS), places), dtype=np.float64)
+    return pose(nearest_rotation(PRINTED_ROTATIONS), np.array(PRINTED_PLACES_CM, dtype=np.float64) / 100)
 
 
 def sample_times() -> Array:
     """Return the 501 moments of the project [s]."""
-    return PERIOD * np.arange(SAMPLES)
+    return np.linspace(0.0, PERIOD * (SAMPLES - 1), SAMPLES)
 
 
 def joint_trajectory() -> Trajectory:
@@ -257,7 +256,7 @@ def _stopped(arm: Arm, way: Way) -> str:
     if way == "joint":
         return ""
     try:
-        along(solver_of(arm), study_poses(), path_of(way), np.array(TIMES), BLEND, near=middle(arm), ends="running")
+        along(arm, study_poses(), path_of(way), np.array(TIMES), BLEND, near=middle(arm), ends="running")
     except PathError as error:
         return str(error)
     return ""

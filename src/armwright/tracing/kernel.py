@@ -29,7 +29,7 @@ def {name}({inputs}, *, threads=None, out=None):
                 {blanks}
                 if not one({inputs}, {outputs}):
                     return {outputs}
-            elif {first}.ndim == {axes} + 1 and (len({first}) < {few} or threads == 1):
+            elif {all_rows} and (len({first}) < {few} or threads == 1):
                 rows_asked = len({first})
                 {blanks_of_many}
                 if not rows(0, rows_asked, {inputs}, {outputs}):
@@ -99,6 +99,8 @@ class Kernel:
             inputs=", ".join(inputs),
             first=next(iter(inputs)),
             axes=len(next(iter(inputs.values()))),
+            # A compiled function takes long to find out that one of its inputs has too few axes.
+            all_rows=" and ".join(f"{x}.ndim == {len(shape) + 1}" for x, shape in inputs.items()),
             few=2 * _ROWS_PER_THREAD,
             blanks=blanks(""),
             blanks_of_many=blanks("rows_asked, "),

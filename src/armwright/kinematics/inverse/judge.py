@@ -16,6 +16,8 @@ from armwright.spatial.rotations import angle_between, nearest_rotation, orthono
 
 # A pose typed with a few digits is turned into a rotation up to this error; beyond it is a mistake.
 _TYPED_ROTATION = 2e-2
+# What remains of a rotation after a chain of products.
+_COMPUTED = 1e-14
 # The last row of a pose is 0 0 0 1 but for the rounding of a product.
 _LAST_ROW = 1e-9
 # A place this far outside counts as the edge of the reach: six typed digits of a metre [m]; an orientation this far
@@ -41,6 +43,9 @@ def clean_pose(X_BT: ArrayLike) -> Array:
     X = typed_poses(X_BT)
     if X.ndim != 2:
         raise ShapeError(f"pose: expected one pose, shape (4, 4), got {X.shape}; inverse_branches takes many")
+    # A rotation that was computed is as exact as one can be; what is typed is off by far more.
+    if float(orthonormality_error(X[:3, :3])) < _COMPUTED:
+        return X
     return pose(nearest_rotation(X[:3, :3]), X[:3, 3])
 
 
