@@ -16,6 +16,7 @@ from armwright.dynamics.simulation import Event, JointState, Simulation
 from armwright.kinematics.inverse.solution import Branch
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
+from armwright.study import puma_moves
 
 HERE = Path(__file__).parent
 INK, FAINT, GRID, ALARM = "#1f2933", "#7b8794", "#e4e7eb", "#c62828"
@@ -225,11 +226,70 @@ def released() -> Figure:
     return figure
 
 
+# The two moves.
+
+BY_JOINTS, BY_HAND = "#b45309", "#1d6fa5"
+WRIST = {3: "joint 4", 4: "joint 5", 5: "joint 6"}
+
+
+def draw_ways(axes: Axes) -> None:
+    """Draw the paths of the hand of both moves, with approach vectors, over their shadows on a level below."""
+    t = puma_moves.sample_times()
+    level = -0.75
+    stops = puma_moves.study_poses()[:, :3, 3]
+    for way, colour, name in (("joint", BY_JOINTS, "joint move"), ("geodesic", BY_HAND, "Cartesian move")):
+        X = puma_moves.poses_along(way, t)  # type: ignore[arg-type]
+        p = X[:, :3, 3]
+        shadow = p.copy()
+        shadow[:, 2] = level
+        axes.plot(*seen(shadow)[:, :2].T, color=GRID, linewidth=2.2, solid_capstyle="round")
+        axes.plot(*seen(p)[:, :2].T, color=colour, linewidth=2.2, label=name)
+        some = slice(0, None, 25)
+        tips = seen(p[some] + 0.09 * X[some, :3, 2])[:, :2]
+        for start, tip in zip(seen(p[some])[:, :2], tips, strict=True):
+            axes.plot(*zip(start, tip, strict=True), color=colour, linewidth=0.9)
+    for name, stop in zip(puma_moves.NAMES, stops, strict=True):
+        foot = stop.copy()
+        foot[2] = level
+        axes.plot(*zip(seen(foot)[:2], seen(stop)[:2], strict=True), color=FAINT, linewidth=0.6, linestyle=(0, (2, 2)))
+        axes.plot(*seen(stop)[:2], "o", color=INK, markersize=5)
+        axes.annotate(name, seen(stop)[:2], xytext=(6, 5), textcoords="offset points", fontweight="bold")
+    axes.set_aspect("equal")
+    axes.axis("off")
+    axes.legend(loc="upper left", frameon=False)
+
+
+def draw_wrist(axes: Axes, joint: int) -> None:
+    """Draw the position of one joint of the wrist in both moves, and its limits."""
+    t = puma_moves.sample_times()
+    limit = np.degrees(load_arm("puma560").joints[joint].limits.upper)
+    for way, colour in (("joint", BY_JOINTS), ("geodesic", BY_HAND)):
+        axes.plot(t, np.degrees(puma_moves.joints_along(way)(t)[:, joint]), color=colour, linewidth=1.8)  # type: ignore[arg-type]
+    for bound in (-limit, limit):
+        axes.axhline(bound, color=ALARM, linewidth=0.9, linestyle=(0, (4, 3)))
+    axes.set(ylabel=f"{WRIST[joint]}, deg", xlim=(0, 1), ylim=(-290, 290), yticks=(-180, 0, 180))
+    axes.grid(color=GRID)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def two_moves() -> Figure:
+    """Draw a joint move and a Cartesian move through the same three poses, and what the wrist does."""
+    figure = Figure(figsize=(7.4, 4.3), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=(1.15, 1))
+    draw_ways(left.subplots())
+    rows = right.subplots(3, 1, sharex=True)
+    for axes, joint in zip(rows, WRIST, strict=True):
+        draw_wrist(axes, joint)
+    rows[-1].set_xlabel("time, s")
+    return figure
+
+
 def main() -> None:
     """Draw all pictures."""
     with mpl.rc_context(STYLE):
         write(postures(), "postures.svg")
         write(released(), "released.svg")
+        write(two_moves(), "two_moves.svg")
 
 
 if __name__ == "__main__":
