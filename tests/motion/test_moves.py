@@ -16,6 +16,7 @@ from armwright.errors import InvalidValueError, KindError, RotationWarning, Shap
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.motion.blends import blended
+from armwright.motion.continuity import continuity
 from armwright.motion.follow import PathError
 from armwright.motion.limit_use import limit_use, slowing_for_limits
 from armwright.motion.moves import cartesian_move, exact_poses, joint_move, stopping_move
@@ -90,7 +91,7 @@ def test_the_seeds_cartesian_move_has_no_branch(puma: CompiledArm, orientation: 
         cartesian_move(puma, SEED_POSES, SEED_TIMES, blend=SEED_BLEND, ends="running", orientation=orientation)  # type: ignore[arg-type]
 
     assert stop.value.segment == 1
-    assert 0.7 < stop.value.fraction < 0.8
+    assert 0.65 < stop.value.fraction < 0.8
 
 
 def test_as_fast_as_the_limits_allow(puma: CompiledArm) -> None:
@@ -155,6 +156,7 @@ def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str,
         assert 0.99 * certificate.turn_seen - 1e-7 <= turn <= certificate.turn + 1e-7
         assert certificate.turn <= 5 * deviation
         assert np.linalg.norm(move.hand(certificate.worst_time)[:3, 3] - certificate.worst_place) < ROUNDING
+        assert continuity(move.trajectory).order >= 2
         lowest, highest = move.trajectory.extremes(0)
         assert (lowest >= arm.arm.limit("lower") - ROUNDING).all()
         assert (highest <= arm.arm.limit("upper") + ROUNDING).all()

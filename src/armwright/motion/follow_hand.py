@@ -21,7 +21,7 @@ from armwright.motion.polynomials import evaluate
 from armwright.motion.postures import Posture
 from armwright.motion.solver import Solver
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline import smooth_weight, xspline
 
 Counts: TypeAlias = npt.NDArray[np.intp]
 
@@ -145,7 +145,7 @@ def _carried(
             return stop
         still = np.zeros(arm.n)
         rates = (still, still) if ends == "rest" else (_rate(t, q), _rate(t[::-1], q[::-1]))
-        trajectory = xspline(t, q, *rates)
+        trajectory = xspline(t, q, *rates, b=smooth_weight(t))
         speed, acceleration = cubic_peaks(trajectory.coefficients, np.diff(t))
         bounds = hand_bounds(arm, trajectory.coefficients, np.diff(t), speed, acceleration)
         strays = _strays(solver, hand, trajectory, bounds, deviation)

@@ -149,9 +149,9 @@ def cartesian_move(
 ) -> Move:
     """Plan a move on which the hand goes straight from pose to pose, with blends.
 
-    Places and orientations are planned, the joints solved on them and joined by an X-spline, with as many knots as the
-    deviation asks for. The branch is chosen once and kept: of the postures inside the limits at the first pose the
-    nearest that carries through.
+    Places and orientations are planned, the joints solved on them and joined by the X-spline whose acceleration is
+    continuous, with as many knots as the deviation asks for. The branch is chosen once and kept: of the postures inside
+    the limits at the first pose the nearest that carries through.
 
     Args:
         arm: the arm, or a compiled one, which plans faster.

@@ -10,8 +10,8 @@ other curves to the fourth order, where
     a h_last + b h_next = h_last h_next / (h_last + h_next)
 
 The report has b = 0: then each rate follows from the one before it and the next knot, which is what lets
-``xspline_online`` plan while the arm moves. With b = h_last / 2 (h_last + h_next) it is the spline whose acceleration
-is continuous, which has to know all knots.
+``xspline_online`` plan while the arm moves. With ``smooth_weight``, b = h_last / 2 (h_last + h_next), it is the spline
+whose acceleration is continuous, which has to know all knots.
 """
 
 from collections.abc import Callable
@@ -41,6 +41,12 @@ def usual_weight(steps: Pair, b: Scalar = 0.0) -> Scalar:
     """Return the a that makes the spline exact for cubics, given b; for b = 0 it is the report's."""
     h_last, h_next = steps
     return h_next / (h_last + h_next) - b * (h_next / h_last)
+
+
+def smooth_weight(times: Array) -> Array:
+    """Return the b of every inner knot with which the acceleration is continuous, (k - 2,), for times (k,)."""
+    h = np.diff(times)
+    return np.asarray(h[:-1] / (2 * (h[:-1] + h[1:])))
 
 
 def right_side(slopes: Pair, steps: Pair, a: Scalar, b: Scalar) -> Scalar:
