@@ -194,7 +194,8 @@ def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: b
 
     from armwright.kinematics.forward import forward
     from armwright.report import move_figures
-    from armwright.report.moved import motion_csv, move_page
+    from armwright.report.motion_table import motion_csv
+    from armwright.report.moved import move_page
     from armwright.report.page import run_page
 
     planned, samples = moved.move, moved.samples
@@ -205,7 +206,7 @@ def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: b
     joints = move_figures.joint_panels(samples, [joint.revolute for joint in planned.arm.joints])
     hand = move_figures.hand_panels(samples.times, X)
     files: dict[str, Any] = {
-        "motion.csv": motion_csv(samples, moved.tau),
+        "motion.csv": motion_csv(samples.times, samples.q, samples.qd, samples.qdd, moved.tau),
         "move.json": json.dumps(_summary(planned, moved.file, uses), indent=2, ensure_ascii=False) + "\n",
         "joints.svg": move_figures.panels(f"{title}: joints", samples.times, joints, marks=moments),
         "hand.svg": move_figures.panels(f"{title}: hand", samples.times, hand, marks=moments, columns=2),

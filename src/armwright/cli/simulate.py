@@ -1,7 +1,6 @@
 """``armwright simulate``: what an arm does when its drives do this."""
 
 import enum
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -59,6 +58,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.dynamics.payload import payload
     from armwright.dynamics.simulate import simulate as run
     from armwright.files.output import write_folder
+    from armwright.report.motion_table import motion_csv
 
     model = load_arm(arm)
     if load is not None:
@@ -76,21 +76,11 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         period=step_ms * 1e-3,
     )
     if output is not None:
-        write_folder(output, {"motion.csv": _rows(found)})
+        write_folder(output, {"motion.csv": motion_csv(found.t, found.q, found.qd, found.qdd, found.tau)})
     if as_json:
         print(json.dumps({"status": found.status.name.lower(), "t": float(found.t[-1]), **_account(found)}, indent=2))
     else:
         _print(model, found)
-
-
-def _rows(found: "Simulation") -> Iterator[str]:
-    import numpy as np
-
-    n = found.q.shape[1]
-    yield ",".join(["t", *(f"{name}{i + 1}" for name in ("q", "qd", "qdd", "tau") for i in range(n))]) + "\n"
-    table = np.concatenate([found.t[:, None], found.q, found.qd, found.qdd, found.tau], axis=1) + 0.0
-    for row in table.tolist():
-        yield ",".join(f"{value:.12g}" for value in row) + "\n"
 
 
 def _account(found: "Simulation") -> dict[str, float]:

@@ -78,16 +78,6 @@ def move_page(moved: Moved) -> RunPage:
     )
 
 
-def motion_csv(samples: Samples, tau: Array) -> Iterator[str]:
-    """Give the lines of motion.csv: time, and per joint position, speed, acceleration and effort, in SI."""
-    n = samples.q.shape[1]
-    yield ",".join(["t", *(f"{name}{i + 1}" for name in ("q", "qd", "qdd", "tau") for i in range(n))]) + "\n"
-    table = np.concatenate([samples.times[:, None], samples.q, samples.qd, samples.qdd, tau], axis=1)
-    line = ",".join(["%.12g"] * table.shape[1]) + "\n"
-    # Adding 0 turns -0 into 0, which reads better.
-    yield from (line % tuple(row) for row in (table + 0.0).tolist())
-
-
 def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
     for i, (name, t, line) in enumerate(zip(file.names, move.times.tolist(), file.lines, strict=True)):
         met = move.misses[i] == 0
