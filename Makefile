@@ -37,6 +37,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/twelve_moves.rlo --cell examples/stanford_cell.toml -o out/twelve_moves
 	$(BIN)/armwright run examples/portable.rlo --cell examples/stanford_cell.toml -o out/portable
 	$(BIN)/armwright run examples/gearbox.rlo --cell examples/puma_cell.toml -o out/gearbox
+	$(BIN)/armwright run examples/around.rlo --cell examples/puma_cell.toml --around via -o out/around
 	$(BIN)/armwright move joint puma560 examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 

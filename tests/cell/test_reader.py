@@ -116,6 +116,7 @@ def test_defaults(tmp_path: Path) -> None:
     arm = place.arms["ARM_1"]
 
     assert (place.period, place.deviation, place.vision_time) == (1e-3, 1e-3, 0.1)
+    assert place.around is None
     assert (arm.arm.name, arm.open_time, arm.grasp_time) == ("stanford", 0.3, 0.3)
     np.testing.assert_array_equal(arm.base, np.eye(4))
     np.testing.assert_array_equal(arm.start, (0, 0, 0.3, 0, 0, 0))
@@ -144,6 +145,7 @@ z = -0.1
 [motion]
 servo_ms = 4
 deviation_mm = 0.5
+around = "via"
 [frames]
 "Table" = {IDENTITY}
 """
@@ -151,6 +153,7 @@ deviation_mm = 0.5
     arm = place.arms["ARM_2"]
 
     assert (place.name, place.period, place.deviation, place.vision_time) == ("all of it", 0.004, 0.0005, 0.2)
+    assert place.around == "via"
     assert (arm.arm.name, arm.open_time, arm.grasp_time, arm.arm.tool[2, 3]) == ("puma560", 0.25, 0.5, 0.12)
     assert place.devices == {"PRESS", "LAMP"}
     assert place.contact_height == -0.1
@@ -367,6 +370,11 @@ FAULTS = {
         "devices, PRESS, v: unknown key; none is kn",
     ),
     "servo out of range": (ARM + "[motion]\nservo_ms = 0.05\n", 5, "motion, servo_ms: expected 0.1 to 100, got 0.05"),
+    "no way round": (
+        ARM + '[motion]\naround = "dampd"\n',
+        5,
+        "motion, around: expected one of damped, none, via, got the text 'dampd'; did you mean 'damped'?",
+    ),
     "no deviation": (ARM + "[motion]\ndeviation_mm = 0\n", 5, "motion, deviation_mm: expected 0.001 to 1000, got 0"),
     "a misspelt table": (ARM + "[motions]\nservo_ms = 1\n", 4, "motions: unknown key; did you mean 'motion'?"),
     "a misspelt table below": (ARM + "[device]\nPRESS = {}\n", 4, "device: unknown key; did you mean 'devices'?"),

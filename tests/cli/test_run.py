@@ -24,6 +24,7 @@ ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 STACKING = EXAMPLES / "stacking.rlo"
 STANFORD = EXAMPLES / "stanford_cell.toml"
+PUMA = EXAMPLES / "puma_cell.toml"
 FILES = {"motion.csv", "events.jsonl", "frames.json", "run.json", "report.html"}
 
 
@@ -92,7 +93,7 @@ def test_run_file(stacked: Path) -> None:
 
     assert run["inputs"]["program"]["sha256"] == hashlib.sha256(STACKING.read_bytes()).hexdigest()
     assert run["inputs"]["cell"]["sha256"] == hashlib.sha256(STANFORD.read_bytes()).hexdigest()
-    assert run["options"] == {"servo_ms": 1.0, "deviation_mm": 1.0, "strict": False}
+    assert run["options"] == {"servo_ms": 1.0, "deviation_mm": 1.0, "around": "none", "strict": False}
     assert run["seed"] == 0
     assert run["command"].startswith("armwright run ")
     assert [stage["kind"] for stage in run["stages"]] == ["PTP"] * 3
@@ -107,12 +108,13 @@ def test_same_input_same_files(stacked: Path, tmp_path: Path) -> None:
         assert (tmp_path / "again" / name).read_bytes() == (stacked / name).read_bytes()
 
 
-@pytest.mark.parametrize("name", ["bench", "twelve_moves", "portable", "gearbox"])
+@pytest.mark.parametrize("name", ["bench", "twelve_moves", "portable", "gearbox", "around"])
 def test_examples(name: str, tmp_path: Path) -> None:
     """Every example runs to its end."""
-    cell = EXAMPLES / "puma_cell.toml" if name == "gearbox" else STANFORD
+    cell = PUMA if name in ("gearbox", "around") else STANFORD
+    more = ("--around", "via") if name == "around" else ()
 
-    done = armwright("run", EXAMPLES / f"{name}.rlo", "--cell", cell, "-o", tmp_path / name, "--servo-ms", "4")
+    done = armwright("run", EXAMPLES / f"{name}.rlo", "--cell", cell, "-o", tmp_path / name, "--servo-ms", "4", *more)
 
     assert done.returncode == 0, done
     assert {path.name for path in (tmp_path / name).iterdir()} == FILES
@@ -146,6 +148,40 @@ def test_servo_period_and_deviation(tmp_path: Path) -> None:
     armwright("run", EXAMPLES / "bench.rlo", "--cell", STANFORD, "--servo-ms", "10", "-o", tmp_path / "slow")
     times = [line.split(",")[0] for line in (tmp_path / "slow" / "motion.csv").read_text().splitlines()[1:4]]
     assert times == ["0", "0.01", "0.02"]
+
+
+def test_a_way_round(tmp_path: Path) -> None:
+    """--around is recorded; warning, run.json and page tell what stopped the line, how it is left, and the price."""
+    done = armwright("run", EXAMPLES / "around.rlo", "--cell", PUMA, "--around", "damped", "-o", tmp_path / "out")
+
+    assert done.returncode == 0, done
+    assert "warning[W402]: ARM_1 leaves the straight way to `bottom`, by damped rates: " in done.stdout
+    assert "around.rlo:12:3" in done.stdout
+    run = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert run["options"]["around"] == "damped"
+    ptp, line, _ = run["stages"]
+    assert ptp["detour"] is None
+    detour = line["detour"]
+    assert (detour["by"], detour["cause"], detour["joint"], detour["via"]) == ("damped", "singular", 6, None)
+    assert detour["along"] == pytest.approx(detour["fraction"] * detour["line"])
+    assert 0 < detour["off_the_line"] < 0.01
+    assert line["deviation"] == detour["off_the_line"]
+    assert f"{detour['off_the_line'] * 1e3:.1f} mm off the line" in done.stdout
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "the straight way is stopped 50 % of the way there" in page
+
+
+def test_a_cell_that_goes_round(tmp_path: Path) -> None:
+    """The cell file can ask for ways round, and the option overrules it; a misspelt way gets the nearest."""
+    cell = tmp_path / "cell.toml"
+    cell.write_text(PUMA.read_text() + 'around = "via"\n')
+    call = ("run", EXAMPLES / "around.rlo", "--cell", cell, "--servo-ms", "8")
+
+    assert "W402" in armwright(*call).stdout
+    assert "error[E403]" in fails(*call, "--around", "none")
+    cell.write_text(PUMA.read_text() + 'around = "dampd"\n')
+    assert "did you mean 'damped'?" in fails(*call)
+    assert armwright(*call, "--around", "over").returncode == 2
 
 
 def test_option_out_of_range() -> None:

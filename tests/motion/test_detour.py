@@ -1,5 +1,6 @@
 """Ways round what stops a straight line."""
 
+import attrs
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from armwright.kinematics.jacobian import jacobian
 from armwright.motion.detour import line_or_detour
 from armwright.motion.follow import PathError
 from armwright.motion.straight import straight_line
+from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 
 
@@ -103,3 +105,25 @@ def test_unknown_way() -> None:
     """A misspelt way gets the nearest one."""
     with pytest.raises(UnknownNameError, match="Did you mean 'damped'"):
         line_or_detour(load_arm("puma560"), np.zeros(6), np.eye(4), by="dampd")  # type: ignore[arg-type]
+
+
+def test_no_crawling() -> None:
+    """Lines past the wrist's singularity that would take a minute and more are gone round in seconds."""
+    arm = attrs.evolve(load_arm("puma560"), tool=pose(np.eye(3), (0, 0, 0.12)))
+    level = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    crawls = 0
+    for aside in (0.003, 0.004, 0.006):  # metres below the line is the place where forearm and hand are in line
+        X, Y = pose(level, (0.55, -0.05, aside - 0.3125)), pose(level, (0.55, 0.35, aside - 0.5125))
+        q = next(branch.q for branch in inverse(arm, X).allowed if branch.q[3] > 0)
+        try:
+            crawls += straight_line(arm, q, Y, deviation=2e-3).trajectory.duration > 60
+        except PathError:
+            continue
+        for by in ("via", "damped"):
+            way = line_or_detour(arm, q, Y, by=by, deviation=2e-3)  # type: ignore[arg-type]
+            assert way.trajectory.duration < 10
+            assert way.obstacle is not None
+            assert way.obstacle.joint in (4, 6)
+            assert 0.4 < way.obstacle.fraction < 0.6
+            assert "times slower" in way.obstacle.reason
+    assert crawls > 0

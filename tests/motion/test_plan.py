@@ -150,8 +150,9 @@ def test_far_away_goals_fail_at_once(stanford: Arm, x: float) -> None:
     with pytest.raises(StageError) as caught:
         plan(stanford, q, [StageGoal(kind="LINE", poses=np.array([at(x, 0, 0.05)]))], Manner())
 
-    assert caught.value.fraction == 1.0
-    assert (caught.value.stage, caught.value.pose) == (0, 0)
+    assert caught.value.obstacle.fraction == 1.0
+    assert caught.value.obstacle.certain
+    assert (caught.value.stage, caught.value.obstacle.pose) == (0, 0)
 
 
 def test_through_frames_without_a_stop(stanford: Arm) -> None:
@@ -270,10 +271,54 @@ def test_unreachable_stage_is_named(stanford: Arm) -> None:
     with pytest.raises(StageError, match=r"beyond its limit 1117\.6 mm") as caught:
         plan(stanford, q, goals, Manner())
 
-    assert (caught.value.stage, caught.value.pose, caught.value.cause) == (1, 1, "limits")
+    stopped = caught.value.obstacle
+    assert (caught.value.stage, stopped.pose, stopped.cause) == (1, 1, "limits")
 
 
 def test_deviation_must_be_positive(stanford: Arm) -> None:
     """A line cannot be kept to nothing."""
     with pytest.raises(InvalidValueError, match="more than 0 m, got 0"):
         place_knots(stanford, Path(poses=[at(0.5, 0, 0.1), at(0.5, 0.1, 0.1)]), deviation=0, speed=100)
+
+
+def test_the_first_obstacle_of_the_nearest_posture(stanford: Arm) -> None:
+    """What stops a line is told with joint, fraction, length and place, and the place lies on the line."""
+    q = start(stanford, at(0.3, 0.3, 0.1))
+
+    with pytest.raises(StageError) as caught:
+        plan(stanford, q, [StageGoal(kind="LINE", poses=at(-0.3, -0.3, 0.1)[None])], Manner())
+
+    stopped = caught.value.obstacle
+    assert (stopped.cause, stopped.joint, stopped.certain) == ("limits", 3, False)
+    assert stopped.length == pytest.approx(np.hypot(0.6, 0.6))
+    assert stopped.along == pytest.approx(stopped.fraction * np.hypot(0.6, 0.6))
+    x = 0.3 - 0.6 * stopped.fraction
+    np.testing.assert_allclose(stopped.place, (x, x, 0.1), atol=POSE)
+
+
+def test_a_posture_with_a_free_line_comes_before_a_way_round(rng: np.random.Generator) -> None:
+    """Where another posture has the line free, it is run, and nothing is gone round although that was asked for."""
+    arm = load_arm("puma560")
+    tried = 0
+    for q in random_postures(arm, rng, 400):
+        A = forward(arm, q)
+        B = A @ pose(np.eye(3), (0.0, 0.0, -0.25))
+        goals = [StageGoal(kind="PTP", poses=A[None]), StageGoal(kind="LINE", poses=B[None])]
+        try:
+            plan(arm, q, goals[1:], Manner())
+        except StageError:
+            pass
+        else:
+            continue
+        try:
+            plain = plan(arm, q, goals, Manner())
+        except StageError:
+            continue
+        tried += 1
+        asked = plan(arm, q, goals, Manner(around="via"))
+        assert asked[1].detour is None
+        for one, other in zip(plain, asked, strict=True):
+            np.testing.assert_array_equal(one.trajectory.coefficients, other.trajectory.coefficients)
+        if tried == 3:
+            break
+    assert tried == 3

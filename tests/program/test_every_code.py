@@ -11,7 +11,7 @@ from program.shelf import ACCEPTED, BARE, REJECTED, compile_program, expectation
 SOURCES = Path(armwright.program.__file__).parent
 MANUAL = Path(__file__).parents[2] / "docs" / "language.md"
 # What a running program says is shown by its own tests.
-RUNNING = {"interpret.py", "recording.py"}
+RUNNING = {"interpret.py", "obstacles.py"}
 
 
 def codes() -> set[str]:
@@ -32,7 +32,7 @@ def test_every_code_is_explained() -> None:
     rows = set(re.findall(r"^\| ([EWLR]\d{3}) \|", MANUAL.read_text(encoding="utf-8"), re.MULTILINE))
     running = {code for name in RUNNING for code in re.findall(r'"([EWLR]\d{3})"', (SOURCES / name).read_text())}
 
-    assert codes() <= rows
+    assert codes() | running <= rows
     assert rows <= codes() | running
 
 

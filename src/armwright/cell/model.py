@@ -1,6 +1,7 @@
 """The cell as its file tells it: arms on their bases, frames, what the camera will see, devices, obstacles."""
 
 from collections.abc import Mapping
+from typing import Literal, TypeAlias
 
 import attrs
 import numpy as np
@@ -11,6 +12,8 @@ from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import forward
 from armwright.spatial.poses import one_pose
+
+Around: TypeAlias = Literal["via", "damped"]
 
 
 def _posture(value: ArrayLike) -> Array:
@@ -63,6 +66,7 @@ class Cell:
         vision_time: how long the camera takes for an answer [s].
         deviation: allowed distance from straight lines [m].
         period: of the servo [s].
+        around: how to go round what stops a straight line, by ``via`` poses or ``damped`` rates; None to stop there.
     """
 
     name: str
@@ -75,6 +79,7 @@ class Cell:
     vision_time: float = 0.1
     deviation: float = 1e-3
     period: float = 1e-3
+    around: Around | None = None
 
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.

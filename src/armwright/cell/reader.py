@@ -12,7 +12,7 @@ from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, Node
-from armwright.cell.model import Cell, CellArm
+from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.names import arm_name
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
@@ -33,6 +33,8 @@ _TYPED_ROTATION = 2e-2
 # A faster servo fills a disk, a slower one controls nothing [ms].
 SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
+# How to go round what stops a straight line, as it is written.
+WAYS_ROUND: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # Fingers and cameras that take longer are a slip of units [s].
 _LONGEST_WAIT = 600.0
 
@@ -62,11 +64,17 @@ def read_cell(path: Path | str) -> Cell:
         contact_height=None if math.isnan(height) else height,
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
+        around=_around(motion),
     )
     top.allow("devices")
     for table in (camera, motion, contact, top):
         table.finish()
     return cell
+
+
+def _around(motion: Table) -> Around | None:
+    """Read how to go round what stops a straight line; without the key nothing is gone round."""
+    return WAYS_ROUND[motion.choice("around", WAYS_ROUND, default="none")]
 
 
 def _arms(table: Table, folder: Path) -> dict[str, CellArm]:

@@ -1,5 +1,6 @@
 """``armwright run``: a program moves an arm, and the user sees what happened."""
 
+import enum
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -20,6 +21,14 @@ if TYPE_CHECKING:
     from armwright.program.recording import Recording, RunStage
 
 
+class Around(enum.StrEnum):
+    """How to go round what stops a straight line."""
+
+    VIA = "via"
+    DAMPED = "damped"
+    NONE = "none"
+
+
 def run(  # noqa: PLR0917 - Typer reads one parameter per option
     program: Annotated[Path, typer.Argument(help="The program, in RLO.", show_default=False)],
     cell: Annotated[Path, typer.Option("--cell", help="The cell it runs in, TOML or JSON.", show_default=False)],
@@ -33,6 +42,13 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         float | None,
         typer.Option(help="Allowed deviation from straight lines; the cell file's, or 1.", show_default=False),
     ] = None,
+    around: Annotated[
+        Around | None,
+        typer.Option(
+            help="Go round what stops a straight line: by a pose beside it, or damped rates; the cell file's, or none.",
+            show_default=False,
+        ),
+    ] = None,
     strict: Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")] = False,
     seed: Annotated[int, typer.Option(help="Recorded in run.json; this simulator draws no random numbers.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
@@ -42,7 +58,8 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 
     Writes motion.csv (every servo tick, SI), events.jsonl (every effect with its source line), frames.json (the
     final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the disk and
-    shows the arm moving.
+    shows the arm moving. With --around, a straight line that meets a singularity or a limit is left and met again; a
+    warning says where, why and at what price in mm, mrad and s.
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
@@ -53,7 +70,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.program.interpret import RunError, warnings
     from armwright.report.files import Origin, result_files, summary
 
-    place = _cell(cell, servo_ms, deviation_mm)
+    place = _cell(cell, servo_ms, deviation_mm, around)
     compiled = compile_file(program, place, strict=strict)
     if compiled.code is None:
         _fail(compiled.source, compiled.diagnostics, as_json=as_json)
@@ -64,7 +81,12 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         _fail(code.source, [*compiled.diagnostics, error.diagnostic], error, code, as_json=as_json)
     diagnostics = (*compiled.diagnostics, *warnings(recording))
     if output is not None:
-        options = {"servo_ms": place.period * 1e3, "deviation_mm": place.deviation * 1e3, "strict": strict}
+        options = {
+            "servo_ms": place.period * 1e3,
+            "deviation_mm": place.deviation * 1e3,
+            "around": place.around or Around.NONE.value,
+            "strict": strict,
+        }
         origin = Origin(program=program, cell=cell, command=_command(), seed=seed, options=options)
         write_folder(output, result_files(recording, code, diagnostics, origin))
     if diagnostics and not as_json:
@@ -76,15 +98,16 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         _print_summary(recording, code, output)
 
 
-def _cell(path: Path, servo_ms: float | None, deviation_mm: float | None) -> "Cell":
+def _cell(path: Path, servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
     import attrs
 
-    from armwright.cell.reader import DEVIATION_MM, SERVO_MS, read_cell
+    from armwright.cell.reader import DEVIATION_MM, SERVO_MS, WAYS_ROUND, read_cell
 
     place = read_cell(path)
     period = place.period if servo_ms is None else _option("--servo-ms", servo_ms, SERVO_MS)
     deviation = place.deviation if deviation_mm is None else _option("--deviation-mm", deviation_mm, DEVIATION_MM)
-    return attrs.evolve(place, period=period, deviation=deviation)
+    way_round = place.around if around is None else WAYS_ROUND[around.value]
+    return attrs.evolve(place, period=period, deviation=deviation, around=way_round)
 
 
 def _option(name: str, value: float, bounds: tuple[float, float]) -> float:

@@ -9,14 +9,14 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike
-from armwright.errors import one_of
+from armwright.errors import InvalidValueError, one_of
 from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.inverse.judge import clean_pose
 from armwright.motion.certificate import slowing
 from armwright.motion.deviation import Spline, Ways, deviation_of
 from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.solver import AnyArm, Solver, solver_of
-from armwright.motion.straight import CertifiedLine, Line, straight_line, timed_line
+from armwright.motion.straight import CertifiedLine, Line, at_place, straight_line, timed_line
 from armwright.motion.trajectory import Trajectory, join
 from armwright.motion.xspline import xspline
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
@@ -29,6 +29,9 @@ _DIRECTIONS = 8
 _TURNS = (0.1, 0.3, 0.6)
 # A way round that takes longer than the line by so many times its duration is worth looking for another.
 _LONG = 2.0
+# A line that takes so many times its duration, and so much longer [s], is crawled along. A way round is looked for
+# then too, and taken where it needs no more than this part of the time.
+_CRAWL, _WAIT, _BETTER = 10.0, 1.0, 0.5
 # A via pose stands no nearer to the ends of the line than this part of it.
 _MARGIN = 0.1
 # Damped rates: steps of the way, how fast what is missing is made up for [1/s], and how long after the end, at most.
@@ -49,7 +52,8 @@ class Price:
     Attributes:
         distance: largest distance of the hand from the straight line [m].
         turn: largest angle from the orientation that belongs to the line [rad].
-        time: how much longer it takes than the line by the report's rule would [s].
+        time: how much longer it takes than the line by the report's rule would [s]; 0 for a line that is run, if it is
+            no crawl.
     """
 
     distance: float
@@ -68,7 +72,7 @@ class Detour:
     Attributes:
         trajectory: of the joints, at rest at both ends.
         by: ``line`` where the straight line itself can be run, ``via`` or ``damped`` otherwise.
-        obstacle: what stopped the line; None where nothing did.
+        obstacle: what stopped the line, or made it a crawl; None where the line is run.
         via: (4, 4) the pose that it stops at on the way; None unless by ``via``.
         price: what it costs.
         legs: the certified lines it is made of; none by ``damped`` rates, which follow no line.
@@ -96,7 +100,8 @@ def line_or_detour(
 
     By ``via``: a stop at a pose beside the line, or at the same place with the hand turned, that two certified lines
     lead to and from; the nearest that is found. By ``damped``: along the line, where the posture is nearly singular
-    with joint rates that stay bounded, so that the hand leaves the line there and comes back.
+    with joint rates that stay bounded, so that the hand leaves the line there and comes back. A line that could only
+    be crawled along, at a tenth of its speed, is gone round too, where that takes less than half the time.
 
     Args:
         arm: an arm, or a compiled one, which plans faster.
@@ -114,22 +119,47 @@ def line_or_detour(
     one_of("way round", by, ("via", "damped"))
     solver = solver_of(arm)
     q, B = one_posture(solver.arm, q_start, "q_start"), clean_pose(X_goal)
+    asked = timed_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
+    straight: Detour | None = None
     try:
         line = straight_line(arm, q, B, deviation=deviation, speed=speed)
     except PathError as error:
         obstacle = error
     else:
-        free = Price(distance=line.certificate.deviation, turn=line.certificate.turn, time=0.0)
-        return Detour(trajectory=line.trajectory, by="line", obstacle=None, via=None, price=free, legs=(line,))
-    asked = timed_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
+        slower = 0.0 if asked is None else line.trajectory.duration - asked.duration
+        crawls = asked is not None and slower > max((_CRAWL - 1) * asked.duration, _WAIT)
+        straight = _straight(line, slower if crawls else 0.0)
+        if asked is None or not crawls:
+            return straight
+        obstacle = _crawl(asked, line)
     if asked is None or (by == "damped" and obstacle.cause == "reach"):
         raise obstacle
     found = _damped(solver, asked, q, damping, obstacle) if by == "damped" else None
     if by == "via":
         found = _by_via(arm, asked, q, obstacle, deviation=deviation, speed=speed)
+    if straight is not None and (found is None or found.trajectory.duration > _BETTER * straight.trajectory.duration):
+        return straight
     if found is None:
         raise obstacle
     return found
+
+
+def _straight(line: CertifiedLine, slower: float) -> Detour:
+    """Return the line itself."""
+    price = Price(distance=line.certificate.deviation, turn=line.certificate.turn, time=slower)
+    return Detour(trajectory=line.trajectory, by="line", obstacle=None, via=None, price=price, legs=(line,))
+
+
+def _crawl(asked: Line, line: CertifiedLine) -> PathError:
+    """Return what makes a line a crawl: the joint for which it is slowed most, and where that is."""
+    factor, because = line.certificate.factor, line.certificate.because
+    assert because is not None  # noqa: S101 - nothing is slowed for nothing
+    order = {"speed": 1}.get(because[0], 2)  # efforts rise where accelerations do
+    worst = int(line.trajectory.segment_peaks(order)[:, because[1]].argmax())
+    time = line.trajectory.times[worst] / line.trajectory.duration * asked.duration
+    s = float(asked.fractions(np.array([time]))[0])
+    reason = f"for the {because[0]} of joint {because[1] + 1} the line would have to be run {factor:.0f} times slower"
+    return PathError("singular", 0, s, f"near {at_place(asked, s)} {reason}", joint=because[1] + 1, reason=reason)
 
 
 def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation: float, speed: float) -> Detour | None:
@@ -141,7 +171,8 @@ def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation
                 there = straight_line(arm, q, via, deviation=deviation, speed=speed)
                 at_via = there.trajectory(there.trajectory.duration)
                 back = straight_line(arm, at_via, line.B, deviation=deviation, speed=speed)
-            except PathError:
+            # A leg on which gravity alone takes more than a joint may give is no way either.
+            except (PathError, InvalidValueError):
                 continue
             motion = join([there.trajectory, back.trajectory])
             place, turn = _apart(line, via)
@@ -233,10 +264,14 @@ def _easing(arm: Arm, trajectory: Trajectory) -> Array:
 
 
 def _integrated(solver: Solver, line: Line, q: Array, damping: float) -> tuple[Array, Array | None]:
-    """Return times (k,) and postures (k, n) from the start to where the end is met; no postures where it is not."""
+    """Return times (k,) and postures (k, n) from the start to where the end is met.
+
+    No postures where it is not met, or where a joint passes a limit before.
+    """
     h = line.duration / _STEPS
+    lower, upper = solver.arm.limit("lower"), solver.arm.limit("upper")
     postures, t = [q], 0.0
-    while t < line.duration * (1 + _AFTER):
+    while t < line.duration * (1 + _AFTER) and not ((q < lower) | (q > upper)).any():
         ahead = line.poses(line.fractions(np.minimum([t, t + h], line.duration)))
         twist = np.concatenate([ahead[1, :3, 3] - ahead[0, :3, 3], _turn(ahead[0], ahead[1])]) / h
         missing = _missing(solver.forward(q), ahead[0])

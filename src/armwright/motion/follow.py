@@ -10,6 +10,7 @@ from armwright.arrays import Array, ArrayLike
 from armwright.errors import ArmwrightError
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.solution import Answer, InverseSolution, violations
+from armwright.kinematics.singularities import singularities
 from armwright.motion.chain import chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of
 from armwright.motion.path import NEGLIGIBLE, Knots, Path, place_knots
@@ -58,11 +59,23 @@ class PathError(ArmwrightError, ValueError):
         cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` posture.
         segment: which way of the path, from 0.
         fraction: how far along that way.
+        joint: number of the joint that stops it, from 1; None where it is no single one, or not known.
+        reason: what happens there, without the place.
     """
 
-    def __init__(self, cause: Cause, segment: int, fraction: float, message: str) -> None:
+    def __init__(
+        self,
+        cause: Cause,
+        segment: int,
+        fraction: float,
+        message: str,
+        *,
+        joint: int | None = None,
+        reason: str | None = None,
+    ) -> None:
         """Say what stops the arm, and where."""
-        self.cause, self.segment, self.fraction = cause, segment, fraction
+        self.cause, self.segment, self.fraction, self.joint = cause, segment, fraction, joint
+        self.reason = message if reason is None else reason
         super().__init__(message)
 
 
@@ -112,6 +125,11 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     )
 
 
+def nearest_singularity(arm: Arm, q: ArrayLike) -> str:
+    """Return the name of the factor that is nearest to zero, such as ``wrist``; see ``Factor``."""
+    return min(singularities(arm, q).factors, key=lambda factor: abs(factor.value) / factor.scale).name
+
+
 def cause_of(solution: InverseSolution) -> Cause:
     """Return why no posture of a solution can be taken."""
     return "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
@@ -133,13 +151,14 @@ def _solve(solver: Solver, path: Path, knots: Knots, q_start: Array) -> Array:
     outside = np.any((met < arm.limit("lower")) | (met > arm.limit("upper")), axis=1)
     for k in np.flatnonzero(outside):
         for fault in violations(arm, q[k]):
-            raise PathError("limits", knots.segments[k], knots.fractions[k], str(fault))
+            raise PathError("limits", knots.segments[k], knots.fractions[k], str(fault), joint=fault.joint)
     if missed is not None:
         place = knots.segments[missed], knots.fractions[missed]
         solution = inverse(arm, X[missed], q[missed - 1])
         if solution.answer is Answer.OUT_OF_REACH:
             raise PathError("reach", *place, solution.explain())
-        raise PathError("singular", *place, f"the posture would have to change near {_place(path, knots, missed)}")
+        message = f"the posture would have to change near {_place(path, knots, missed)}"
+        raise PathError("singular", *place, message, reason="the posture would have to change there")
     return q
 
 
@@ -166,7 +185,7 @@ def _check_between(arm: Arm, knots: Knots, trajectory: Trajectory) -> None:
     for q in trajectory.extremes(0):
         for fault in violations(arm, q):
             nearest = int(np.abs(at_knots[:, fault.joint - 1] - fault.value).argmin())
-            raise PathError("limits", knots.segments[nearest], knots.fractions[nearest], str(fault))
+            raise PathError("limits", knots.segments[nearest], knots.fractions[nearest], str(fault), joint=fault.joint)
 
 
 def _slowing(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> tuple[float, str]:
@@ -177,14 +196,13 @@ def _slowing(arm: Arm, path: Path, knots: Knots, trajectory: Trajectory) -> tupl
     }
     if needs["speed"].max() > SLOWEST:
         interval, worst = np.unravel_index(int(needs["speed"].argmax()), needs["speed"].shape)
-        k = int(interval) + 1
-        raise PathError(
-            "singular",
-            knots.segments[k],
-            knots.fractions[k],
-            f"near {_place(path, knots, k)} joint {worst + 1} would have to move {needs['speed'].max():.0f} times as "
-            "fast as it may: the arm is nearly singular there",
+        k, joint = int(interval) + 1, int(worst) + 1
+        reason = (
+            f"joint {joint} would have to move {needs['speed'].max():.0f} times as fast as it may: the arm is nearly "
+            f"singular there ({nearest_singularity(arm, trajectory(knots.times[k]))})"
         )
+        message = f"near {_place(path, knots, k)} {reason}"
+        raise PathError("singular", knots.segments[k], knots.fractions[k], message, joint=joint, reason=reason)
     what = max(needs, key=lambda name: float(needs[name].max()))
     joint = int(np.unravel_index(int(needs[what].argmax()), needs[what].shape)[1])
     factor = float(needs[what].max())
@@ -202,10 +220,15 @@ def _give_up(arm: Arm, path: Path, knots: Knots, q: Array, badness: Array) -> No
     joint = int(jump.argmax())
     amount = abs(q[worst + 1, joint] - q[worst, joint])
     verb, unit, scale = ("turn", "deg", 180 / np.pi) if arm.joints[joint].revolute else ("move", "mm", 1e3)
+    why = (
+        f"the arm is singular there ({nearest_singularity(arm, q[worst + 1])}) and joint {joint + 1} would have to "
+        f"{verb} {amount * scale:.1f} {unit} at once"
+    )
     raise PathError(
         "singular",
         knots.segments[worst + 1],
         knots.fractions[worst + 1],
-        f"the hand cannot stay on the path near {_place(path, knots, worst + 1)}: the arm is singular there "
-        f"and joint {joint + 1} would have to {verb} {amount * scale:.1f} {unit} at once",
+        f"the hand cannot stay on the path near {_place(path, knots, worst + 1)}: {why}",
+        joint=joint + 1,
+        reason=f"the hand cannot stay on the path: {why}",
     )

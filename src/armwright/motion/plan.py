@@ -7,11 +7,13 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, joint_array, of_shape
-from armwright.errors import ArmwrightError
+from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
+from armwright.errors import ArmwrightError, InvalidValueError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.turns import images, travel
+from armwright.motion.certificate import LimitName
+from armwright.motion.detour import By, Detour, line_or_detour
 from armwright.motion.follow import Cause, PathError, cause_of, follow
 from armwright.motion.path import Path
 from armwright.motion.quintic import point_to_point
@@ -19,6 +21,9 @@ from armwright.motion.trajectory import Trajectory, whole_ticks
 
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
 _FARTHEST = 1e6
+
+# Places of the hand along a smooth motion from which its length is summed.
+_LOOKS = 101
 
 StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE"]
 
@@ -31,11 +36,14 @@ class Manner:
         speed: 1 to 120, 100 is normal.
         deviation: allowed distance from straight lines [m].
         period: of the servo [s]; stages last a whole number of it.
+        around: how to go round what stops a straight line, see ``line_or_detour``; None to stop there. Only a LINE is
+            gone round: a way through several frames is run without a stop, which a way round one of its parts is not.
     """
 
     speed: float = 100.0
     deviation: float = 1e-3
     period: float = 1e-3
+    around: By | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -52,6 +60,36 @@ class StageGoal:
 
 
 @attrs.frozen(kw_only=True, eq=False)
+class Obstacle:
+    """What stops the arm on its way, and where.
+
+    Attributes:
+        cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` posture.
+        reason: the same in words, with the joint and the amount.
+        joint: number of the joint that stops it, from 1; None where it is no single one.
+        pose: which pose of the stage the arm was on the way to, from 0.
+        fraction: how far along that way; 1 for the pose itself.
+        length: of that way [m]; None for point to point, which has no way in space.
+        place: (3,) where, seen from the base of the arm [m].
+        certain: whether the pose itself cannot be taken, whichever way leads to it.
+    """
+
+    cause: Cause
+    reason: str
+    joint: int | None
+    pose: int
+    fraction: float
+    length: float | None
+    place: Array = attrs.field(converter=read_only)
+    certain: bool
+
+    @property
+    def along(self) -> float | None:
+        """How far along that way [m]; None for point to point."""
+        return None if self.length is None else self.fraction * self.length
+
+
+@attrs.frozen(kw_only=True, eq=False)
 class Stage:
     """One stage, planned.
 
@@ -62,6 +100,8 @@ class Stage:
         knots: number of poses that were solved.
         deviation: largest distance from the path that was found [m]; None for point to point.
         slowed: why it runs slower than asked, or empty.
+        obstacle: what stopped the straight line; None where it is run.
+        detour: the way round it, and its price; None where there is no obstacle.
     """
 
     kind: StageKind
@@ -70,44 +110,64 @@ class Stage:
     knots: int
     deviation: float | None
     slowed: str
+    obstacle: Obstacle | None = None
+    detour: Detour | None = None
 
 
 class StageError(ArmwrightError, ValueError):
     """A stage cannot be made.
 
     Attributes:
-        cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` posture.
         stage: which stage, from 0.
-        pose: which of its poses the arm was on the way to, from 0.
-        fraction: how far along that way; 1 for the pose itself.
+        obstacle: what stops it, and where.
     """
 
-    def __init__(self, cause: Cause, stage: int, pose: int, fraction: float, message: str) -> None:
-        """Say what stops the arm, and where."""
-        self.cause, self.stage, self.pose, self.fraction = cause, stage, pose, fraction
-        super().__init__(message)
+    def __init__(self, stage: int, obstacle: Obstacle) -> None:
+        """Keep the place; the text is the reason."""
+        self.stage, self.obstacle = stage, obstacle
+        super().__init__(obstacle.reason)
 
 
 def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manner) -> list[Stage]:
     """Plan the stages of one move, each beginning where the last one ended.
 
     A point-to-point stage has up to eight postures to end in. The nearest comes first; when no straight line
-    can go on from it, the next nearest is tried.
+    can go on from it, the next nearest is tried. What stops a line is gone round, where ``manner`` asks for that, only
+    when no posture has straight lines for the whole move.
 
     Args:
         arm: any arm; with a closed-form inverse all its postures are known, without one those that are found.
         q_start: (n,) present joint positions.
         goals: the stages.
-        manner: speed, deviation, servo period.
+        manner: speed, deviation, servo period, ways round.
 
     Returns:
         One planned stage per goal.
 
     Raises:
-        StageError: a stage cannot be made from any posture; it names the first obstacle of the nearest one.
+        StageError: a stage cannot be made from any posture; it names the first obstacle of the nearest one, on a
+            straight line also where a way round was looked for in vain.
         InvalidValueError: speed or deviation are out of range.
     """
-    return _plan(arm, joint_array(q_start, arm.n, "q_start"), goals, manner, 0)
+    q = joint_array(q_start, arm.n, "q_start")
+    try:
+        return _plan(arm, q, goals, attrs.evolve(manner, around=None), 0)
+    except StageError:
+        if manner.around is None or not _worth_looking(arm, goals):
+            raise
+        try:
+            return _plan(arm, q, goals, manner, 0)
+        except StageError:
+            pass
+        raise
+
+
+def _worth_looking(arm: Arm, goals: Sequence[StageGoal]) -> bool:
+    """Whether there is a line that could be gone round, and every pose can be taken in some posture."""
+    poses = [X for goal in goals for X in goal.poses]
+    return any(goal.kind == "LINE" for goal in goals) and all(
+        np.abs(X[:3, 3]).max() <= _FARTHEST and inverse(arm, X).allowed for X in poses
+    )
 
 
 def _plan(arm: Arm, q: Array, goals: Sequence[StageGoal], manner: Manner, number: int) -> list[Stage]:
@@ -128,7 +188,8 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
     poses = of_shape(goal.poses, (4, 4), "poses")
     far = np.abs(poses[:, :3, 3]).max(axis=-1)
     if far.max() > _FARTHEST:
-        raise StageError("reach", number, int(far.argmax()), 1.0, f"the pose is {far.max():.3g} m away")
+        worst = int(far.argmax())
+        raise StageError(number, _at_pose("reach", f"the pose is {far.max():.3g} m away", worst, poses[worst]))
     if goal.kind == "PTP":
         # Planned as they are asked for: nearly always the first one does.
         yield from (_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number))
@@ -137,33 +198,101 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
     try:
         found = follow(arm, path, q, deviation=manner.deviation, speed=manner.speed)
     except PathError as error:
-        raise StageError(error.cause, number, error.segment, error.fraction, str(error)) from error
+        obstacle = _on_the_way(arm, path, error)
+        way_round = _way_round(arm, q, goal, manner, obstacle)
+        if way_round is None:
+            raise StageError(number, obstacle) from error
+        yield way_round
+        return
     yield Stage(
         kind=goal.kind,
         trajectory=whole_ticks(found.trajectory, manner.period),
-        length=float(np.linalg.norm(np.diff(path.poses[:, :3, 3], axis=0), axis=-1).sum()),
+        length=_length(path.poses),
         knots=found.knots,
         deviation=found.deviation,
         slowed=found.slowed,
     )
 
 
+def _on_the_way(arm: Arm, path: Path, error: PathError) -> Obstacle:
+    """Return what stops the arm on a path, with its place."""
+    ends = path.poses[error.segment : error.segment + 2]
+    return Obstacle(
+        cause=error.cause,
+        reason=error.reason,
+        joint=error.joint,
+        pose=error.segment,
+        fraction=error.fraction,
+        length=_length(ends),
+        place=path.at(error.segment, error.fraction)[:3, 3],
+        certain=error.fraction == 1 and not inverse(arm, ends[1]).allowed,
+    )
+
+
+def _at_pose(cause: Cause, reason: str, pose: int, X: Array) -> Obstacle:
+    """Return the obstacle that a pose itself is."""
+    return Obstacle(
+        cause=cause, reason=reason, joint=None, pose=pose, fraction=1.0, length=None, place=X[:3, 3], certain=True
+    )
+
+
+def _way_round(arm: Arm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> Stage | None:
+    """Return the stage that goes round what stops a line; None where that is not asked for, or there is no way."""
+    if manner.around is None or goal.kind != "LINE" or obstacle.certain:
+        return None
+    X, Y = forward(arm, q), goal.poses[0]
+    try:
+        detour = line_or_detour(arm, q, Y, by=manner.around, deviation=manner.deviation, speed=manner.speed)
+    except (PathError, InvalidValueError):
+        # No way was found, or none on which the joints could hold the arm up.
+        return None
+    trajectory = whole_ticks(detour.trajectory, manner.period)
+    taken = detour.by != "line"
+    corners = [X, Y] if detour.via is None else [X, detour.via, Y]
+    legs = [leg.certificate for leg in detour.legs]
+    slowest = max(legs, key=lambda leg: leg.factor, default=None)
+    return Stage(
+        kind="LINE",
+        trajectory=trajectory,
+        length=_length(np.stack(corners)) if legs else _hand_length(arm, trajectory),
+        knots=sum(leg.knots for leg in legs) or len(trajectory.times),
+        # The via pose is as far from the line as any place of the legs that meet in it.
+        deviation=detour.price.distance + (max(leg.deviation for leg in legs) if taken and legs else 0.0),
+        slowed="" if slowest is None or slowest.because is None else _slower(slowest.factor, slowest.because),
+        obstacle=obstacle if taken else None,
+        detour=detour if taken else None,
+    )
+
+
+def _slower(factor: float, because: tuple[LimitName, int]) -> str:
+    return f"{factor:.2f} times slower, for the {because[0]} of joint {because[1] + 1}"
+
+
+def _length(poses: Array) -> float:
+    """Return the length of the straight ways from pose to pose (k, 4, 4) [m]."""
+    return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1).sum())
+
+
+def _hand_length(arm: Arm, trajectory: Trajectory) -> float:
+    """Return the length of the way of the hand, looked at often enough for a smooth one [m]."""
+    return _length(forward(arm, trajectory(np.linspace(0.0, trajectory.duration, _LOOKS))))
+
+
 def _postures(arm: Arm, X: Array, q: Array, number: int) -> list[Array]:
     """Return the postures inside the limits that reach a pose, whole turns included, nearest first."""
     solution = inverse(arm, X, q)
     if not solution.allowed:
-        raise StageError(cause_of(solution), number, 0, 1.0, solution.explain())
+        raise StageError(number, _at_pose(cause_of(solution), solution.explain(), 0, X))
     postures = [image for branch in solution.allowed for image in images(arm, branch.q)]
     return sorted(postures, key=lambda posture: travel(arm, q, posture))
 
 
 def _direct(arm: Arm, q: Array, goal: Array, manner: Manner) -> Stage:
     trajectory = point_to_point(arm, q, goal, manner.speed)
-    hand = forward(arm, trajectory(np.linspace(0.0, trajectory.duration, 101)))[:, :3, 3]
     return Stage(
         kind="PTP",
         trajectory=whole_ticks(trajectory, manner.period),
-        length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
+        length=_hand_length(arm, trajectory),
         knots=2,
         deviation=None,
         slowed="",

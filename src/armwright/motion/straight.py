@@ -13,12 +13,11 @@ from armwright.errors import InvalidValueError
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import clean_pose
 from armwright.kinematics.inverse.solution import Answer, violations
-from armwright.kinematics.singularities import singularities
 from armwright.motion.certificate import Certificate, LimitName, slowing
 from armwright.motion.chain import chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned, turning_points
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
-from armwright.motion.follow import SLOWEST, TURN_PER_METRE, PathError
+from armwright.motion.follow import SLOWEST, TURN_PER_METRE, PathError, nearest_singularity
 from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, report_speed, report_step
 from armwright.motion.quintic import check_speed
 from armwright.motion.solver import AnyArm, Solver, solver_of
@@ -170,8 +169,10 @@ def _slowing(
     factor, because = slowing(arm, {"speed": found.speed.max(axis=0), "acceleration": found.acceleration.max(axis=0)})
     if because is not None and because[0] == "speed" and factor > SLOWEST:
         time = trajectory.times[found.speed[:, because[1]].argmax()]
-        reason = f"joint {because[1] + 1} would have to move {factor:.0f} times as fast as it may"
-        raise _singular(arm, line, trajectory(time), float(line.fractions(np.array([time]))[0]), reason)
+        reason = f"would have to move {factor:.0f} times as fast as it may"
+        raise _singular(
+            arm, line, trajectory(time), float(line.fractions(np.array([time]))[0]), joint=because[1], reason=reason
+        )
     return factor, because
 
 
@@ -192,7 +193,7 @@ def _ends(solver: Solver, q_start: ArrayLike, X_goal: ArrayLike, deviation: floa
     q = one_posture(solver.arm, q_start, "q_start")
     B = clean_pose(X_goal)
     for fault in violations(solver.arm, q):
-        raise PathError("limits", 0, 0.0, f"at the start {fault}")
+        raise PathError("limits", 0, 0.0, f"at the start {fault}", joint=fault.joint, reason=str(fault))
     return q, np.asarray(solver.forward(q)), B
 
 
@@ -236,7 +237,7 @@ def _refined(
         times = np.append(np.concatenate(inside), line.duration)
     worst = int(excess.argmax())
     joint = int(np.abs(q[worst + 1] - q[worst]).argmax())
-    raise _singular(solver.arm, line, q[worst], float(s[worst]), f"joint {joint + 1} would have to move at once")
+    raise _singular(solver.arm, line, q[worst], float(s[worst]), joint=joint, reason="would have to move at once")
 
 
 def _check_rush(arm: Arm, line: Line, found: Deviation, lengths: Array, q: Array) -> None:
@@ -244,32 +245,36 @@ def _check_rush(arm: Arm, line: Line, found: Deviation, lengths: Array, q: Array
     rush = np.where((lengths < line.duration / _SHORT)[:, None], found.speed / arm.limit("speed"), 0.0)
     if rush.max() > SLOWEST:
         worst, joint = np.unravel_index(int(rush.argmax()), rush.shape)
-        reason = f"joint {joint + 1} would have to move {rush.max():.0f} times as fast as it may"
+        reason = f"would have to move {rush.max():.0f} times as fast as it may"
         s = float(line.fractions(np.cumsum(lengths)[worst : worst + 1])[0])
-        raise _singular(arm, line, q[worst], s, reason)
+        raise _singular(arm, line, q[worst], s, joint=int(joint), reason=reason)
 
 
-def _singular(arm: Arm, line: Line, q: Array, s: float, reason: str) -> PathError:
-    """Return the error for a place where the arm is singular, and say by which factor."""
-    factors = singularities(arm, q).factors
-    name = min(factors, key=lambda factor: abs(factor.value) / factor.scale).name
-    message = f"the hand cannot stay on the line near {_place(line, s)}: the arm is singular there ({name}), {reason}"
-    return PathError("singular", 0, s, message)
+def _singular(arm: Arm, line: Line, q: Array, s: float, *, joint: int, reason: str) -> PathError:
+    """Return the error for a place where the arm is singular, and say by which factor, and what a joint has to do."""
+    why = f"the arm is singular there ({nearest_singularity(arm, q)}), joint {joint + 1} {reason}"
+    message = f"the hand cannot stay on the line near {at_place(line, s)}: {why}"
+    return PathError("singular", 0, s, message, joint=joint + 1, reason=f"the hand cannot stay on the line: {why}")
 
 
 def _solved(solver: Solver, line: Line, X: Array, s: Array, q_start: Array) -> Array:
     """Return the postures (k, n) at poses (k, 4, 4), each next to the one before."""
     q, missed = chain(solver, X, q_start)
-    if missed is not None:
-        solution = inverse(solver.arm, X[missed], q[missed - 1])
-        at = f"on the line near {_place(line, s[missed])}"
-        if solution.answer is Answer.OUT_OF_REACH:
-            raise PathError("reach", 0, float(s[missed]), f"{at}: {solution.explain()}")
-        raise PathError("singular", 0, float(s[missed]), f"{at} the posture would have to change")
-    outside = (q < solver.arm.limit("lower")) | (q > solver.arm.limit("upper"))
+    # What stops the hand first is told: a limit before the pose that is not met, or that pose.
+    met = q[:missed]
+    outside = (met < solver.arm.limit("lower")) | (met > solver.arm.limit("upper"))
     for k in np.flatnonzero(outside.any(axis=1)):
         for fault in violations(solver.arm, q[k]):
-            raise PathError("limits", 0, float(s[k]), f"on the line near {_place(line, s[k])} {fault}")
+            message = f"on the line near {at_place(line, s[k])} {fault}"
+            raise PathError("limits", 0, float(s[k]), message, joint=fault.joint, reason=str(fault))
+    if missed is not None:
+        solution = inverse(solver.arm, X[missed], q[missed - 1])
+        at = f"on the line near {at_place(line, s[missed])}"
+        if solution.answer is Answer.OUT_OF_REACH:
+            why = solution.explain()
+            raise PathError("reach", 0, float(s[missed]), f"{at}: {why}", reason=why)
+        why = "the posture would have to change"
+        raise PathError("singular", 0, float(s[missed]), f"{at} {why}", reason=f"{why} there")
     return q
 
 
@@ -282,7 +287,8 @@ def _check_positions(arm: Arm, line: Line, trajectory: Trajectory) -> None:
     for k in np.flatnonzero(outside):
         s = float(line.fractions(trajectory.times[k : k + 1])[0])
         for fault in (*violations(arm, q[0, k]), *violations(arm, q[1, k])):
-            raise PathError("limits", 0, s, f"on the line near {_place(line, s)} {fault}")
+            message = f"on the line near {at_place(line, s)} {fault}"
+            raise PathError("limits", 0, s, message, joint=fault.joint, reason=str(fault))
 
 
 def _nowhere(arm: Arm, q: Array, A: Array, deviation: float, turn: float) -> CertifiedLine:
@@ -309,6 +315,7 @@ def _nowhere(arm: Arm, q: Array, A: Array, deviation: float, turn: float) -> Cer
     )
 
 
-def _place(line: Line, s: float) -> str:
+def at_place(line: Line, s: float) -> str:
+    """Return a place on a line in words, seen from the base of the arm."""
     x, y, z = (line.A[:3, 3] + s * (line.B[:3, 3] - line.A[:3, 3])) * 1e3
     return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"

@@ -14,7 +14,7 @@ from armwright.cell.hardware import DeviceError, Hardware
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
-from armwright.motion.plan import Manner, Stage, StageError, StageGoal, plan
+from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
 from armwright.motion.trajectory import Trajectory
 from armwright.program.code import (
     HIGHEST_SPEED,
@@ -24,10 +24,12 @@ from armwright.program.code import (
     Kind,
     Move,
     Op,
+    StagePlan,
     stages_of,
     stages_text,
 )
 from armwright.program.diagnostics import Diagnostic, Label, Severity
+from armwright.program.obstacles import CODES, detour_warning, stopped, ways_round, where_and_why
 from armwright.program.recording import Effect, EffectKind, Recording, RunStage, efforts, stream
 from armwright.program.source import Span
 from armwright.spatial.poses import from_noap, inverse
@@ -37,12 +39,6 @@ Progress = Callable[[int, int, int], None]
 
 # A place this many times farther than the arm reaches was probably typed in millimetres.
 _MILLIMETRES = 50.0
-_CODES = {"reach": "E401", "limits": "E402", "singular": "E403"}
-_WHAT = {
-    "reach": "is out of reach of {arm}",
-    "limits": "cannot be reached by {arm} inside its joint limits",
-    "singular": "cannot be reached by {arm} on this path: the arm is singular on the way",
-}
 
 
 class RunError(ArmwrightError, RuntimeError):
@@ -86,9 +82,11 @@ def interpret(code: Code, cell: Cell, hardware: Hardware, progress: Progress | N
 
 
 def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
-    """Return a warning for every joint of every stage for which inverse dynamics asks more than it can give."""
+    """Return a warning for every straight line that was gone round, and for every joint asked for too much effort."""
     found = []
     for stage in recording.stages:
+        detour = detour_warning(stage)
+        found += [] if detour is None else [detour]
         arm = recording.cell.arms[stage.arm].arm
         over = stage.peak_effort / arm.limit("effort")
         if (over <= 1).all():
@@ -258,11 +256,11 @@ class _Run:
         plans = stages_of(move)
         goals = [StageGoal(kind=one.kind.value, poses=self._hand_goals(move, one.frames)) for one in plans]
         cell = self._cell
-        manner = Manner(speed=speed, deviation=cell.deviation, period=cell.period)
+        manner = Manner(speed=speed, deviation=cell.deviation, period=cell.period, around=cell.around)
         try:
             stages = plan(cell.arms[move.arm].arm, self._hardware.posture(move.arm), goals, manner)
         except StageError as error:
-            self._fail_move(error, move, plans[error.stage].frames, gathered)
+            self._fail_move(error.obstacle, move, plans[error.stage], gathered)
         begun = self._now
         for one, stage in zip(plans, stages, strict=True):
             self._run_stage(move.arm, stage, [self._spelled(name) for name in one.frames], speed, step.span)
@@ -341,24 +339,19 @@ class _Run:
             Effect(t0=begun, t1=self._now, kind=kind, span=step.span, text=text, arm=arm, data=data or {})
         )
 
-    def _fail_move(self, error: StageError, move: Move, frames: Sequence[str], gathered: _Gathered) -> NoReturn:
-        frame = frames[min(error.pose, len(frames) - 1)]
-        spelled = self._spelled(frame)
-        what = _WHAT[error.cause].format(arm=move.arm)
-        on_the_way = error.fraction < 1 and error.cause != "singular"
-        message = f"`{spelled}` {what}"
-        if on_the_way:
-            message = f"the way to `{spelled}` leads out of what {move.arm} can reach"
-        where = f"{error.fraction * 100:.0f} % of the way there: " if error.fraction < 1 else ""
+    def _fail_move(self, obstacle: Obstacle, move: Move, stage: StagePlan, gathered: _Gathered) -> NoReturn:
+        frame = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
+        spelled, kind = self._spelled(frame), stage.kind.value
+        to = [self._spelled(name) for name in stage.frames]
         secondary = [Label(self._written[frame], f"`{spelled}` got its place here")] if frame in self._written else []
         self._fail(
-            _CODES[error.cause],
-            message,
+            CODES[obstacle.cause],
+            stopped(obstacle, spelled, move.arm),
             gathered.span_of(frame),
             "cannot be reached",
             secondary=secondary,
-            notes=(f"{where}{error}",),
-            helps=self._metres(frame, move.arm),
+            notes=(where_and_why(obstacle, kind, to, move.arm),),
+            helps=(*self._metres(frame, move.arm), *ways_round(obstacle, kind, self._cell.around)),
         )
 
     def _metres(self, frame: str, arm: str) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
+from armwright.motion.plan import Stage
 from armwright.program.code import Code
 from armwright.program.diagnostics import Diagnostic, to_json
 from armwright.program.recording import Recording, RunStage, motion_rows
@@ -109,11 +110,33 @@ def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
         "knots": run.stage.knots,
         "deviation": run.stage.deviation,
         "slowed": run.stage.slowed,
+        "detour": _detour(run.stage),
         "peak_speed": _numbers(motion.peaks(1)),
         "peak_acceleration": _numbers(motion.peaks(2)),
         "peak_effort": _numbers(run.peak_effort),
         "speed_of_limit": _numbers(motion.peaks(1) / arm.limit("speed")),
         "effort_of_limit": _numbers(run.peak_effort / arm.limit("effort")),
+    }
+
+
+def _detour(stage: Stage) -> dict[str, Any] | None:
+    """Return what stopped a straight line, how the stage goes round it and the price; None where nothing did."""
+    obstacle, detour = stage.obstacle, stage.detour
+    if obstacle is None or detour is None:
+        return None
+    return {
+        "by": detour.by,
+        "via": None if detour.via is None else _numbers(to_noap(detour.via)),
+        "stopped_by": obstacle.reason,
+        "cause": obstacle.cause,
+        "joint": obstacle.joint,
+        "fraction": obstacle.fraction,
+        "along": obstacle.along,
+        "line": obstacle.length,
+        "place": _numbers(obstacle.place),
+        "off_the_line": detour.price.distance,
+        "turned_off": detour.price.turn,
+        "longer_by": detour.price.time,
     }
 
 

@@ -11,6 +11,7 @@ from armwright.cell.model import Cell, CellArm, base_name
 from armwright.kinematics.forward import link_poses
 from armwright.program.code import Code
 from armwright.program.diagnostics import Diagnostic
+from armwright.program.obstacles import note_of
 from armwright.program.recording import Effect as RunEffect
 from armwright.program.recording import Recording, RunStage, Stream
 from armwright.report.page import (
@@ -76,7 +77,7 @@ def _stage(run: RunStage, line: int) -> Stage:
         peak_effort=run.peak_effort.tolist(),
         hand_length=run.stage.length,
         deviation=run.stage.deviation,
-        note=run.stage.slowed,
+        note=note_of(run),
     )
 
 
