@@ -11,11 +11,10 @@ from armwright.arrays import Array
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.solution import Violation, violations
 from armwright.kinematics.inverse.turns import travel
-from armwright.kinematics.singularities import singularities
 from armwright.motion.blends import Ends
 from armwright.motion.chain import chain
 from armwright.motion.deviation import HandBounds, cubic_peaks, half_sines, hand_bounds
-from armwright.motion.follow import SLOWEST, TURN_PER_METRE, Cause, PathError, cause_of
+from armwright.motion.follow import SLOWEST, TURN_PER_METRE, Cause, PathError, cause_of, nearest_singularity
 from armwright.motion.hand_path import HandPath
 from armwright.motion.polynomials import evaluate
 from armwright.motion.postures import Posture
@@ -70,10 +69,11 @@ class Strays(NamedTuple):
 
 
 class _Stop(NamedTuple):
-    """What stops a branch: why, and at which time [s]."""
+    """What stops a branch: why, which joint, from 1, if it is one, and at which time [s]."""
 
     cause: Cause
     why: str
+    joint: int | None
     time: float
 
 
@@ -107,7 +107,8 @@ def carry(solver: Solver, hand: HandPath, times: Array, near: Array, *, ends: En
     way = int(np.clip(np.searchsorted(times, first.time, side="right") - 1, 0, len(times) - 2))
     fraction = float(np.clip((first.time - times[way]) / (times[way + 1] - times[way]), 0.0, 1.0))
     reasons = "; ".join(f"{label}: {_place(hand, times, stop.time)} {stop.why}" for label, stop in stops.items())
-    raise PathError(first.cause, way, fraction, f"no branch carries the hand to its last pose. {reasons}")
+    message = f"no branch carries the hand to its last pose. {reasons}"
+    raise PathError(first.cause, way, fraction, message, joint=first.joint, reason=first.why)
 
 
 def _starts(arm: Arm, X: Array, near: Array) -> list[Posture]:
@@ -161,11 +162,10 @@ def _carried(
         t = _divided(t, parts)
     worst = int(excess.argmax())
     joint = int((speed[worst] / arm.limit("speed")).argmax())
-    factors = singularities(arm, q[worst]).factors
-    name = min(factors, key=lambda factor: abs(factor.value) / factor.scale).name if factors else "posture"
     rush = float(speed[worst, joint] / arm.limit("speed")[joint])
-    why = f"the arm is singular ({name}): joint {joint + 1} would have to move {rush:.0f} times as fast as it may"
-    return _Stop("singular", why, float(t[worst]))
+    why = f"joint {joint + 1} would have to move {rush:.0f} times as fast as it may"
+    near = nearest_singularity(arm, q[worst])
+    return _Stop("singular", f"the arm is singular ({near}): {why}" if near else why, joint + 1, float(t[worst]))
 
 
 def _turned_inside(arm: Arm, q: Array, missed: int | None) -> Array:
@@ -184,13 +184,13 @@ def _stopped(arm: Arm, q: Array, missed: int | None, X: Array, t: Array) -> _Sto
     for k in outside:
         faults = violations(arm, q[k])
         if faults:
-            return _Stop("limits", _beyond(faults[0], arm, met), float(t[k]))
+            return _Stop("limits", _beyond(faults[0], arm, met), faults[0].joint, float(t[k]))
     if missed is None:
         return None
     solution = inverse(arm, X[missed], q[missed - 1])
     if solution.allowed:
-        return _Stop("singular", "the posture would have to change", float(t[missed]))
-    return _Stop(cause_of(solution), solution.explain(), float(t[missed]))
+        return _Stop("singular", "the posture would have to change", None, float(t[missed]))
+    return _Stop(cause_of(solution), solution.explain(), None, float(t[missed]))
 
 
 def _beyond(fault: Violation, arm: Arm, q: Array) -> str:
@@ -207,7 +207,7 @@ def _swings_out(arm: Arm, trajectory: Trajectory) -> _Stop | None:
         for fault in violations(arm, extreme):
             looks = trajectory(trajectory.times)[:, fault.joint - 1]
             nearest = int(np.abs(looks - fault.value).argmin())
-            return _Stop("limits", str(fault), float(trajectory.times[nearest]))
+            return _Stop("limits", str(fault), fault.joint, float(trajectory.times[nearest]))
     return None
 
 

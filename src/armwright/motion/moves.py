@@ -356,7 +356,8 @@ def _legs(arm: AnyArm, q: Array, X: Array, *, by: By, deviation: float, speed: f
         try:
             legs.append(line_or_detour(arm, q, goal, by=by, deviation=deviation, speed=speed))
         except PathError as error:
-            raise PathError(error.cause, i, error.fraction, f"from pose {i + 1} to pose {i + 2}: {error}") from error
+            message = f"from pose {i + 1} to pose {i + 2}: {error}"
+            raise PathError(error.cause, i, error.fraction, message, joint=error.joint, reason=error.reason) from error
         q = legs[-1].trajectory(legs[-1].trajectory.duration)
     return legs
 
