@@ -96,6 +96,14 @@ def test_way_round() -> None:
     assert " mm off the line, " in said
 
 
+def test_a_servo_slower_than_the_move(tmp_path: Path) -> None:
+    """With a servo period as long as the move, start and end are written, and figures drawn from the two of them."""
+    done = armwright("move", "joint", "puma560", POSES, "-o", tmp_path, "--no-film", "--servo-ms", "1000")
+
+    assert done.returncode == 0, done.stderr
+    assert np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1).shape == (2, 25)
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [

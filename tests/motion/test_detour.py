@@ -6,6 +6,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
+from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse
@@ -72,6 +73,21 @@ def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
     assert "mm off the line" in str(way.price)
     if by == "via":
         assert all(leg.certificate.holds for leg in way.legs)
+
+
+def test_damped_rates_keep_efforts(through_the_wrist: tuple[Array, Array]) -> None:
+    """Where the motors are weak and nothing else binds, the way by damped rates is run as slowly as they ask for."""
+    q, X = through_the_wrist
+    strong = load_arm("puma560")
+    limits = [attrs.evolve(j.limits, acceleration=1e3, effort=0.15 * j.limits.effort) for j in strong.joints]
+    joints = [attrs.evolve(j, limits=limit) for j, limit in zip(strong.joints, limits, strict=True)]
+    weak = attrs.evolve(strong, joints=joints)
+
+    motion = line_or_detour(weak, q, X, by="damped").trajectory
+
+    t = np.linspace(0, motion.duration, 20_000)
+    parts = np.abs(inverse_dynamics(weak, motion(t), motion(t, 1), motion(t, 2))) / weak.limit("effort")
+    assert parts.max() == pytest.approx(1, abs=1e-3)
 
 
 def test_a_line_that_needs_none() -> None:

@@ -334,3 +334,25 @@ def test_whole_turns_that_fit(puma: CompiledArm) -> None:
 
     assert move.postures[0, 5] == pytest.approx(5.5 - 2 * np.pi)
     assert move.postures[1, 5] == pytest.approx(7.5 - 2 * np.pi)
+
+
+def test_a_move_of_a_day(puma: CompiledArm) -> None:
+    """However long a move lasts, knots are put by what the path asks for, and the certificate holds."""
+    q = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
+    X = forward(puma.arm, [q, q])
+    X[1, :3, 3] += (0.1, -0.2, -0.1)
+
+    move = cartesian_move(puma, X, [0.0, 86_400.0], near=q)
+
+    assert move.trajectory.duration == 86_400
+    assert len(move.trajectory.times) < 5000
+    assert move.certificate is not None
+    assert move.certificate.holds
+
+
+def test_stops_at_one_and_the_same_place(puma: CompiledArm) -> None:
+    """Poses that are all the same leave no way on which to stop."""
+    X = forward(puma.arm, [[0.6, 0.2, 0.6, 0.3, 0.9, 0.1]] * 3)
+
+    with pytest.raises(InvalidValueError, match="all of them are the same, so there is no way to go"):
+        stopping_move(puma, X)

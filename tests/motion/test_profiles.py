@@ -113,6 +113,8 @@ def test_durations_that_no_joint_can_keep() -> None:
         (([0.0], [1.0], "fast", 1.0), KindError, "speed: expected numbers, got 'fast'"),
         (([0.0], [1.0], [1.0, 2.0], 1.0), ShapeError, "speed: expected one number, or 1, one per joint"),
         (([0.0], [1.0], 1.0, 1.0, 0.0), InvalidValueError, "duration: expected more than 0 s, 1e-09 s at least, got 0"),
+        (([0.0], [1.0], 1.0, 1.0, 1e60), InvalidValueError, r"duration: expected 1e\+50 s at most, got 1e\+60"),
+        (([0.0], [1.0], 1e-300, 1.0), InvalidValueError, r"duration: expected 1e\+50 s at most, got 1e\+300"),
         ((0.0, 1.0, 1.0, 1.0), ShapeError, r"q_start: expected shape \(n,\), got \(\)"),
         (([np.nan], [1.0], 1.0, 1.0), InvalidValueError, "q_start: every number must be finite, got nan"),
     ],

@@ -163,6 +163,13 @@ def test_equal_rates_pass_nearest_at_the_point() -> None:
     assert via_distances(times, points, 0.4, ends="running")[1] == pytest.approx(3 / 16 * 0.4 * np.sqrt(2))
 
 
+def test_a_place_to_wait_at_is_not_missed() -> None:
+    """Where the path waits before it goes on, or after it has come, it has been at the point."""
+    points = [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0], [3.0, 1.0]]
+
+    np.testing.assert_allclose(via_distances([0, 1, 2, 3], points, 0.2), 0, atol=SAME)
+
+
 @given(
     way=st.lists(st.integers(1, 20), min_size=1, max_size=6),
     speed=st.floats(0.1, 10),

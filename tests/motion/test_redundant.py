@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
-from armwright.arm.model import Arm
+from armwright.arm.model import Arm, Joint, Limits
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward import forward
+from armwright.motion.follow import PathError
+from armwright.motion.moves import cartesian_move
 from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.motion.straight import straight_line
+from armwright.spatial.rotations import rotation_from_vector
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "seven_joints.urdf"
 START = np.array([0.1, 0.5, 0.2, 1.2, 0.3, 1.0, 0.2])
@@ -62,3 +65,20 @@ def test_a_robot_file_without_speed() -> None:
 
     with pytest.raises(InvalidValueError, match=r"paths in space need its reach and its tool speed \(\[hand\]"):
         straight_line(arm, START, X)
+
+
+def test_a_turn_that_few_joints_cannot_make() -> None:
+    """An arm whose hand stays upright refuses to tilt it, in a moment, though the place itself is in reach."""
+    limits = Limits(lower=-2.5, upper=2.5, speed=3.0, acceleration=20.0)
+    turning = Joint(kind="revolute", d=0.3, a=0.4, limits=limits)
+    slide = Joint(kind="prismatic", limits=attrs.evolve(limits, lower=0.0, upper=0.4))
+    last = Joint(kind="revolute", limits=limits)
+    scara = Arm(name="scara", joints=(turning, turning, slide, last), reach=0.8, tool_speed=1.0)
+    q = np.array([0.3, 0.5, 0.2, 0.1])
+    X = forward(scara, [q, q])
+    X[1, :3, :3] = X[0, :3, :3] @ rotation_from_vector((0.0, 1.0, 0.0))
+
+    with pytest.raises(PathError, match=r"deg out of reach of 'scara'") as stopped:
+        cartesian_move(scara, X, near=q)
+
+    assert stopped.value.cause == "reach"

@@ -10,7 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.dynamics.compiled import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, KindError
 from armwright.kinematics.forward import forward
 from armwright.motion.follow import PathError
 from armwright.motion.straight import CertifiedLine, straight_line
@@ -194,6 +194,12 @@ def test_bad_manner() -> None:
     ):
         with pytest.raises(InvalidValueError, match=words):
             plain_line(puma, **manner)
+    for period in (0.0, -1e-3, float("nan")):
+        with pytest.raises(InvalidValueError, match=f"period: expected more than 0 s, got {period}"):
+            plain_line(puma, period=period)
+    for name in ("deviation", "turn", "speed", "period"):
+        with pytest.raises(KindError, match=f"{name}: expected a number, got 'little'"):
+            plain_line(puma, **{name: "little"})  # type: ignore[arg-type]
 
 
 def test_public_name() -> None:

@@ -1,5 +1,7 @@
 """Trajectories: quintics, exact extremes, slowing, turning round, joining and sampling."""
 
+from collections.abc import Callable
+
 import hypothesis.strategies as st
 import numpy as np
 import pytest
@@ -211,6 +213,7 @@ def test_whole_periods_have_no_last_sliver(duration: float, count: int) -> None:
     assert len(times) == count
     assert np.diff(times).min() > 0.4e-3
     assert hold([1.0], 0.0).sampled(1e-3).times.tolist() == [0.0]
+    assert quintic([0.0], [1.0], 1e-9).sampled(10.0).times.tolist() == [0.0, 1e-9]
 
 
 def test_parts_that_do_not_meet() -> None:
@@ -224,6 +227,10 @@ def test_parts_that_do_not_meet() -> None:
         join([])
     with pytest.raises(KindError, match="join: expected trajectories, got 5"):
         join([there, 5])  # type: ignore[list-item]
+    with pytest.raises(KindError, match="join: expected a list of trajectories, got None"):
+        join(None)  # type: ignore[arg-type]
+    with pytest.raises(KindError, match="gap: expected a number, got 'small'"):
+        join([there, there.reversed()], gap="small")  # type: ignore[arg-type]
     assert join([there, quintic([1.0, 1.5], [0.0, 0.0], 1.0)], gap=0.6).duration == 2
 
 
@@ -235,7 +242,32 @@ def test_times_that_mean_nothing() -> None:
             move.sampled(period)
         with pytest.raises(InvalidValueError, match=f"duration: expected more than 0 s, got {period}"):
             move.retimed(period)
+        with pytest.raises(InvalidValueError, match=f"period: expected more than 0 s, got {period}"):
+            whole_ticks(move, period)
+    with pytest.raises(KindError, match="period: expected a number, got None"):
+        whole_ticks(move, None)  # type: ignore[arg-type]
     with pytest.raises(InvalidValueError, match=r"1e-12 s cuts 1 s into 1e\+12 samples, 1e\+08 are allowed"):
         move.sampled(1e-12)
     with pytest.raises(InvalidValueError, match=r"a motion of 0 s cannot be run in 2 s; hold\(q, 2\) stands still"):
         hold([0.0], 0.0).retimed(2)
+
+
+def test_standing_nowhere() -> None:
+    """Standing still needs one position per joint, and a time that does not run backwards."""
+    with pytest.raises(ShapeError, match=r"q: expected shape \(n,\), got \(\)"):
+        hold(1.0, 1.0)
+    with pytest.raises(InvalidValueError, match=r"duration: expected 0 s or more, got -1\.0"):
+        hold([1.0], -1)
+    with pytest.raises(KindError, match="duration: expected a number, got 'long'"):
+        hold([1.0], "long")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("ask", [Trajectory.extremes, Trajectory.peaks, Trajectory.segment_peaks])
+def test_extremes_of_no_derivative(ask: Callable[[Trajectory, object], object]) -> None:
+    """There is no derivative of half or negative order, and none gets the extremes of another."""
+    move = quintic([0.0], [1.0], 1.0)
+    with pytest.raises(InvalidValueError, match="order: expected 0 or more, got -1"):
+        ask(move, -1)
+    for order in (0.5, "speed", True):
+        with pytest.raises(KindError, match="order: expected a whole number from 0, got "):
+            ask(move, order)

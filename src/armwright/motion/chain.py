@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from armwright.arrays import Array
+from armwright.arrays import Array, Flags
 from armwright.kinematics.inverse.numeric import next_posture
 from armwright.kinematics.inverse.turns import nearest_turn, travel
 from armwright.motion.solver import Solver
 
-# A pose is met to this [m].
-MET = 1e-8
+# A pose is met to this [m], and to this in the entries of its rotation.
+MET, _TURN_MET = 1e-8, 1e-6
 # A joint that moves farther from pose to pose may have jumped from one posture to another [rad] or [m].
 _JUMP = 1.0
 # A posture this far from the one the arm has at the start of the path is another one [rad] or [m].
@@ -35,15 +35,17 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
     if solver.inverse_branches is None:
         for k in range(1, len(X)):
             q[k] = next_posture(solver.arm, X[k], q[k - 1])
+            if _missed(solver, q[k], X[k]):
+                break
     else:
         found, singular = solver.inverse_branches(X, q_start)
-        if _along_one_branch(solver, found, singular, q) and _miss(solver, q, X).max() <= MET:
+        if _along_one_branch(solver, found, singular, q) and not _missed(solver, q, X).any():
             return q, None
         for k in range(1, len(X)):
             candidates = solver.inverse_branches(X[k], q[k - 1])[0] if singular[k].any() else found[k]
             candidates = nearest_turn(solver.arm, candidates, q[k - 1])
             q[k] = min(candidates, key=lambda posture: travel(solver.arm, q[k - 1], posture))
-    missed = np.flatnonzero(_miss(solver, q, X) > MET)
+    missed = np.flatnonzero(_missed(solver, q, X))
     return q, int(missed[0]) if len(missed) else None
 
 
@@ -59,5 +61,7 @@ def _along_one_branch(solver: Solver, found: Array, singular: Array, q: Array) -
     return True
 
 
-def _miss(solver: Solver, q: Array, X: Array) -> Array:
-    return np.asarray(np.abs(solver.forward(q)[..., :3, 3] - X[..., :3, 3]).max(axis=-1))
+def _missed(solver: Solver, q: Array, X: Array) -> Flags:
+    """Return which postures (..., n) do not meet their poses (..., 4, 4): an arm of few joints may turn otherwise."""
+    off = np.abs(solver.forward(q) - X)
+    return np.asarray((off[..., :3, 3].max(axis=-1) > MET) | (off[..., :3, :3].max(axis=(-2, -1)) > _TURN_MET))

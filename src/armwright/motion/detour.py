@@ -12,9 +12,9 @@ from armwright.arrays import Array, ArrayLike
 from armwright.errors import InvalidValueError, one_of
 from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.inverse.judge import clean_pose
-from armwright.motion.certificate import slowing
 from armwright.motion.deviation import Spline, Ways, deviation_of
 from armwright.motion.follow import TURN_PER_METRE, PathError
+from armwright.motion.limit_use import slowing_for_limits
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.straight import CertifiedLine, Line, at_place, straight_line, timed_line
 from armwright.motion.trajectory import Trajectory, join
@@ -114,7 +114,8 @@ def line_or_detour(
 
     Raises:
         PathError: there is no way round either; what stopped the line itself, with place and cause.
-        InvalidValueError: ``by``, deviation or speed are none.
+        InvalidValueError: ``by``, deviation, speed or damping are none, or gravity alone takes more than a joint may
+            give.
     """
     one_of("way round", by, ("via", "damped"))
     solver = solver_of(arm)
@@ -134,7 +135,7 @@ def line_or_detour(
         obstacle = _crawl(asked, line)
     if asked is None or (by == "damped" and obstacle.cause == "reach"):
         raise obstacle
-    found = _damped(solver, asked, q, damping, obstacle) if by == "damped" else None
+    found = _damped(arm, asked, q, damping, obstacle) if by == "damped" else None
     if by == "via":
         found = _by_via(arm, asked, q, obstacle, deviation=deviation, speed=speed)
     if straight is not None and (found is None or found.trajectory.duration > _BETTER * straight.trajectory.duration):
@@ -224,8 +225,9 @@ def _apart(line: Line, X: Array) -> tuple[float, float]:
     return float(np.linalg.norm(X[:3, 3] - on[:3, 3])), float(np.linalg.norm(turn))
 
 
-def _damped(solver: Solver, line: Line, q: Array, damping: float, obstacle: PathError) -> Detour | None:
-    """Follow the line by damped rates; None where the end is not met, or a joint passes a limit."""
+def _damped(arm: AnyArm, line: Line, q: Array, damping: float, obstacle: PathError) -> Detour | None:
+    """Follow the line by damped rates; None where the end is not met, or a joint cannot keep its limits."""
+    solver = solver_of(arm)
     times, postures = _integrated(solver, line, q, damping)
     if postures is None:
         return None
@@ -243,7 +245,10 @@ def _damped(solver: Solver, line: Line, q: Array, damping: float, obstacle: Path
     spline = Spline(np.diff(times), c[..., :n], c[..., n])
     ways = Ways.of_one(line.A, line.B, line.turn, len(spline.lengths))
     off = deviation_of(solver.arm, solver.forward, ways, spline, allowed=1e-3, allowed_turn=TURN_PER_METRE * 1e-3)
-    factor, _ = slowing(solver.arm, {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2)})
+    try:
+        factor, _ = slowing_for_limits(arm, trajectory)
+    except InvalidValueError:  # where gravity alone takes more than a joint may give there is no way either
+        return None
     trajectory = trajectory.slowed(factor)
     price = Price(distance=float(off.place.max()), turn=float(off.turn.max()), time=trajectory.duration - line.duration)
     return Detour(trajectory=trajectory, by="damped", obstacle=obstacle, via=None, price=price, legs=())

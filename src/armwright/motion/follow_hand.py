@@ -24,8 +24,8 @@ from armwright.motion.xspline import smooth_weight, xspline
 
 Counts: TypeAlias = npt.NDArray[np.intp]
 
-# Knots to begin with: so far apart at most [s], and so many on each blend and each straight way at least.
-_STEP, _FEWEST = 0.02, 4
+# Knots to begin with: so far apart [s], and so many on each blend and each straight way at least and at most.
+_STEP, _FEWEST, _ENOUGH = 0.02, 4, 500
 # Rounds of putting knots where they are missing; the deviation falls with the fourth power of the step.
 _ROUNDS, _CLOSER, _MOST = 8, 1.1, 500_000
 # Whole turns; a limit passed by this part of one is not passed.
@@ -122,7 +122,7 @@ def _starts(arm: Arm, X: Array, near: Array) -> list[Posture]:
 
 def _first_knots(hand: HandPath) -> Array:
     lengths = np.diff(hand.knots)
-    parts = np.maximum(np.ceil(lengths / _STEP), _FEWEST).astype(np.intp)
+    parts = np.clip(np.ceil(lengths / _STEP), _FEWEST, _ENOUGH).astype(np.intp)
     return _divided(hand.knots, parts)
 
 

@@ -7,6 +7,8 @@ from armwright.errors import InvalidValueError, ShapeError
 
 # A motion shorter than a billionth of a second is a slip of the unit; powers of its time would not be numbers [s].
 SHORTEST = 1e-9
+# Nor would those of a time as long as this [s].
+_LONGEST = 1e50
 # A way of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
 NOWHERE = 1e-12
 
@@ -62,11 +64,13 @@ def check_duration(duration: float) -> float:
 
     Raises:
         KindError: it is no number.
-        InvalidValueError: it is shorter than a billionth of a second, or no number that counts.
+        InvalidValueError: it is shorter than a billionth of a second, or longer than any motion.
     """
     duration = number(duration, "duration")
-    if not SHORTEST <= duration <= LARGEST:
+    if not duration >= SHORTEST:
         raise InvalidValueError(f"duration: expected more than 0 s, {SHORTEST:g} s at least, got {duration}")
+    if duration > _LONGEST:
+        raise InvalidValueError(f"duration: expected {_LONGEST:g} s at most, got {duration:g}")
     return duration
 
 

@@ -252,9 +252,11 @@ def stopping_move(
 
     Raises:
         PathError: there is no way between two poses, from no posture at the first one: what stops the nearest.
-        ArmwrightError: poses, ``by``, deviation or speed are none.
+        ArmwrightError: poses, ``by``, deviation or speed are none, or all poses are the same.
     """
     solver, X = solver_of(arm), exact_poses(poses)
+    if Path(poses=X).lengths().max() <= NEGLIGIBLE:
+        raise InvalidValueError("poses: all of them are the same, so there is no way to go")
     first: PathError | None = None
     for start in postures_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
         try:

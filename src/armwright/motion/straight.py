@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
-from armwright.arrays import Array, ArrayLike
+from armwright.arrays import Array, ArrayLike, number
 from armwright.errors import InvalidValueError
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import clean_pose
@@ -118,7 +118,7 @@ def straight_line(
     """
     solver = solver_of(arm)
     q, A, B = _ends(solver, q_start, X_goal, deviation)
-    turn = TURN_PER_METRE * deviation if turn is None else turn
+    turn = TURN_PER_METRE * deviation if turn is None else number(turn, "turn")
     if not turn > 0:
         raise InvalidValueError(f"turn: expected more than 0 rad, got {turn:g}")
     line = timed_line(solver.arm, A, B, speed)
@@ -188,7 +188,7 @@ def _efforts(solver: Solver, spline: Spline, looks: int, factor: float) -> Array
 
 def _ends(solver: Solver, q_start: ArrayLike, X_goal: ArrayLike, deviation: float) -> tuple[Array, Array, Array]:
     """Return the posture and the pose at the start, and the pose at the end, of a line that the arm can end."""
-    if not 0 < deviation < math.inf:
+    if not 0 < number(deviation, "deviation") < math.inf:
         raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation:g}")
     q = one_posture(solver.arm, q_start, "q_start")
     B = clean_pose(X_goal)

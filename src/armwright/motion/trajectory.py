@@ -10,6 +10,7 @@ import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, number, read_only
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.motion.knots import one_way
 from armwright.motion.polynomials import derivative, extremes, shifted
 
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
@@ -95,10 +96,7 @@ class Trajectory:
             KindError: a time is no number, or the order no whole number.
             InvalidValueError: a time is NaN or infinite, or the order below 0.
         """
-        if isinstance(order, bool) or not isinstance(order, Integral):
-            raise KindError(f"order: expected a whole number from 0, got {shown(order)}")
-        if order < 0:
-            raise InvalidValueError(f"order: expected 0 or more, got {order}")
+        _check_order(order)
         t = floats(t, "t")
         inside = np.clip(t, 0.0, self.duration)
         segment = np.clip(np.searchsorted(self.times, inside, side="right") - 1, 0, len(self.coefficients) - 1)
@@ -116,12 +114,23 @@ class Trajectory:
 
         Args:
             order: 0 position, 1 speed, 2 acceleration, 3 jerk.
+
+        Raises:
+            KindError: the order is no whole number.
+            InvalidValueError: it is below 0.
         """
+        _check_order(order)
         lowest, highest = extremes(derivative(self.coefficients, order), np.diff(self.times))
         return lowest.min(axis=0), highest.max(axis=0)
 
     def segment_peaks(self, order: int) -> Array:
-        """Return the largest magnitude of a derivative on every segment for every joint, (m, n), exactly."""
+        """Return the largest magnitude of a derivative on every segment for every joint, (m, n), exactly.
+
+        Raises:
+            KindError: the order is no whole number.
+            InvalidValueError: it is below 0.
+        """
+        _check_order(order)
         lowest, highest = extremes(derivative(self.coefficients, order), np.diff(self.times))
         return np.maximum(np.abs(lowest), np.abs(highest))
 
@@ -139,8 +148,10 @@ class Trajectory:
         factor = number(factor, "factor")
         if not 0 < factor <= LARGEST:
             raise InvalidValueError(f"factor: expected more than 0, got {factor}")
-        powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
-        return Trajectory(times=self.times * factor, coefficients=self.coefficients * powers[:, None])
+        with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
+            powers = factor ** -np.arange(self.coefficients.shape[1], dtype=np.float64)
+            coefficients = self.coefficients * powers[:, None]
+        return Trajectory(times=self.times * factor, coefficients=coefficients)
 
     def retimed(self, duration: float) -> "Trajectory":
         """Return the same path run in another time, which is met to the last bit.
@@ -180,23 +191,30 @@ class Trajectory:
             KindError: the period is no number.
             InvalidValueError: it is not above 0, or so short that there would be more than 1e8 samples.
         """
-        period = number(period, "period")
-        if not 0 < period <= LARGEST:
-            raise InvalidValueError(f"period: expected more than 0 s, got {period}")
+        period = _period(period)
         if self.duration / period > _MOST_SAMPLES:
             raise InvalidValueError(
                 f"period: {period:g} s cuts {self.duration:g} s into {self.duration / period:.3g} samples, "
                 f"{_MOST_SAMPLES:.0e} are allowed"
             )
-        before = math.ceil(self.duration / period - _HAIR)
+        before = max(math.ceil(self.duration / period - _HAIR), int(self.duration > 0))
         times = np.append(period * np.arange(before), self.duration)
         q, qd, qdd, jerk = (self(times, order) for order in range(4))
         return Samples(times=times, q=q, qd=qd, qdd=qdd, jerk=jerk)
 
 
 def hold(q: ArrayLike, duration: float) -> Trajectory:
-    """Return the motion of standing still at q (n,) for a time [s]."""
-    return Trajectory(times=(0.0, duration), coefficients=floats(q, "q")[None, None, :])
+    """Return the motion of standing still at q (n,) for a time [s].
+
+    Raises:
+        KindError: an argument is something else than real numbers.
+        ShapeError: q is not (n,).
+        InvalidValueError: a number is NaN or infinite, or the duration below 0.
+    """
+    duration = number(duration, "duration")
+    if not 0 <= duration <= LARGEST:
+        raise InvalidValueError(f"duration: expected 0 s or more, got {duration}")
+    return Trajectory(times=(0.0, duration), coefficients=one_way(q, "q")[None, None, :])
 
 
 def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
@@ -208,13 +226,16 @@ def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
             ``continuity``.
 
     Raises:
-        KindError: a part is no trajectory.
+        KindError: a part is no trajectory, or the gap no number.
         ShapeError: there is none, or their joints differ in number.
         InvalidValueError: a part begins elsewhere than the one before it ends.
     """
+    if not isinstance(parts, Sequence):
+        raise KindError(f"join: expected a list of trajectories, got {shown(parts)}")
     for part in parts:
         if not isinstance(part, Trajectory):
             raise KindError(f"join: expected trajectories, got {shown(part)}")
+    gap = number(gap, "gap")
     if not parts:
         raise ShapeError("join: expected one trajectory at least, got none")
     for i, (last, part) in enumerate(pairwise(parts), 1):
@@ -224,6 +245,20 @@ def join(parts: Sequence[Trajectory], *, gap: float = 1e-6) -> Trajectory:
     starts = np.cumsum([0.0, *(part.duration for part in parts)])
     times = np.concatenate([[0.0], *(part.times[1:] + start for part, start in zip(parts, starts[:-1], strict=True))])
     return Trajectory(times=times, coefficients=np.concatenate(padded))
+
+
+def _check_order(order: int) -> None:
+    if isinstance(order, bool) or not isinstance(order, Integral):
+        raise KindError(f"order: expected a whole number from 0, got {shown(order)}")
+    if order < 0:
+        raise InvalidValueError(f"order: expected 0 or more, got {order}")
+
+
+def _period(period: float) -> float:
+    period = number(period, "period")
+    if not 0 < period <= LARGEST:
+        raise InvalidValueError(f"period: expected more than 0 s, got {period}")
+    return period
 
 
 def _check_meeting(last: Trajectory, part: Trajectory, number_of_last: int, gap: float) -> None:
@@ -247,7 +282,12 @@ def whole_ticks(trajectory: Trajectory, period: float) -> Trajectory:
     Args:
         trajectory: what to run.
         period: of the servo [s].
+
+    Raises:
+        KindError: the period is no number.
+        InvalidValueError: it is not above 0.
     """
+    period = _period(period)
     if trajectory.duration == 0:
         return trajectory
     ticks = max(1, math.ceil(trajectory.duration / period - _HAIR))

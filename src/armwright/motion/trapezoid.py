@@ -44,7 +44,7 @@ def trapezoid(
         KindError: an argument is something else than real numbers.
         ShapeError: positions or limits are not (n,).
         InvalidValueError: a number is NaN, a position infinite, a limit not above 0 or missing, or the duration too
-            short for the limits of a joint.
+            short for the limits of a joint, or too long to be one.
     """
     start, goal = two_ends(q_start, q_goal)
     way = goal - start
@@ -54,7 +54,7 @@ def trapezoid(
         return hold(start, asked or 0.0)
     shortest = _shortest(limits)
     if asked is None:
-        asked = shortest
+        asked = check_duration(shortest)
     elif asked < shortest * (1 - _ROUNDING):
         raise InvalidValueError(_too_short(way, limits, asked, shortest))
     a = limits.acceleration

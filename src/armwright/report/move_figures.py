@@ -124,15 +124,22 @@ def hand_panels(t: Array, X: Array) -> list[Panel]:
     angles = np.degrees(zyz_angles(X[:, :3, :3]))
     found = []
     for unit, names, values in (("cm", "xyz", places), ("deg", ("phi", "theta", "psi"), angles)):
-        rate = np.gradient(values, t, axis=0, edge_order=2)
+        rate = _rate(values, t)
         what = "place" if unit == "cm" else "ZYZ angles"
         for title, per, curve in (
             (what, "", values),
             (f"speed of the {what}", "/s", rate),
-            (f"acceleration of the {what}", "/s²", np.gradient(rate, t, axis=0, edge_order=2)),
+            (f"acceleration of the {what}", "/s²", _rate(rate, t)),
         ):
             found.append(Panel(title, unit + per, dict(zip(names, curve.T, strict=True))))
     return found
+
+
+def _rate(values: Array, t: Array) -> Array:
+    """Return the rates of values (m, k), as exactly as so few or many samples tell them."""
+    if len(t) < 2:
+        return np.zeros_like(values)
+    return np.asarray(np.gradient(values, t, axis=0, edge_order=2 if len(t) > 2 else 1))
 
 
 def draw_curves(axis: "Axes", t: Array, panel: Panel) -> None:
