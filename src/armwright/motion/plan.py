@@ -15,8 +15,9 @@ from armwright.kinematics.inverse.turns import images, travel
 from armwright.motion.certificate import LimitName
 from armwright.motion.detour import By, Detour, line_or_detour
 from armwright.motion.follow import Cause, PathError, cause_of, follow
-from armwright.motion.path import Path
+from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.quintic import point_to_point
+from armwright.motion.rounded import rounded_move
 from armwright.motion.trajectory import Trajectory, whole_ticks
 
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
@@ -25,7 +26,7 @@ _FARTHEST = 1e6
 # Places of the hand along a smooth motion from which its length is summed.
 _LOOKS = 101
 
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE"]
+StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND"]
 
 
 @attrs.frozen(kw_only=True)
@@ -51,12 +52,15 @@ class StageGoal:
     """What one stage has to do.
 
     Attributes:
-        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` through several.
+        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` through several, ``BLEND`` straight from one to the
+            next with rounded corners.
         poses: (k, 4, 4) tool poses in the base frame of the arm.
+        blend: how far from a corner the rounding may begin [m]; only for ``BLEND``.
     """
 
     kind: StageKind
     poses: Array
+    blend: float | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -195,6 +199,13 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
         yield from (_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number))
         return
     path = Path(poses=np.concatenate([forward(arm, q)[None], poses]))
+    if goal.kind == "BLEND" and (path.lengths() > NEGLIGIBLE).sum() > 1:
+        assert goal.blend is not None  # noqa: S101 - a BLEND has one
+        try:
+            yield _rounded(arm, path, q, goal.blend, manner)
+        except PathError as error:
+            raise StageError(number, _on_the_way(arm, path, error)) from error
+        return
     try:
         found = follow(arm, path, q, deviation=manner.deviation, speed=manner.speed)
     except PathError as error:
@@ -211,6 +222,21 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
         knots=found.knots,
         deviation=found.deviation,
         slowed=found.slowed,
+    )
+
+
+def _rounded(arm: Arm, path: Path, q: Array, blend: float, manner: Manner) -> Stage:
+    move = rounded_move(arm, path, q, blend=blend, deviation=manner.deviation, speed=manner.speed)
+    certificate = move.certificate
+    assert certificate is not None  # noqa: S101 - the move keeps to a planned path
+    return Stage(
+        kind="BLEND",
+        trajectory=whole_ticks(move.trajectory, manner.period),
+        length=_length(path.poses),
+        knots=certificate.knots,
+        # Of the path with sharp corners: what the rounding leaves out, and what the joints are off.
+        deviation=float(move.misses.max()) + certificate.deviation,
+        slowed="" if certificate.because is None else _slower(certificate.factor, certificate.because),
     )
 
 

@@ -1,0 +1,75 @@
+"""Stops in mid-motion."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from armwright.arm.load import load_arm
+from armwright.errors import InvalidValueError
+from armwright.motion.braking import brake
+from armwright.motion.continuity import continuity
+from armwright.motion.quintic import point_to_point
+from armwright.motion.trajectory import Trajectory
+
+# Positions, speeds and accelerations go on to rounding.
+ROUNDING = 1e-9
+
+
+@pytest.fixture(scope="module")
+def running() -> Trajectory:
+    arm = load_arm("puma560")
+    return point_to_point(arm, np.zeros(6), np.array([1.2, -0.4, 0.3, 0.0, 0.9, -2.0]), 100.0)
+
+
+@given(share=st.floats(0.0, 1.0))
+def test_a_stop_goes_on_from_the_motion(running: Trajectory, share: float) -> None:
+    """Position, speed and acceleration have no jump where the stop begins, and the arm rests at its end."""
+    t = share * running.duration
+    stop = brake(running, t, load_arm("puma560").limit("acceleration"))
+
+    for order in range(3):
+        np.testing.assert_allclose(stop(0.0, order), running(t, order), atol=ROUNDING)
+    np.testing.assert_allclose(stop(stop.duration - 1e-12, 1), 0, atol=1e-6)
+    np.testing.assert_allclose(stop(stop.duration - 1e-12, 2), 0, atol=1e-6)
+
+
+@given(share=st.floats(0.0, 1.0))
+def test_a_stop_keeps_the_limit(running: Trajectory, share: float) -> None:
+    """No joint brakes harder than it may, nor harder than it was accelerating already."""
+    t = share * running.duration
+    limit = np.maximum(load_arm("puma560").limit("acceleration"), np.abs(running(t, 2)))
+
+    assert (brake(running, t, np.full(6, limit)).peaks(2) <= limit * (1 + 1e-6)).all()
+
+
+def test_one_joint_at_constant_speed() -> None:
+    """From 1 rad/s with 3 rad/s² at most, a parabola stops in 1.5 v / a = half a second, and half of v t further."""
+    running = Trajectory(times=[0.0, 1.0], coefficients=[[[0.0], [1.0]]])
+    stop = brake(running, 0.5, [3.0])
+
+    assert stop.duration == pytest.approx(0.5, rel=0.03)
+    assert stop(stop.duration)[0] - 0.5 == pytest.approx(stop.duration / 2, rel=1e-9)
+
+
+def test_joints_stop_one_by_one(running: Trajectory) -> None:
+    """The whole stop has no jump inside either, and lasts a whole number of servo periods when one is given."""
+    t = 0.4 * running.duration
+    stop = brake(running, t, load_arm("puma560").limit("acceleration"), period=1e-3)
+
+    assert stop.duration / 1e-3 == pytest.approx(round(stop.duration / 1e-3), abs=1e-6)
+    assert max(continuity(stop).largest(order).max() for order in range(3)) < ROUNDING
+
+
+def test_at_rest() -> None:
+    """An arm at rest stays where it is."""
+    rest = Trajectory(times=[0.0, 1.0], coefficients=[[[0.3]]])
+
+    np.testing.assert_allclose(brake(rest, 1.0, [1.0], period=1e-3)(5.0), 0.3)
+
+
+@pytest.mark.parametrize(("t", "limit", "text"), [(-1.0, 1.0, "expected 0 to"), (0.1, 0.0, "more than 0")])
+def test_refused(running: Trajectory, t: float, limit: float, text: str) -> None:
+    """A moment outside the motion and a limit of nothing are refused."""
+    with pytest.raises(InvalidValueError, match=text):
+        brake(running, t, np.full(6, limit))
