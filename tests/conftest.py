@@ -14,9 +14,12 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(83008)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Start the system's chromium once for all pages."""
+    """Start the system's chromium once for the pages of a module.
+
+    Its event loop runs as long as it does; no longer than that, because tests of the language server need their own.
+    """
     chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if chromium is None:
         pytest.skip("no chromium on this machine: pages are not tried in a browser")

@@ -108,10 +108,13 @@ def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
         The nearest name, or None when none is near.
     """
     word = name.upper()
+    glyphs = word.translate(_CONFUSABLE)
     best: tuple[int, str] | None = None
     for choice in known:
         other = choice.upper()
-        if word.translate(_CONFUSABLE) == other.translate(_CONFUSABLE):
+        if abs(len(word) - len(other)) > limit:
+            continue
+        if glyphs == other.translate(_CONFUSABLE):
             return choice
         distance = edit_distance(word, other)
         # A slip changes less than half of a word: "A" is not a misspelt "B".
@@ -126,6 +129,11 @@ def edit_distance(a: Sequence[str], b: Sequence[str]) -> int:
     Source:
         Damerau (1964), restricted form: no part is edited twice.
     """
+    # What both begin or end with costs nothing.
+    while a and b and a[0] == b[0]:
+        a, b = a[1:], b[1:]
+    while a and b and a[-1] == b[-1]:
+        a, b = a[:-1], b[:-1]
     before_last: list[int] = []
     last = list(range(len(b) + 1))
     for i, x in enumerate(a, 1):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from armwright.cell.model import Cell, CellArm
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.errors import ShapeError
+from armwright.kinematics.forward import forward
 from armwright.motion.quintic import quintic
 
 BENCH = """name = "bench"
@@ -106,14 +108,15 @@ def test_arms_move_alone(tmp_path: Path) -> None:
     hardware = Simulator(bench(tmp_path))
     goal = [0.5, -0.2, 0.4, 0.1, 0.2, 0.3]
 
-    end = hardware.run("ARM_1", quintic(hardware.posture("ARM_1"), goal, 2.0))
+    motion = quintic(hardware.posture("ARM_1", 5.0), goal, 2.0)
+    hardware.begin("ARM_1", motion, 5.0, np.eye(4))
 
-    np.testing.assert_allclose(end, goal, atol=1e-12)
-    np.testing.assert_array_equal(hardware.posture("ARM_1"), end)
-    np.testing.assert_array_equal(hardware.posture("ARM_2"), (1, 0, 0.3, 0, 0, 0))
-    for arm in ("ARM_1", "ARM_2"):
-        with pytest.raises(ValueError, match="read-only"):
-            hardware.posture(arm)[0] = 9
+    np.testing.assert_array_equal(hardware.posture("ARM_1", 6.0), motion(1.0))
+    for later in (7.0, 100.0):
+        np.testing.assert_allclose(hardware.posture("ARM_1", later), goal, atol=1e-12)
+        np.testing.assert_array_equal(hardware.posture("ARM_2", later), (1, 0, 0.3, 0, 0, 0))
+    hardware.posture("ARM_1", 7.0)[0] = 9
+    np.testing.assert_allclose(hardware.posture("ARM_1", 7.0), goal, atol=1e-12)
 
 
 def test_a_trajectory_that_begins_elsewhere(tmp_path: Path) -> None:
@@ -122,7 +125,30 @@ def test_a_trajectory_that_begins_elsewhere(tmp_path: Path) -> None:
     start = np.array((0.1, 0, 0.3, 0, 0, 0))
 
     with pytest.raises(AssertionError, match=r"ARM_1 stands 0\.1 away from where its trajectory begins"):
-        hardware.run("ARM_1", quintic(start, start, 1.0))
+        hardware.begin("ARM_1", quintic(start, start, 1.0), 0.0, np.eye(4))
+
+
+def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
+    """The hand stands still where it touches the plane, and the force grows with how deep it was sent."""
+    cell = bench(tmp_path)
+    start = cell.arms["ARM_1"].start
+    arm = cell.arms["ARM_1"].arm
+    X_WB = cell.arms["ARM_1"].base
+    goal = start + np.array([0, 0, 0.1, 0, 0, 0])
+    motion = quintic(start, goal, 2.0)
+    heights = [(X_WB @ forward(arm, motion(t)))[2, 3] for t in (0.0, 1.0, 2.0)]
+    down = heights[2] < heights[0]
+    motion = motion if down else quintic(start, start - np.array([0, 0, 0.1, 0, 0, 0]), 2.0)
+    plane = (X_WB @ forward(arm, motion(1.0)))[2, 3]
+    hardware = Simulator(attrs.evolve(cell, contact_height=plane, contact_stiffness=1000.0))
+
+    hardware.begin("ARM_1", motion, 3.0, np.eye(4))
+
+    assert hardware.stopped_at("ARM_1") == pytest.approx(4.0, abs=1e-9)
+    assert hardware.force("ARM_1", 4.0)[2] == pytest.approx(0, abs=1e-6)
+    np.testing.assert_allclose(hardware.posture("ARM_1", 4.5), motion(1.0), atol=1e-9)
+    sent = (X_WB @ forward(arm, motion(1.5)))[2, 3]
+    np.testing.assert_allclose(hardware.force("ARM_1", 4.5), (0, 0, 1000 * (plane - sent)), atol=1e-6)
 
 
 def test_fingers_take_their_time(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_emit_tree() -> None:
     lines = check(STACKING, "--emit", "tree").stdout.splitlines()
 
     assert lines[0] == "Program"
-    assert lines[1:4] == ["  declarations: Declaration", "    names: Name OBJ1", "    names: Name OBJ2"]
+    assert lines[1:4] == ["  headers: Declaration", "    names: Name OBJ1", "    names: Name OBJ2"]
     assert "  statements: Move" in lines
     assert "    moved: ArmName ARM-1" in lines
 

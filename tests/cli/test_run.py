@@ -93,7 +93,7 @@ def test_run_file(stacked: Path) -> None:
 
     assert run["inputs"]["program"]["sha256"] == hashlib.sha256(STACKING.read_bytes()).hexdigest()
     assert run["inputs"]["cell"]["sha256"] == hashlib.sha256(STANFORD.read_bytes()).hexdigest()
-    assert run["options"] == {"servo_ms": 1.0, "deviation_mm": 1.0, "around": "none", "strict": False}
+    assert run["options"] == {"servo_ms": 1.0, "deviation_mm": 1.0, "around": "none", "std": "2", "strict": False}
     assert run["seed"] == 0
     assert run["command"].startswith("armwright run ")
     assert [stage["kind"] for stage in run["stages"]] == ["PTP"] * 3

@@ -1,11 +1,14 @@
 """Programs on the shelf: the conformance programs, small ones by feature, and the cells they are meant for."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from armwright.errors import FileFormatError
 from armwright.program import Compilation, KnownCell, Source
 from armwright.program import compile as translate
+from armwright.program.known import Imported, ReadImport
+from armwright.program.words import Standard
 
 ONE_ARM = KnownCell(
     arms=frozenset({"ARM_1"}),
@@ -23,6 +26,8 @@ ACCEPTED = sorted((HERE / "accepted").rglob("*.rlo"))
 EXPECTATION = re.compile(r"// expect: ([ELRW]\d{3}) line (\d+)")
 CELL = re.compile(r"// cell: (arms|frames|devices|visions) (.*)")
 STRICT = re.compile(r"// strict$", re.MULTILINE)
+OLD = re.compile(r"// std=83$", re.MULTILINE)
+IMPORT = re.compile(r"// import: (\S+): (.*)")
 
 
 def expectations(text: str) -> list[tuple[str, int]]:
@@ -35,19 +40,42 @@ def cell_of(text: str) -> KnownCell | None:
     told: Mapping[str, list[str]] = {what: re.split(r",\s*", names.strip()) for what, names in CELL.findall(text)}
     if not told:
         return None
-    hanging = (name.partition(" on ") for name in told.get("frames", ()))
     return KnownCell(
         arms=frozenset(told["arms"]),
-        frames={name: parent or "WORLD" for name, _, parent in hanging},
+        frames=hanging(told.get("frames", ())),
         devices=frozenset(told["devices"]) if "devices" in told else None,
         visions=frozenset(told["visions"]) if "visions" in told else None,
     )
 
 
+def hanging(names: Iterable[str]) -> dict[str, str]:
+    """Return what each frame hangs on, of names such as ``LID on CUP``."""
+    parts = (name.partition(" on ") for name in names)
+    return {name: parent or "WORLD" for name, _, parent in parts}
+
+
+def imports_of(text: str) -> ReadImport | None:
+    """Return a reader of the files that the comments of a program tell of; any other file is missing."""
+    files = {path: hanging(re.split(r",\s*", names.strip())) for path, names in IMPORT.findall(text)}
+
+    def read(path: str) -> Imported:
+        if path not in files:
+            raise FileFormatError(path, None, "", "there is no such file")
+        return Imported(frames=files[path])
+
+    return read if files else None
+
+
 def compile_file(path: Path) -> Compilation:
     """Translate a program as its comments ask for."""
     text = path.read_text(encoding="utf-8")
-    return translate(Source(path.name, text), cell_of(text), strict=bool(STRICT.search(text)))
+    return translate(
+        Source(path.name, text),
+        cell_of(text),
+        strict=bool(STRICT.search(text)),
+        std=Standard.RLO_83 if OLD.search(text) else Standard.RLO_2,
+        read_import=imports_of(text),
+    )
 
 
 def said(compilation: Compilation) -> list[tuple[str, int]]:
@@ -55,7 +83,9 @@ def said(compilation: Compilation) -> list[tuple[str, int]]:
     return sorted((one.code, compilation.source.line(one.span.start)) for one in compilation.diagnostics)
 
 
-def compile_program(name: str, cell: KnownCell | None = None, *, strict: bool = False) -> Compilation:
+def compile_program(
+    name: str, cell: KnownCell | None = None, *, strict: bool = False, std: Standard = Standard.RLO_2
+) -> Compilation:
     """Translate one of the conformance programs."""
     text = (CORPUS / f"{name}.rlo").read_text(encoding="utf-8")
-    return translate(Source(f"{name}.rlo", text), cell, strict=strict)
+    return translate(Source(f"{name}.rlo", text), cell, strict=strict, std=std)

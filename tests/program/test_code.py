@@ -5,7 +5,7 @@ import pytest
 
 from armwright.program import KnownCell, Source
 from armwright.program import compile as translate
-from armwright.program.code import Code, Kind, Move, Op, Trajectory, listing, stages_of
+from armwright.program.code import Code, Constant, Kind, Op, Trajectory, Type, listing
 from program.shelf import BARE
 
 # Twelve numbers as the program writes them come through unchanged, or as the nearest rotation to rounding.
@@ -18,32 +18,34 @@ def code_of(text: str) -> Code:
     return compilation.code
 
 
-def move_of(clauses: str) -> Move:
-    """Return the MOVE with some clauses in a program where every frame has a value."""
+def move_of(clauses: str) -> list[tuple[object, ...]]:
+    """Return the instructions of the MOVE with some clauses in a program where every frame has a value."""
     code = code_of(
         "VAR f, a, d, v, w : FRAME ; n : SCALAR ; BEGIN READ VISIONS (f) ; READ VISIONS (a) ; READ VISIONS (d) ;"
         f"READ VISIONS (v) ; READ VISIONS (w) ; n = 40 ; MOVE ARM_1 TO f {clauses} ; END."
     )
-    return next(step.move for step in code.instructions if step.move)
+    ops = [step.op for step in code.instructions]
+    whole = code.instructions[ops.index(Op.MVBEG) : ops.index(Op.MVEND) + 1]
+    return [(step.op.value, *step.operands, step.comment) for step in whole]
 
 
 def stages(clauses: str) -> list[tuple[str, ...]]:
-    return [(stage.kind.value, *stage.frames) for stage in stages_of(move_of(clauses))]
+    return [tuple(stage.split()) for stage in str(move_of(clauses)[-1][-1]).split(" / ")]
 
 
 @pytest.mark.parametrize(
     ("clauses", "expected"),
     [
-        ("", [("PTP", "F")]),
-        ("DIRECTLY", [("PTP", "F")]),
-        ("STRAIGHTLY", [("LINE", "F")]),
-        ("VIA (v, w)", [("SPLINE", "V", "W", "F")]),
-        ("WITH APPROACH = a", [("PTP", "A"), ("LINE", "F")]),
-        ("WITH DEPARTURE = d", [("LINE", "D"), ("PTP", "F")]),
-        ("WITH APPROACH = a, VIA (v, w)", [("SPLINE", "V", "W", "A"), ("LINE", "F")]),
-        ("WITH DEPARTURE = d, VIA (v)", [("LINE", "D"), ("SPLINE", "V", "F")]),
-        ("WITH APPROACH = a, WITH DEPARTURE = d", [("LINE", "D"), ("PTP", "A"), ("LINE", "F")]),
-        ("VIA (v) WITH DEPARTURE = d WITH APPROACH = a", [("LINE", "D"), ("SPLINE", "V", "A"), ("LINE", "F")]),
+        ("", [("PTP", "f")]),
+        ("DIRECTLY", [("PTP", "f")]),
+        ("STRAIGHTLY", [("LINE", "f")]),
+        ("VIA (v, w)", [("SPLINE", "v", "w", "f")]),
+        ("WITH APPROACH = a", [("PTP", "a"), ("LINE", "f")]),
+        ("WITH DEPARTURE = d", [("LINE", "d"), ("PTP", "f")]),
+        ("WITH APPROACH = a, VIA (v, w)", [("SPLINE", "v", "w", "a"), ("LINE", "f")]),
+        ("WITH DEPARTURE = d, VIA (v)", [("LINE", "d"), ("SPLINE", "v", "f")]),
+        ("WITH APPROACH = a, WITH DEPARTURE = d", [("LINE", "d"), ("PTP", "a"), ("LINE", "f")]),
+        ("VIA (v) WITH DEPARTURE = d WITH APPROACH = a", [("LINE", "d"), ("SPLINE", "v", "a"), ("LINE", "f")]),
     ],
 )
 def test_stages(clauses: str, expected: list[tuple[str, ...]]) -> None:
@@ -52,25 +54,21 @@ def test_stages(clauses: str, expected: list[tuple[str, ...]]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("clauses", "direct", "straight", "speed"),
+    ("clauses", "parts"),
     [
-        ("", True, False, 100.0),
-        ("WITH SPEED = 12.5", True, False, 12.5),
-        ("DIRECTLY, WITH SPEED = n", True, False, "N"),
-        ("STRAIGHTLY", False, True, 100.0),
-        ("VIA (v)", False, False, 100.0),
+        ("", ["MVDIR"]),
+        ("WITH SPEED = 12.5", ["MVDIR", "MVSPD 12.5"]),
+        ("DIRECTLY, WITH SPEED = n", ["MVDIR", "MVSPD N"]),
+        ("STRAIGHTLY", ["MVSTR"]),
+        ("VIA (v)", ["MVVIA V"]),
+        ("VIA (v, w), WITH BLEND = 20mm", ["MVVIA V W", "MVBLD 0.02"]),
+        ("WITH DURATION = 300ms", ["MVDIR", "MVDUR 0.3"]),
+        ("WITH DEPARTURE = d, VIA (v, w), WITH APPROACH = a", ["MVDEP D", "MVVIA V W", "MVAPP A"]),
     ],
 )
-def test_ways(clauses: str, direct: bool, straight: bool, speed: float | str) -> None:  # noqa: FBT001
-    """Without a clause on the way a MOVE is direct, and without a speed it has the normal one."""
-    move = move_of(clauses)
-
-    assert (move.direct, move.straight, move.speed) == (direct, straight, speed)
-
-
-def test_frames_of_a_move() -> None:
-    """A MOVE knows every frame that it needs."""
-    assert move_of("WITH DEPARTURE = d, VIA (v, w), WITH APPROACH = a").frames == ("F", "V", "W", "A", "D")
+def test_parts(clauses: str, parts: list[str]) -> None:
+    """Without a clause on the way a MOVE is direct; numbers stand in the units of the program."""
+    assert [" ".join(map(str, part[:-1])) for part in move_of(clauses)[1:-1]] == parts
 
 
 def test_every_statement() -> None:
@@ -82,8 +80,8 @@ def test_every_statement() -> None:
     )
 
     assert [(step.op.value, *step.operands) for step in code.instructions] == [
-        ("LOADS", "N", 0),
-        ("LOADM", "T", 1),
+        ("LOADS", "N", Constant(0)),
+        ("LOADM", "T", Constant(1)),
         ("READV", "F"),
         ("AFFAT", "G", "F", "T"),
         ("AFFIX", "F", "STATION"),
@@ -91,13 +89,13 @@ def test_every_statement() -> None:
         ("OPEN", "ARM_1"),
         ("GRASP", "ARM_1"),
         ("READS", "ARM_1"),
-        ("OPER", "TOOL1"),
+        ("OPER", "TOOL1", "ON"),
         ("STOP",),
     ]
     assert code.constants == (60.0, (1, 0, 0, 0, 1, 0, 0, 0, 1, -1, -1, -1))
-    assert code.kinds["G"] is Kind.FRAME
-    assert code.kinds["T"] is Kind.TRANS
-    assert code.kinds["N"] is Kind.SCALAR
+    assert code.types["G"] == Type(Kind.FRAME)
+    assert code.types["T"] == Type(Kind.TRANS)
+    assert code.types["N"] == Type(Kind.SCALAR)
     assert code.spelled("TOOL1") == "Tool1"
     assert code.spelled("STATION") == "station"
 
@@ -152,9 +150,42 @@ def test_listing_of_names_and_numbers() -> None:
     assert rows[-1] == "c0    12.5"
 
 
-def test_three_trajectories() -> None:
-    """There are three basic trajectories."""
-    assert [kind.value for kind in Trajectory] == ["PTP", "LINE", "SPLINE"]
+def test_trajectories() -> None:
+    """There are the three basic trajectories of the report, and one with rounded corners."""
+    assert [kind.value for kind in Trajectory] == ["PTP", "LINE", "SPLINE", "BLEND"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("n = 1 + 2 * n", ["MUL %1 2.0 N", "ADD N 1.0 %1"]),
+        ("f = f * XYZ(1, 2, 3)", ["XYZ %1 1.0 2.0 3.0", "MUL F F %1"]),
+        ("x[1,2] = n", ["ELEM %1 X 1.0 2.0", "COPY %1 N"]),
+        ("IF n > 1 THEN HALT", ["GT %1 N 1.0", "JZ %1 @", "HALT"]),
+        ("IF n > 1 OR n < 0 THEN HALT", ["GT %1 N 1.0", "NOT %2 %1", "JZ %2 @", "LT %1 N 0.0", "JZ %1 @", "HALT"]),
+        ("WHILE n < 3 DO n = 4", ["LT %1 N 3.0", "JZ %1 @", "LOADS N c", "JMP @"]),
+        ("REPEAT n = 4 UNTIL n > 3", ["LOADS N c", "GT %1 N 3.0", "JZ %1 @"]),
+        ("LOCK (f) DO SIGNAL e", ["LOCK F", "SIG E", "UNLK F"]),
+        ("TRY HALT RECOVER RETRY END", ["TRY @", "HALT", "ENDT @", "RETRY", "ENDR"]),
+    ],
+)
+def test_statements_of_rlo_2(text: str, expected: list[str]) -> None:
+    """Expressions need no stack: each operation puts its value somewhere, the last one where the statement wants it."""
+    code = code_of(
+        "VAR f : FRAME ; n : SCALAR ; e : EVENT ; x : ARRAY [1,2] OF SCALAR ; "
+        f"BEGIN n = 0 ; x[1,1] = 0 ; f = WORLD ; SIGNAL e ; PRINT(x[1,1]) ; {text} END."
+    )
+    shown = []
+    for step in code.instructions[7:-1]:
+        words = [operand if isinstance(operand, str) else repr(operand) for operand in step.operands]
+        words = ["@" if "Place" in word else "c" if "Constant" in word else word for word in words]
+        shown.append(" ".join((step.op.value, *words)))
+    first = min(int(word[1:]) for row in shown for word in row.split() if word[0] == "%") if "%" in str(shown) else 1
+    renamed = [
+        " ".join(f"%{int(word[1:]) - first + 1}" if word[0] == "%" else word for word in row.split()) for row in shown
+    ]
+
+    assert renamed == expected
 
 
 @pytest.mark.parametrize(

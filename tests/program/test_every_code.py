@@ -1,4 +1,4 @@
-"""Every code of a diagnostic is shown by a program and explained in the manual."""
+"""Every code of a diagnostic is shown by a program on the shelf; the pages that explain them have their own tests."""
 
 import re
 from pathlib import Path
@@ -11,11 +11,21 @@ from program.shelf import ACCEPTED, BARE, REJECTED, compile_program, expectation
 SOURCES = Path(armwright.program.__file__).parent
 MANUAL = Path(__file__).parents[2] / "docs" / "language.md"
 # What a running program says is shown by its own tests.
-RUNNING = {"interpret.py", "obstacles.py"}
+RUNNING = {
+    "acting.py",
+    "asking.py",
+    "control.py",
+    "evaluate.py",
+    "interpret.py",
+    "machine.py",
+    "moving.py",
+    "obstacles.py",
+}
 
 
 def codes() -> set[str]:
-    texts = [path.read_text() for path in SOURCES.glob("*.py") if path.name not in RUNNING]
+    """What the translator may say."""
+    texts = [path.read_text(encoding="utf-8") for path in SOURCES.rglob("*.py") if path.name not in RUNNING]
     return {code for text in texts for code in re.findall(r'"([EWLR]\d{3})"', text)}
 
 
@@ -24,16 +34,7 @@ def test_every_code_is_shown() -> None:
     shown = {code for path in [*REJECTED, *ACCEPTED] for code, _ in expectations(path.read_text(encoding="utf-8"))}
 
     assert codes() - shown == set()
-    assert len(codes()) > 50
-
-
-def test_every_code_is_explained() -> None:
-    """The manual has a row for each code, and no row for a code that nothing says."""
-    rows = set(re.findall(r"^\| ([EWLR]\d{3}) \|", MANUAL.read_text(encoding="utf-8"), re.MULTILINE))
-    running = {code for name in RUNNING for code in re.findall(r'"([EWLR]\d{3})"', (SOURCES / name).read_text())}
-
-    assert codes() | running <= rows
-    assert rows <= codes() | running
+    assert len(codes()) > 80
 
 
 def test_numbers_of_the_ranges() -> None:
@@ -46,7 +47,7 @@ def test_numbers_of_the_ranges() -> None:
 
 def test_program_of_the_manual() -> None:
     """The program that opens the manual has neither errors nor warnings."""
-    text = re.search(r"^```\n(var.*?)^```", MANUAL.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    text = re.search(r"^```\n(.*?)^```", MANUAL.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     assert text is not None
 
     assert translate(Source("manual.rlo", text[1]), BARE).diagnostics == ()

@@ -276,7 +276,7 @@ def test_millimetres_for_metres() -> None:
     """A goal typed in millimetres gets the hint that lengths are metres."""
     error = _fails("VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,450,0,250) ; MOVE ARM_1 TO f STRAIGHTLY ; END.")
 
-    assert error.diagnostic.helps == ("`f` is 514.8 m away: lengths in a program are metres",)
+    assert error.diagnostic.helps == ("`f` is 514.8 m away: lengths in this program are metres",)
 
 
 def test_moves_to_where_the_hand_is() -> None:

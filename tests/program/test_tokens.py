@@ -6,16 +6,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armwright.program.source import Source
-from armwright.program.tokens import Token, TokenKind, scan
+from armwright.program.source import Source, Span
+from armwright.program.tokens import Scanned, Token, TokenKind, scan
+from armwright.program.words import VOCABULARIES, Standard
 
 
-def tokens_of(text: str) -> list[Token]:
-    return scan(Source("t.rlo", text), text)[0][:-1]
+def scanned(text: str, standard: Standard = Standard.RLO_2) -> Scanned:
+    return scan(Source("t.rlo", text), text, standard)
 
 
-def codes_of(text: str) -> list[str]:
-    return [one.code for one in scan(Source("t.rlo", text), text)[1]]
+def tokens_of(text: str, standard: Standard = Standard.RLO_2) -> tuple[Token, ...]:
+    return scanned(text, standard).tokens[:-1]
+
+
+def codes_of(text: str, standard: Standard = Standard.RLO_2) -> list[str]:
+    return [one.code for one in scanned(text, standard).found]
 
 
 @pytest.mark.parametrize("text", ["ARM-1", "arm-1", "ARM_1", "Arm_01", "arm-001"])
@@ -74,11 +79,71 @@ def test_no_numbers(text: str) -> None:
     assert codes_of(text) == ["E113"]
 
 
-def test_unit() -> None:
-    """A unit that touches its number is part of the token, for RLO-2."""
-    (token,) = tokens_of("120mm")
+@pytest.mark.parametrize("standard", Standard)
+@pytest.mark.parametrize(("text", "digits"), [("120mm", "120"), ("2.5E3Cm", "2.5E3"), ("1e5m", "1e5"), ("3s", "3")])
+def test_unit(text: str, digits: str, standard: Standard) -> None:
+    """A unit that touches its number is part of the token, also for RLO-83, which has none to allow it."""
+    (token,) = tokens_of(text, standard)
 
-    assert (token.kind, token.text, token.key) == (TokenKind.NUMBER, "120mm", "120")
+    assert (token.kind, token.text, token.key, token.damaged) == (TokenKind.NUMBER, text, digits, False)
+    assert codes_of(text, standard) == []
+
+
+@pytest.mark.parametrize("text", ["5mmm", "5metres", "1.5.2mm", "1e999mm", ".5mm"])
+def test_no_units(text: str) -> None:
+    """What only looks like a number with a unit is one token, reported once."""
+    (token,) = tokens_of(text)
+
+    assert token.damaged
+    assert codes_of(text) == ["E113"]
+
+
+@pytest.mark.parametrize("word", ["wait", "For", "COEND", "on", "nonrigidly", "blend"])
+def test_words_of_rlo_2(word: str) -> None:
+    """What RLO-2 adds to the reserved words are names in RLO-83."""
+    kinds = [tokens_of(word, standard)[0].kind for standard in Standard]
+
+    assert kinds == [TokenKind.NAME, TokenKind.KEYWORD]
+
+
+def test_names_of_the_report() -> None:
+    """No name that the report uses is reserved, nor what has a meaning in one place only."""
+    names = "OBJ1 STOP f1 t1 tool1 apf1 def1 grasp1 lvpoint show station viaf1 n1 visions system mm xyz force x"
+
+    assert {token.kind for token in tokens_of(names)} == {TokenKind.NAME}
+    assert [len(VOCABULARIES[standard].reserved) for standard in Standard] == [23, 23 + 36]
+
+
+@pytest.mark.parametrize("text", ['""', '"seated"', '"a; { b } // c"', '"größe；"', '"\t"'])
+def test_texts(text: str) -> None:
+    """Between two marks anything is a text, exactly as written."""
+    (token,) = tokens_of(text)
+
+    assert (token.kind, token.text) == (TokenKind.STRING, text)
+    assert codes_of(text) == []
+
+
+def test_text_not_closed() -> None:
+    """A text ends with its line at the latest; what was meant to stand behind it still counts."""
+    text = 'PRINT("done) ;\nHALT'
+
+    assert [token.key for token in tokens_of(text)] == ["PRINT", "(", '"', ")", ";", "HALT"]
+    assert codes_of(text) == ["E120"]
+
+
+@pytest.mark.parametrize("sign", ["==", "!=", "=<", "=>", "&&", "||", ":="])
+def test_signs_of_other_languages(sign: str) -> None:
+    """What other languages write is one token, so that the parser can tell what it should be."""
+    assert [token.key for token in tokens_of(f"a{sign}b")] == ["A", sign, "B"]
+
+
+def test_comments_are_kept() -> None:
+    """The place of every comment is known, for whoever writes the program anew."""
+    text = "a { b } c // d\ne"
+    found = scanned(text)
+
+    assert found.comments == (Span(2, 7), Span(10, 14))
+    assert [text[span.start : span.end] for span in found.comments] == ["{ b }", "// d"]
 
 
 def test_comments_leave_nothing() -> None:
@@ -92,30 +157,30 @@ def test_comments_leave_nothing() -> None:
 )
 def test_look_alikes(text: str, meant: str) -> None:
     """A mark of another keyboard counts as the one it looks like, and is reported with the change that cures it."""
-    found, odd = scan(Source("t.rlo", text), text)
+    found = scanned(text)
 
-    assert found[0].key == meant
-    assert [(one.code, one.fixes[0].replacement) for one in odd] == [("E101", meant)]
+    assert found.tokens[0].key == meant
+    assert [(one.code, one.fixes[0].replacement) for one in found.found] == [("E101", meant)]
 
 
 def test_look_alikes_once() -> None:
     """The same wrong mark is reported once, with all its places to change."""
-    text = "a；b；c；"
-    _, (odd,) = scan(Source("t.rlo", text), text)
+    (odd,) = scanned("a；b；c；").found
 
     assert len(odd.fixes) == 3
     assert odd.notes == ("it stands in 3 places",)
 
 
 @settings(deadline=None)
-@given(st.text(max_size=60))
-def test_tokens_lie_in_the_text(text: str) -> None:
+@given(st.text(max_size=60), st.sampled_from(Standard))
+def test_tokens_lie_in_the_text(text: str, standard: Standard) -> None:
     """Of any text whatever the tokens lie one behind the other, and end at its end."""
-    found, odd = scan(Source("t.rlo", text), text)
+    found = scanned(text, standard)
 
-    assert all(before.end <= after.start for before, after in pairwise(found))
-    assert found[-1].start == len(text)
-    assert all(0 <= one.span.start <= one.span.end <= len(text) for one in odd)
+    assert all(before.end <= after.start for before, after in pairwise(found.tokens))
+    assert found.tokens[-1].start == len(text)
+    assert all(0 <= one.span.start <= one.span.end <= len(text) for one in found.found)
+    assert all(before.end <= after.start for before, after in pairwise(found.comments))
 
 
 def test_word_in_place() -> None:

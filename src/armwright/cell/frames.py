@@ -7,13 +7,22 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, of_shape
 from armwright.errors import InvalidValueError, UnknownNameError
-from armwright.spatial.poses import inverse
+from armwright.spatial.poses import turned_over
 
 WORLD = "WORLD"
 
 
 def _relation(value: ArrayLike) -> Array:
+    if isinstance(value, np.ndarray) and value.shape == (4, 4) and not value.flags.writeable:
+        # Nobody can change it: it was checked before, or worked out here.
+        return value
     return of_shape(value, (4, 4), "relation")
+
+
+def _kept(X: Array) -> Array:
+    """Return a pose that was worked out here, and that nobody shall change."""
+    X.setflags(write=False)
+    return X
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -23,10 +32,12 @@ class Node:
     Attributes:
         parent: the frame it hangs on.
         relation: (4, 4) its pose seen from the parent; None while the frame has no value.
+        rigid: whether the parent comes along when the frame is given another place.
     """
 
     parent: str
     relation: Array | None = attrs.field(converter=attrs.converters.optional(_relation))
+    rigid: bool = False
 
 
 @attrs.frozen(eq=False)
@@ -98,36 +109,58 @@ class FrameTree:
             UnknownNameError: no such frame.
             InvalidValueError: the frame, or one it hangs on, has no value yet.
         """
-        X = np.eye(4)
-        name = child
+        X, name = None, child
         while name != ancestor:
             node = self._node(name)
             if node.relation is None:
                 raise InvalidValueError(f"frame {name} has no value yet")
-            X = node.relation @ X
+            X = node.relation if X is None else node.relation @ X
             name = node.parent
-        return X
+        return np.eye(4) if X is None else X
 
     def declare(self, name: str) -> "FrameTree":
         """Return the tree with a frame that hangs on WORLD and has no value yet; a known frame stays as it is."""
         return self if name in self else self._with(name, Node(parent=WORLD, relation=None))
 
     def place(self, name: str, X_WF: ArrayLike) -> "FrameTree":
-        """Return the tree with a frame set to a pose in the world; it goes on hanging on what it hung on."""
+        """Return the tree with a frame set to a pose in the world; it goes on hanging on what it hung on.
+
+        A frame that hangs rigidly takes its parent along, and that its own, up to ``leader``.
+        """
         if name == WORLD:
             raise InvalidValueError("the frame WORLD is the root and cannot be placed")
-        parent = self.nodes[name].parent if name in self.nodes else WORLD
-        return self._with(
-            name, Node(parent=parent, relation=inverse(self.world(parent)) @ of_shape(X_WF, (4, 4), "pose"))
-        )
+        node = self.nodes.get(name)
+        if node is not None and node.rigid and node.relation is not None:
+            return self.place(node.parent, of_shape(X_WF, (4, 4), "pose") @ turned_over(node.relation))
+        parent = WORLD if node is None else node.parent
+        X = of_shape(X_WF, (4, 4), "pose")
+        relation = X if parent == WORLD else _kept(turned_over(self.world(parent)) @ X)
+        return self._with(name, Node(parent=parent, relation=relation))
 
-    def affix(self, child: str, parent: str, relation: ArrayLike | None = None) -> "FrameTree":
+    def leader(self, name: str) -> str:
+        """Return the frame that gets another place when ``name`` does: itself, or the end of its rigid links."""
+        while (node := self.nodes.get(name)) is not None and node.rigid:
+            name = node.parent
+        return name
+
+    def without(self, name: str) -> "FrameTree":
+        """Return the tree without a frame; what hung on it keeps its place and hangs on WORLD."""
+        nodes = dict(self.nodes)
+        for child, node in self.nodes.items():
+            if node.parent == name:
+                relation = None if not self.has_value(child) else self.world(child)
+                nodes[child] = Node(parent=WORLD, relation=relation)
+        nodes.pop(name, None)
+        return FrameTree(nodes)
+
+    def affix(self, child: str, parent: str, relation: ArrayLike | None = None, *, rigid: bool = False) -> "FrameTree":
         """Return the tree with ``child`` hanging on ``parent``.
 
         Args:
             child: the frame that follows.
             parent: the frame it follows.
             relation: (4, 4) pose of the child seen from the parent; where both stand now when left out.
+            rigid: whether the parent comes along when the child is given another place.
 
         Raises:
             UnknownNameError: no such frame.
@@ -136,10 +169,10 @@ class FrameTree:
         if child == parent or child in self.ancestors(parent):
             raise InvalidValueError(f"{child} cannot hang on {parent}, which hangs on {child}")
         if relation is None:
-            relation = inverse(self.world(parent)) @ self.world(child)
+            relation = _kept(turned_over(self.world(parent)) @ self.world(child))
         else:
             self.world(parent)
-        return self._with(child, Node(parent=parent, relation=relation))
+        return self._with(child, Node(parent=parent, relation=relation, rigid=rigid))
 
     def unfix(self, child: str) -> "FrameTree":
         """Return the tree with ``child`` cut loose: it keeps its place and hangs on WORLD."""

@@ -63,6 +63,7 @@ class Cell:
         camera: (4, 4) pose of the camera in the world.
         devices: names of the tools that can be operated; None when the cell does not say, and any will do.
         contact_height: height of a plane that stops whatever comes down on it [m]; None where there is none.
+        contact_stiffness: how the force grows while an arm goes on pressing on that plane [N/m].
         vision_time: how long the camera takes for an answer [s].
         deviation: allowed distance from straight lines [m].
         period: of the servo [s].
@@ -76,6 +77,7 @@ class Cell:
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     devices: frozenset[str] | None = None
     contact_height: float | None = None
+    contact_stiffness: float = 2e4
     vision_time: float = 0.1
     deviation: float = 1e-3
     period: float = 1e-3

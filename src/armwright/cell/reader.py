@@ -39,18 +39,20 @@ WAYS_ROUND: Mapping[str, Around | None] = {"none": None, "via": "via", "damped":
 _LONGEST_WAIT = 600.0
 
 
-def read_cell(path: Path | str) -> Cell:
+def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     """Read a cell from a TOML or JSON file.
 
     Args:
         path: the file; its format is in docs/cells.md.
+        arms_needed: whether a file without arms is refused; what a program imports may have frames alone.
 
     Raises:
         FileFormatError: the file is missing, broken, or says what cannot be; the text has file, line and key.
     """
     path = Path(path)
     top = Document.read(path).root
-    arms = _arms(top.table("arms", required=True), path.parent)
+    arms = _arms(top.table("arms", required=True), path.parent) if arms_needed or "arms" in top else {}
+    top.allow("arms")
     camera, motion, contact = top.table("camera"), top.table("motion"), top.table("contact")
     height = contact.number("z", default=math.nan)
     cell = Cell(
@@ -62,6 +64,7 @@ def read_cell(path: Path | str) -> Cell:
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_LONGEST_WAIT),
         devices=_devices(top.table("devices")) if "devices" in top else None,
         contact_height=None if math.isnan(height) else height,
+        contact_stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
         around=_around(motion),

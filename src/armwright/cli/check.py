@@ -1,16 +1,17 @@
 """``armwright check``: what the translator has to say about a program, and what it makes of it."""
 
 import enum
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.programs import ProgramFile, Std, Strict
+from armwright.program.words import Standard
+
 if TYPE_CHECKING:
-    from armwright.cell.model import Cell
-    from armwright.program import Compilation, Source
-    from armwright.program.diagnostics import Diagnostic
+    from armwright.program import Compilation
 
 
 class Emit(enum.StrEnum):
@@ -21,8 +22,16 @@ class Emit(enum.StrEnum):
     TOKENS = "tokens"
 
 
-def check(
-    program: Annotated[Path, typer.Argument(help="The program, in RLO.", show_default=False)],
+class Format(enum.StrEnum):
+    """How diagnostics are printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    SARIF = "sarif"
+
+
+def check(  # noqa: PLR0917 - Typer reads one parameter per option
+    program: ProgramFile,
     cell: Annotated[
         Path | None,
         typer.Option("--cell", help="The cell it will run in; frames, arms and devices are then checked too."),
@@ -30,7 +39,9 @@ def check(
     emit: Annotated[
         Emit | None, typer.Option(help="Print this instead; diagnostics go to the error output.", show_default=False)
     ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")] = False,
+    std: Std = Standard.RLO_2,
+    strict: Strict = False,
+    output_format: Annotated[Format, typer.Option("--format", help="How to print diagnostics.")] = Format.TEXT,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
     """Check an RLO program without running it.
@@ -41,9 +52,16 @@ def check(
     """
     import json
 
-    compiled = compile_file(program, _cell(cell), strict=strict)
-    if as_json:
+    from armwright.cli.programs import in_its_cell, print_diagnostics
+
+    compiled, _ = in_its_cell(program, _cell(cell), strict=strict, std=std)
+    if as_json or output_format is Format.JSON:
         print(json.dumps(_as_data(compiled, emit), indent=2, ensure_ascii=False))
+    elif output_format is Format.SARIF:
+        from armwright.program.sarif import to_sarif
+
+        log = to_sarif(compiled.diagnostics, compiled.source, program.as_posix())
+        print(json.dumps(log, indent=2, ensure_ascii=False))
     else:
         for line in _emitted(compiled, emit) if emit else ():
             print(line)
@@ -53,45 +71,12 @@ def check(
         raise typer.Exit(1)
 
 
-def _cell(path: Path | None) -> "Cell | None":
+def _cell(path: Path | None) -> "Any":
     if path is None:
         return None
     from armwright.cell.reader import read_cell
 
     return read_cell(path)
-
-
-def compile_file(path: Path, cell: "Cell | None" = None, *, strict: bool = False) -> "Compilation":
-    """Read and translate a program.
-
-    Args:
-        path: of the program, UTF-8 text.
-        cell: what it will act on.
-        strict: whether an AFFIX that is only implied is an error.
-
-    Raises:
-        FileFormatError: the file cannot be read, or is not text.
-    """
-    from armwright.files.document import read_text
-    from armwright.program import Source, known_cell
-    from armwright.program import compile as translate
-
-    return translate(Source(path.name, read_text(path)), known_cell(cell) if cell else None, strict=strict)
-
-
-def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, to_errors: bool = False) -> None:
-    """Print diagnostics with the lines they are about, in colour when a person watches."""
-    import sys
-
-    from rich.console import Console
-
-    from armwright.program.rendering import render, render_rich
-
-    console = Console(stderr=to_errors)
-    if console.is_terminal:
-        console.print(render_rich(diagnostics, source), soft_wrap=True, end="")
-    else:
-        print(render(diagnostics, source), end="", file=sys.stderr if to_errors else sys.stdout)
 
 
 def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:
@@ -111,22 +96,17 @@ def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:
 
 
 def _as_data(compiled: "Compilation", emit: Emit | None) -> dict[str, Any]:
-    from armwright.program.diagnostics import to_json
+    from armwright.cli.programs import diagnostics_data
+    from armwright.program.code import shown_operands
 
-    errors = sum(one.is_error for one in compiled.diagnostics)
-    data: dict[str, Any] = {
-        "program": compiled.source.name,
-        "errors": errors,
-        "warnings": len(compiled.diagnostics) - errors,
-        "diagnostics": [to_json(one, compiled.source) for one in compiled.diagnostics],
-    }
+    data = diagnostics_data(compiled)
     if emit is Emit.CODE and compiled.code:
         code = compiled.code
         data["constants"] = list(code.constants)
         data["code"] = [
             {
                 "op": step.op.value,
-                "operands": list(step.operands),
+                "operands": list(shown_operands(code, step)),
                 "at": [code.line(step), code.source.column(step.span.start)],
                 **({"comment": step.comment} if step.comment else {}),
             }

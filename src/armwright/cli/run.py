@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict
+from armwright.program.words import Standard
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -17,7 +20,7 @@ if TYPE_CHECKING:
     from armwright.program import Source
     from armwright.program.code import Code
     from armwright.program.diagnostics import Diagnostic
-    from armwright.program.interpret import RunError
+    from armwright.program.interpret import Limits, RunError
     from armwright.program.recording import Recording, RunStage
 
 
@@ -30,8 +33,8 @@ class Around(enum.StrEnum):
 
 
 def run(  # noqa: PLR0917 - Typer reads one parameter per option
-    program: Annotated[Path, typer.Argument(help="The program, in RLO.", show_default=False)],
-    cell: Annotated[Path, typer.Option("--cell", help="The cell it runs in, TOML or JSON.", show_default=False)],
+    program: ProgramFile,
+    cell: CellFile = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the results; none are kept without it.")
     ] = None,
@@ -49,7 +52,14 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
             show_default=False,
         ),
     ] = None,
-    strict: Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")] = False,
+    std: Std = Standard.RLO_2,
+    strict: Strict = False,
+    max_steps: Annotated[
+        int, typer.Option(min=1, help="End a program that does so many steps without any time going by.")
+    ] = 1_000_000,
+    max_time: Annotated[
+        float, typer.Option(min=0.0, help="End a program that runs so long on the cell's clock, in s.")
+    ] = 3600.0,
     seed: Annotated[int, typer.Option(help="Recorded in run.json; this simulator draws no random numbers.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")] = False,
@@ -65,29 +75,29 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     import json
 
-    from armwright.cli.check import compile_file, print_diagnostics
+    from armwright.cli.programs import print_diagnostics
     from armwright.files.output import write_folder
-    from armwright.program.interpret import RunError, warnings
+    from armwright.program.interpret import Limits, RunError, warnings
     from armwright.report.files import Origin, result_files, summary
 
-    place = _cell(cell, servo_ms, deviation_mm, around)
-    compiled = compile_file(program, place, strict=strict)
-    if compiled.code is None:
-        _fail(compiled.source, compiled.diagnostics, as_json=as_json)
-    code = compiled.code
+    given = None if cell is None else _read(cell)
+    code, place, said, imports = _translated(program, given, strict=strict, std=std, as_json=as_json)
+    place = _adjusted(place, servo_ms, deviation_mm, around)
+    limits = Limits(steps=max_steps, time=max_time)
     try:
-        recording = _interpret(code, place, watched=not (quiet or as_json))
+        recording = _interpret(code, place, limits, watched=not (quiet or as_json))
     except RunError as error:
-        _fail(code.source, [*compiled.diagnostics, error.diagnostic], error, code, as_json=as_json)
-    diagnostics = (*compiled.diagnostics, *warnings(recording))
+        _fail(code.source, [*said, error.diagnostic], error, code, as_json=as_json)
+    diagnostics = (*said, *warnings(recording))
     if output is not None:
         options = {
             "servo_ms": place.period * 1e3,
             "deviation_mm": place.deviation * 1e3,
             "around": place.around or Around.NONE.value,
+            "std": std.value,
             "strict": strict,
         }
-        origin = Origin(program=program, cell=cell, command=_command(), seed=seed, options=options)
+        origin = Origin(program=program, cell=cell, imports=imports, command=_command(), seed=seed, options=options)
         write_folder(output, result_files(recording, code, diagnostics, origin))
     if diagnostics and not as_json:
         print_diagnostics(diagnostics, code.source)
@@ -98,12 +108,44 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         _print_summary(recording, code, output)
 
 
-def _cell(path: Path, servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
+def _read(path: Path) -> "Cell":
+    from armwright.cell.reader import read_cell
+
+    return read_cell(path)
+
+
+def _translated(
+    program: Path, given: "Cell | None", *, strict: bool, std: Standard, as_json: bool
+) -> "tuple[Code, Cell, tuple[Diagnostic, ...], tuple[Path, ...]]":
+    """Return the code of a program, its cell, what was said of it, and the files that it imports."""
+    from armwright.cli.programs import in_its_cell
+    from armwright.files.document import read_text
+    from armwright.program import tree
+    from armwright.program.assembly import assemble
+
+    if program.suffix == CODE_SUFFIX:
+        if given is None:
+            _no_cell(program)
+        return assemble(read_text(program), str(program)), given, (), ()
+    compiled, place = in_its_cell(program, given, strict=strict, std=std)
+    if compiled.code is None:
+        _fail(compiled.source, compiled.diagnostics, as_json=as_json)
+    if place is None:
+        _no_cell(program)
+    imports = [node.path.value for node in compiled.tree.headers if isinstance(node, tree.Import)]
+    return compiled.code, place, compiled.diagnostics, tuple(program.parent / name for name in imports)
+
+
+def _no_cell(program: Path) -> NoReturn:
+    what = f"{program} needs a cell to run in, and IMPORTs none"
+    raise typer.BadParameter(f"missing: {what}; try examples/stanford_cell.toml", param_hint="--cell")
+
+
+def _adjusted(place: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
     import attrs
 
-    from armwright.cell.reader import DEVIATION_MM, SERVO_MS, WAYS_ROUND, read_cell
+    from armwright.cell.reader import DEVIATION_MM, SERVO_MS, WAYS_ROUND
 
-    place = read_cell(path)
     period = place.period if servo_ms is None else _option("--servo-ms", servo_ms, SERVO_MS)
     deviation = place.deviation if deviation_mm is None else _option("--deviation-mm", deviation_mm, DEVIATION_MM)
     way_round = place.around if around is None else WAYS_ROUND[around.value]
@@ -117,10 +159,10 @@ def _option(name: str, value: float, bounds: tuple[float, float]) -> float:
     return value * 1e-3
 
 
-def _interpret(code: "Code", place: "Cell", *, watched: bool) -> "Recording":
-    """Run in the simulator, with a progress bar when a person watches."""
+def _interpret(code: "Code", place: "Cell", limits: "Limits", *, watched: bool) -> "Recording":
+    """Run in the simulator, with the present statement on the screen when a person watches."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import Progress, SpinnerColumn, TextColumn
 
     from armwright.cell.simulator import Simulator
     from armwright.program.interpret import interpret
@@ -128,15 +170,16 @@ def _interpret(code: "Code", place: "Cell", *, watched: bool) -> "Recording":
     simulator = Simulator(place)
     console = Console(stderr=True)
     if not (watched and console.is_terminal):
-        return interpret(code, place, simulator)
-    columns = TextColumn("running"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}")
-    with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=len(code.instructions))
+        return interpret(code, place, simulator, limits=limits)
+    with Progress(SpinnerColumn(), TextColumn("{task.description}"), console=console, transient=True) as bar:
+        task = bar.add_task("", total=None)
 
-        def show(done: int, _total: int, line: int) -> None:
-            bar.update(task, completed=done, description=code.source.line_text(line).strip()[:60])
+        def show(now: float, line: int) -> None:
+            # Source lines may hold what looks like markup.
+            words = code.source.line_text(line).strip()[:60].replace("[", "\\[")
+            bar.update(task, description=f"{now:9.3f} s  line {line:<5} {words}")
 
-        return interpret(code, place, simulator, show)
+        return interpret(code, place, simulator, show, limits=limits)
 
 
 def _fail(
@@ -150,7 +193,7 @@ def _fail(
     """Say why a program did not run, or did not run to its end, and stop with status 1."""
     import json
 
-    from armwright.cli.check import print_diagnostics
+    from armwright.cli.programs import print_diagnostics
     from armwright.program.diagnostics import to_json
 
     if as_json:

@@ -1,7 +1,29 @@
-"""The robot language RLO: from text over a checked tree to intermediate code."""
+"""The robot language RLO: from text over a checked tree to intermediate code, and from code to what arms do."""
 
-from armwright.program.compiler import Compilation, compile  # noqa: A004 - what a translator does is compile
-from armwright.program.known import KnownCell, known_cell
-from armwright.program.source import Source
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from armwright.program.compiler import Compilation as Compilation
+    from armwright.program.compiler import compile as compile  # noqa: A004 - what a translator does
+    from armwright.program.known import KnownCell as KnownCell
+    from armwright.program.known import known_cell as known_cell
+    from armwright.program.source import Source as Source
+
+# Loaded when they are asked for: the command line needs some words of the language for its --help, and no compiler.
+_HOMES = {
+    "Compilation": "compiler",
+    "compile": "compiler",
+    "KnownCell": "known",
+    "known_cell": "known",
+    "Source": "source",
+}
 
 __all__ = ["Compilation", "KnownCell", "Source", "compile", "known_cell"]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name where it lives."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -1,156 +1,186 @@
 """Names and types: every name declared once and used as what it is; clauses that go together; values in range."""
 
-from armwright.errors import closest
-from armwright.program import moves, tree
+from collections.abc import Callable
+
+from armwright.program import actions, headers, moves, tree
+from armwright.program.amounts import in_range, measure
+from armwright.program.calls import Calls
 from armwright.program.code import Kind
 from armwright.program.diagnostics import Diagnostic
-from armwright.program.known import WORLD, KnownCell
-from armwright.program.matrices import check as check_matrix
-from armwright.program.names import Names, Symbols
+from armwright.program.kinds import condition, need, quantity
+from armwright.program.known import Imported, KnownCell, ReadImport
+from armwright.program.names import Symbols
+from armwright.program.naming import Names, Procedure
+from armwright.program.sorts import Sort
+from armwright.program.words import Standard
 
 
-def check(program: tree.Program, cell: KnownCell | None = None) -> tuple[Symbols, list[Diagnostic]]:
-    """Return the names of a program, and what is wrong with names, types, clauses and values."""
-    names = Names(cell)
-    for declaration in program.declarations:
-        names.declare(declaration)
-    for statement in program.statements:
-        _statement(names, statement)
+def check(
+    program: tree.Program,
+    cell: KnownCell | None = None,
+    *,
+    std: Standard = Standard.RLO_2,
+    read_import: ReadImport | None = None,
+) -> tuple[Symbols, list[Diagnostic], tuple[Imported, ...]]:
+    """Look at names, types, clauses and values.
+
+    Args:
+        program: as the parser gave it, errors of syntax included.
+        cell: what the program will act on, if that is known.
+        std: the language it is written in.
+        read_import: gives what the file of an IMPORT holds, and raises an ArmwrightError when it cannot be read;
+            without it nothing is looked up.
+
+    Returns:
+        The names of the program, what is wrong, and what was imported.
+    """
+    names = Names(cell, std)
+    procedures = headers.declare(names, program, read_import)
+    calls = Calls(names)
+    for procedure in procedures:
+        with names.inside(procedure):
+            _Statements(names, calls, procedure).all(procedure.node.body.statements)
+    _Statements(names, calls, None).all(program.statements)
+    calls.finish()
     names.unused()
-    return names.symbols, names.found
+    return names.symbols, names.found, tuple(names.imports)
 
 
-def _statement(names: Names, statement: tree.Statement) -> None:
-    """Check one statement."""
-    match statement:
-        case tree.Init():
-            _init(names, statement)
-        case tree.Affix():
-            _affix(names, statement)
-        case tree.Unfix(child=child, parent=parent):
-            _child(names, child, "UNFIX cuts", "unfixed", ())
-            names.need(parent, Kind.FRAME, "E215", "FROM needs a FRAME or an arm")
-        case tree.Move():
-            moves.check(names, statement)
-        case tree.Poison():
-            names.mention(statement.names)
-        case _:
-            _tool_or_sensor(names, statement)
+class _Statements:
+    """Checks statements, one inside the other."""
 
+    def __init__(self, names: Names, calls: Calls, inside: Procedure | None) -> None:
+        """Start outside of any RECOVER."""
+        self._names, self._calls, self._inside = names, calls, inside
+        self._recovering = False
+        self._checks: dict[type, Callable[..., None]] = {
+            tree.Assign: self._assign,
+            tree.Affix: self._affix,
+            tree.Unfix: self._unfix,
+            tree.Open: self._open,
+            tree.Grasp: lambda node: actions.arm(names, node.arm, "GRASP"),
+            tree.Operate: lambda node: actions.operate(names, node),
+            tree.ReadVisions: self._read_visions,
+            tree.ReadSystem: lambda node: actions.arm(names, node.arm, "READ SYSTEM"),
+            tree.Move: self._move,
+            tree.Block: lambda node: self.all(node.statements),
+            tree.If: self._if,
+            tree.While: self._while,
+            tree.Repeat: self._repeat,
+            tree.For: self._for,
+            tree.Cobegin: self._cobegin,
+            tree.Signal: lambda node: actions.event(names, node.event, "SIGNAL"),
+            tree.Wait: lambda node: actions.event(names, node.event, "WAIT"),
+            tree.Pause: self._pause,
+            tree.Lock: self._lock,
+            tree.Try: self._try,
+            tree.Retry: self._retry,
+            tree.Halt: lambda _: None,
+            tree.Print: lambda node: actions.show(names, node),
+            tree.Call: lambda node: calls.check(node, inside),
+            tree.Poison: lambda node: names.mention(node.names),
+        }
 
-def _tool_or_sensor(names: Names, statement: tree.Statement) -> None:
-    match statement:
-        case tree.Open(arm=arm):
-            _arm(names, arm, "OPEN")
-        case tree.Grasp(arm=arm):
-            _arm(names, arm, "GRASP")
-        case tree.ReadSystem(arm=arm):
-            _arm(names, arm, "READ SYSTEM")
-        case tree.ReadVisions(target=target):
-            _target(names, target)
-        case tree.Operate(device=tree.ArmName() as arm):
-            names.found.say("E201", f"OPERATE starts a device, but `{arm.text}` is an arm", arm.span, "an arm")
-        case _:
-            pass
+    def all(self, statements: tuple[tree.Statement, ...]) -> None:
+        """Check several, one after the other."""
+        for statement in statements:
+            self._checks[type(statement)](statement)
 
+    def one(self, statement: tree.Statement) -> None:
+        """Check one statement."""
+        self._checks[type(statement)](statement)
 
-def _init(names: Names, init: tree.Init) -> None:
-    name, value = init.name, init.value
-    if isinstance(value, tree.Poison):
-        # The variable keeps its kind; only what it holds is unknown. What stands on the right counts as used.
-        names.use(value.names)
-    if isinstance(name, tree.ArmName):
-        help_ = f"move it, or write `READ SYSTEM ({name.key})`"
-        names.found.say(
-            "E218", f"`{name.text}` is an arm and cannot be given a value", name.span, "an arm", helps=(help_,)
-        )
-        return
-    kind = names.kind(name)
-    if name.key == WORLD:
-        names.found.say("E218", f"`{name.text}` cannot be given a value", name.span, "the root of all frames")
-    elif kind is not None and not isinstance(value, tree.Poison):
-        _fits(names, name, kind, value)
+    # ---- frames, tools, sensors, motion ----------------------------------------------------------------------------
 
+    def _assign(self, node: tree.Assign) -> None:
+        self._calls.changes(node.target, self._inside, node.span)
+        actions.assign(self._names, node)
 
-def _fits(names: Names, name: tree.Name, kind: Kind, value: tree.Matrix | tree.Number) -> None:
-    """Check that a scalar gets one number, anything else twelve that make a place."""
-    is_matrix = isinstance(value, tree.Matrix)
-    if is_matrix == (kind is Kind.SCALAR):
-        takes = "one number" if kind is Kind.SCALAR else "twelve numbers in `( )`"
-        names.found.say(
-            "E217",
-            f"`{name.text}` is a {kind} and takes {takes}",
-            value.span,
-            "a matrix" if is_matrix else "one number",
-            secondary=names.where_declared(name.key),
-        )
-        names.poisoned.add(name.key)
-    elif isinstance(value, tree.Matrix) and (fault := check_matrix(value)):
-        names.found.append(fault)
+    def _affix(self, node: tree.Affix) -> None:
+        self._calls.changes(node.child, self._inside, node.link)
+        if node.rigid:
+            self._calls.changes(node.parent, self._inside, node.link)
+        actions.affix(self._names, node)
 
+    def _unfix(self, node: tree.Unfix) -> None:
+        self._calls.changes(node.child, self._inside, node.span)
+        actions.child(self._names, node.child, "UNFIX cuts", "unfixed")
+        if node.parent is not None:
+            need(self._names, node.parent, Sort.FRAME, "E215", "FROM needs a FRAME or an arm")
 
-def _affix(names: Names, affix: tree.Affix) -> None:
-    child, parent, at = affix.child, affix.parent, affix.at
-    swap = isinstance(parent, tree.Name) and isinstance(child, tree.ArmName)
-    helps = (f"did you mean `AFFIX {_text(parent)} TO {_text(child)}`?",) if swap else ()
-    _child(names, child, "AFFIX hangs", "affixed to a frame", helps)
-    names.need(parent, Kind.FRAME, "E215", "AFFIX ... TO needs a FRAME or an arm")
-    if at is None:
-        return
-    is_frame = isinstance(at, tree.Name) and names.kinds.get(at.key) is Kind.FRAME
-    whence, where = _text(parent), _text(at)
-    names.need(
-        at,
-        Kind.TRANS,
-        "E210",
-        "AT needs a TRANS",
-        notes=("a FRAME is a place in the cell; a TRANS is the step from one frame to another",),
-        helps=(f"for the step from {whence} to {where} write `AT INV({whence}) * {where}`",) if is_frame else (),
-    )
+    def _open(self, node: tree.Open) -> None:
+        actions.arm(self._names, node.arm, "OPEN")
+        if node.width is not None and quantity(self._names, node.width, "length", "OPEN ... TO needs a width"):
+            in_range(self._names, node.width, "a width", zero=True)
 
+    def _read_visions(self, node: tree.ReadVisions) -> None:
+        for target in node.targets:
+            self._calls.changes(target, self._inside, node.span)
+            actions.vision(self._names, target)
 
-def _text(node: tree.Mobile) -> str:
-    return "..." if isinstance(node, tree.Poison) else node.text
+    def _move(self, node: tree.Move) -> None:
+        moves.check(self._names, node)
+        for clause in node.clauses:
+            if isinstance(clause, tree.On):
+                condition(self._names, clause.condition, "ON")
+                self._apart(clause.action)
 
+    # ---- control ---------------------------------------------------------------------------------------------------
 
-def _child(names: Names, child: tree.Mobile, verb: str, done: str, helps: tuple[str, ...]) -> None:
-    """Check the frame that AFFIX hangs or UNFIX cuts."""
-    if isinstance(child, tree.ArmName):
-        text = f"an arm cannot be {done}"
-        names.found.say("E308", text, child.span, "an arm hangs on its own base", helps=helps)
-    elif isinstance(child, tree.Name) and child.key == WORLD:
-        names.found.say(
-            "E309", f"`{child.text}` cannot be {done.partition(' ')[0]}", child.span, "the root of all frames"
-        )
-    else:
-        names.need(child, Kind.FRAME, "E215", f"{verb} a FRAME")
+    def _if(self, node: tree.If) -> None:
+        condition(self._names, node.condition, "IF")
+        self.one(node.then)
+        if node.otherwise is not None:
+            self.one(node.otherwise)
 
+    def _while(self, node: tree.While) -> None:
+        condition(self._names, node.condition, "WHILE")
+        self.one(node.body)
 
-def _target(names: Names, target: tree.Mobile) -> None:
-    if isinstance(target, tree.ArmName):
-        help_ = f"write `READ SYSTEM ({target.key})` to read the arm"
-        text = f"READ VISIONS finds a FRAME, but `{target.text}` is an arm"
-        names.found.say("E215", text, target.span, "an arm", helps=(help_,))
-    elif isinstance(target, tree.Name) and target.key == WORLD:
-        names.found.say("E218", f"`{target.text}` cannot be given a value", target.span, "the root of all frames")
-    else:
-        names.need(target, Kind.FRAME, "E215", "READ VISIONS finds a FRAME")
+    def _repeat(self, node: tree.Repeat) -> None:
+        self.all(node.body)
+        condition(self._names, node.condition, "UNTIL")
 
+    def _for(self, node: tree.For) -> None:
+        actions.count(self._names, node)
+        self.one(node.body)
 
-def _arm(names: Names, node: tree.Mobile | None, who: str) -> None:
-    if not isinstance(node, tree.Name):
-        return
-    names.use([node.key])
-    if node.key in names.poisoned:
-        return
-    near = closest(node.text, names.arms())
-    kind = names.kinds.get(node.key)
-    is_what = f"is a {kind}" if kind else "is no arm"
-    names.found.say(
-        "E201",
-        f"{who} needs an arm, but `{node.text}` {is_what}",
-        node.span,
-        str(kind or "not an arm"),
-        secondary=names.where_declared(node.key),
-        helps=(f"did you mean `{near}`?",) if near else (f"write the name of an arm, such as `{names.arms()[0]}`",),
-    )
+    def _cobegin(self, node: tree.Cobegin) -> None:
+        for branch in node.branches:
+            if branch.priority is not None:
+                measure(self._names, branch.priority, None, "a priority has no unit")
+            self._apart(branch.body)
+
+    def _pause(self, node: tree.Pause) -> None:
+        if quantity(self._names, node.duration, "time", "PAUSE needs a time"):
+            in_range(self._names, node.duration, "a pause", zero=True)
+
+    def _lock(self, node: tree.Lock) -> None:
+        for target in node.targets:
+            need(self._names, target, Sort.FRAME, "E215", f"LOCK needs a {Kind.FRAME}")
+        self.one(node.body)
+
+    def _try(self, node: tree.Try) -> None:
+        # An error in a RECOVER part goes outward: a TRY inside of it has a RECOVER of its own.
+        outside, self._recovering = self._recovering, False
+        self.all(node.body)
+        self._recovering = True
+        self.all(node.recovery)
+        self._recovering = outside
+
+    def _retry(self, node: tree.Retry) -> None:
+        if not self._recovering:
+            self._names.found.say(
+                "E225",
+                "RETRY stands outside of RECOVER",
+                node.span,
+                "retry what?",
+                notes=("RETRY runs the TRY part again to whose RECOVER it belongs",),
+                helps=("write `TRY ... RECOVER ... RETRY END`",),
+            )
+
+    def _apart(self, statement: tree.Statement) -> None:
+        """Check what runs beside the statements around it: it cannot start their TRY again."""
+        outside, self._recovering = self._recovering, False
+        self.one(statement)
+        self._recovering = outside

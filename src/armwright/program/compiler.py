@@ -1,16 +1,23 @@
 """The whole way from a text to code, in one call."""
 
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import attrs
 
 from armwright.program import check, flow, tree
 from armwright.program.code import Code
 from armwright.program.diagnostics import Diagnostic, in_order
-from armwright.program.known import KnownCell
+from armwright.program.flow import Flow
+from armwright.program.known import Imported, KnownCell, ReadImport
+from armwright.program.names import Symbols
 from armwright.program.numbering import without_numbers
 from armwright.program.parse import parse
-from armwright.program.source import Source
+from armwright.program.source import Source, Span
 from armwright.program.tokens import Token, TokenKind, scan
 from armwright.program.translate import translate
+from armwright.program.words import Standard
 
 
 @attrs.frozen(kw_only=True)
@@ -19,43 +26,95 @@ class Compilation:
 
     Attributes:
         source: the text.
+        standard: the language it was read as.
         tokens: its words.
+        comments: where its comments stand.
         tree: what it says.
+        symbols: its names.
+        imports: what its IMPORTs brought.
+        flow: the arms of its statements; None where the syntax is wrong.
         diagnostics: what is wrong or odd, in the order of the text.
         code: what it does; None when there are errors.
     """
 
     source: Source
+    standard: Standard
     tokens: tuple[Token, ...]
+    comments: tuple[Span, ...]
     tree: tree.Program
+    symbols: Symbols
+    imports: tuple[Imported, ...]
+    flow: Flow | None
     diagnostics: tuple[Diagnostic, ...]
     code: Code | None
 
 
-def compile(source: Source, cell: KnownCell | None = None, *, strict: bool = False) -> Compilation:  # noqa: A001
+def compile(  # noqa: A001 - what a translator does
+    source: Source,
+    cell: KnownCell | None = None,
+    *,
+    strict: bool = False,
+    std: Standard = Standard.RLO_2,
+    read_import: ReadImport | None = None,
+) -> Compilation:
     """Translate a program.
 
     Args:
-        source: the text, in RLO-83.
+        source: the text.
         cell: what the program will act on; without one, some questions stay open.
         strict: whether an AFFIX that is only implied is an error.
+        std: the language: RLO-2, or RLO-83 with nothing more than the report has.
+        read_import: how to read what an IMPORT names; without it, imports stay unknown.
 
     Returns:
         Tree, diagnostics and, where there are no errors, code. A wrong program raises nothing.
     """
+    with _no_collection():
+        return _compile(source, cell, strict=strict, std=std, read_import=read_import)
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Keep the collector of rings away: a translation makes many small things and no rings, and it looks at them all.
+
+    Of a program of ten thousand lines that is half the time.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _compile(
+    source: Source, cell: KnownCell | None, *, strict: bool, std: Standard, read_import: ReadImport | None
+) -> Compilation:
     text, found = without_numbers(source)
-    tokens, odd = scan(source, text)
-    program, slips = parse(source, tokens)
-    symbols, wrong = check.check(program, cell)
-    spelling = {token.key: token.text for token in reversed(tokens) if token.kind is TokenKind.NAME}
-    found += [*odd, *slips]
+    scanned = scan(source, text, std)
+    program, slips = parse(source, scanned.tokens, std)
+    symbols, wrong, imports = check.check(program, cell, std=std, read_import=read_import)
+    spelling = {token.key: token.text for token in reversed(scanned.tokens) if token.kind is TokenKind.NAME}
+    found += [*scanned.found, *slips]
     guessed = any(one.is_syntax for one in found)
     # Where the parser had to guess, a name may seem unused, and what the statements do cannot be told.
     found += [one for one in wrong if not (guessed and one.code == "L304")]
-    code = None
+    code = course = None
     if not guessed:
-        course, odd_course = flow.check(program, symbols, spelling, cell, strict=strict)
+        course, odd_course = flow.check(program, symbols, spelling, cell, strict=strict, source=source)
         found += odd_course
         if not any(one.is_error for one in found):
             code = translate(source, program, symbols, course, spelling)
-    return Compilation(source=source, tokens=tuple(tokens), tree=program, diagnostics=in_order(found), code=code)
+    return Compilation(
+        source=source,
+        standard=std,
+        tokens=tuple(scanned.tokens),
+        comments=tuple(scanned.comments),
+        tree=program,
+        symbols=symbols,
+        imports=imports,
+        flow=course,
+        diagnostics=in_order(found),
+        code=code,
+    )

@@ -1,92 +1,28 @@
-"""Parsing what stands in front of the statements: VAR parts and BEGIN."""
+"""Parsing declarations: VAR parts, types, and what is wrong with them."""
 
-# ruff: noqa: ERA001 - each rule of the grammar stands above its function
+import math
 
 from armwright.errors import closest
 from armwright.program import beyond, tree
 from armwright.program.cursor import LostError, Tokens, shown
 from armwright.program.diagnostics import Fix
-from armwright.program.source import Span
+from armwright.program.expressions import listed, number
 from armwright.program.tokens import TokenKind
-from armwright.program.values import check_length, refuse_reserved
-from armwright.program.words import LATER_TYPES, STATEMENTS, TYPES
+from armwright.program.values import check_length
+from armwright.program.words import LATER_TYPES
 
 
-def head(tokens: Tokens) -> list[tree.Declaration]:
-    """Read everything up to and including BEGIN; at the end of the text BEGIN may be missing."""
-    found: list[tree.Declaration] = []
-    begin = tokens.find("BEGIN")
-    while True:
-        while tokens.accept(";"):
-            pass
-        token, after = tokens.now, tokens.ahead()
-        if tokens.sees("VAR"):
-            found += var_part(tokens)
-        elif beyond.starts_header(tokens):
-            beyond.header(tokens)
-        elif token.kind is TokenKind.NAME and after.key in (",", ":"):
-            gap = Span(token.start, token.start)
-            tokens.found.say(
-                "E112", "missing `VAR` before the declarations", gap, "expected `VAR` here", fixes=(Fix(gap, "VAR "),)
-            )
-            found += _declarations(tokens)
-        elif token.kind is TokenKind.NAME and after.kind is TokenKind.NAME and closest(token.text, ["VAR"]):
-            _misspelt(tokens, "VAR")
-            found += var_part(tokens)
-        elif tokens.at < begin and not tokens.sees(*STATEMENTS) and after.key != "=":
-            found.append(_nonsense(tokens))
-        else:
-            break
-    _begin(tokens)
-    return found
-
-
-def _nonsense(tokens: Tokens) -> tree.Declaration:
-    """Pass over what is neither a declaration nor BEGIN; the names in it may have been meant to be declared."""
-    start = tokens.take()
-    if not start.damaged:
-        tokens.found.say("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
-    names: list[tree.Name | None] = []
-    if start.kind is TokenKind.NAME:
-        names.append(tree.Name(start.span, start.text, start.key))
-    return _passed_over(tokens, names)
-
-
-def _passed_over(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
+def passed_over(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
     """Pass over the rest of a declaration; return what was perhaps declared, of no known type."""
     start = tokens.now
-    while not tokens.done and not tokens.sees(";", "BEGIN", "VAR", "END", *STATEMENTS):
+    stops = ("BEGIN", *tokens.words.headers, *tokens.words.statements)
+    while not tokens.done and not tokens.sees(";", "END", *stops):
         token = tokens.take()
         if token.kind is TokenKind.NAME:
             names.append(tree.Name(token.span, token.text, token.key))
     tokens.accept(";")
     span = tokens.since(start)
     return tree.Declaration(span, tuple(name for name in names if name), tree.TypeName(span, "", None))
-
-
-def _begin(tokens: Tokens) -> None:
-    if tokens.accept("BEGIN") or tokens.done:
-        return
-    if tokens.now.kind is TokenKind.NAME and tokens.ahead().key != "=" and closest(tokens.now.text, ["BEGIN"]):
-        _misspelt(tokens, "BEGIN")
-        tokens.take()
-        return
-    gap = Span(tokens.now.start, tokens.now.start)
-    if not tokens.now.damaged:
-        tokens.found.say(
-            "E115",
-            "missing `BEGIN` before the first statement",
-            gap,
-            "expected `BEGIN` here",
-            fixes=(Fix(gap, "BEGIN "),),
-        )
-
-
-def _misspelt(tokens: Tokens, near: str) -> None:
-    token = tokens.now
-    tokens.found.say(
-        "E105", f"unknown word `{token.text}`", token.span, "not a word of RLO", helps=(f"did you mean `{near}`?",)
-    )
 
 
 # var_part = "VAR" decl { decl } ;
@@ -99,7 +35,7 @@ def var_part(tokens: Tokens) -> list[tree.Declaration]:
     if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not _reserved(tokens):
         tokens.found.say("E111", "VAR declares nothing", word.span, "expected a name after VAR")
         return []
-    return _declarations(tokens)
+    return declarations(tokens)
 
 
 def _reserved(tokens: Tokens) -> bool:
@@ -109,15 +45,18 @@ def _reserved(tokens: Tokens) -> bool:
     return token.kind is TokenKind.KEYWORD and token.key not in outside and tokens.ahead().key in (",", ":")
 
 
-def _declarations(tokens: Tokens) -> list[tree.Declaration]:
+def declarations(tokens: Tokens) -> list[tree.Declaration]:
+    """Read declarations, as many as there are."""
     found = []
+    depth = tokens.depth
     while _goes_on(tokens):
         at = tokens.at
         names: list[tree.Name | None] = []
         try:
             found.append(_declaration(tokens, names))
         except LostError:
-            found.append(_passed_over(tokens, names))
+            tokens.depth = depth
+            found.append(passed_over(tokens, names))
         if tokens.at == at:
             tokens.take()
     return found
@@ -132,13 +71,29 @@ def _goes_on(tokens: Tokens) -> bool:
         return False
     if after.key in (",", ":"):
         return True
-    return not beyond.starts_header(tokens) and not closest(token.text, ["BEGIN", *STATEMENTS])
+    if tokens.later:
+        return not closest(token.text, ["BEGIN", *tokens.words.headers, *tokens.words.statements])
+    return not beyond.starts_header(tokens) and not closest(token.text, ["BEGIN", *tokens.words.statements])
 
 
 # decl = name { "," name } ":" type ";" ;
 def _declaration(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
     """Read one declaration; put its names also where they are safe if the rest makes no sense."""
     start = tokens.now
+    names_of(tokens, names)
+    kind = type_name(tokens)
+    span = tokens.since(start)
+    _close(tokens)
+    return tree.Declaration(span, tuple(name for name in names if name), kind)
+
+
+# name { "," name } ":"
+def names_of(tokens: Tokens, names: list[tree.Name | None]) -> None:
+    """Read what is declared, up to the type.
+
+    Raises:
+        LostError: there is no type.
+    """
     names.append(_declared(tokens))
     while True:
         if tokens.accept(","):
@@ -155,12 +110,8 @@ def _declaration(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declarat
     if not tokens.accept(":"):
         gap = tokens.gap()
         tokens.found.say("E112", "missing `:` before the type", gap, "expected `:` and a type here")
-        if not tokens.sees(*TYPES):
+        if not tokens.sees(*tokens.words.types, "ARRAY"):
             raise LostError
-    kind = _type(tokens)
-    span = tokens.since(start)
-    _close(tokens)
-    return tree.Declaration(span, tuple(name for name in names if name), kind)
 
 
 def _declared(tokens: Tokens) -> tree.Name | None:
@@ -170,6 +121,7 @@ def _declared(tokens: Tokens) -> tree.Name | None:
         tokens.take()
         name = tree.Name(token.span, token.text, token.key)
         check_length(tokens, name)
+        tokens.declared.add(name.key)
         return name
     if token.kind is TokenKind.ARM:
         if not token.damaged:
@@ -177,31 +129,70 @@ def _declared(tokens: Tokens) -> tree.Name | None:
         tokens.take()
         return None
     if _reserved(tokens):
-        refuse_reserved(tokens)
+        tokens.refuse_reserved()
         tokens.take()
         return None
     return tokens.lost("expected a name", f"found {shown(token)}")
 
 
-# type = "SCALAR" | "TRANS" | "FRAME" ;
-def _type(tokens: Tokens) -> tree.TypeName:
+# type = "SCALAR" | "TRANS" | "FRAME" ;                                                           (* RLO-83 *)
+# type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;   (* RLO-2 *)
+def type_name(tokens: Tokens) -> tree.TypeName:
+    """Read a type.
+
+    Raises:
+        LostError: there is none.
+    """
+    start = tokens.now
+    sizes = _sizes(tokens) if tokens.accept("ARRAY") else ()
     token = tokens.now
-    if tokens.accept(*TYPES):
-        return tree.TypeName(token.span, token.text, token.key)
+    types = tokens.words.types
+    expected = f"expected {', '.join(types[:-1])} or {types[-1]}"
+    if tokens.accept(*types):
+        span = tokens.since(start)
+        return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
     if tokens.sees_word(*LATER_TYPES):
         return beyond.type_name(tokens)
     if token.kind is not TokenKind.NAME:
-        tokens.lost("expected a type after `:`", f"expected {', '.join(TYPES[:-1])} or {TYPES[-1]}")
-    near = closest(token.text, TYPES)
+        tokens.lost("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
+    near = closest(token.text, types)
     tokens.found.say(
         "E205",
         f"unknown type `{token.text}`",
         token.span,
-        f"expected {', '.join(TYPES[:-1])} or {TYPES[-1]}",
+        expected,
         helps=(f"did you mean `{near}`?",) if near else (),
     )
     tokens.take()
-    return tree.TypeName(token.span, token.text, near)
+    return tree.TypeName(tokens.since(start), token.text, near, sizes)
+
+
+def _sizes(tokens: Tokens) -> tuple[tree.Number, ...]:
+    """Read what stands between ARRAY and the type of its elements."""
+    if tokens.sees("OF"):
+        gap = tokens.gap()
+        tokens.say_once("E111", "an array needs its sizes", gap, "expected `[` and a number here")
+        sizes: tuple[tree.Number, ...] = (tree.Number(gap, "", math.nan),)
+    else:
+        sizes = listed(tokens, _size, "a number", "after ARRAY", "[")
+        if tokens.ahead(-2).key == ",":
+            sizes = (*sizes, tree.Number(tokens.gap(), "", math.nan))
+    tokens.expect("OF", "before the type of the elements", statement=True)
+    return sizes or (tree.Number(tokens.gap(), "", math.nan),)
+
+
+def _size(tokens: Tokens, wants: str, where: str) -> tree.Number:
+    if tokens.now.kind is TokenKind.NUMBER:
+        return number(tokens)
+    start = tokens.now
+    if start.kind is not TokenKind.NAME and start.key != "-":
+        tokens.lost(f"expected {wants} {where or f'after `{tokens.before.text}`'}", f"found {shown(start)}")
+    tokens.say_once("E111", "the size of an array is a plain number", start.span, "such as `6`")
+    tokens.take()
+    if start.key == "-":
+        tokens.take()
+    span = tokens.since(start)
+    return tree.Number(span, tokens.source.slice(span), math.nan)
 
 
 def _close(tokens: Tokens) -> None:
@@ -216,5 +207,6 @@ def _close(tokens: Tokens) -> None:
         helps=(f"insert `;` after `{tokens.before.text}`",),
         fixes=(Fix(gap, ";"),),
     )
-    if not tokens.sees("BEGIN", "VAR", *STATEMENTS) and tokens.ahead().key not in (",", ":", "="):
+    words = tokens.words
+    if not tokens.sees("BEGIN", *words.headers, *words.statements) and tokens.ahead().key not in (",", ":", "="):
         raise LostError

@@ -2,41 +2,55 @@
 
 from armwright.errors import closest
 from armwright.program import tree
-from armwright.program.code import HIGHEST_SPEED, LOWEST_SPEED, Kind
-from armwright.program.course import Course
+from armwright.program.code import HIGHEST_SPEED, LOWEST_SPEED
+from armwright.program.course import LAST, Course
 from armwright.program.diagnostics import Label, Severity
-from armwright.program.hanging import is_arm
+from armwright.program.hanging import UNKNOWN, is_any, is_arm
 from armwright.program.known import WORLD
+from armwright.program.linking import leaves, place
 from armwright.program.moves import SPEED_NOTE
-from armwright.program.source import Span
+from armwright.program.sorts import written
+
+# ---- the hand ------------------------------------------------------------------------------------------------------
 
 
-def grasp(course: Course, grasp: tree.Grasp) -> None:
+def open_hand(course: Course, node: tree.Open) -> None:
+    """Open the fingers of an arm."""
+    course.need(node.width)
+    if isinstance(node.arm, tree.ArmName):
+        course.mention(node.arm)
+        course.use(node.arm.key, node.span.to(node.arm.span))
+        course.table.open(node.arm.key, node.span)
+
+
+def grasp(course: Course, node: tree.Grasp) -> None:
     """Close the fingers of an arm; say which when no arm is named."""
-    course.mention(grasp.arm)
-    arm = grasp.arm.key if isinstance(grasp.arm, tree.ArmName) else course.last_arm
-    if grasp.arm is not None and not isinstance(grasp.arm, tree.ArmName):
+    course.mention(node.arm)
+    arm = node.arm.key if isinstance(node.arm, tree.ArmName) else course.last[LAST]
+    if node.arm is not None and not isinstance(node.arm, tree.ArmName):
         return
-    if arm is None or course.arm_unknown:
-        if not course.arm_unknown:
-            help_ = f"write `GRASP {course.some_arm()}`"
-            text = "GRASP does not say which arm, and none has been used yet"
-            course.found.say("E307", text, grasp.span, "which arm?", helps=(help_,))
+    if arm is None:
+        help_ = f"write `GRASP {course.some_arm()}`"
+        text = "GRASP does not say which arm, and none has been used yet"
+        course.say("E307", text, node.span, "which arm?", helps=(help_,))
         return
-    course.arms[course.index] = arm
-    hand = course.table.hand(arm)
+    course.record(node, None if arm == UNKNOWN else arm)
+    if arm == UNKNOWN:
+        course.lose_arms(grasps=True)
+        return
+    course.use(arm, node.span)
     _closed_on_arrival(course, arm)
-    hand.open, hand.holds, hand.grasp = False, hand.at, grasp.span
+    course.table.close(arm, node.span)
 
 
 def _closed_on_arrival(course: Course, arm: str) -> None:
     """Point at a hand that came to its object without room for it between the fingers."""
-    hand = course.table.hand(arm)
+    hand = course.table.hands[arm]
     opened_late = hand.arrived_open is None and hand.opened is not None
     never_opened = hand.arrived_open is False and hand.opened is None
     if hand.arrival is None or hand.at is None or not (opened_late or never_opened):
         return
-    course.found.say(
+    course.say(
         "L301",
         f"{arm} {'may come' if opened_late else 'comes'} to `{course.name(hand.at)}` with closed fingers",
         hand.arrival,
@@ -47,33 +61,56 @@ def _closed_on_arrival(course: Course, arm: str) -> None:
     )
 
 
-def read(course: Course, target: tree.Name, span: Span) -> None:
-    """Ask the camera for a frame."""
-    if course.symbols.frame(target) is None or target.key == WORLD:
+# ---- tools and sensors ---------------------------------------------------------------------------------------------
+
+
+def read_arm(course: Course, node: tree.ReadSystem) -> None:
+    """Ask the sensors of an arm where it is."""
+    if isinstance(node.arm, tree.ArmName):
+        course.mention(node.arm)
+        course.use(node.arm.key, node.span.to(node.arm.span))
+        # They may find the arm elsewhere, and with it what hangs on it.
+        course.table.displace(node.arm.key, by=node.arm.key)
+
+
+def read(course: Course, node: tree.ReadVisions) -> None:
+    """Ask the camera for frames."""
+    for target in node.targets:
+        if isinstance(target, tree.Poison):
+            for name in sorted(target.names):
+                if not is_arm(name):
+                    course.table.forget(name)
+            continue
+        course.need_indices(target)
+        frame = course.frame(target)
+        if frame is None or frame == WORLD:
+            continue
+        visions = course.cell.visions if course.cell else None
+        own = "'" in frame or "[" in frame
+        if visions is not None and not own and frame not in visions and course.settle(frame):
+            near = closest(written(target), visions)
+            course.say(
+                "W601",
+                f"the camera of the cell has no answer for `{written(target)}`",
+                target.span,
+                "will not be found",
+                helps=(f"did you mean `{near}`?",) if near else (),
+                severity=Severity.WARNING,
+            )
+        place(course, frame, target, node.span)
+
+
+def operate(course: Course, node: tree.Operate) -> None:
+    """Switch a device on or off."""
+    device, devices = node.device, course.cell.devices if course.cell else None
+    if not isinstance(device, tree.Name) or devices is None:
         return
-    visions = course.cell.visions if course.cell else None
-    if visions is not None and target.key not in visions and target.key not in course.settled:
-        course.settled.add(target.key)
-        near = closest(target.text, visions)
-        course.found.say(
-            "W601",
-            f"the camera of the cell has no answer for `{target.text}`",
-            target.span,
-            "will not be found",
-            helps=(f"did you mean `{near}`?",) if near else (),
-            severity=Severity.WARNING,
-        )
-    course.table.assign(target.key, course.index, span)
-
-
-def operate(course: Course, device: tree.Name) -> None:
-    """Switch a device on."""
-    devices = course.cell.devices if course.cell else None
-    if devices is None or device.key in (known := {name.upper() for name in devices}):
+    known = {name.upper() for name in devices}
+    if device.key in known:
         return
     near = closest(device.text, known)
     listed = ", ".join(sorted(known)) or "none"
-    course.found.say(
+    course.say(
         "R602",
         f"the cell has no device `{device.text}`",
         device.span,
@@ -83,110 +120,133 @@ def operate(course: Course, device: tree.Name) -> None:
     )
 
 
-def move(course: Course, move: tree.Move) -> None:
-    """Move an arm and what hangs on it."""
-    course.mention(move.moved)
-    moved, goal = course.symbols.frame(move.moved), course.symbols.frame(move.goal)
-    arm = moved if moved and is_arm(moved) else _carrier(course, move, moved)
-    for node in _places(move):
-        course.need_value(node)
-    for clause in move.clauses:
+# ---- MOVE ----------------------------------------------------------------------------------------------------------
+
+
+def begin(course: Course, node: tree.Move) -> str | None:
+    """Look at what a MOVE needs to begin; return the arm, None where it is unknown."""
+    course.mention(node.moved)
+    course.need_indices(node.moved)
+    moved = course.frame(node.moved)
+    implied = False
+    if moved is not None and is_arm(moved):
+        arm: str | None = moved
+    else:
+        arm, implied = _carrier(course, node, moved)
+    course.record(node, arm, implied=implied)
+    course.need(*_places(node))
+    for clause in node.clauses:
         if isinstance(clause, tree.Speed):
             _speed(course, clause.value)
-    if arm is None or moved is None:
-        # An arm has moved, but nobody knows which: that is no reason to say that none has been used.
-        lost = moved is None or course.table.unknown(moved)
-        course.arm_unknown = course.arm_unknown or (lost and course.last_arm is None)
-        return
-    course.arms[course.index] = arm
-    course.last_arm, course.arm_unknown = arm, False
-    if goal and course.table.carrier(goal) == arm and not course.table.unknown(goal):
-        _relative(course, move, goal, arm)
-    course.table.arrive(arm, goal if moved == arm else moved, move.span if moved == arm else None)
-
-
-def _carrier(course: Course, move: tree.Move, moved: str | None) -> str | None:
-    """Return the arm that carries what is moved; hang it on the arm that has grasped it, if nothing else does."""
-    if moved is None or course.table.unknown(moved):
+        elif isinstance(clause, tree.Blend | tree.Duration):
+            course.need(clause.value)
+    if arm is None:
         return None
+    course.use(arm, node.span.to(node.moved.span), moves=True)
+    goal = course.frame(node.goal)
+    if goal is not None and not course.table.unknown(goal) and course.table.carrier(goal) == arm:
+        _relative(course, node, arm)
+    return arm
+
+
+def end(course: Course, node: tree.Move, arm: str | None, *, halted: bool) -> None:
+    """Take note of where a MOVE has brought what.
+
+    Args:
+        course: the state.
+        node: the MOVE.
+        arm: as ``begin`` gave it.
+        halted: whether an action may have ended the motion on the way.
+    """
+    moved = course.frame(node.moved)
+    if arm is None or moved is None:
+        if moved is None or course.table.unknown(moved) or course.table.holder(moved) == UNKNOWN:
+            # An arm has moved, but nobody knows which: that is no reason to say that none has been used.
+            course.lose_arms(grasps=False)
+            if moved is not None:
+                course.table.forget(moved)
+        return
+    at: str | None = moved
+    if moved == arm:
+        goal = course.frame(node.goal)
+        at = UNKNOWN if halted or (goal is not None and is_any(goal)) else goal
+        if goal is None and not isinstance(node.goal, tree.Binary | tree.Matrix | tree.Function):
+            # Something was reported of the goal, or it is given to a procedure in a way that is not followed.
+            at = UNKNOWN
+    course.table.arrive(arm, at, node.span if moved == arm else None)
+
+
+def _carrier(course: Course, node: tree.Move, moved: str | None) -> tuple[str | None, bool]:
+    """Return the arm that carries what is moved; hang it on the arm that has grasped it, if nothing else does.
+
+    Returns:
+        The arm, None where it is unknown, and whether the frame hangs there only from now on.
+    """
+    if moved is None or course.table.unknown(moved):
+        return None, False
     if (arm := course.table.carrier(moved)) is not None:
-        return arm
-    for arm, hand in course.table.hands.items():
-        if hand.holds == moved:
-            _imply(course, move, moved, arm)
-            return arm
-    _not_carried(course, move, moved)
-    return None
+        return arm, False
+    holder = course.table.holder(moved)
+    if holder == UNKNOWN:
+        return None, False
+    if holder is None:
+        _not_carried(course, node, moved)
+    else:
+        _imply(course, node, moved, holder)
+    return holder, holder is not None
 
 
-def _imply(course: Course, move: tree.Move, moved: str, arm: str) -> None:
-    name, grasp = course.name(moved), course.table.hand(arm).grasp
-    course.found.say(
+def _imply(course: Course, node: tree.Move, moved: str, arm: str) -> None:
+    name, grip = course.name(moved), course.table.grips[arm]
+    course.say(
         "W201",
         f"`{name}` is moved, but no AFFIX hangs it on {arm}",
-        move.span,
+        node.span,
         f"`AFFIX {name} TO {arm}` is implied",
-        secondary=(Label(grasp, f"{arm} grasped it here"),) if grasp else (),
+        secondary=(Label(grip.span, f"{arm} grasped it here"),) if grip and grip.span else (),
         helps=(f"write `AFFIX {name} TO {arm}` after GRASP",),
         severity=Severity.ERROR if course.strict else Severity.WARNING,
     )
-    leaves(course, moved, arm, move.span)
-    course.table.hang(moved, arm, move.span)
-    course.implied.add(course.index)
+    leaves(course, moved, arm, node.span)
+    course.table.hang(moved, arm, node.span)
 
 
-def leaves(course: Course, child: str, parent: str, span: Span) -> None:
-    """Warn when a frame leaves the one it hangs on without UNFIX."""
-    link = course.table.links.get(child)
-    if link is None or link.parent == parent:
-        return
-    name = course.name
-    course.found.say(
-        "W203",
-        f"`{name(child)}` still hangs on `{name(link.parent)}`",
-        span,
-        f"from here on it hangs on {name(parent)}",
-        secondary=(Label(link.span, f"affixed to {name(link.parent)} here"),) if link.span else (),
-        notes=() if link.span else (f"in the cell it hangs on {name(link.parent)}",),
-        helps=(f"write `UNFIX {name(child)} FROM {name(link.parent)}` first to say so",),
-        severity=Severity.WARNING,
-    )
-
-
-def _not_carried(course: Course, move: tree.Move, moved: str) -> None:
-    assert isinstance(move.moved, tree.Name)  # noqa: S101 - an arm carries itself
-    link, name = course.table.links.get(moved), course.name(moved)
-    course.found.say(
+def _not_carried(course: Course, node: tree.Move, moved: str) -> None:
+    link, name = course.table.links[moved], course.name(moved)
+    course.say(
         "E301",
         f"`{name}` cannot be moved: it is not affixed to an arm",
-        move.moved.span,
-        f"hangs on {course.name(link.parent) if link else WORLD}, not on an arm",
+        node.moved.span,
+        f"hangs on {course.name(link.parent) if link and link.parent else WORLD}, not on an arm",
         secondary=(Label(link.span, "affixed here"),) if link and link.span else (),
-        helps=(f"grasp it and write `AFFIX {name} TO {course.last_arm or course.some_arm()}` first",)
+        helps=(f"grasp it and write `AFFIX {name} TO {course.last_arm() or course.some_arm()}` first",)
         if moved != WORLD
         else (),
     )
 
 
-def _relative(course: Course, move: tree.Move, goal: str, arm: str) -> None:
-    course.found.say(
+def _relative(course: Course, node: tree.Move, arm: str) -> None:
+    course.say(
         "L302",
-        f"`{course.name(goal)}` moves together with {arm}, which is to come to it",
-        move.goal.span,
+        f"`{written(node.goal)}` moves together with {arm}, which is to come to it",
+        node.goal.span,
         f"hangs on {arm}",
         notes=("the goal is taken where it is when the motion starts, so this is a relative motion",),
         severity=Severity.WARNING,
     )
 
 
-def _speed(course: Course, node: tree.Number | tree.Mobile) -> None:
-    if isinstance(node, tree.Number) or not course.need_number(node, Kind.SCALAR):
+def _speed(course: Course, node: tree.Expression) -> None:
+    course.need(node)
+    known = course.number(node)
+    if isinstance(node, tree.Number) or known is None or not isinstance(node, tree.Name):
         return
-    assert isinstance(node, tree.Name)  # noqa: S101 - nothing else is a scalar
-    value, span = course.scalars.get(node.key, (None, node.span))
-    if value is not None and not LOWEST_SPEED <= value <= HIGHEST_SPEED and node.key not in course.settled:
-        course.settled.add(node.key)
-        course.found.say(
+    value, span = known
+    kept = course.bound(node.key)
+    if LOWEST_SPEED <= value <= HIGHEST_SPEED or kept is None or course.now.scope.is_poisoned(node.key):
+        return
+    if course.settle(kept):
+        course.say(
             "E207",
             f"speed `{node.text}` = {value:.12g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
             node.span,
@@ -196,10 +256,10 @@ def _speed(course: Course, node: tree.Number | tree.Mobile) -> None:
         )
 
 
-def _places(move: tree.Move) -> list[tree.Mobile]:
+def _places(node: tree.Move) -> list[tree.Expression]:
     """Return every frame that a MOVE comes to."""
-    places = [move.goal]
-    for clause in move.clauses:
+    places = [node.goal]
+    for clause in node.clauses:
         if isinstance(clause, tree.Via):
             places += clause.points
         elif isinstance(clause, tree.Approach | tree.Departure):

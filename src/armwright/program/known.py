@@ -1,6 +1,7 @@
 """What is known of the cell while a program is checked: names, and what hangs on what; no numbers."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
 import attrs
 
@@ -27,6 +28,23 @@ class KnownCell:
     visions: frozenset[str] | None = None
 
 
+@attrs.frozen(kw_only=True)
+class Imported:
+    """What an IMPORT brings.
+
+    Attributes:
+        frames: each with the frame it hangs on, in upper case, like those of a cell.
+        cell: the cell that the file describes; None for a file of frames alone.
+    """
+
+    frames: Mapping[str, str] = attrs.field(factory=dict)
+    cell: Cell | None = None
+
+
+# How a checker gets at the file of an IMPORT; it raises an ArmwrightError when the file cannot be read.
+ReadImport: TypeAlias = Callable[[str], Imported]
+
+
 def known_cell(cell: Cell) -> KnownCell:
     """Return what the checker has to know of a cell."""
     return KnownCell(
@@ -37,4 +55,4 @@ def known_cell(cell: Cell) -> KnownCell:
     )
 
 
-__all__ = ["STATION", "WORLD", "KnownCell", "known_cell"]
+__all__ = ["STATION", "WORLD", "Imported", "KnownCell", "ReadImport", "known_cell"]

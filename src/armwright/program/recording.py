@@ -1,5 +1,6 @@
 """What a run leaves: every effect with its place in the program, every stage, every servo tick of every arm."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
@@ -17,8 +18,29 @@ from armwright.program.source import Span
 
 # Rows that are computed and written together.
 _ROWS_AT_ONCE = 16384
+# A time this part of a period behind a tick is on it.
+_ON_A_TICK = 1e-6
 
-EffectKind: TypeAlias = Literal["PLACE", "AFFIX", "UNFIX", "OPEN", "GRASP", "OPERATE", "READ", "MOVE", "END"]
+EffectKind: TypeAlias = Literal[
+    "PLACE",
+    "AFFIX",
+    "UNFIX",
+    "OPEN",
+    "GRASP",
+    "OPERATE",
+    "READ",
+    "MOVE",
+    "STOP",
+    "SIGNAL",
+    "WAIT",
+    "PAUSE",
+    "LOCK",
+    "PRINT",
+    "ERROR",
+    "END",
+]
+# Not of the trace: assignments, locks and the end of the text.
+_SILENT = ("PLACE", "LOCK", "END")
 
 
 @attrs.frozen(kw_only=True)
@@ -56,6 +78,7 @@ class RunStage:
         speed: that was asked for, 100 being normal.
         stage: its motion.
         peak_effort: (n,) largest efforts on its servo ticks [N m] or [N].
+        duration: how long it ran [s]; less than its motion takes where it was stopped.
     """
 
     t0: float
@@ -65,11 +88,27 @@ class RunStage:
     speed: float
     stage: Stage
     peak_effort: Array
+    duration: float
 
     @property
     def t1(self) -> float:
         """When it ended [s]."""
-        return self.t0 + self.stage.trajectory.duration
+        return self.t0 + self.duration
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Run:
+    """What one arm did for a while: a trajectory, as far as it came.
+
+    Attributes:
+        t0: when it began [s].
+        trajectory: from then on.
+        duration: how long the arm followed it [s]; then it rested.
+    """
+
+    t0: float
+    trajectory: Trajectory
+    duration: float
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -122,19 +161,17 @@ class Recording:
 
     def trace(self) -> list[str]:
         """Return the lines of the trace."""
-        return [effect.text for effect in self.effects if effect.kind not in ("PLACE", "END")]
+        return [effect.text for effect in self.effects if effect.kind not in _SILENT]
 
 
-def stream(
-    name: str, arm: Arm, start: Array, runs: Sequence[tuple[float, Trajectory]], *, duration: float, period: float
-) -> Stream:
+def stream(name: str, arm: Arm, start: Array, runs: Sequence[Run], *, duration: float, period: float) -> Stream:
     """Sample what an arm does at every servo tick.
 
     Args:
         name: of the arm in the cell.
         arm: its model.
         start: (n,) posture at the start.
-        runs: when each trajectory began [s], and the trajectory, in order; the arm rests between.
+        runs: in order; the arm rests between.
         duration: of the whole run [s].
         period: of the servo [s].
     """
@@ -142,12 +179,13 @@ def stream(
     q = np.empty((ticks, arm.n))
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
     first, posture = 0, start
-    for t0, trajectory in runs:
-        begin, end = round(t0 / period), round((t0 + trajectory.duration) / period)
+    for run in runs:
+        # A run that was stopped by an obstacle ends between two ticks.
+        begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _ON_A_TICK)
         q[first:begin] = posture
         local = np.arange(end - begin) * period
-        q[begin:end], qd[begin:end], qdd[begin:end] = (trajectory(local, order) for order in range(3))
-        first, posture = end, trajectory(trajectory.duration)
+        q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))
+        first, posture = end, run.trajectory(run.duration)
     q[first:] = posture
     t: Array = np.arange(ticks, dtype=np.float64) * period
     tau = np.empty((ticks, arm.n))

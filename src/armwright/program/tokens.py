@@ -3,14 +3,14 @@
 import enum
 import math
 import re
-from collections.abc import Iterator
 
 import attrs
 
 from armwright.cell.names import arm_name
 from armwright.program.diagnostics import Diagnostic, Fix
 from armwright.program.source import Source, Span
-from armwright.program.words import RESERVED
+from armwright.program.units import UNITS
+from armwright.program.words import VOCABULARIES, Standard
 
 
 class TokenKind(enum.Enum):
@@ -25,7 +25,8 @@ class TokenKind(enum.Enum):
     END = "end of text"
 
 
-@attrs.frozen
+# Not frozen, though nothing changes one: a program has a hundred thousand of them, and freezing trebles their price.
+@attrs.define
 class Token:
     """One token.
 
@@ -51,26 +52,52 @@ class Token:
         return Span(self.start, self.end)
 
 
-UNITS = ("MM", "CM", "M", "IN", "DEG", "RAD", "S", "MS", "N")
+@attrs.frozen(kw_only=True)
+class Scanned:
+    """What became of the characters of a text.
 
-_TOKEN = re.compile(
-    r"""
-      (?P<blank>   [ \t\r\n\f\v]+ )
-    | (?P<comment> \{ [^}]* \} | //[^\r\n]* )
-    | (?P<open>    \{ | \(\* | /\* )
-    | (?P<arm>     ARM [-_] [0-9]+ (?![\w]) )
-    | (?P<noarm>   ARM (?: [ \t]* [-_] [ \t]* | [ \t]+ ) [0-9]+ (?![\w]) | ARM (?![\w]) )
-    | (?P<word>    [^\W\d_] \w* )
-    | (?P<number>  [0-9]+ (?:\.[0-9]+)? (?:E[+-]?[0-9]+)? (?![\w.]) )
-    | (?P<odd>     \.?[0-9] (?: [\w.] | (?<=E)[+-](?=[0-9]) )* )
-    | (?P<string>  " [^"\r\n]* "? )
-    | (?P<symbol>  := | <= | >= | <> | [;,()=:.\[\]+*/<>-] )
-    | (?P<stray>   . )
-    """,
-    re.VERBOSE | re.IGNORECASE | re.DOTALL,
-)
-_PLAIN = {"symbol": TokenKind.SYMBOL, "string": TokenKind.STRING}
-_WITH_UNIT = re.compile(rf"([0-9]+(?:\.[0-9]+)?(?:E[+-]?[0-9]+)?)({'|'.join(UNITS)})", re.IGNORECASE)
+    Attributes:
+        tokens: in order, the last being the end of the text; whatever can be guessed is a token all the same.
+        comments: where each stands, from its first mark to its last.
+        found: what is wrong.
+    """
+
+    tokens: tuple[Token, ...]
+    comments: tuple[Span, ...]
+    found: tuple[Diagnostic, ...]
+
+
+_BLANKS = " \t\r\n\f\v"
+_DIGITS = r"[0-9]+ (?:\.[0-9]+)? (?:[Ee][+-]?[0-9]+)?"
+_UNIT = "(?:" + "|".join("".join(f"[{letter}{letter.lower()}]" for letter in unit) for unit in UNITS) + ")"
+_NUMBERS = {Standard.RLO_83: _DIGITS, Standard.RLO_2: f"{_DIGITS} {_UNIT}?"}
+# In RLO-2 what other languages write for = <> AND OR is read whole, so that it can be called by its name.
+_FOREIGN_SIGNS = {Standard.RLO_83: "", Standard.RLO_2: r"| == | != | && | \|\| | =< | =>"}
+_PATTERNS = {
+    standard: re.compile(
+        rf"""
+        [{_BLANKS}]*+ (?:
+          ( [^\W\d_] \w* )                                                          # a word
+        | ( := | <= | >= | <> {_FOREIGN_SIGNS[standard]} | [;,)=:\[\]+*<>-] | \.(?![0-9]) | \((?!\*) | /(?![/*]) )
+        | ( {_NUMBERS[standard]} (?![\w.]) )
+        | ( \{{ [^}}]*+ \}} | //[^\r\n]* )                                          # a comment
+        | ( " [^"\r\n]* "? )
+        | ( \.?[0-9] (?: [\w.] | (?<=[Ee])[+-](?=[0-9]) )* )                        # like a number
+        | ( \{{ | \(\* | /\* )                                                      # a comment that is none
+        | ( . )
+        )
+        """,
+        re.VERBOSE | re.DOTALL,
+    )
+    for standard in Standard
+}
+_WORD, _SYMBOL, _NUMBER, _COMMENT, _STRING, _ODD_NUMBER, _OPEN, _STRAY = range(1, 9)
+
+_ARM = re.compile(r"ARM[-_]([0-9]+)(?!\w)", re.IGNORECASE)
+_NO_ARM = re.compile(r"ARM(?:[ \t]*[-_][ \t]*|[ \t]+)[0-9]+(?!\w)|ARM(?!\w)", re.IGNORECASE)
+_WITH_UNIT = re.compile(rf"({_DIGITS}){_UNIT}", re.VERBOSE)
+# Where a text that is not closed may have been meant to end.
+_AFTER_TEXT = re.compile(r"[ \t]*\)?[ \t]*;?[ \t]*\Z")
 
 # Characters of other keyboards that stand for one of the language; each takes one place, like the one it stands for.
 LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94)} | {
@@ -88,75 +115,104 @@ LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94)} | {
     for other in others
 }
 _HINTS = {
-    "'": "RLO has no quotation marks",
     "!": "a comment is written { ... } or // ...",
     "#": "a comment is written { ... } or // ...",
     "}": "no comment is open here",
-    "\u201c": "RLO has no quotation marks",
-    "\u201d": "RLO has no quotation marks",
 }
+_QUOTES = {Standard.RLO_83: "RLO has no quotation marks", Standard.RLO_2: 'a text stands between two `"`'}
 
 
-def scan(source: Source, text: str) -> tuple[list[Token], list[Diagnostic]]:
-    """Cut a text into tokens, the last being the end of the text.
+def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> Scanned:
+    """Cut a text into tokens.
 
     Args:
         source: the program as written.
         text: the same, as long, with line numbers blanked out.
-
-    Returns:
-        The tokens and what is wrong with them; whatever can be guessed is a token all the same.
+        standard: which words are reserved, and whether there are texts and units.
     """
-    return _Scanner(source, text).run()
+    return _Scanner(source, text, standard).run()
 
 
 class _Scanner:
     """One pass over a text."""
 
-    def __init__(self, source: Source, text: str) -> None:
+    def __init__(self, source: Source, text: str, standard: Standard) -> None:
         self._written = source.text
         self._text = text if text.isascii() else text.translate(LOOK_ALIKES)
         # A look-alike inside a comment is nobody's business, so they are looked for token by token.
         self._foreign = not text.isascii()
+        self._standard = standard
+        self._reserved = VOCABULARIES[standard].reserved
         self._unclosed = False
+        # Most words of a program stand there more than once: what they are is found out the first time.
+        self._known: dict[str, tuple[TokenKind, str]] = {}
+        self._tokens: list[Token] = []
+        self._comments: list[Span] = []
         self._found: list[Diagnostic] = []
         self._strays: dict[str, list[Span]] = {}
         self._refused: set[str] = set()
 
-    def run(self) -> tuple[list[Token], list[Diagnostic]]:
-        tokens = list(self._tokens())
+    def run(self) -> Scanned:
+        # Blanks at the end would be tried in vain from each of them.
+        position, limit = 0, len(self._text.rstrip(_BLANKS))
+        while position < limit:
+            position = self._stretch(position, limit)
         end = len(self._text)
-        tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
-        self._found += [_stray(character, spans) for character, spans in self._strays.items()]
-        return tokens, self._found
+        self._tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
+        self._found += [_stray(character, spans, self._standard) for character, spans in self._strays.items()]
+        return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), found=tuple(self._found))
 
-    def _tokens(self) -> Iterator[Token]:
-        position, text = 0, self._text
-        makers = {
-            "word": self._word,
-            "odd": self._odd_number,
-            "noarm": self._no_arm,
-            "arm": _arm,
-            "number": self._number,
-        }
-        while match := _TOKEN.match(text, position):
-            what, word, start = match.lastgroup or "", match[0], position
-            position = match.end()
-            if self._foreign and what != "comment":
-                self._look_alikes(start, position)
-            if what in _PLAIN:
-                yield Token(_PLAIN[what], word, word, start, position)
-            elif what in makers:
-                yield makers[what](word, start, position)
-            elif what == "open":
-                position = self._comment(word, start)
-            elif what == "stray":
-                self._strays.setdefault(self._written[start], []).append(Span(start, position))
+    def _stretch(self, position: int, limit: int) -> int:
+        """Read tokens one behind the other; return where the text goes on behind one that needs a closer look."""
+        known, add, foreign = self._known, self._tokens.append, self._foreign
+        for match in _PATTERNS[self._standard].finditer(self._text, position, limit):
+            what = match.lastindex or _STRAY
+            word = match[what]
+            start, end = match.span(what)
+            if foreign:
+                # Of a comment only the blanks in front, of a text only its marks.
+                inside = what == _COMMENT or (what == _STRING and self._standard is Standard.RLO_2)
+                self._look_alikes(match.start(), start + (what == _STRING) if inside else end)
+            if (plain := known.get(word)) is not None:
+                add(Token(plain[0], word, plain[1], start, end))
+                continue
+            behind = self._closer_look(what, word, start, end)
+            if behind != end:
+                return behind
+        return limit
+
+    def _closer_look(self, what: int, word: str, start: int, end: int) -> int:
+        """Make a token of a word seen for the first time; return where the text goes on."""
+        if what == _COMMENT:
+            self._comments.append(Span(start, end))
+            return end
+        if what == _OPEN:
+            return self._comment(word, start)
+        if what == _STRAY:
+            self._strays.setdefault(self._written[start], []).append(Span(start, end))
+            return end
+        if what == _STRING:
+            token = self._string(start, end)
+        elif what == _WORD:
+            token = self._word(word, start, end)
+        elif what == _SYMBOL:
+            token = Token(TokenKind.SYMBOL, word, word, start, end)
+        else:
+            token = self._number(word, start, end, odd=what == _ODD_NUMBER)
+        self._tokens.append(token)
+        if not token.damaged and token.text == word and what != _STRING:
+            self._known[word] = token.kind, token.key
+        return token.end
 
     def _word(self, word: str, start: int, end: int) -> Token:
         key = word.upper()
+        if key.startswith("ARM"):
+            if match := _ARM.match(self._text, start):
+                return Token(TokenKind.ARM, match[0], arm_name(match[1]), start, match.end())
+            if match := _NO_ARM.match(self._text, start):
+                return self._no_arm(match[0], start, match.end())
         if word.isascii():
-            return Token(TokenKind.KEYWORD if key in RESERVED else TokenKind.NAME, word, key, start, end)
+            return Token(TokenKind.KEYWORD if key in self._reserved else TokenKind.NAME, word, key, start, end)
         if key not in self._refused:
             self._refused.add(key)
             odd = next(character for character in word if not character.isascii())
@@ -168,15 +224,12 @@ class _Scanner:
             )
         return Token(TokenKind.NAME, word, key, start, end, damaged=True)
 
-    def _number(self, word: str, start: int, end: int) -> Token:
-        if not math.isfinite(float(word)):
-            return self._odd_number(word, start, end)
-        return Token(TokenKind.NUMBER, word, word, start, end)
-
-    def _odd_number(self, word: str, start: int, end: int) -> Token:
-        if match := _WITH_UNIT.fullmatch(word):
-            return Token(TokenKind.NUMBER, word, match[1], start, end)
-        why = "too large" if _is_number(word) else "not a number"
+    def _number(self, word: str, start: int, end: int, *, odd: bool) -> Token:
+        match = _WITH_UNIT.fullmatch(word)
+        digits = match[1] if match else word
+        if (match or not odd) and math.isfinite(float(digits)):
+            return Token(TokenKind.NUMBER, word, digits, start, end)
+        why = "too large" if _is_number(digits) else "not a number"
         helps: tuple[str, ...] = ()
         fixes: tuple[Fix, ...] = ()
         if _is_number(word) and "." in (word[0], word[-1]):
@@ -188,6 +241,17 @@ class _Scanner:
             )
         self._say("E113", f"`{word}` is not a number of RLO", Span(start, end), why, helps=helps, fixes=fixes)
         return Token(TokenKind.NUMBER, word, "0", start, end, damaged=True)
+
+    def _string(self, start: int, end: int) -> Token:
+        written = self._written[start:end]
+        if self._standard is Standard.RLO_83:
+            return Token(TokenKind.STRING, self._text[start:end], self._text[start:end], start, end)
+        if len(written) > 1 and self._text[end - 1] == '"':
+            return Token(TokenKind.STRING, written, written, start, end)
+        match = _AFTER_TEXT.search(self._text, start + 1, end)
+        end = match.start() if match else end
+        self._say("E120", "this text is not closed", Span(start, end), "opened here", helps=('close it with `"`',))
+        return Token(TokenKind.STRING, f'{self._written[start:end]}"', '"', start, end, damaged=True)
 
     def _no_arm(self, word: str, start: int, end: int) -> Token:
         digits = word[3:].strip(" \t-_")
@@ -213,6 +277,7 @@ class _Scanner:
         inside = self._text[start + 2 : end]
         fixes = () if "}" in inside else (Fix(here, "{"), Fix(Span(end, end + 2), "}"))
         self._say("E101", f"`{opening}` does not open a comment in RLO", here, "write `{ ... }`", fixes=fixes)
+        self._comments.append(Span(start, end + 2))
         return end + 2
 
     def _look_alikes(self, start: int, end: int) -> None:
@@ -236,10 +301,6 @@ class _Scanner:
         self._found.append(Diagnostic(code=code, message=message, span=span, label=label, helps=helps, fixes=fixes))
 
 
-def _arm(word: str, start: int, end: int) -> Token:
-    return Token(TokenKind.ARM, word, arm_name(word[len("ARM_") :]), start, end)
-
-
 def _is_number(word: str) -> bool:
     try:
         float(word)
@@ -248,17 +309,18 @@ def _is_number(word: str) -> bool:
     return "_" not in word
 
 
-def _stray(character: str, spans: list[Span]) -> Diagnostic:
+def _stray(character: str, spans: list[Span], standard: Standard) -> Diagnostic:
     """Say once what a character is that does not belong to the language."""
     meant = LOOK_ALIKES.get(ord(character))
     shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
     more = f"it stands in {len(spans)} places" if len(spans) > 1 else ""
     name = "a blank" if meant == " " else f"`{meant}`"
+    hint = _QUOTES[standard] if character in "'\u201c\u201d" else _HINTS.get(character, "has no meaning here")
     return Diagnostic(
         code="E101",
         message=f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs"),
         span=spans[0],
-        label=f"looks like {name}" if meant else _HINTS.get(character, "has no meaning here"),
+        label=f"looks like {name}" if meant else hint,
         notes=(more,) if more else (),
         helps=(f"write {name}",) if meant else (),
         fixes=tuple(Fix(span, meant) for span in spans) if meant else (),

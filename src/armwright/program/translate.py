@@ -1,14 +1,14 @@
 """From a checked tree to intermediate code."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 
-import attrs
-
-from armwright.program import matrices, tree
-from armwright.program.code import Code, Instruction, Kind, Move, Op, stages_text
+from armwright.program import tree
+from armwright.program.code import Code, Form, Op, Operand, ProcedureCode, Text, Type, stages_text
+from armwright.program.emitting import LATER, Emitter
 from armwright.program.flow import Flow
+from armwright.program.hanging import is_arm
 from armwright.program.names import Symbols
-from armwright.program.source import Source
+from armwright.program.source import Source, Span
 
 
 def translate(source: Source, program: tree.Program, symbols: Symbols, flow: Flow, spelling: Mapping[str, str]) -> Code:
@@ -21,127 +21,320 @@ def translate(source: Source, program: tree.Program, symbols: Symbols, flow: Flo
         flow: the arms of its statements.
         spelling: how it writes its names.
     """
-    frame = Code(
-        instructions=(),
-        spelling=spelling,
-        kinds={key: kind for key, kind in symbols.kinds.items() if kind is not None}
-        | dict.fromkeys(flow.arms.values(), Kind.FRAME),
+    out = Emitter(source, symbols.units)
+    writer = _Statements(out, flow, spelling)
+    writer.all(program.statements)
+    out.begin()
+    out.emit(Op.STOP, span=program.end)
+    procedures = {}
+    for procedure in program.procedures:
+        own = symbols.procedures[procedure.name.key]
+        start = out.here.index
+        writer.all(procedure.body.statements)
+        out.begin()
+        out.emit(Op.RET, span=procedure.body.end)
+        procedures[procedure.name.key] = ProcedureCode(start=start, parameters=own.parameters, types=_known(own.types))
+    return Code(
+        instructions=tuple(out.instructions),
+        constants=tuple(out.constants),
+        types=_known(symbols.types),
+        procedures=procedures,
+        units=symbols.units,
+        spelling={key: text for key, text in spelling.items() if text != key},
         source=source,
     )
-    translator = _Translator(frame, flow)
-    instructions: list[Instruction] = []
-    for index, statement in enumerate(program.statements):
-        instructions += translator.statement(index, statement)
-    instructions.append(Instruction(op=Op.STOP, span=program.end))
-    return attrs.evolve(frame, instructions=tuple(instructions), constants=tuple(translator.constants))
 
 
-class _Translator:
-    """The constants so far."""
+def _known(types: Mapping[str, Type | None]) -> dict[str, Type]:
+    return {key: kind for key, kind in types.items() if kind is not None}
 
-    def __init__(self, frame: Code, flow: Flow) -> None:
-        self.constants: list[tuple[float, ...] | float] = []
-        self._frame, self._flow = frame, flow
 
-    def statement(self, index: int, statement: tree.Statement) -> Iterator[Instruction]:
+class _Statements:
+    """Writes statements."""
+
+    def __init__(self, out: Emitter, flow: Flow, spelling: Mapping[str, str]) -> None:
+        self._out, self._flow, self._spelling = out, flow, spelling
+        self._in_action = False
+
+    def all(self, statements: tuple[tree.Statement, ...]) -> None:
+        """Write several, one after the other."""
+        for statement in statements:
+            self.one(statement)
+
+    def one(self, statement: tree.Statement) -> None:
+        """Write one statement."""
+        if isinstance(statement, tree.Block):
+            self.all(statement.statements)
+            return
+        self._out.begin()
         match statement:
-            case tree.Init():
-                yield self._init(statement)
-            case tree.Affix(child=child, parent=parent, at=None):
-                yield Instruction(op=Op.AFFIX, operands=(_key(child), _key(parent)), span=statement.span)
-            case tree.Affix(child=child, parent=parent, at=step):
-                yield Instruction(op=Op.AFFAT, operands=(_key(child), _key(parent), _key(step)), span=statement.span)
-            case tree.Unfix(child=child, parent=parent):
-                yield Instruction(op=Op.UNFIX, operands=(_key(child), _key(parent)), span=statement.span)
+            case tree.Assign() | tree.Affix() | tree.Unfix():
+                self._frames(statement)
             case tree.Move():
-                yield from self._move(index, statement)
-            case tree.Grasp(arm=arm):
-                comment = "" if arm else "arm by context"
-                yield Instruction(op=Op.GRASP, operands=(self._flow.arms[index],), span=statement.span, comment=comment)
-            case (
-                tree.Open(arm=name)
-                | tree.Operate(device=name)
-                | tree.ReadVisions(target=name)
-                | tree.ReadSystem(arm=name)
-            ):
-                yield Instruction(op=_ONE_NAME[type(statement)], operands=(_key(name),), span=statement.span)
+                self._move(statement)
+            case tree.Open() | tree.Grasp() | tree.Operate() | tree.ReadVisions() | tree.ReadSystem():
+                self._tool_or_sensor(statement)
+            case tree.If() | tree.While() | tree.Repeat() | tree.For():
+                self._control(statement)
+            case tree.Cobegin() | tree.Signal() | tree.Wait() | tree.Pause() | tree.Lock():
+                self._processes(statement)
+            case _:
+                self._others(statement)
 
-    def _init(self, init: tree.Init) -> Instruction:
-        index = len(self.constants)
-        if isinstance(init.value, tree.Matrix):
-            self.constants.append(matrices.constant(init.value))
-            return Instruction(op=Op.LOADM, operands=(init.name.key, index), span=init.span)
-        assert isinstance(init.value, tree.Number)  # noqa: S101 - a checked program has nothing else
-        self.constants.append(init.value.value)
-        return Instruction(op=Op.LOADS, operands=(init.name.key, index), span=init.span)
+    # ---- frames, tools, sensors ------------------------------------------------------------------------------------
 
-    def _move(self, index: int, move: tree.Move) -> Iterator[Instruction]:
-        whole = _whole(move, arm=self._flow.arms[index], implied=index in self._flow.implied)
-        yield Instruction(op=Op.MVBEG, operands=(whole.moved, whole.goal), span=move.span)
-        if whole.direct and not any(isinstance(clause, tree.Directly) for clause in move.clauses):
-            yield Instruction(op=Op.MVDIR, span=move.span)
-        for kind, op in _CLAUSES.items():
-            for clause in move.clauses:
-                if isinstance(clause, kind):
-                    yield Instruction(op=op, operands=_operands(clause), span=clause.span)
-        comment = stages_text(self._frame, whole)
-        if whole.moved != whole.arm:
-            comment += f", r = {whole.arm} -> {self._frame.spelled(whole.moved)}"
-        yield Instruction(op=Op.MVEND, span=move.span, move=whole, comment=comment)
+    def _frames(self, statement: tree.Assign | tree.Affix | tree.Unfix) -> None:
+        out = self._out
+        match statement:
+            case tree.Assign(target=target, value=value):
+                to = str(self._operand(target))
+                if isinstance(value, tree.Number):
+                    out.emit(Op.LOADS, to, out.constant(float(out.value(value))), span=statement.span)  # type: ignore[arg-type]
+                else:
+                    out.value(value, to)
+                    self._whole(statement.span)
+            case tree.Affix(child=child, parent=parent, at=at):
+                operands = [self._operand(child), self._operand(parent)]
+                if at is not None:
+                    operands.append(out.value(at))
+                rigid = ("RIGIDLY",) if statement.rigid else ()
+                out.emit(Op.AFFIX if at is None else Op.AFFAT, *operands, *rigid, span=statement.span)
+            case tree.Unfix(child=child, parent=parent):
+                above = () if parent is None else (self._operand(parent),)
+                out.emit(Op.UNFIX, self._operand(child), *above, span=statement.span)
+
+    def _whole(self, span: Span) -> None:
+        """The instruction written last does what its whole statement says."""
+        out = self._out
+        last = out.instructions[-1]
+        out.instructions[-1] = type(last)(op=last.op, operands=last.operands, span=span, begins=last.begins)
+
+    def _tool_or_sensor(
+        self, statement: tree.Open | tree.Grasp | tree.Operate | tree.ReadVisions | tree.ReadSystem
+    ) -> None:
+        out, span = self._out, statement.span
+        match statement:
+            case tree.Open(arm=arm, width=width):
+                wide = () if width is None else (out.value(width),)
+                out.emit(Op.OPEN, self._operand(arm), *wide, span=span)
+            case tree.Grasp(arm=None):
+                known = self._flow.arms.get(span.start)
+                out.emit(Op.GRASP, *((known,) if known else ()), span=span, comment="arm by context")
+            case tree.Grasp(arm=arm) if arm is not None:
+                out.emit(Op.GRASP, self._operand(arm), span=span)
+            case tree.Operate(device=device, on=on):
+                out.emit(Op.OPER, self._operand(device), "ON" if on else "OFF", span=span)
+            case tree.ReadVisions(targets=targets):
+                for target in targets:
+                    out.emit(Op.READV, self._operand(target), span=span)
+            case tree.ReadSystem(arm=arm):
+                out.emit(Op.READS, self._operand(arm), span=span)
+
+    # ---- motion ----------------------------------------------------------------------------------------------------
+
+    def _move(self, move: tree.Move) -> None:
+        out = self._out
+        guards = [clause for clause in move.clauses if isinstance(clause, tree.On)]
+        moved, goal = self._operand(move.moved), out.value(move.goal)
+        # Places are worked out before the motion begins, so that its own instructions follow one another.
+        parts = [(op, clause, self._parts(clause)) for op, clause in _in_order(move)]
+        out.emit(Op.MVBEG, moved, goal, span=move.span)
+        form = form_of(move, self._text)
+        if form.direct:
+            out.emit(Op.MVDIR, span=move.span)
+        for op, clause, operands in parts:
+            out.emit(op, *operands, span=clause.span)
+        conditions = [(guard, out.emit(Op.MVON, LATER, out.passing(), LATER, span=guard.head)) for guard in guards]
+        comment = stages_text(form)
+        arm = self._flow.arms.get(move.span.start)
+        if arm and moved != arm:
+            comment += f", r = {arm} -> {self._text(move.moved)}"
+        out.emit(Op.MVEND, span=move.span, comment=comment)
+        if guards:
+            over = out.emit(Op.JMP, LATER, span=move.span)
+            for guard, number in conditions:
+                self._guard(guard, number)
+            out.land(over)
+
+    def _guard(self, guard: tree.On, number: int) -> None:
+        """Write condition and action of a guard, each ended by RET."""
+        out = self._out
+        old = out.instructions[number]
+        truth = old.operands[1]
+        condition = out.here
+        out.value(guard.condition, str(truth))
+        out.emit(Op.RET, span=guard.head)
+        action = out.here
+        inside, self._in_action = self._in_action, True
+        self.one(guard.action)
+        self._in_action = inside
+        out.emit(Op.RET, span=guard.span)
+        out.instructions[number] = type(old)(
+            op=old.op, operands=(condition, truth, action), span=old.span, begins=old.begins
+        )
+
+    def _parts(self, clause: tree.Clause) -> tuple[Operand, ...]:
+        out = self._out
+        match clause:
+            case tree.Via(points=points):
+                return tuple(out.value(point) for point in points)
+            case tree.Approach(point=value) | tree.Departure(point=value):
+                return (out.value(value),)
+            case tree.Speed(value=value) | tree.Blend(value=value) | tree.Duration(value=value):
+                return (out.value(value),)
+            case _:
+                return ()
+
+    def _text(self, node: tree.Expression) -> str:
+        if isinstance(node, tree.Name | tree.ArmName):
+            return node.key if is_arm(node.key) else self._spelling.get(node.key, node.key)
+        return self._out.text(node)
+
+    # ---- control ---------------------------------------------------------------------------------------------------
+
+    def _control(self, statement: tree.If | tree.While | tree.Repeat | tree.For) -> None:
+        out = self._out
+        match statement:
+            case tree.If(condition=condition, then=then, otherwise=otherwise, head=head):
+                otherwise_at = out.emit(Op.JZ, out.value(condition), LATER, span=head)
+                self.one(then)
+                if otherwise is None:
+                    out.land(otherwise_at)
+                else:
+                    over = out.emit(Op.JMP, LATER, span=head)
+                    out.land(otherwise_at)
+                    self.one(otherwise)
+                    out.land(over)
+            case tree.While(condition=condition, body=body, head=head):
+                top = out.here
+                over = out.emit(Op.JZ, out.value(condition), LATER, span=head)
+                self.one(body)
+                out.emit(Op.JMP, top, span=head)
+                out.land(over)
+            case tree.Repeat(body=inner, condition=condition, tail=tail):
+                top = out.here
+                self.all(inner)
+                out.begin()
+                out.emit(Op.JZ, out.value(condition), top, span=tail)
+            case tree.For():
+                self._for(statement)
+
+    def _for(self, loop: tree.For) -> None:
+        out, head = self._out, loop.head
+        count = out.passing()
+        # The bounds may be variables that the loop changes: they count as they were.
+        bounds = [out.passing() for _ in range(3)]
+        for bound, node in zip(bounds, (loop.first, loop.last, loop.step), strict=True):
+            if node is None:
+                out.emit(Op.COPY, bound, 1.0, span=head)
+            else:
+                out.value(node, bound)
+        out.emit(Op.COPY, count, 0.0, span=head)
+        out.begin()
+        top = out.here
+        over = out.emit(Op.FOR, self._operand(loop.variable), count, *bounds, LATER, span=head)
+        self.one(loop.body)
+        out.emit(Op.JMP, top, span=head)
+        out.land(over)
+
+    # ---- processes -------------------------------------------------------------------------------------------------
+
+    def _processes(self, statement: tree.Cobegin | tree.Signal | tree.Wait | tree.Pause | tree.Lock) -> None:
+        out, span = self._out, statement.span
+        match statement:
+            case tree.Cobegin():
+                self._cobegin(statement)
+            case tree.Signal(event=event):
+                out.emit(Op.SIG, self._operand(event), span=span)
+            case tree.Wait(event=event):
+                out.emit(Op.WAIT, self._operand(event), span=span)
+            case tree.Pause(duration=duration):
+                out.emit(Op.PAUSE, out.value(duration), span=span)
+            case tree.Lock(targets=targets, body=body, head=head):
+                locked = [self._operand(target) for target in targets]
+                out.emit(Op.LOCK, *locked, span=head)
+                self.one(body)
+                out.emit(Op.UNLK, *locked, span=head)
+
+    def _cobegin(self, cobegin: tree.Cobegin) -> None:
+        out = self._out
+        forks = []
+        for branch in cobegin.branches:
+            rank = () if branch.priority is None else (branch.priority.value,)
+            forks.append(out.emit(Op.FORK, LATER, *rank, span=branch.head))
+        join = out.emit(Op.JOIN, span=cobegin.span)
+        over = out.emit(Op.JMP, LATER, span=out.instructions[join].span)
+        # HALT in a branch ends the program, also where the branch is part of an action.
+        inside, self._in_action = self._in_action, False
+        for branch, fork in zip(cobegin.branches, forks, strict=True):
+            out.land(fork)
+            self.all(branch.body.statements)
+            out.begin()
+            out.emit(Op.QUIT, span=branch.body.end)
+        self._in_action = inside
+        out.land(over)
+
+    # ---- the rest --------------------------------------------------------------------------------------------------
+
+    def _others(self, statement: tree.Statement) -> None:
+        out = self._out
+        match statement:
+            case tree.Try(body=body, recovery=recovery, span=span):
+                attempt = out.emit(Op.TRY, LATER, span=span)
+                self.all(body)
+                well = out.emit(Op.ENDT, LATER, span=span)
+                out.land(attempt)
+                self.all(recovery)
+                out.emit(Op.ENDR, span=span)
+                out.land(well)
+            case tree.Retry(span=span):
+                out.emit(Op.RETRY, span=span)
+            case tree.Halt(span=span):
+                out.emit(Op.MVHLT if self._in_action else Op.HALT, span=span)
+            case tree.Print(items=items, span=span):
+                shown = [Text(item.value) if isinstance(item, tree.String) else out.value(item) for item in items]
+                out.emit(Op.PRINT, *shown, span=span)
+            case tree.Call(name=name, arguments=arguments, span=span):
+                values = [out.value(argument) for argument in arguments]
+                out.emit(Op.CALL, name.key, *values, span=span)
+            case _:
+                raise AssertionError(f"a checked program has no {type(statement).__name__}")
+
+    def _operand(self, node: tree.Mobile) -> Operand:
+        assert not isinstance(node, tree.Poison)  # noqa: S101 - a checked program has none
+        return self._out.value(node)
 
 
-_ONE_NAME: dict[type, Op] = {
-    tree.Open: Op.OPEN,
-    tree.Operate: Op.OPER,
-    tree.ReadVisions: Op.READV,
-    tree.ReadSystem: Op.READS,
-}
 # In the order of the listing: the way, the points on it, the speed.
 _CLAUSES: dict[type, Op] = {
-    tree.Directly: Op.MVDIR,
     tree.Straightly: Op.MVSTR,
     tree.Departure: Op.MVDEP,
     tree.Via: Op.MVVIA,
     tree.Approach: Op.MVAPP,
     tree.Speed: Op.MVSPD,
+    tree.Blend: Op.MVBLD,
+    tree.Duration: Op.MVDUR,
 }
 
 
-def _whole(move: tree.Move, arm: str, *, implied: bool) -> Move:
-    """Return all that a MOVE says."""
-    whole = Move(moved=_key(move.moved), arm=arm, implied=implied, goal=_key(move.goal))
+def _in_order(move: tree.Move) -> list[tuple[Op, tree.Clause]]:
+    return [(op, clause) for kind, op in _CLAUSES.items() for clause in move.clauses if isinstance(clause, kind)]
+
+
+def form_of(move: tree.Move, text: Callable[[tree.Expression], str]) -> Form:
+    """Return the form of a MOVE, its places in the words that ``text`` gives for them."""
+    via: tuple[str, ...] = ()
+    ends: dict[type, str] = {}
     for clause in move.clauses:
-        match clause:
-            case tree.Straightly():
-                whole = attrs.evolve(whole, straight=True)
-            case tree.Via(points=points):
-                whole = attrs.evolve(whole, via=tuple(_key(point) for point in points))
-            case tree.Approach(point=point):
-                whole = attrs.evolve(whole, approach=_key(point))
-            case tree.Departure(point=point):
-                whole = attrs.evolve(whole, departure=_key(point))
-            case tree.Speed(value=value):
-                whole = attrs.evolve(whole, speed=value.value if isinstance(value, tree.Number) else _key(value))
-            case _:
-                pass
-    # No word on the way means the shortest.
-    return attrs.evolve(whole, direct=not (whole.straight or whole.via or whole.approach or whole.departure))
-
-
-def _operands(clause: tree.Clause) -> tuple[str | float, ...]:
-    match clause:
-        case tree.Via(points=points):
-            return tuple(_key(point) for point in points)
-        case tree.Approach(point=point) | tree.Departure(point=point):
-            return (_key(point),)
-        case tree.Speed(value=tree.Number(value=value)):
-            return (value,)
-        case tree.Speed(value=tree.Name(key=key)):
-            return (key,)
-        case _:
-            return ()
-
-
-def _key(node: tree.Mobile | None) -> str:
-    assert isinstance(node, tree.Name | tree.ArmName)  # noqa: S101 - a checked program has nothing else
-    return node.key
+        if isinstance(clause, tree.Via):
+            via = tuple(text(point) for point in clause.points)
+        elif isinstance(clause, tree.Approach | tree.Departure):
+            ends[type(clause)] = text(clause.point)
+    return Form(
+        goal=text(move.goal),
+        via=via,
+        approach=ends.get(tree.Approach),
+        departure=ends.get(tree.Departure),
+        straight=any(isinstance(clause, tree.Straightly) for clause in move.clauses),
+        blend=any(isinstance(clause, tree.Blend) for clause in move.clauses),
+    )

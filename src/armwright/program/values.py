@@ -1,19 +1,42 @@
-"""Parsing what stands for a value: names, arms, numbers, matrices."""
+"""Parsing what stands for a value: in RLO-83 names, arms, numbers, matrices; in RLO-2 any expression."""
 
 # ruff: noqa: ERA001 - each rule of the grammar stands above its function
 
 import math
 
-from armwright.program import beyond, tree
+from armwright.program import beyond, expressions, tree
 from armwright.program.cursor import Tokens, shown
 from armwright.program.diagnostics import Fix
 from armwright.program.source import Span
 from armwright.program.tokens import TokenKind
-from armwright.program.words import LONGEST_NAME, PLAIN_CLAUSES
+from armwright.program.words import PLAIN_CLAUSES
 
 _SET_WANTS = "a number or twelve numbers in `( )`"
 # What may stand behind a name, so that a reserved word in front of it was meant as one.
 _BEHIND_A_NAME = (",", ";", ")", ":", "=", "TO", "FROM", "AT", "WITH", "VIA")
+
+
+def mobile(tokens: Tokens, wants: str, where: str) -> tree.Mobile:
+    """Read a name, an arm or, in RLO-2, an element of an array.
+
+    Args:
+        tokens: at the operand.
+        wants: what is expected, in words.
+        where: the place in words, such as ``after TO``.
+
+    Raises:
+        LostError: there is nothing that could be meant.
+    """
+    return expressions.mobile(tokens, wants, where) if tokens.later else operand(tokens, wants, where)
+
+
+def value(tokens: Tokens, wants: str, where: str) -> tree.Expression:
+    """Read a name or an arm or, in RLO-2, any expression; the arguments are those of ``mobile``.
+
+    Raises:
+        LostError: there is nothing that could be meant.
+    """
+    return expressions.expression(tokens, wants, where) if tokens.later else operand(tokens, wants, where)
 
 
 # mobile = arm | name ;
@@ -38,7 +61,7 @@ def operand(tokens: Tokens, wants: str, where: str) -> tree.Mobile:
     if tokens.sees("(", "-"):
         return beyond.expression(tokens, wants)
     if _reserved_as_name(tokens):
-        refuse_reserved(tokens)
+        tokens.refuse_reserved()
         return tree.Poison(tokens.take().span)
     return tokens.lost(f"expected {wants} {where}", f"found {shown(token)}")
 
@@ -54,34 +77,40 @@ def _reserved_as_name(tokens: Tokens) -> bool:
     )
 
 
-def refuse_reserved(tokens: Tokens) -> None:
-    """Say that the word that stands here cannot be a name."""
-    token = tokens.now
-    text = f"`{token.text}` is a reserved word and cannot be a name"
-    tokens.found.say("E107", text, token.span, "a word of the language")
-
-
 def check_length(tokens: Tokens, name: tree.Name) -> None:
-    """Refuse a name of more than nine characters."""
-    if len(name.text) > LONGEST_NAME:
+    """Refuse a name that is too long."""
+    longest = tokens.words.longest_name
+    if len(name.text) > longest:
         tokens.found.say(
             "E103",
-            f"the name `{name.text}` is longer than {LONGEST_NAME} characters",
+            f"the name `{name.text}` is longer than {longest} characters",
             name.span,
             f"{len(name.text)} characters",
-            notes=(f"names of RLO-83 have 1 to {LONGEST_NAME} characters",),
+            notes=(f"names of {tokens.words.name} have 1 to {longest} characters",),
         )
 
 
-# init = name "=" ( matrix | signed ) ;
-def init(tokens: Tokens) -> tree.Init:
+# init   = name "=" ( matrix | signed ) ;                      (* RLO-83 *)
+# assign = lvalue "=" expr ;                                   (* RLO-2 *)
+def assign(tokens: Tokens) -> tree.Assign:
     """Read ``name = value``."""
-    token = tokens.take()
+    token = tokens.now
+    target: tree.Mobile
+    if tokens.later:
+        target = expressions.mobile(tokens, "a name", "here")
+        if tokens.now.key == "=":
+            tokens.take()
+        else:
+            written = tokens.source.slice(tokens.since(token))
+            equals(tokens, f"`{written}`", written)
+        value = expressions.expression(tokens, "a value", "")
+        return tree.Assign(tokens.since(token), target, value)
+    tokens.take()
     make = tree.ArmName if token.kind is TokenKind.ARM else tree.Name
-    name = make(token.span, token.text, token.key)
-    equals(tokens, f"`{name.text}`", name.text)
-    value = _value(tokens)
-    return tree.Init(tokens.since(token), name, value)
+    target = make(token.span, token.text, token.key)
+    equals(tokens, f"`{token.text}`", token.text)
+    found = _value(tokens)
+    return tree.Assign(tokens.since(token), target, found)
 
 
 def equals(tokens: Tokens, what: str, written: str) -> None:
@@ -89,15 +118,15 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
     if tokens.accept("="):
         return
     token = tokens.now
-    if tokens.accept(":="):
+    if tokens.accept(":=", "=="):
         tokens.found.say(
             "E109",
-            f"{what} gets its value with `=`, not `:=`",
+            f"{what} gets its value with `=`, not `{token.text}`",
             token.span,
             "write `=`",
             fixes=(Fix(token.span, "="),),
         )
-    elif tokens.done or tokens.sees(";", ",", ")", "END"):
+    elif tokens.done or tokens.sees(";", ",", ")", "END") or (tokens.later and token.kind is TokenKind.KEYWORD):
         tokens.lost(f"{what} needs `=` and a value", "expected `=` and a value here", code="E109")
     elif not token.damaged:
         tokens.found.say(
@@ -120,13 +149,13 @@ def _value(tokens: Tokens) -> tree.Matrix | tree.Number | tree.Poison:
             return matrix
         # Not a list of numbers but an expression that begins with a parenthesis.
         del tokens.found[found:]
-        tokens.at = start
+        tokens.back(start)
         return beyond.expression(tokens, _SET_WANTS)
     if token.kind is TokenKind.NUMBER or tokens.sees("-", "+"):
         number = _signed_or_none(tokens)
         if number is not None and not tokens.sees(*beyond.OPERATORS):
             return number
-        tokens.at = start
+        tokens.back(start)
         return beyond.expression(tokens, _SET_WANTS)
     if token.kind in (TokenKind.NAME, TokenKind.ARM, TokenKind.STRING):
         return beyond.expression(tokens, _SET_WANTS)
@@ -207,7 +236,7 @@ def parenthesised(tokens: Tokens, wants: str, where: str) -> tuple[tree.Mobile, 
     while comma := tokens.accept(","):
         # Without parentheses a comma may also lead to the next clause.
         if not opening and tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM):
-            tokens.at -= 1
+            tokens.back(tokens.at - 1)
             break
         if tokens.sees(")"):
             tokens.found.say("E111", f"expected {wants} after `,`", comma.span, "nothing follows")

@@ -1,18 +1,24 @@
-"""The words of the language: which are reserved, which have a meaning in one place only, which belong to RLO-2."""
+"""The words of the language in both standards: which are reserved, and which have a meaning in one place only."""
+
+import enum
+
+import attrs
+
+
+class Standard(enum.StrEnum):
+    """Which RLO a program is written in: that of the report, or the one that grants its wishes."""
+
+    RLO_83 = "83"
+    RLO_2 = "2"
+
 
 STATEMENTS = ("AFFIX", "UNFIX", "OPEN", "GRASP", "OPERATE", "READ", "MOVE")
 TYPES = ("SCALAR", "TRANS", "FRAME")
 PLAIN_CLAUSES = ("DIRECTLY", "STRAIGHTLY", "VIA")
 WITH_CLAUSES = ("APPROACH", "DEPARTURE", "SPEED")
-CLAUSES = (*PLAIN_CLAUSES, "WITH", *WITH_CLAUSES)
-
-RESERVED = frozenset(("VAR", "BEGIN", "END", "TO", "FROM", "AT", *STATEMENTS, *TYPES, *CLAUSES))
 
 # Words only after READ: programs may use them as names.
 SENSORS = ("VISIONS", "SYSTEM")
-
-# The longest name; the report says "1-9 characters".
-LONGEST_NAME = 9
 
 # What starts a statement in RLO-2, and what RLO-83 lacks. All of these may be names in RLO-83.
 LATER_STATEMENTS = {
@@ -41,3 +47,76 @@ LATER_WITH = ("BLEND", "DURATION")
 # What opens and closes a stretch of statements in RLO-2.
 OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
 CLOSING = frozenset(("END", "COEND", "UNTIL"))
+
+_FRAMEWORK = ("VAR", "BEGIN", "END", "TO", "FROM", "AT", "WITH")
+_LATER_FRAMEWORK = (
+    *("OF", "THEN", "ELSE", "DO", "UNTIL", "STEP", "COEND", "PRIORITY", "RECOVER"),
+    *("ON", "OFF", "AND", "OR", "NOT", "RIGIDLY", "NONRIGIDLY"),
+)
+
+
+@attrs.frozen(kw_only=True)
+class Vocabulary:
+    """The words of one standard.
+
+    Attributes:
+        name: of the standard.
+        headers: what starts a part in front of BEGIN.
+        statements: what starts a statement, but for names.
+        closing: what ends a stretch of statements or a part of one.
+        types: of single things.
+        plain_clauses: clauses of MOVE that stand without WITH.
+        with_clauses: those that stand behind WITH.
+        reserved: all words that cannot be names.
+        longest_name: of how many characters.
+    """
+
+    name: str
+    headers: tuple[str, ...]
+    statements: tuple[str, ...]
+    closing: tuple[str, ...]
+    types: tuple[str, ...]
+    plain_clauses: tuple[str, ...]
+    with_clauses: tuple[str, ...]
+    reserved: frozenset[str]
+    longest_name: int
+
+    @property
+    def clauses(self) -> tuple[str, ...]:
+        """The words that start a clause of MOVE, and those that would with WITH in front."""
+        return (*self.plain_clauses, "WITH", *self.with_clauses)
+
+
+_OLD = frozenset((*_FRAMEWORK, *STATEMENTS, *TYPES, *PLAIN_CLAUSES, *WITH_CLAUSES))
+_NEW = frozenset((*_LATER_FRAMEWORK, *LATER_STATEMENTS, *LATER_HEADERS, *LATER_TYPES, *LATER_WITH))
+
+# The longest name of RLO-83 is that of the report: "1-9 characters".
+VOCABULARIES = {
+    Standard.RLO_83: Vocabulary(
+        name="RLO-83",
+        headers=("VAR",),
+        statements=STATEMENTS,
+        closing=("END",),
+        types=TYPES,
+        plain_clauses=PLAIN_CLAUSES,
+        with_clauses=WITH_CLAUSES,
+        reserved=_OLD,
+        longest_name=9,
+    ),
+    Standard.RLO_2: Vocabulary(
+        name="RLO-2",
+        headers=("VAR", *LATER_HEADERS),
+        statements=(*STATEMENTS, *LATER_STATEMENTS, "BEGIN"),
+        closing=("END", "UNTIL", "COEND", "PRIORITY", "RECOVER", "ELSE"),
+        types=(*TYPES, "EVENT"),
+        plain_clauses=(*PLAIN_CLAUSES, "ON"),
+        with_clauses=(*WITH_CLAUSES, *LATER_WITH),
+        reserved=_OLD | _NEW,
+        longest_name=31,
+    ),
+}
+
+
+def is_later(word: str) -> bool:
+    """Whether a word, in upper case, is reserved in RLO-2 alone."""
+    return word in _NEW

@@ -31,14 +31,16 @@ class Origin:
 
     Attributes:
         program: path of the program.
-        cell: path of the cell file.
+        cell: path of the cell file; None where the program imports its cell.
+        imports: paths of the files that the program imports.
         command: the command line.
         seed: as given.
         options: those that shape the result, by name.
     """
 
     program: Path
-    cell: Path
+    cell: Path | None
+    imports: Sequence[Path] = ()
     command: str
     seed: int
     options: Mapping[str, Any]
@@ -162,8 +164,9 @@ def _run(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], or
     return {
         "command": origin.command,
         "inputs": {
-            "program": {"path": str(origin.program), "sha256": _hash(origin.program)},
-            "cell": {"path": str(origin.cell), "sha256": _hash(origin.cell)},
+            "program": _file(origin.program),
+            "cell": None if origin.cell is None else _file(origin.cell),
+            "imports": [_file(path) for path in origin.imports],
             "arms": arms,
         },
         "options": dict(origin.options),
@@ -173,8 +176,8 @@ def _run(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], or
     }
 
 
-def _hash(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _file(path: Path) -> dict[str, str]:
+    return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
 
 
 def _numbers(values: Array) -> list[float]:

@@ -17,7 +17,7 @@ from armwright.report.markup import run_html
 from armwright.report.tracks import axes, check_rows, instants, numbers, path, per_joint, poses, rotations, skeleton
 
 Severity: TypeAlias = Literal["error", "warning", "note"]
-StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "JOINT", "HAND"]
+StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"]
 TextKind: TypeAlias = Literal["Program", "Poses"]
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
 
@@ -75,7 +75,7 @@ class Stage:
         t1: when it ended [s].
         line: line of the program, from 1.
         arm: name of the arm.
-        kind: ``PTP``, ``LINE`` or ``SPLINE`` of a program; ``JOINT`` or ``HAND`` of a move through poses.
+        kind: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND`` of a program; ``JOINT`` or ``HAND`` of a move through poses.
         to: the frames it goes to, the last one its goal.
         speed: what the program asked for, 100 being normal.
         peak_speed: n largest joint speeds [rad/s] or [m/s].

@@ -41,6 +41,15 @@ def inverse(X_AB: ArrayLike) -> Array:
     return pose(R_BA, -(R_BA @ X_AB[..., :3, 3:])[..., 0])
 
 
+def turned_over(X_AB: Array) -> Array:
+    """Return the inverse (4, 4) of one pose that is known to be one: nothing is checked."""
+    X_BA = np.eye(4)
+    R_BA = X_AB[:3, :3].T
+    X_BA[:3, :3] = R_BA
+    X_BA[:3, 3] = -(R_BA @ X_AB[:3, 3])
+    return X_BA
+
+
 def from_noap(numbers: ArrayLike) -> Array:
     """Return the pose (..., 4, 4) whose columns n, o, a, p are written out in (..., 12) numbers."""
     columns = of_shape(numbers, (12,), "n, o, a, p")

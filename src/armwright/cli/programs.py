@@ -1,0 +1,117 @@
+"""What the commands for programs share: reading and translating them, their cells, and showing diagnostics."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
+
+from armwright.program.words import Standard
+
+if TYPE_CHECKING:
+    from armwright.cell.model import Cell
+    from armwright.program import Compilation, Source
+    from armwright.program.diagnostics import Diagnostic
+    from armwright.program.known import ReadImport
+
+# The text form of intermediate code.
+CODE_SUFFIX = ".rlc"
+
+ProgramFile: TypeAlias = Annotated[Path, typer.Argument(help="The program, in RLO.", show_default=False)]
+CellFile: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--cell", help="The cell it runs in, TOML or JSON; else what the program IMPORTs.", show_default=False
+    ),
+]
+Std: TypeAlias = Annotated[Standard, typer.Option(help="The language: RLO-2, or the RLO-83 of the report alone.")]
+Strict: TypeAlias = Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")]
+
+
+def translate_file(
+    path: Path, cell: "Cell | None" = None, *, strict: bool = False, std: Standard = Standard.RLO_2
+) -> "Compilation":
+    """Read and translate a program.
+
+    Args:
+        path: of the program, UTF-8 text.
+        cell: what it will act on.
+        strict: whether an AFFIX that is only implied is an error.
+        std: the language.
+
+    Raises:
+        FileFormatError: the file cannot be read, or is not text.
+    """
+    from armwright.files.document import read_text
+    from armwright.program import Source, known_cell
+    from armwright.program import compile as translate
+
+    source = Source(path.name, read_text(path))
+    known = known_cell(cell) if cell else None
+    return translate(source, known, strict=strict, std=std, read_import=import_reader(path.parent))
+
+
+def import_reader(folder: Path) -> "ReadImport":
+    """Return what reads the files that a program of this folder IMPORTs."""
+    from armwright.program.known import Imported
+
+    def read(name: str) -> Imported:
+        from armwright.cell.reader import read_cell
+
+        cell = read_cell(folder / name, arms_needed=False)
+        return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
+
+    return read
+
+
+def in_its_cell(path: Path, cell: "Cell | None", *, strict: bool, std: Standard) -> "tuple[Compilation, Cell | None]":
+    """Translate a program for its cell: the one given, or else the first it IMPORTs that has arms.
+
+    Returns:
+        The translation, and the cell with all frames that the program imports; None where there is no cell.
+    """
+    compiled = translate_file(path, cell, strict=strict, std=std)
+    if cell is None:
+        cell = next((one.cell for one in compiled.imports if one.cell and one.cell.arms), None)
+        if cell is not None:
+            compiled = translate_file(path, cell, strict=strict, std=std)
+    return compiled, None if cell is None else with_imports(cell, compiled)
+
+
+def with_imports(cell: "Cell", compiled: "Compilation") -> "Cell":
+    """Return a cell with the frames that a program imports; a frame of the cell itself stays as it is."""
+    import attrs
+
+    frames = dict(cell.frames)
+    for imported in compiled.imports:
+        if imported.cell is not None:
+            frames = {**imported.cell.frames, **frames}
+    return attrs.evolve(cell, frames=frames)
+
+
+def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, to_errors: bool = False) -> None:
+    """Print diagnostics with the lines they are about, in colour when a person watches."""
+    import sys
+
+    from rich.console import Console
+
+    from armwright.program.rendering import render, render_rich
+
+    console = Console(stderr=to_errors)
+    if console.is_terminal:
+        console.print(render_rich(diagnostics, source), soft_wrap=True, end="")
+    else:
+        print(render(diagnostics, source), end="", file=sys.stderr if to_errors else sys.stdout)
+
+
+def diagnostics_data(compiled: "Compilation") -> dict[str, Any]:
+    """Return what is wrong with a program as plain data."""
+    from armwright.program.diagnostics import to_json
+
+    errors = sum(one.is_error for one in compiled.diagnostics)
+    return {
+        "program": compiled.source.name,
+        "errors": errors,
+        "warnings": len(compiled.diagnostics) - errors,
+        "diagnostics": [to_json(one, compiled.source) for one in compiled.diagnostics],
+    }

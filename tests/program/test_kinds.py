@@ -1,0 +1,210 @@
+"""What expressions are, and the names that they are made of."""
+
+import pytest
+
+from armwright.program import check, tree
+from armwright.program.code import Kind, Type
+from armwright.program.diagnostics import Diagnostic
+from armwright.program.kinds import sort
+from armwright.program.names import Symbols
+from armwright.program.naming import Names
+from armwright.program.parse import parse
+from armwright.program.sorts import Sort, written
+from armwright.program.source import Source
+from armwright.program.tokens import scan
+from armwright.program.words import Standard
+
+DECLARED = {
+    "F": Type(Kind.FRAME),
+    "G": Type(Kind.FRAME),
+    "T": Type(Kind.TRANS),
+    "U": Type(Kind.TRANS),
+    "N": Type(Kind.SCALAR),
+    "E": Type(Kind.EVENT),
+    "SLOT": Type(Kind.FRAME, (2, 3)),
+    "COUNT": Type(Kind.SCALAR, (4,)),
+}
+UNIT = "(1,0,0, 0,1,0, 0,0,1, 0,0,0)"
+
+
+def parsed(text: str) -> tree.Program:
+    source = Source("t.rlo", text)
+    program, slips = parse(source, scan(source, text, Standard.RLO_2).tokens, Standard.RLO_2)
+    assert slips == []
+    return program
+
+
+def expression(text: str) -> tree.Expression:
+    """Return the tree of an expression."""
+    (statement,) = parsed(f"BEGIN PRINT({text}) END.").statements
+    assert isinstance(statement, tree.Print)
+    (item,) = statement.items
+    assert not isinstance(item, tree.String)
+    return item
+
+
+def judged(text: str) -> tuple[Sort | None, list[Diagnostic]]:
+    """Return what an expression is, and what is said of it."""
+    names = Names(None)
+    names.main.types.update(DECLARED)
+    return sort(names, expression(text)), names.found
+
+
+def checked(text: str) -> tuple[Symbols, list[Diagnostic]]:
+    symbols, found, _ = check.check(parsed(text))
+    return symbols, found
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1 + n * 2 / -n", Sort.SCALAR),
+        ("2mm", Sort.SCALAR),
+        ("DIST(f, ARM_1)", Sort.SCALAR),
+        ("FORCE(z)", Sort.SCALAR),
+        ("count[count[1]]", Sort.SCALAR),
+        ("n < 3", Sort.CONDITION),
+        ("NOT n = 1 AND (n > 2 OR n <> 4)", Sort.CONDITION),
+        ("ARM_1", Sort.FRAME),
+        ("WORLD", Sort.FRAME),
+        ("slot[2, n + 1]", Sort.FRAME),
+        ("f * t", Sort.FRAME),
+        ("ARM_1 * XYZ(0, 0, n) * ROTX(90)", Sort.FRAME),
+        (f"f * {UNIT}", Sort.FRAME),
+        ("t * u", Sort.TRANS),
+        (f"t * {UNIT}", Sort.TRANS),
+        ("INV(t)", Sort.TRANS),
+        ("INV(f) * g", Sort.TRANS),
+        ("INV(f) * g * t", Sort.TRANS),
+        (f"INV(f) * {UNIT}", Sort.TRANS),
+        ("INV(INV(f))", Sort.FRAME),
+        ("INV(f)", Sort.INVERSE),
+        (UNIT, Sort.MATRIX),
+        (f"{UNIT} * t", Sort.MATRIX),
+        (f"INV({UNIT} * {UNIT})", Sort.MATRIX),
+        ("e", Sort.EVENT),
+    ],
+)
+def test_kinds(text: str, expected: Sort) -> None:
+    """A place is moved by a step to a place, steps follow one another, and two places are a step apart."""
+    assert judged(text) == (expected, [])
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "message", "help_"),
+    [
+        ("f * g", "E221", "`*` has no meaning between a FRAME and a FRAME", "write `INV(f) * g`"),
+        ("t * f", "E221", "`*` has no meaning between a TRANS and a FRAME", "write `f * t`"),
+        ("f + t", "E221", "`+` has no meaning between a FRAME and a TRANS", "write `f * t`"),
+        ("f - t", "E221", "`-` has no meaning between a FRAME and a TRANS", "write `f * INV(t)`"),
+        ("f - g", "E221", "`-` has no meaning between a FRAME and a FRAME", "write `INV(g) * f`"),
+        ("f / t", "E221", "`/` has no meaning between a FRAME and a TRANS", "write `f * INV(t)`"),
+        ("f = g", "E221", "`=` has no meaning between a FRAME and a FRAME", "write `DIST(f, g)`"),
+        ("-t", "E221", "`-` takes a number, but this is a TRANS", "write `INV(t)`"),
+        ("2 * t", "E221", "`*` has no meaning between a number and a TRANS", "XYZ"),
+        ("t * INV(f)", "E221", "`*` has no meaning between a TRANS and the inverse of a FRAME", "`INV(f) * g`"),
+        ("1 + (n < 2)", "E221", "`+` has no meaning between a number and a condition", "AND and OR"),
+        ("n AND n < 2", "E219", "AND needs a condition, but `n` is a SCALAR", "write `n <> 0`"),
+        ("NOT f", "E219", "NOT needs a condition, but `f` is a FRAME", "such as `n > 0`"),
+        ("e + 1", "E223", "`e` is an EVENT and cannot be computed with", ""),
+        ("slot", "E222", "`slot` is an ARRAY [2,3] OF FRAME and needs an index", "write `slot[1,1]`"),
+        ("slot[1]", "E222", "`slot` has 2 indices, not 1", ""),
+        ("slot[1,4]", "E222", "index 4 is outside 1..3", ""),
+        ("n[1]", "E222", "`n` is a SCALAR and has no index", ""),
+        ("XYZ(1, 2)", "E220", "XYZ takes three lengths, not 2 arguments", ""),
+        ("DIST(f, t)", "E220", "DIST takes two FRAMEs, but `t` is a TRANS", ""),
+        ("FORCE(n)", "E220", "FORCE takes one axis, X, Y or Z, not `n`", "FORCE(Z)"),
+        ("ROTY(5mm)", "E224", "ROTY takes one angle, but `5mm` is a length", ""),
+        ("XZY(1, 2, 3)", "E227", "unknown function `XZY`", "did you mean `XYZ`?"),
+        ("slot(1, 2)", "E227", "`slot` is an ARRAY [2,3] OF FRAME and no function", "write `slot[1,2]`"),
+        ("(1, 2, n)", "E206", "a matrix has 12 numbers, not 3", "write `XYZ(1, 2, n)`"),
+        ("sl0t[1,1]", "E202", "`sl0t` is not declared", "did you mean `SLOT`?"),
+    ],
+)
+def test_no_kind(text: str, code: str, message: str, help_: str) -> None:
+    """What has no meaning is named, with what was probably meant."""
+    _, (found,) = judged(text)
+
+    assert (found.code, found.message) == (code, message)
+    assert help_ in " ".join(found.helps)
+
+
+@pytest.mark.parametrize("text", ["a < b", "f * nothing = nothing", "-nothing < 1", "slot[nothing,1] * nothing"])
+def test_unknown_is_silent(text: str) -> None:
+    """Of what was reported as unknown nothing more is said."""
+    _, found = judged(text)
+
+    assert {one.code for one in found} == {"E202"}
+    assert len(found) == len({one.message for one in found})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "NOT n = 1 AND n > 2",
+        "(n + 1) * 2 - -n",
+        "n - (n - 1)",
+        "n / (n * 2)",
+        "INV(f) * slot[1,n + 1]",
+        "-(n + 1)",
+        "(n < 1 OR n > 2) AND n <> 3",
+        "NOT (n < 1 AND n > 2)",
+        "f * (t * u)",
+    ],
+)
+def test_written(text: str) -> None:
+    """Advice repeats an expression as one would write it."""
+    assert written(expression(text)) == text
+
+
+def test_long_expressions_are_not_repeated() -> None:
+    """A message does not repeat half a line; its place is marked anyway."""
+    _, found = checked("BEGIN MOVE ARM_1 TO XYZ(100, 200, 300) * ROTZ(90) * ROTX(45) END.")
+
+    assert found[0].message == "a MOVE must go to a FRAME, but this is a TRANS"
+
+
+def test_scopes() -> None:
+    """A procedure's own names hide those of the program; whatever it lacks is looked up there."""
+    symbols, found = checked(
+        "VAR f, g : FRAME ; PROCEDURE work(f : TRANS) ; VAR n : SCALAR ; "
+        "BEGIN n = 1 ; g = g * f ; PRINT(n) END ; BEGIN g = ARM_1 ; f = g ; work(XYZ(0,0,1)) END."
+    )
+    main, inside = symbols.scope(None), symbols.scope("WORK")
+
+    assert found == []
+    assert symbols.procedures["WORK"].parameters == ("F",)
+    assert (main.type("F"), inside.type("F")) == (Type(Kind.FRAME), Type(Kind.TRANS))
+    assert (main.type("N"), inside.type("N")) == (None, Type(Kind.SCALAR))
+    assert (main.is_local("F"), inside.is_local("F"), inside.is_local("G")) == (False, True, False)
+    assert inside.type("G") == Type(Kind.FRAME)
+    assert inside.declared("F") != main.declared("F")
+    assert inside.declared("G") == main.declared("G") != None  # noqa: E711
+    assert inside.declared("STATION") is None
+
+
+def test_frames_of_a_scope() -> None:
+    """A frame by name is a single FRAME or an arm; an array, an element and an expression are none."""
+    symbols, _ = checked("VAR f : FRAME ; a : ARRAY [2] OF FRAME ; t : TRANS ; BEGIN END.")
+    scope = symbols.scope(None)
+    names = {text: scope.frame(expression(text)) for text in ("f", "arm-1", "world", "a", "a[1]", "t", "f * t", "x")}
+
+    assert {text: name for text, name in names.items() if name} == {"f": "F", "arm-1": "ARM_1", "world": "WORLD"}
+
+
+def test_units_of_a_program() -> None:
+    """Bare numbers are metres and degrees until UNITS says otherwise, wherever it stands among the headers."""
+    assert (checked("BEGIN END.")[0].units.length, checked("BEGIN END.")[0].units.angle) == ("M", "DEG")
+
+    units = checked("VAR t : TRANS ; UNITS rad, mm ; BEGIN t = XYZ(0,0,1) END.")[0].units
+    assert (units.length, units.angle) == ("MM", "RAD")
+
+
+def test_many_unknown_names() -> None:
+    """Thousands of names that nobody declared are all reported, without looking for each among all others."""
+    unknown = " ".join(f"x{number} = 1 ;" for number in range(3000))
+    known = " ".join(f"VAR y{number} : SCALAR ;" for number in range(3000))
+    _, found = checked(f"{known} BEGIN {unknown} END.")
+
+    assert sum(one.code == "E202" for one in found) == 3000
+    assert sum("did you mean" in "".join(one.helps) for one in found) < 20

@@ -1,0 +1,202 @@
+"""Several processes on one clock: order, priorities, events, locks, arms, and how they stop."""
+
+import os
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from armwright.program.interpret import Limits
+from program.running import cell_of, corpus_text, down, expect, failure, printed, run
+
+HOME = "VAR a, b : FRAME ; n : SCALAR ; e, g : EVENT ; BEGIN a = (1,0,0, 0,-1,0, 0,0,-1, 0.40,0.15,0.20) ; "
+HOME += "b = (1,0,0, 0,-1,0, 0,0,-1, 0.70,0.15,0.20) ; n = 0 ; "
+
+
+def branches(*texts: str) -> str:
+    return f"{HOME} COBEGIN {' ; '.join(texts)} COEND END."
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "order"),
+    [
+        ("", "", ["1", "1", "2", "2"]),
+        ("PRIORITY 1 :", "PRIORITY 2 :", ["2", "2", "1", "1"]),
+        ("PRIORITY 2 :", "PRIORITY 1 :", ["1", "1", "2", "2"]),
+    ],
+)
+def test_order_of_one_instant(first: str, second: str, order: list[str]) -> None:
+    """What is due at the same instant is served by priority, then in the order of the text."""
+    body = "BEGIN PRINT({0}) ; PRINT({0}) END"
+    recording = run(branches(f"{first} {body.format(1)}", f"{second} {body.format(2)}"))
+
+    assert printed(recording) == order
+
+
+def test_signal_wakes_the_important_one_first() -> None:
+    """A process of high priority goes on at the instant its event comes, before the one that signalled."""
+    recording = run(branches("PRIORITY 1 : BEGIN SIGNAL e ; PRINT(1) END", "PRIORITY 2 : BEGIN WAIT e ; PRINT(2) END"))
+
+    assert printed(recording) == ["2", "1"]
+
+
+def test_events_count() -> None:
+    """SIGNAL adds one, WAIT takes one: two signals before the waits let both through."""
+    recording = run(HOME + "SIGNAL e ; SIGNAL e ; WAIT e ; WAIT e ; PRINT(3) END.")
+
+    assert printed(recording) == ["3"]
+
+
+def test_pauses_go_by_the_clock() -> None:
+    """PAUSE takes its time on the common clock, in any unit of time."""
+    recording = run(branches("BEGIN PAUSE 300ms ; PRINT(1) END", "BEGIN PAUSE 0.2 ; PRINT(2) ; PAUSE 0.2s END"))
+
+    assert printed(recording) == ["2", "1"]
+    assert recording.duration == pytest.approx(0.4)
+
+
+def test_branches_share_variables() -> None:
+    """What one branch writes the others read."""
+    recording = run(branches("BEGIN n = 7 ; SIGNAL e END", "BEGIN WAIT e ; PRINT(n) END"))
+
+    assert printed(recording) == ["7"]
+
+
+def test_locks_keep_each_other_out() -> None:
+    """A LOCK that needs a frame of another waits until that one is given back."""
+    recording = run(
+        branches(
+            "BEGIN LOCK (a, b) DO BEGIN PRINT(1) ; PAUSE 1 ; PRINT(2) END END",
+            "BEGIN LOCK (b) DO PRINT(3) END",
+        )
+    )
+
+    assert printed(recording) == ["1", "2", "3"]
+
+
+def test_crossed_locks() -> None:
+    """Two LOCKs of the same frames in opposite order do not wait for each other for ever."""
+    recording = run(
+        branches(
+            "BEGIN LOCK (a, b) DO PAUSE 0.1 ; PRINT(1) END",
+            "BEGIN LOCK (b, a) DO PAUSE 0.1 ; PRINT(2) END",
+        )
+    )
+
+    assert printed(recording) == ["1", "2"]
+
+
+def test_deadlock() -> None:
+    """Processes that wait for one another are all named, with what they wait for."""
+    error = failure(
+        branches("BEGIN IF n > 1 THEN SIGNAL g ; WAIT e END", "BEGIN IF n = 0 THEN WAIT g ; SIGNAL e END")
+    ).diagnostic
+
+    assert error.code == "E501"
+    assert error.message == "2 processes wait for ever"
+    assert [error.label, *(label.text for label in error.secondary)] == ["branch 1 waits for e", "branch 2 waits for g"]
+
+
+def test_arm_of_two_branches() -> None:
+    """An arm belongs to one branch, also where the checker cannot see who uses it."""
+    text = (
+        "VAR x : ARRAY [2] OF FRAME ; n : SCALAR ; BEGIN n = DIST(WORLD, WORLD) + 1 ;"
+        "AFFIX x[1] TO ARM_1 AT XYZ(0, 0, 0) ; x[2] = WORLD ; COBEGIN BEGIN OPEN ARM_1 END ;"
+        "BEGIN MOVE x[n] TO ARM_1 END COEND END."
+    )
+    error = failure(text).diagnostic
+
+    assert error.code == "E503"
+    assert error.message == "ARM_1 is used by branch 1 and by branch 2 of one COBEGIN"
+
+
+def test_halt_stops_everything() -> None:
+    """HALT in one branch stops the arm of the other in a controlled way, and the frame table knows where."""
+    cell = cell_of("cell2")
+    recording = run(branches("BEGIN PAUSE 0.3 ; HALT END", "BEGIN MOVE ARM_2 TO b END"), cell)
+
+    (stream,) = (one for one in recording.streams if one.arm == "ARM_2")
+    assert "ARM_2 stops" in recording.trace()
+    assert np.abs(stream.qd[-1]).max() == 0
+    assert np.abs(np.diff(stream.qd, axis=0)).max() < 0.1
+    hand = recording.tree.world("ARM_2")[:3, 3]
+    assert 0.01 < np.linalg.norm(hand - down(0.70, 0.15, 0.20)[:3, 3]) < 0.2
+    limit = cell.arms["ARM_2"].arm.limit("acceleration")
+    assert (np.abs(stream.qdd).max(axis=0) <= limit * (1 + 1e-6)).all()
+
+
+def test_an_error_stops_everything() -> None:
+    """What goes wrong in one branch stops the other arm and switches the devices off."""
+    text = branches(
+        "BEGIN OPERATE torch ; PAUSE 0.2 ; a = a * XYZ(5, 0, 0) ; MOVE ARM_1 TO a END", "BEGIN MOVE ARM_2 TO b END"
+    )
+    error = failure(text, cell_of("cell2"))
+
+    assert error.diagnostic.code == "E402"
+    assert error.time > 0.2
+    assert np.linalg.norm(error.tree.world("ARM_2")[:3, 3] - np.array([0.65, 0, 0.25])) > 1e-3
+
+
+def test_recover_around_branches() -> None:
+    """A TRY around COBEGIN catches what goes wrong in a branch, once all branches are stopped."""
+    text = HOME + (
+        "TRY COBEGIN BEGIN READ VISIONS (a) ; PRINT(1) END ; BEGIN MOVE ARM_2 TO b ; PRINT(2) END COEND "
+        "RECOVER PRINT(3) ; MOVE ARM_2 TO b END END."
+    )
+    recording = run(text, cell_of("cell2"))
+
+    assert printed(recording) == ["3"]
+    expect(recording, ARM_2=down(0.70, 0.15, 0.20))
+
+
+def test_same_run_on_any_hash_seed() -> None:
+    """The trace and the joint positions are the same whatever seed Python's hashes have."""
+    script = textwrap.dedent(
+        """
+        import hashlib, sys
+        sys.path[:0] = sys.argv[1:]
+        from program.running import cell_of, corpus_text, run
+        r = run(corpus_text("p08"), cell_of("cell2"))
+        print(hashlib.sha256(repr(r.trace()).encode() + b"".join(s.q.tobytes() for s in r.streams)).hexdigest())
+        """
+    )
+    seen = set()
+    for seed in ("0", "1", "4711"):
+        result = subprocess.run(
+            [sys.executable, "-c", script, *sys.path],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        seen.add(result.stdout)
+
+    assert len(seen) == 1
+
+
+def test_step_limit() -> None:
+    """A loop in which no time goes by is ended with a word on what it needs."""
+    error = failure(HOME + "WHILE n = 0 DO n = 0 END.", limits=Limits(steps=5000)).diagnostic
+
+    assert error.code == "E504"
+    assert "5000 steps" in error.message
+
+
+def test_time_limit() -> None:
+    """A loop that pauses for ever is ended by the clock."""
+    error = failure(HOME + "WHILE n = 0 DO PAUSE 1 END.", limits=Limits(time=60.0)).diagnostic
+
+    assert error.code == "E506"
+    assert "60 s" in error.message
+
+
+def test_hand_over_is_the_corpus_program() -> None:
+    """The program of the corpus has no warning."""
+    from armwright.program import Source, known_cell
+    from armwright.program import compile as translate
+
+    compiled = translate(Source("p08.rlo", corpus_text("p08")), known_cell(cell_of("cell2")))
+
+    assert [one.code for one in compiled.diagnostics if one.is_error] == []
