@@ -1,0 +1,103 @@
+"""``armwright fix``: slips that have one certain cure, cured in place."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armwright.cli.programs import Std
+from armwright.program.words import Standard
+
+if TYPE_CHECKING:
+    from armwright.cell.model import Cell
+    from armwright.program import Compilation, Source
+    from armwright.program.editing.fixing import Fixed, Translate
+
+
+def fix(
+    programs: Annotated[list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO.", show_default=False)],
+    cell: Annotated[
+        Path | None, typer.Option("--cell", help="The cell they will run in; what is left is then checked against it.")
+    ] = None,
+    diff: Annotated[
+        bool, typer.Option("--diff", "--dry-run", help="Write nothing; show what would change and what would be left.")
+    ] = False,
+    std: Std = Standard.RLO_2,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was done and what is left as JSON.")] = False,
+) -> None:
+    """Cure what is certain in RLO programs: a missing `;` or `=`, a matrix row by row, look-alike characters.
+
+    Exit status 0: no program has errors any more; 1: something is left to do by hand.
+
+    **Example:** `armwright fix examples/bench.rlo --diff`
+    """
+    import json
+
+    from armwright.cell.reader import read_cell
+    from armwright.cli.rewriting import print_difference, read_program, write_back
+    from armwright.errors import ArmwrightError
+    from armwright.program.editing.fixing import fixed
+
+    acted_on = read_cell(cell) if cell else None
+    rows: list[dict[str, Any]] = []
+    for path in programs:
+        try:
+            source = read_program(path)
+            result = fixed(source, _translator(path.parent, acted_on, std))
+            if result.cures and not diff:
+                write_back(path, result.text)
+        except ArmwrightError as error:
+            rows.append({"program": str(path), "errors": 1, "error": str(error)})
+            if not as_json:
+                print(f"armwright: {error}", file=sys.stderr)
+            continue
+        rows.append(_as_data(result))
+        if not as_json:
+            if diff and result.cures:
+                print_difference(source, result.text)
+            _print(result, done="could be cured" if diff else "cured")
+    if as_json:
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
+    if any(row["errors"] for row in rows):
+        raise typer.Exit(1)
+
+
+def _translator(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":
+    """Return what finds out what is wrong with a program: in a cell, or in the one it IMPORTs."""
+    from armwright.cli.programs import import_reader
+    from armwright.program import compile as translate
+    from armwright.program import known_cell
+
+    def find(source: "Source") -> "Compilation":
+        read = import_reader(folder)
+        known = known_cell(cell) if cell else None
+        found = translate(source, known, std=std, read_import=read)
+        own = next((one.cell for one in found.imports if one.cell and one.cell.arms), None)
+        if known is None and own is not None:
+            found = translate(source, known_cell(own), std=std, read_import=read)
+        return found
+
+    return find
+
+
+def _print(result: "Fixed", *, done: str) -> None:
+    from armwright.cli.programs import print_diagnostics
+
+    for cure in result.cures:
+        source, start = cure.source, cure.diagnostic.span.start
+        place = f"{source.name}:{source.line(start)}:{source.column(start)}"
+        print(f"{place}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.what}")
+    count = len(result.cures)
+    slips = f"{count} slip{'s' if count > 1 else ''} {done}" if count else "nothing to cure"
+    print(f"{result.compilation.source.name}: {slips}")
+    if result.compilation.diagnostics:
+        print_diagnostics(result.compilation.diagnostics, result.compilation.source)
+
+
+def _as_data(result: "Fixed") -> dict[str, Any]:
+    from armwright.cli.programs import diagnostics_data
+    from armwright.program.diagnostics import to_json
+
+    cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.what} for cure in result.cures]
+    return {**diagnostics_data(result.compilation), "cures": cures}

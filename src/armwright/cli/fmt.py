@@ -1,0 +1,76 @@
+"""``armwright fmt``: programs laid out, in place."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armwright.cli.programs import Std
+from armwright.program.words import Standard
+
+if TYPE_CHECKING:
+    from armwright.program.source import Source
+
+
+def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
+    programs: Annotated[
+        list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
+    ],
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; exit with 1 if something would change.")
+    ] = False,
+    diff: Annotated[bool, typer.Option("--diff", help="Write nothing; show what would change.")] = False,
+    stdout: Annotated[bool, typer.Option("--stdout", help="Print the programs and leave their files alone.")] = False,
+    numbers: Annotated[
+        int | None,
+        typer.Option(min=1, help="Number the lines in steps of this; else they get no numbers.", show_default=False),
+    ] = None,
+    std: Std = Standard.RLO_2,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what became of each program as JSON.")] = False,
+) -> None:
+    """Lay RLO programs out: one statement a line, indented, words of the language in upper case, comments kept.
+
+    A program with a slip of syntax is left alone and told of; the others are written all the same.
+
+    **Example:** `armwright fmt examples/*.rlo --check`
+    """
+    import json
+
+    from armwright.cli.rewriting import INPUT, print_difference, read_program, write_back
+    from armwright.errors import ArmwrightError
+    from armwright.program.editing.formatting import formatted
+
+    rows: list[dict[str, Any]] = []
+    for path in programs:
+        row: dict[str, Any] = {"program": str(path)}
+        rows.append(row)
+        try:
+            source = read_program(path)
+            after = formatted(source, std=std, numbers=numbers)
+            row["changed"] = after != source.text
+            if row["changed"] and not (check or diff or stdout or path == INPUT):
+                write_back(path, after)
+        except ArmwrightError as error:
+            row["error"] = str(error)
+            if not as_json:
+                print(f"armwright: {error}", file=sys.stderr)
+            continue
+        if as_json:
+            continue
+        if diff:
+            print_difference(source, after)
+        elif stdout or (path == INPUT and not check):
+            print(after, end="")
+        else:
+            print(_said(source, changed=row["changed"], check=check))
+    if as_json:
+        print(json.dumps(rows, indent=2, ensure_ascii=False))
+    if any("error" in row or (check and row["changed"]) for row in rows):
+        raise typer.Exit(1)
+
+
+def _said(source: "Source", *, changed: bool, check: bool) -> str:
+    if not changed:
+        return f"as it should be: {source.name}"
+    return f"would change: {source.name}" if check else f"laid out: {source.name}"

@@ -1,0 +1,154 @@
+"""The command ``armwright fmt``, as a user calls it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+WRITTEN = "begin open arm-1 ; { now } grasp end.\n"
+LAID_OUT = "BEGIN\n  OPEN ARM_1 ;  { now }\n  GRASP\nEND.\n"
+
+
+def fmt(
+    *arguments: str | Path, typed: str | bytes = "", folder: Path | None = None
+) -> subprocess.CompletedProcess[bytes]:
+    """Call the command where nobody watches."""
+    return subprocess.run(
+        [sys.executable, "-m", "armwright", "fmt", *map(str, arguments)],
+        capture_output=True,
+        input=typed.encode() if isinstance(typed, str) else typed,
+        check=False,
+        cwd=folder,
+        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONUTF8": "1"},
+        timeout=120,
+    )
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Path:
+    """Return a program that is not laid out."""
+    path = tmp_path / "arm.rlo"
+    path.write_text(WRITTEN)
+    return path
+
+
+def test_in_place(written: Path) -> None:
+    """A program is laid out where it is, and then left as it is."""
+    first, second = fmt(written), fmt(written)
+
+    assert written.read_text() == LAID_OUT
+    assert (first.returncode, first.stdout.decode()) == (0, f"laid out: {written}\n")
+    assert (second.returncode, second.stdout.decode()) == (0, f"as it should be: {written}\n")
+    assert [path.name for path in written.parent.iterdir()] == ["arm.rlo"]
+
+
+def test_check(written: Path) -> None:
+    """With --check nothing is written, and the exit status tells whether something would have been."""
+    result = fmt(written, "--check")
+    assert (result.returncode, result.stdout.decode()) == (1, f"would change: {written}\n")
+    assert written.read_text() == WRITTEN
+
+    written.write_text(LAID_OUT)
+    assert fmt(written, "--check").returncode == 0
+
+
+def test_diff(written: Path) -> None:
+    """With --diff what would change is shown and nothing is written."""
+    result = fmt(written, "--diff")
+
+    assert result.returncode == 0
+    assert result.stdout.decode().splitlines() == [
+        f"--- {written}",
+        f"+++ {written} (changed)",
+        "@@ -1,2 +1,5 @@",
+        "-begin open arm-1 ; { now } grasp end.",
+        *(f"+{line}" for line in LAID_OUT.splitlines()),
+        " ",
+    ]
+    assert written.read_text() == WRITTEN
+
+
+def test_stdout_and_numbers(written: Path) -> None:
+    """With --stdout the program is printed; lines are numbered if wanted."""
+    result = fmt(written, "--stdout", "--numbers", "100")
+
+    assert result.stdout.decode().splitlines() == [
+        "100  BEGIN",
+        "200    OPEN ARM_1 ;  { now }",
+        "300    GRASP",
+        "400  END.",
+    ]
+    assert written.read_text() == WRITTEN
+
+
+def test_standard_input() -> None:
+    """``-`` reads what is typed and prints it."""
+    assert fmt("-", typed=WRITTEN).stdout.decode() == LAID_OUT
+    assert fmt("-", "--check", typed=WRITTEN).returncode == 1
+    assert fmt("-", "--check", typed=LAID_OUT).returncode == 0
+
+
+def test_standard_input_that_is_no_text() -> None:
+    """Bytes that are no text are refused with their line."""
+    result = fmt("-", typed=b"BEGIN\n\xff END.")
+
+    assert result.returncode == 1
+    assert result.stderr.decode() == "armwright: standard input:2: not UTF-8 text: byte 0xff has no meaning\n"
+
+
+def test_wrong_program(written: Path) -> None:
+    """A program with a slip of syntax is left alone and told of; the others are laid out all the same."""
+    wrong, missing = written.with_name("wrong.rlo"), written.with_name("missing.rlo")
+    wrong.write_text("begin\ngrasp grasp\nend.")
+    result = fmt(wrong, missing, written)
+
+    assert result.returncode == 1
+    first, second = result.stderr.decode().splitlines()
+    assert first == f"armwright: {wrong}:2:6: cannot be laid out: missing `;` between two statements (E104)"
+    assert second.startswith(f"armwright: {missing}: no such file")
+    assert wrong.read_text() == "begin\ngrasp grasp\nend."
+    assert written.read_text() == LAID_OUT
+
+
+def test_links_and_rights(written: Path) -> None:
+    """A link stays a link, and who may write a file may go on."""
+    written.chmod(0o640)
+    link = written.with_name("link.rlo")
+    link.symlink_to(written)
+    fmt(link)
+
+    assert link.is_symlink()
+    assert written.read_text() == LAID_OUT
+    assert written.stat().st_mode & 0o777 == 0o640
+
+
+def test_old_standard(written: Path) -> None:
+    """What is a name in RLO-83 is one only with --std=83."""
+    written.write_text("var on : frame; begin read visions(ON) end.")
+
+    assert b"E107" in fmt(written).stderr
+    assert fmt(written, "--std", "83", "--stdout").stdout.decode().splitlines()[2] == "  READ VISIONS (on)"
+
+
+def test_json(written: Path) -> None:
+    """As JSON, each program has its row."""
+    wrong = written.with_name("wrong.rlo")
+    wrong.write_text("begin grasp")
+    result = fmt(written, wrong, "--check", "--json")
+    right, bad = json.loads(result.stdout)
+
+    assert result.returncode == 1
+    assert right == {"program": str(written), "changed": True}
+    assert bad["program"] == str(wrong)
+    assert "the program has no END" in bad["error"]
+
+
+def test_help() -> None:
+    """The help has an example."""
+    result = fmt("--help")
+
+    assert result.returncode == 0
+    assert "armwright fmt examples/*.rlo --check" in result.stdout.decode()
