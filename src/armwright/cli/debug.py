@@ -1,0 +1,107 @@
+"""``armwright debug``: a program step by step, in an editor or on the terminal."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from armwright.cli.programs import CellFile, Std
+from armwright.program.words import Standard
+
+if TYPE_CHECKING:
+    from armwright.program.debugging.editor import Launch, Loaded
+    from armwright.program.recording import Recording
+
+
+def debug(
+    program: Annotated[
+        Path | None,
+        typer.Argument(help="The program; without one, editors are served over stdio.", show_default=False),
+    ] = None,
+    cell: CellFile = None,
+    std: Std = Standard.RLO_2,
+) -> None:
+    """Run an RLO program step by step, forwards and back.
+
+    With a program it is a debugger on the terminal; `help` lists its commands. Without one it speaks the Debug
+    Adapter Protocol over stdin and stdout, for editors: their launch names program, cell, stopOnEntry, std and output.
+
+    **Example:** `armwright debug examples/stacking.rlo --cell examples/stanford_cell.toml`
+    """
+    if program is None:
+        if cell is not None:
+            raise typer.BadParameter("an editor names the cell in its launch", param_hint="--cell")
+        _serve()
+        return
+    from armwright.cli.debug_terminal import Terminal
+    from armwright.program.debugging.editor import Launch, LoadError
+
+    launch = Launch(program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False)
+    try:
+        loaded = load(launch)
+    except LoadError as error:
+        print(error.page, end="")
+        raise typer.Exit(1) from None
+    Terminal(loaded).run()
+
+
+def _serve() -> None:
+    """Speak the protocol; whatever else is printed must not get into it."""
+    import os
+    import sys
+
+    from armwright.program.debugging.adapter import serve
+
+    # Unbuffered, and apart from sys.stdin: a thread may still be reading when the interpreter ends.
+    incoming = os.fdopen(os.dup(0), "rb", buffering=0)
+    outgoing = os.fdopen(os.dup(1), "wb")
+    sys.stdout = sys.stderr
+    serve(incoming, outgoing, load, save)
+
+
+def load(launch: "Launch") -> "Loaded":
+    """Return the program of a session, with its cell.
+
+    Raises:
+        LoadError: it has errors, or no cell to run in.
+        FileFormatError: a file cannot be read.
+    """
+    from armwright.cell.reader import read_cell
+    from armwright.cli.programs import in_its_cell
+    from armwright.program.debugging.editor import Loaded, LoadError
+    from armwright.program.diagnostics import count_line
+    from armwright.program.rendering import render
+
+    given = None if launch.cell is None else read_cell(launch.cell)
+    compiled, place = in_its_cell(launch.program, given, strict=False, std=launch.std)
+    if compiled.code is None:
+        raise LoadError(
+            count_line(compiled.diagnostics, compiled.source), render(compiled.diagnostics, compiled.source)
+        )
+    if place is None:
+        message = f"{launch.program.name} needs a cell to run in, and IMPORTs none"
+        raise LoadError(message, f"{message}\n")
+    return Loaded(code=compiled.code, cell=place, diagnostics=compiled.diagnostics)
+
+
+def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
+    """Write what a run leaves, as ``armwright run -o`` does; return a line that says where.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    from armwright.files.output import write_folder
+    from armwright.program.interpret import warnings
+    from armwright.report.files import Origin, result_files
+
+    assert launch.output is not None  # noqa: S101 - asked for only then
+    origin = Origin(
+        program=launch.program,
+        cell=launch.cell,
+        command="armwright debug",
+        seed=0,
+        options={"std": launch.std.value},
+    )
+    diagnostics = (*loaded.diagnostics, *warnings(recording))
+    write_folder(launch.output, result_files(recording, loaded.code, diagnostics, origin))
+    return f"report: {launch.output / 'report.html'}"

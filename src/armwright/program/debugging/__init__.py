@@ -1,0 +1,1 @@
+"""Watching programs at work: a debugger, and the protocol by which editors speak to it."""

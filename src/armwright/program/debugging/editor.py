@@ -1,0 +1,349 @@
+"""One debugging session of an editor: the program, the debugger, and what the editor has been told so far."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from armwright.cell.model import Cell
+from armwright.errors import ArmwrightError
+from armwright.program.code import Code
+from armwright.program.debugging.breakpoints import Breakpoint
+from armwright.program.debugging.debugger import Command, Debugger
+from armwright.program.debugging.protocol import Arguments, RequestError
+from armwright.program.debugging.stopping import Stop
+from armwright.program.debugging.timeline import Path as ProcessPath
+from armwright.program.debugging.variables import Shown
+from armwright.program.diagnostics import Diagnostic
+from armwright.program.recording import Recording
+from armwright.program.rendering import render
+from armwright.program.source import Span
+from armwright.program.words import Standard
+
+_DESCRIPTIONS = {"start": "back at the start", "data breakpoint": "something has changed"}
+# What the protocol has a word for.
+_REASONS = {"start": "entry"}
+
+
+@attrs.frozen(kw_only=True)
+class Launch:
+    """What a session is asked to run.
+
+    Attributes:
+        program: path of the program.
+        cell: path of the cell; None where the program imports it.
+        std: the language.
+        output: a folder for what a run leaves; None for none.
+        stop_on_entry: whether to stop in front of the first statement.
+        no_debug: whether to run without stops.
+    """
+
+    program: Path
+    cell: Path | None
+    std: Standard
+    output: Path | None
+    stop_on_entry: bool
+    no_debug: bool
+
+
+@attrs.frozen(kw_only=True)
+class Loaded:
+    """A program that can run.
+
+    Attributes:
+        code: the program.
+        cell: what it runs in.
+        diagnostics: warnings.
+    """
+
+    code: Code
+    cell: Cell
+    diagnostics: Sequence[Diagnostic] = ()
+
+
+class LoadError(ArmwrightError, ValueError):
+    """A program cannot run.
+
+    Attributes:
+        page: all that is wrong with it, with the lines.
+    """
+
+    def __init__(self, message: str, page: str) -> None:
+        """Keep both texts."""
+        super().__init__(message)
+        self.page = page
+
+
+Load = Callable[[Launch], Loaded]
+# Writes what a run leaves; returns a line that says so.
+Save = Callable[[Launch, Loaded, Recording], str]
+Send = Callable[[str, Mapping[str, Any]], None]
+
+
+class EditorSession:
+    """The state of a session.
+
+    Attributes:
+        send: sends an event.
+        debugger: None until a program is launched.
+        launch: what was asked for.
+        loaded: what became of it.
+        configured: whether breakpoints have been told, so that the program may begin.
+        begun: whether it has.
+        ended: whether its end has been told.
+        wanted: the breakpoints that were asked for, with their numbers.
+        watched: what shall be watched: number, where it is kept, condition, count.
+        catches: the errors to stop at, ``uncaught`` and ``caught``.
+        frames: of the stacks that the editor has seen, process and level.
+        opened: what the editor can open, with process and level.
+        numbers: of the breakpoints as the editor knows them, by those of the debugger.
+    """
+
+    def __init__(self, load: Load, save: Save, send: Send) -> None:
+        """Start without a program."""
+        self._load, self._save, self.send = load, save, send
+        self.debugger: Debugger | None = None
+        self.launch: Launch | None = None
+        self.loaded: Loaded | None = None
+        self.configured = self.begun = self.ended = False
+        self.first_line = self.first_column = 1
+        self.wanted: list[tuple[int, Arguments]] = []
+        self.watched: list[tuple[int, str, str, str]] = []
+        self.numbers: dict[int, int] = {}
+        self.catches = frozenset({"uncaught"})
+        self._count = 0
+        self._threads: dict[ProcessPath, int] = {(): 1}
+        self._alive: set[int] = set()
+        self.frames: list[tuple[ProcessPath, int]] = []
+        self.opened: list[tuple[Shown, ProcessPath, int]] = []
+
+    # ---- the program -----------------------------------------------------------------------------------------------
+
+    def start(self, launch: Launch) -> None:
+        """Load a program.
+
+        Raises:
+            LoadError: it has errors.
+            ArmwrightError: a file cannot be read.
+        """
+        try:
+            loaded = self._load(launch)
+        except LoadError as error:
+            self.say(error.page, "stderr")
+            raise
+        self.launch, self.loaded = launch, loaded
+        self.debugger = Debugger(loaded.code, loaded.cell)
+        self.begun = self.ended = False
+        self.forget_places()
+        self.catch()
+        if loaded.diagnostics:
+            self.say(render(loaded.diagnostics, loaded.code.source), "console")
+        self.bind()
+
+    def begin(self) -> None:
+        """Let the program run, once it is loaded and the breakpoints are known."""
+        if self.debugger is None or self.launch is None or not self.configured or self.begun:
+            return
+        self.begun = True
+        if self.launch.no_debug:
+            self.debugger.clear(breakpoints=True, watches=True)
+            self.debugger.catch(uncaught=False, caught=False)
+        self.debugger.begin(stop_on_entry=self.launch.stop_on_entry and not self.launch.no_debug)
+        self.send("thread", {"reason": "started", "threadId": 1})
+        self._alive = {1}
+
+    def catch(self) -> None:
+        """Stop at the errors that were asked for."""
+        if self.debugger is not None:
+            self.debugger.catch(uncaught="uncaught" in self.catches, caught="caught" in self.catches)
+
+    @property
+    def live(self) -> Debugger:
+        """The debugger of the program.
+
+        Raises:
+            RequestError: no program has been launched.
+        """
+        if self.debugger is None:
+            raise RequestError("no program has been launched")
+        return self.debugger
+
+    @property
+    def standing(self) -> Debugger:
+        """The debugger of a program that stands still.
+
+        Raises:
+            RequestError: it does not, or there is none.
+        """
+        debugger = self.live
+        if debugger.running or not self.begun:
+            raise RequestError("the program is running" if self.begun else "the program has not begun")
+        return debugger
+
+    def go(self, command: Command, path: ProcessPath) -> None:
+        """Let the program go on.
+
+        Raises:
+            RequestError: it does not stand still, or is over.
+        """
+        self.standing.resume(command, path)
+        self.forget_places()
+
+    def work(self, seconds: float) -> None:
+        """Do a slice of what the program has to do; tell what came of it."""
+        debugger = self.live
+        stop = debugger.work(seconds)
+        self._tell_news(debugger)
+        if stop is not None and not debugger.running:
+            self.told(stop)
+
+    def told(self, stop: Stop) -> None:
+        """Tell why the program stands still."""
+        debugger = self.live
+        if stop.over:
+            self._end(stop)
+            return
+        self._tell_threads(debugger)
+        self.send(
+            "stopped",
+            {
+                "reason": _REASONS.get(stop.reason, stop.reason),
+                "description": stop.text or _DESCRIPTIONS.get(stop.reason, stop.reason),
+                "threadId": self.thread(stop.path),
+                "allThreadsStopped": True,
+                **({"text": stop.text} if stop.text else {}),
+                **({"hitBreakpointIds": [self.numbers[one] for one in stop.numbers]} if stop.numbers else {}),
+            },
+        )
+
+    def _end(self, stop: Stop) -> None:
+        """The program is over: its output is written, and the editor told."""
+        if self.ended:
+            return
+        self.ended = True
+        assert self.loaded is not None  # noqa: S101 - it has run
+        if stop.diagnostic is not None:
+            self.say(render([stop.diagnostic], self.loaded.code.source), "stderr")
+        elif self.launch is not None and self.launch.output is not None:
+            try:
+                self.say(self._save(self.launch, self.loaded, self.live.recording()) + "\n", "console")
+            except ArmwrightError as error:
+                self.say(f"{error}\n", "stderr")
+        self.send("exited", {"exitCode": 0 if stop.reason == "end" else 1})
+        self.send("terminated", {})
+
+    def give_up(self) -> None:
+        """End the program where it is."""
+        if not self.ended and self.debugger is not None:
+            if self.debugger.running:
+                self.debugger.pause()
+            self.ended = True
+            self.send("exited", {"exitCode": 1})
+            self.send("terminated", {})
+
+    # ---- what is told ----------------------------------------------------------------------------------------------
+
+    def say(self, text: str, category: str, span: Span | None = None) -> None:
+        """Show a text to the user, with the place in the program that it comes from."""
+        place = {} if span is None else {"source": self.source(), **self.place(span, whole=False)}
+        self.send("output", {"category": category, "output": text, **place})
+
+    def _tell_news(self, debugger: Debugger) -> None:
+        for effect in debugger.news():
+            if effect.kind == "PRINT":
+                self.say(f"{effect.data['printed']}\n", "stdout", effect.span)
+            elif effect.kind == "ERROR":
+                self.say(f"recovered: {effect.text}\n", "stderr", effect.span)
+        for text, breakpoint_ in debugger.said():
+            self.say(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)
+
+    def _tell_threads(self, debugger: Debugger) -> None:
+        alive = {self.thread(one.path) for one in debugger.processes}
+        for number in sorted(alive - self._alive):
+            self.send("thread", {"reason": "started", "threadId": number})
+        for number in sorted(self._alive - alive):
+            self.send("thread", {"reason": "exited", "threadId": number})
+        self._alive = alive
+
+    # ---- numbers of threads, places and breakpoints ----------------------------------------------------------------
+
+    def thread(self, path: ProcessPath) -> int:
+        """Return the number of a process."""
+        return self._threads.setdefault(path, len(self._threads) + 1)
+
+    def process(self, number: int) -> ProcessPath:
+        """Return the process of a number.
+
+        Raises:
+            RequestError: there is none.
+        """
+        for path, known in self._threads.items():
+            if known == number and any(one.path == path for one in self.live.processes):
+                return path
+        raise RequestError(f"there is no thread {number}")
+
+    def forget_places(self) -> None:
+        """Frames and variables have other numbers after the next stop."""
+        self.frames.clear()
+        self.opened.clear()
+
+    def source(self) -> dict[str, Any]:
+        """Return what the editor has to know of the text."""
+        assert self.launch is not None  # noqa: S101 - asked for only with a program
+        return {"name": self.launch.program.name, "path": str(self.launch.program)}
+
+    def place(self, span: Span, *, whole: bool = True) -> dict[str, int]:
+        """Return where a stretch of the text is, in the numbers of the editor."""
+        assert self.loaded is not None  # noqa: S101 - asked for only with a program
+        source = self.loaded.code.source
+        line, column = self.first_line - 1, self.first_column - 1
+        start = {"line": source.line(span.start) + line, "column": source.column(span.start) + column}
+        if not whole:
+            return start
+        return {
+            **start,
+            "endLine": source.line(span.end) + line,
+            "endColumn": source.column(span.end) + column,
+        }
+
+    def number(self) -> int:
+        """Return a new number for a breakpoint."""
+        self._count += 1
+        return self._count
+
+    def bind(self) -> None:
+        """Set the breakpoints that were asked for before there was a program."""
+        if self.debugger is None:
+            return
+        self.debugger.clear(breakpoints=True)
+        for number, wanted in self.wanted:
+            self.send("breakpoint", {"reason": "changed", "breakpoint": self.bound(number, wanted)})
+        for watched in self.watched:
+            self.watch(*watched)
+
+    def watch(self, number: int, kept: str, condition: str, hits: str) -> dict[str, Any]:
+        """Watch a frame or a variable; return what the editor has to know of it."""
+        try:
+            watch = self.live.watch(kept, condition=condition.strip(), hits=hits.strip())
+        except ArmwrightError as error:
+            return {"id": number, "verified": False, "message": str(error)}
+        self.numbers[watch.number] = number
+        return {"id": number, "verified": True}
+
+    def bound(self, number: int, wanted: Arguments) -> dict[str, Any]:
+        """Set a breakpoint; return what the editor has to know of it."""
+        if self.debugger is None:
+            return {"id": number, "verified": False, "message": "no program has been launched"}
+        column = wanted.whole("column") - self.first_column + 1 if "column" in wanted else None
+        found: Breakpoint = self.debugger.break_at(
+            wanted.whole("line") - self.first_line + 1,
+            column,
+            condition=wanted.text("condition", "").strip(),
+            hits=wanted.text("hitCondition", "").strip(),
+            log=wanted.text("logMessage", ""),
+        )
+        self.numbers[found.number] = number
+        if found.start is None:
+            return {"id": number, "verified": False, "message": found.message}
+        return {"id": number, "verified": True, "source": self.source(), **self.place(found.start.span)}

@@ -1,0 +1,148 @@
+"""The outside of the Debug Adapter Protocol: messages on a stream, and what a request must bring with it.
+
+Source:
+    Debug Adapter Protocol, base protocol: a header with Content-Length, an empty line, JSON in UTF-8.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, BinaryIO, NamedTuple, TypeVar
+
+from armwright.errors import ArmwrightError
+
+T = TypeVar("T")
+
+# No request is longer; what claims to be is noise.
+_LONGEST = 16 << 20
+_LONGEST_HEADER = 8192
+_LENGTH = re.compile(rb"(?i)^content-length[ \t]*:[ \t]*([0-9]{1,9})[ \t]*$", re.MULTILINE)
+_CHUNK = 65536
+
+
+class RequestError(ArmwrightError, ValueError):
+    """A request cannot be answered; the text goes back to who sent it."""
+
+
+class Noise(NamedTuple):
+    """What came in and is no message."""
+
+    text: str
+
+
+def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
+    """Give what comes in, one after the other, until the stream ends."""
+    waiting = b""
+    while True:
+        # An empty line ends a header; blank lines in front of one are nobody's.
+        waiting = waiting.lstrip(b"\r\n")
+        end = re.search(rb"\r?\n\r?\n", waiting)
+        if end is None:
+            if len(waiting) > _LONGEST_HEADER:
+                yield Noise("a header without an end")
+                waiting = b""
+            more = stream.read(_CHUNK)
+            if not more:
+                return
+            waiting += more
+            continue
+        header, waiting = waiting[: end.start()], waiting[end.end() :]
+        length = _LENGTH.search(header.replace(b"\r\n", b"\n"))
+        if length is None or int(length[1]) > _LONGEST:
+            yield Noise("a header without a Content-Length that makes sense")
+            continue
+        size = int(length[1])
+        while len(waiting) < size:
+            more = stream.read(_CHUNK)
+            if not more:
+                return
+            waiting += more
+        body, waiting = waiting[:size], waiting[size:]
+        yield _message(body)
+
+
+def _message(body: bytes) -> dict[str, Any] | Noise:
+    try:
+        message = json.loads(body.decode())
+    except (ValueError, RecursionError):
+        return Noise("a message that is no JSON")
+    return message if isinstance(message, dict) else Noise("a message that is no object")
+
+
+def framed(message: Mapping[str, Any]) -> bytes:
+    """Return a message as it is sent."""
+    body = json.dumps(message, ensure_ascii=False).encode("utf-8", "backslashreplace")
+    return b"Content-Length: %d\r\n\r\n%s" % (len(body), body)
+
+
+class Arguments:
+    """What a request brings with it."""
+
+    def __init__(self, given: object) -> None:
+        """Take the arguments of a request.
+
+        Raises:
+            RequestError: they are no object.
+        """
+        self.given: dict[str, Any] = {} if given is None else _as(given, dict, "arguments", "an object")
+
+    def __contains__(self, key: str) -> bool:
+        """Whether something is given, and not null."""
+        return self.given.get(key) is not None
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return a text.
+
+        Raises:
+            RequestError: it is missing, and there is no default, or is no text.
+        """
+        return self._one(key, str, "a text", default)
+
+    def whole(self, key: str, default: int | None = None) -> int:
+        """Return a whole number.
+
+        Raises:
+            RequestError: it is missing, and there is no default, or is no whole number.
+        """
+        value: object = self._one(key, int, "a whole number", default)
+        if isinstance(value, bool):
+            raise RequestError(f"{key}: expected a whole number, got {value}")
+        return _as(value, int, key, "a whole number")
+
+    def flag(self, key: str, *, default: bool = False) -> bool:
+        """Return a truth value.
+
+        Raises:
+            RequestError: it is none.
+        """
+        return self._one(key, bool, "true or false", default)
+
+    def parts(self, key: str) -> "list[Arguments]":
+        """Return a list of objects; an empty one where it is missing.
+
+        Raises:
+            RequestError: it is no list of objects.
+        """
+        return [Arguments(one) for one in self._one(key, list, "a list", [])]
+
+    def part(self, key: str) -> "Arguments":
+        """Return an object.
+
+        Raises:
+            RequestError: it is missing or none.
+        """
+        return Arguments(self._one(key, dict, "an object", None))
+
+    def _one(self, key: str, kind: type[T], what: str, default: T | None) -> T:
+        value = self.given.get(key)
+        if value is None:
+            if default is None:
+                raise RequestError(f"{key}: missing, expected {what}")
+            return default
+        return _as(value, kind, key, what)
+
+
+def _as(value: object, kind: type[T], key: str, what: str) -> T:
+    if not isinstance(value, kind):
+        raise RequestError(f"{key}: expected {what}, got {str(value)[:40]!r}")
+    return value

@@ -1,0 +1,91 @@
+"""The command ``armwright debug`` on a terminal, as a user types into it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+BENCH, STANFORD = EXAMPLES / "bench.rlo", EXAMPLES / "stanford_cell.toml"
+
+
+def debug(*commands: str, program: Path = BENCH) -> tuple[int, list[str]]:
+    """Type commands into a debugger; return its exit status and what it says, without its prompts."""
+    done = subprocess.run(
+        [sys.executable, "-m", "armwright", "debug", str(program), "--cell", str(STANFORD)],
+        input="".join(f"{one}\n" for one in commands),
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "NO_COLOR": "1"},
+        timeout=120,
+    )
+    assert done.stderr == ""
+    return done.returncode, done.stdout.replace("(rlo) ", "").splitlines()
+
+
+def test_steps_and_values() -> None:
+    """Each step shows the line that it ends at; values are worked out, changed, and forgotten on the way back."""
+    status, said = debug("n", "", "b 11", "c", "p DIST(obj1, apf1)", "set obj2 = obj1 * t1", "where", "back", "q")
+
+    assert status == 0
+    assert said[:4] == [
+        "    0.000 s  program, line 5",
+        "    5      station = (1,0,0, 0,1,0, 0,0,1, 0.45,0,0) ;",
+        "    0.000 s  program, line 6",
+        "    6      obj1    = (1,0,0, 0,-1,0, 0,0,-1, 0.40,0.15,0.05) ;",
+    ]
+    assert "breakpoint 1 in line 11" in said
+    assert "    0.000 s  program, line 11: breakpoint" in said
+    assert "0.1  SCALAR" in said
+    assert "(1,0,0, 0,-1,0, 0,0,-1, 0.4,0.15,0.15)" in said
+    assert "*1  program, line 11: move ARM-1 to obj1 with approach = apf1 ," in said
+    assert said[-2:] == ["    0.000 s  program, line 10", "   10      affix apf1 to obj1 at t1 ;"]
+
+
+def test_stages_ticks_and_the_end() -> None:
+    """Stages and ticks of a MOVE can be stepped through, a frame watched, and a finished program taken back."""
+    _, said = debug("b 11", "c", "g", "t 5", "d apf1", "x 1", "c", "frames", "c", "back", "q")
+
+    assert "    0.000 s  program, line 11: ARM_1 begins PTP apf1" in said
+    assert "    0.005 s  program, line 11" in said
+    assert any(line.endswith("line 14: apf1 begins to move with ARM_1") for line in said)
+    assert any(line.startswith("      apf1  (") for line in said), "apf1 hangs on obj1, which hangs on the arm"
+    assert any(line.endswith("the program is over; it can still be taken back") for line in said)
+    assert said[-1] == "   15  end."
+
+
+def test_slips_of_the_user() -> None:
+    """What the debugger does not understand it says, and goes on."""
+    status, said = debug("jump", "b soon", "b 99", "p nobody", "x 7", "set 1 = 2", "th 3", "help", "q")
+
+    assert status == 0
+    assert "no command `jump`; `help` lists them" in said
+    assert "expected a whole number, got `soon`" in said
+    assert "no statement begins here or further down" in said
+    assert any(line.startswith("`nobody` is not declared") for line in said)
+    assert "there is no breakpoint 7" in said
+    assert "`1` cannot be given a value" in said
+    assert "expected 1 to 1, the number of a process" in said
+    assert any(line.startswith("n         next statement") for line in said)
+
+
+def test_a_program_that_goes_wrong(tmp_path: Path) -> None:
+    """An error is shown with its line, and the program stands in front of it."""
+    program = tmp_path / "wrong.rlo"
+    program.write_text("VAR n : SCALAR ;\nBEGIN\n  n = 0 ;\n  PRINT(1 / n)\nEND.\n")
+    _, said = debug("c", "p n", "c", "q", program=program)
+
+    assert "error[E240]: 1 cannot be divided by 0" in said
+    assert "    0.000 s  program, line 4: 1 cannot be divided by 0" in said
+    assert "0  SCALAR" in said
+
+
+def test_a_program_that_cannot_run(tmp_path: Path) -> None:
+    """A program with errors is not debugged; its messages are printed and the status is 1."""
+    program = tmp_path / "wrong.rlo"
+    program.write_text("BEGIN\n  OPNE ARM_1\nEND.\n")
+    status, said = debug(program=program)
+
+    assert status == 1
+    assert said[0] == "error[E105]: unknown statement `OPNE`"
