@@ -1,0 +1,228 @@
+"""``armwright repl``: statements done as they are typed, in a simulated cell."""
+
+import contextlib
+import io
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from armwright.cli.programs import CellFile, Std
+from armwright.errors import ArmwrightError
+from armwright.program.words import Standard
+
+if TYPE_CHECKING:
+    from armwright.cli.repl_commands import Commands
+    from armwright.cli.repl_lines import Lines
+    from armwright.program.interactive.session import Answer, Session
+
+
+def repl(
+    program: Annotated[Path | None, typer.Argument(help="A program to begin with, in RLO.", show_default=False)] = None,
+    cell: CellFile = None,
+    std: Std = Standard.RLO_2,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print one line of JSON for each input, without prompts.")
+    ] = False,
+) -> None:
+    """Try RLO out: each statement is done as it is entered, in a simulated cell, and can be taken back.
+
+    An expression shows its value, :frames the frame tree, :undo goes back, :save writes the session as a program,
+    :help tells the rest. Names and words are completed with the tab key. Without a terminal the lines of the
+    standard input are taken, and the exit status is 1 if anything went wrong.
+
+    **Example:** `armwright repl --cell examples/stanford_cell.toml`
+    """
+    from armwright.cli.programs import import_reader
+    from armwright.cli.repl_commands import COMMANDS, Commands
+    from armwright.cli.repl_lines import Script, Terminal, editing
+    from armwright.program.interactive.session import Session
+
+    session = Session(_read(cell), std, import_reader(Path()))
+    commands = Commands(session, cell)
+    watched = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
+    talk = _Json(session) if as_json else _Talk()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Whoever feeds a pipe waits for answers.
+        sys.stdout.reconfigure(line_buffering=True)
+    if program is not None:
+        talk.answer(commands.load_file(program))
+    if not watched:
+        _converse(session, commands, Script(), talk)
+        if talk.wrong:
+            raise typer.Exit(1)
+        return
+    _greet(session)
+    with _interruptible(), editing(session, COMMANDS):
+        _converse(session, commands, Terminal(colour=_colour()), talk)
+
+
+def _read(path: Path | None) -> "Any":
+    if path is None:
+        return None
+    from armwright.cell.reader import read_cell
+
+    return read_cell(path)
+
+
+@contextlib.contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C abandon a line or a statement, and not the session."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _colour() -> bool:
+    return not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") != "dumb"
+
+
+def _greet(session: "Session") -> None:
+    from armwright.version import __version__
+
+    cell, language = session.state.cell, "RLO-83" if session.std is Standard.RLO_83 else "RLO-2"
+    where = f"in '{cell.name}' with {', '.join(sorted(cell.arms))}" if cell.arms else "without arms (see --cell)"
+    print(f"armwright {__version__}: {language} {where}. :help tells more, Ctrl-D ends.")
+
+
+# ---- the conversation ----------------------------------------------------------------------------------------------
+
+
+def _converse(session: "Session", commands: "Commands", lines: "Lines", talk: "_Talk") -> None:
+    """Take lines until there are no more."""
+    from armwright.cli.repl_commands import EndOfSessionError
+
+    begun = ""
+    while True:
+        number = session.line + begun.count("\n")
+        try:
+            line = lines.line(f"... {number}> " if begun else f"rlo {number}> ")
+        except KeyboardInterrupt:
+            print()
+            # Lines that were seen keep their numbers.
+            session.pass_over(begun)
+            begun = ""
+            continue
+        if line is None:
+            break
+        try:
+            begun = _one(session, commands, begun, line, talk)
+        except EndOfSessionError:
+            return
+        except KeyboardInterrupt:
+            begun = ""
+            talk.interrupted()
+    if begun:
+        talk.answer(session.enter(begun, whole=True))
+
+
+def _one(session: "Session", commands: "Commands", begun: str, line: str, talk: "_Talk") -> str:
+    """Take one line; return what has to be gone on with."""
+    if not begun and line.lstrip().startswith(":"):
+        session.pass_over(line)
+        talk.command(commands, line)
+        return ""
+    text = f"{begun}{line}\n"
+    answer = session.enter(text)
+    if not answer.complete:
+        return text
+    talk.answer(answer)
+    return ""
+
+
+class _Talk:
+    """Shows people what came of their inputs.
+
+    Attributes:
+        wrong: whether anything went wrong so far.
+    """
+
+    def __init__(self) -> None:
+        from rich.console import Console
+
+        self.wrong = False
+        self._console = Console(markup=False, highlight=False, soft_wrap=True)
+
+    def answer(self, answer: "Answer") -> None:
+        """Show what was done, in order, and then what is wrong."""
+        from armwright.cli.programs import print_diagnostics
+        from armwright.program.interactive.taken_back import SILENT
+
+        self.wrong = self.wrong or answer.is_wrong
+        for effect in answer.effects:
+            if effect.kind == "PRINT":
+                self._console.print(effect.data["printed"])
+            elif effect.kind not in SILENT:
+                self._console.print(f"{effect.t1:9.3f}  {effect.text}", style="dim")
+        if answer.diagnostics:
+            print_diagnostics(answer.diagnostics, answer.source)
+        for remark in answer.remarks:
+            self._console.print(remark, style="yellow")
+
+    def command(self, commands: "Commands", line: str) -> None:
+        """Do a command and show what it says."""
+        try:
+            reply = commands.run(line)
+        except ArmwrightError as error:
+            self.wrong = True
+            self._console.print(f"error: {error}", style="bold red")
+            return
+        for text in reply.lines:
+            self._console.print(text)
+        if reply.answer is not None:
+            self.answer(reply.answer)
+
+    def interrupted(self) -> None:
+        """Say what became of a statement that was interrupted."""
+        self._console.print("interrupted; the statement under way was taken back", style="yellow")
+
+
+class _Json(_Talk):
+    """Gives programs one line of JSON for each input."""
+
+    def __init__(self, session: "Session") -> None:
+        super().__init__()
+        self._session = session
+
+    def answer(self, answer: "Answer") -> None:
+        """Give an answer as plain data."""
+        self.wrong = self.wrong or answer.is_wrong
+        self._give(_as_data(answer))
+
+    def command(self, commands: "Commands", line: str) -> None:
+        """Give what a command says, line by line, and what it entered, if it did."""
+        data: dict[str, Any] = {"command": line.strip()}
+        try:
+            reply = commands.run(line)
+        except ArmwrightError as error:
+            self.wrong = True
+            self._give({**data, "ok": False, "error": str(error)})
+            return
+        entered = {} if reply.answer is None else _as_data(reply.answer)
+        self.wrong = self.wrong or not entered.get("ok", True)
+        self._give({**data, "ok": True, "lines": list(reply.lines), **entered})
+
+    def _give(self, data: dict[str, Any]) -> None:
+        print(json.dumps({**data, "time": self._session.state.machine.now}, ensure_ascii=False))
+
+
+def _as_data(answer: "Answer") -> dict[str, Any]:
+    from armwright.program.diagnostics import to_json
+
+    return {
+        "ok": not answer.is_wrong,
+        "printed": list(answer.printed),
+        "effects": [
+            {"t0": one.t0, "t1": one.t1, "kind": one.kind, "arm": one.arm, "text": one.text, **one.data}
+            for one in answer.effects
+        ],
+        "diagnostics": [to_json(one, answer.source) for one in answer.diagnostics],
+        "remarks": list(answer.remarks),
+    }
