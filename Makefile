@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test bench edges examples pictures clean
+.PHONY: help demo test bench edges examples pictures editor fuzz clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -38,17 +38,32 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/portable.rlo --cell examples/stanford_cell.toml -o out/portable
 	$(BIN)/armwright run examples/gearbox.rlo --cell examples/puma_cell.toml -o out/gearbox
 	$(BIN)/armwright run examples/around.rlo --cell examples/puma_cell.toml --around via -o out/around
+	$(BIN)/armwright run examples/palletise.rlo --cell examples/stanford_cell.toml -o out/palletise
+	$(BIN)/armwright run examples/weld.rlo --cell examples/stanford_cell.toml -o out/weld
+	$(BIN)/armwright run examples/peg.rlo --cell examples/peg_cell.toml -o out/peg
+	$(BIN)/armwright run examples/hand_over.rlo --cell examples/two_arms.toml -o out/hand_over
 	$(BIN)/armwright move joint puma560 examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 
 pictures: $(VENV)/core  ## Draw the pictures of the physics pages
 	$(BIN)/python docs/pictures/make.py
 
+messages: $(VENV)/core  ## Write the page of all messages
+	$(BIN)/python docs/make_messages.py
+
 bench: $(VENV)/bench  ## Measure against the peers, one core each
 	PYTHONPATH=tests $(BIN)/python benchmarks/run.py
 
 edges: $(VENV)/bench  ## Measure inverse kinematics at its edges, beside the peers (6 minutes)
 	PYTHONPATH=tests $(BIN)/python benchmarks/inverse_edges.py
+
+editor:           ## Build, check and package the VS Code extension (needs npm)
+	cd editors/vscode && npm ci && npm run check && npm run build && npm test && npm run package
+
+fuzz: $(VENV)/test  ## Fuzz everything that reads what a user types, a million inputs each (hours; TARGET=cell RUNS=1000)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
+	for target in $(or $(TARGET),tokens program format cell code); do \
+	    $(BIN)/python fuzz/fuzz.py $$target -runs=$(or $(RUNS),1000000) || exit 1; done
 
 clean:            ## Remove what was built
 	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -25,8 +25,9 @@ ALL = (
     "motion_path",
     "motion_knots",
     "motion_online",
+    "language",
 )
-PEERS = ("pin", "roboticstoolbox-python", "eaik", "ruckig", "toppra", "numpy", "numba", "scipy")
+PEERS = ("pin", "roboticstoolbox-python", "eaik", "ruckig", "toppra", "lark", "numpy", "numba", "scipy")
 
 
 def main() -> None:

@@ -10,11 +10,18 @@ import typer
 
 from armwright.cli.arms import arms
 from armwright.cli.check import check
+from armwright.cli.code import code
 from armwright.cli.convert import convert
+from armwright.cli.debug import debug
+from armwright.cli.explain import explain
+from armwright.cli.fix import fix
+from armwright.cli.fmt import fmt
 from armwright.cli.forward import forward, jacobian
 from armwright.cli.inverse import inverse
 from armwright.cli.kernel import kernel
+from armwright.cli.lsp import lsp
 from armwright.cli.move import move
+from armwright.cli.repl import repl
 from armwright.cli.run import run
 from armwright.cli.show import show
 from armwright.cli.simulate import simulate
@@ -34,6 +41,13 @@ app = typer.Typer(
 )
 app.command()(run)
 app.command()(check)
+app.command()(explain)
+app.command()(repl)
+app.command()(debug)
+app.command()(fmt)
+app.command()(fix)
+app.command()(lsp)
+app.command()(code)
 app.command()(arms)
 app.command()(show)
 app.command()(convert)

@@ -1,0 +1,142 @@
+"""Coverage-guided fuzzing of everything that reads what a user types: `python fuzz/fuzz.py TARGET [-runs=N]`.
+
+Targets are `tokens` (the lexer), `program` (lexer, parser, checker, flow and translator, both languages), `format` (the
+formatter on what has no errors), `cell` (cell files, TOML and JSON) and `code` (the text form of intermediate code).
+An input fails when anything but the reader's own error is raised, when it takes more than a second, or when memory
+grows beyond 2 GB. Inputs that reach new code are kept in `out/fuzz/TARGET`; a run without limits goes on from them.
+"""
+
+import contextlib
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import atheris
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+KEPT = ROOT / "out" / "fuzz"
+
+with atheris.instrument_imports(include=["armwright"]):
+    from armwright.cell.reader import read_cell
+    from armwright.errors import ArmwrightError, FileFormatError
+    from armwright.program import Source
+    from armwright.program import compile as translate
+    from armwright.program.assembly import assemble, assembly
+    from armwright.program.editing.formatting import formatted
+    from armwright.program.numbering import without_numbers
+    from armwright.program.rendering import render
+    from armwright.program.tokens import scan
+    from armwright.program.words import VOCABULARIES, Standard
+
+
+def _text(data: bytes) -> str:
+    """Return any text: bytes that are no UTF-8 become characters of their own, as no file can hold them."""
+    return data.decode("utf-8", errors="surrogateescape").encode("utf-8", "replace").decode("utf-8")
+
+
+def tokens(data: bytes) -> None:
+    """Every character is in a token, a comment, a blank or a diagnostic; tokens are in order."""
+    source = Source("fuzz.rlo", _text(data))
+    text, _ = without_numbers(source)
+    for std in Standard:
+        found = scan(source, text, std)
+        at = 0
+        for token in found.tokens:
+            assert at <= token.start <= token.end <= len(text)
+            at = token.start
+
+
+def program(data: bytes) -> None:
+    """A program is translated, or something is said about it; what is said can be shown."""
+    source = Source("fuzz.rlo", _text(data))
+    for std in Standard:
+        compiled = translate(source, std=std)
+        assert (compiled.code is None) == any(one.is_error for one in compiled.diagnostics)
+        render(compiled.diagnostics, source)
+        if compiled.code is not None:
+            assert assemble(assembly(compiled.code)) == compiled.code
+
+
+def layout(data: bytes) -> None:
+    """What has been formatted once stays as it is."""
+    source = Source("fuzz.rlo", _text(data))
+    try:
+        once = formatted(source, std=Standard.RLO_2)
+    except ArmwrightError:
+        return
+    assert formatted(Source("fuzz.rlo", once), std=Standard.RLO_2) == once
+
+
+def cell(data: bytes) -> None:
+    """A cell file is read, or refused with file and line."""
+    with tempfile.TemporaryDirectory() as folder:
+        for suffix in (".toml", ".json"):
+            path = Path(folder) / f"cell{suffix}"
+            path.write_bytes(data)
+            # Anything else than this error is a fault of the reader.
+            with contextlib.suppress(FileFormatError):
+                read_cell(path)
+
+
+def code(data: bytes) -> None:
+    """Code is read, or refused with the number of the line; what is read can be written."""
+    try:
+        found = assemble(_text(data))
+    except FileFormatError:
+        return
+    assert assemble(assembly(found)) == found
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {
+    "tokens": tokens,
+    "program": program,
+    "format": layout,
+    "cell": cell,
+    "code": code,
+}
+
+
+def seeds(name: str) -> Path:
+    """Write the programs, cells or codes of the tests as first inputs; return their folder."""
+    folder = KEPT / name
+    folder.mkdir(parents=True, exist_ok=True)
+    corpus = ROOT / "tests" / "program"
+    if name == "cell":
+        paths = [*(corpus / "corpus").glob("*.json"), *(ROOT / "examples").glob("*cell*.toml")]
+    else:
+        paths = [*corpus.rglob("*.rlo"), *(ROOT / "examples").glob("*.rlo")]
+    for path in paths:
+        content = path.read_bytes()
+        if name == "code":
+            made = translate(Source(path.name, content.decode())).code
+            if made is None:
+                continue
+            content = assembly(made).encode()
+        (folder / f"seed-{path.parent.name}-{path.name}").write_bytes(content)
+    return folder
+
+
+def dictionary() -> Path:
+    """Write the words of the language for the mutations."""
+    words = sorted(VOCABULARIES[Standard.RLO_2].reserved | {"ARM_1", "XYZ", "ROTZ", "DIST", "INV", "FORCE"})
+    path = KEPT / "words.dict"
+    path.write_text("".join(f'"{word}"\n' for word in words))
+    return path
+
+
+def main() -> None:
+    """Fuzz one target; further arguments are libFuzzer's."""
+    if len(sys.argv) < 2 or sys.argv[1] not in TARGETS:
+        sys.exit(f"usage: python fuzz/fuzz.py {{{','.join(TARGETS)}}} [-runs=1000000]")
+    name = sys.argv[1]
+    test = TARGETS[name]
+    folder = seeds(name)
+    options = ["-timeout=1", "-rss_limit_mb=2048", "-max_len=4096", f"-dict={dictionary()}", "-print_final_stats=1"]
+    atheris.Setup([sys.argv[0], *options, f"-artifact_prefix={KEPT}/{name}-", *sys.argv[2:], str(folder)], test)
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main()
