@@ -23,12 +23,12 @@ with atheris.instrument_imports(include=["armwright"]):
     from armwright.errors import ArmwrightError, FileFormatError
     from armwright.program import Source
     from armwright.program import compile as translate
-    from armwright.program.assembly import assemble, assembly
     from armwright.program.editing.formatting import formatted
-    from armwright.program.numbering import without_numbers
-    from armwright.program.rendering import render
-    from armwright.program.tokens import scan
-    from armwright.program.words import VOCABULARIES, Standard
+    from armwright.program.intermediate.assembly import assemble, assembly
+    from armwright.program.messages.rendering import render
+    from armwright.program.text.numbering import without_numbers
+    from armwright.program.text.tokens import scan
+    from armwright.program.text.words import VOCABULARIES, Standard
 
 
 def _text(data: bytes) -> str:

@@ -7,8 +7,8 @@ from pathlib import Path
 from armwright.errors import FileFormatError
 from armwright.program import Compilation, KnownCell, Source
 from armwright.program import compile as translate
-from armwright.program.known import Imported, ReadImport
-from armwright.program.words import Standard
+from armwright.program.meaning.known import Imported, ReadImport
+from armwright.program.text.words import Standard
 
 ONE_ARM = KnownCell(
     arms=frozenset({"ARM_1"}),

@@ -15,11 +15,11 @@ from armwright.kinematics.forward import forward
 from armwright.motion.path import report_speed
 from armwright.program import compile as compile_program
 from armwright.program import known_cell
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.interpret import RunError, interpret, warnings
-from armwright.program.obstacles import note_of
-from armwright.program.recording import Recording, RunStage
-from armwright.program.source import Source
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.running.interpret import RunError, interpret, warnings
+from armwright.program.running.obstacles import note_of
+from armwright.program.running.recording import Recording, RunStage
+from armwright.program.text.source import Source
 from armwright.spatial.rotations import angle_between
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from armwright.program import tree
-from armwright.program.cursor import DEEPEST
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.parse import parse
-from armwright.program.source import Source
-from armwright.program.tokens import scan
-from armwright.program.words import Standard
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.syntax import tree
+from armwright.program.syntax.cursor import DEEPEST
+from armwright.program.syntax.parse import parse
+from armwright.program.text.source import Source
+from armwright.program.text.tokens import scan
+from armwright.program.text.words import Standard
 
 # So often a thing is repeated that no sound program would.
 MANY = 10_000

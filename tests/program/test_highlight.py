@@ -9,14 +9,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace, _TokenType
 
-from armwright.program.functions import FUNCTIONS
-from armwright.program.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
-from armwright.program.names import PREDECLARED
-from armwright.program.numbering import without_numbers
-from armwright.program.source import Source
-from armwright.program.tokens import TokenKind, scan
-from armwright.program.units import UNITS
-from armwright.program.words import SENSORS, VOCABULARIES, Standard
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.meaning.names import PREDECLARED
+from armwright.program.meaning.units import UNITS
+from armwright.program.text.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
+from armwright.program.text.numbering import without_numbers
+from armwright.program.text.source import Source
+from armwright.program.text.tokens import TokenKind, scan
+from armwright.program.text.words import SENSORS, VOCABULARIES, Standard
 from program.shelf import ACCEPTED, CORPUS
 
 PROGRAMS = [*sorted(CORPUS.glob("*.rlo")), *ACCEPTED]

@@ -2,17 +2,18 @@
 
 import pytest
 
-from armwright.program import check, tree
-from armwright.program.code import Kind, Type
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.kinds import sort
-from armwright.program.names import Symbols
-from armwright.program.naming import Names
-from armwright.program.parse import parse
-from armwright.program.sorts import Sort, written
-from armwright.program.source import Source
-from armwright.program.tokens import scan
-from armwright.program.words import Standard
+from armwright.program.intermediate.code import Kind, Type
+from armwright.program.meaning import check
+from armwright.program.meaning.kinds import sort
+from armwright.program.meaning.names import Symbols
+from armwright.program.meaning.naming import Names
+from armwright.program.meaning.sorts import Sort, written
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.syntax import tree
+from armwright.program.syntax.parse import parse
+from armwright.program.text.source import Source
+from armwright.program.text.tokens import scan
+from armwright.program.text.words import Standard
 
 DECLARED = {
     "F": Type(Kind.FRAME),

@@ -8,7 +8,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from armwright.program.interpret import Limits
+from armwright.program.running.interpret import Limits
 from program.running import cell_of, corpus_text, down, expect, failure, printed, run
 
 HOME = "VAR a, b : FRAME ; n : SCALAR ; e, g : EVENT ; BEGIN a = (1,0,0, 0,-1,0, 0,0,-1, 0.40,0.15,0.20) ; "

@@ -6,9 +6,9 @@ import pytest
 
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.diagnostics import Diagnostic, Fix, Label, Severity, to_json
-from armwright.program.rendering import render, render_rich
-from armwright.program.source import Span
+from armwright.program.messages.diagnostics import Diagnostic, Fix, Label, Severity, to_json
+from armwright.program.messages.rendering import render, render_rich
+from armwright.program.text.source import Span
 
 
 def one(text: str, marked: str, *, secondary: tuple[Label, ...] = ()) -> list[str]:

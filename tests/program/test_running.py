@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.frames import WORLD
-from armwright.program.interpret import Limits
+from armwright.program.running.interpret import Limits
 from program.running import EXACT, cell_of, down, expect, failure, printed, run
 
 PLACES = (

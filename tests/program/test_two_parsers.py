@@ -8,14 +8,14 @@ import pytest
 from lark import Lark, Token
 from lark.exceptions import LarkError
 
-from armwright.program import tree
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.numbering import without_numbers
-from armwright.program.parse import parse
-from armwright.program.source import Source
-from armwright.program.tokens import scan
-from armwright.program.units import DECLARABLE
-from armwright.program.words import VOCABULARIES, Standard
+from armwright.program.meaning.units import DECLARABLE
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.syntax import tree
+from armwright.program.syntax.parse import parse
+from armwright.program.text.numbering import without_numbers
+from armwright.program.text.source import Source
+from armwright.program.text.tokens import scan
+from armwright.program.text.words import VOCABULARIES, Standard
 from program.sentences import Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, REJECTED
 

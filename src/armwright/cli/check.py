@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.programs import ProgramFile, Std, Strict
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from armwright.program import Compilation
@@ -58,7 +58,7 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
     if as_json or output_format is Format.JSON:
         print(json.dumps(_as_data(compiled, emit), indent=2, ensure_ascii=False))
     elif output_format is Format.SARIF:
-        from armwright.program.sarif import to_sarif
+        from armwright.program.messages.sarif import to_sarif
 
         log = to_sarif(compiled.diagnostics, compiled.source, program.as_posix())
         print(json.dumps(log, indent=2, ensure_ascii=False))
@@ -81,8 +81,8 @@ def _cell(path: Path | None) -> "Any":
 
 def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:
     """Return a stage of the translation as lines; no lines of code for a program with errors."""
-    from armwright.program.code import listing
-    from armwright.program.tree import dump
+    from armwright.program.intermediate.code import listing
+    from armwright.program.syntax.tree import dump
 
     source = compiled.source
     if emit is Emit.CODE:
@@ -97,7 +97,7 @@ def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:
 
 def _as_data(compiled: "Compilation", emit: Emit | None) -> dict[str, Any]:
     from armwright.cli.programs import diagnostics_data
-    from armwright.program.code import shown_operands
+    from armwright.program.intermediate.code import shown_operands
 
     data = diagnostics_data(compiled)
     if emit is Emit.CODE and compiled.code:

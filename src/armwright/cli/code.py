@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.programs import CODE_SUFFIX, CellFile, Std, Strict
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.code import Code
+    from armwright.program.intermediate.code import Code
 
 
 def code(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -31,8 +31,8 @@ def code(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright code examples/bench.rlo -o out/bench.rlc`
     """
     from armwright.files.output import write_file
-    from armwright.program.assembly import assembly
-    from armwright.program.code import listing
+    from armwright.program.intermediate.assembly import assembly
+    from armwright.program.intermediate.code import listing
 
     found = load_code(program, cell, strict=strict, std=std)
     if output is not None:
@@ -52,7 +52,7 @@ def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> 
     from armwright.cell.reader import read_cell
     from armwright.cli.programs import in_its_cell, print_diagnostics
     from armwright.files.document import read_text
-    from armwright.program.assembly import assemble
+    from armwright.program.intermediate.assembly import assemble
 
     if path.suffix == CODE_SUFFIX:
         return assemble(read_text(path), str(path))

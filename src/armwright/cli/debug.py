@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.programs import CellFile, Std
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from armwright.program.debugging.editor import Launch, Loaded
-    from armwright.program.recording import Recording
+    from armwright.program.running.recording import Recording
 
 
 def debug(
@@ -69,8 +69,8 @@ def load(launch: "Launch") -> "Loaded":
     from armwright.cell.reader import read_cell
     from armwright.cli.programs import in_its_cell
     from armwright.program.debugging.editor import Loaded, LoadError
-    from armwright.program.diagnostics import count_line
-    from armwright.program.rendering import render
+    from armwright.program.messages.diagnostics import count_line
+    from armwright.program.messages.rendering import render
 
     given = None if launch.cell is None else read_cell(launch.cell)
     compiled, place = in_its_cell(launch.program, given, strict=False, std=launch.std)
@@ -91,7 +91,7 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
         OutputError: the folder cannot be written.
     """
     from armwright.files.output import write_folder
-    from armwright.program.interpret import warnings
+    from armwright.program.running.interpret import warnings
     from armwright.report.files import Origin, result_files
 
     assert launch.output is not None  # noqa: S101 - asked for only then

@@ -133,7 +133,7 @@ class Terminal:
             signal.signal(signal.SIGINT, before)
 
     def _tell(self) -> None:
-        from armwright.program.rendering import render
+        from armwright.program.messages.rendering import render
 
         debugger, stop = self._debugger, self._debugger.stop
         assert stop is not None  # noqa: S101 - it stands still

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-    from armwright.program.diagnostics import Diagnostic
-    from armwright.program.explaining import Page
-    from armwright.program.source import Source
+    from armwright.program.explanations.explaining import Page
+    from armwright.program.messages.diagnostics import Diagnostic
+    from armwright.program.text.source import Source
 
 _WIDTH = 80
 _INDENT = "    "
@@ -37,9 +37,9 @@ def explain(
         return
     from rich.console import Console
 
-    from armwright.program.explaining import explanation
-    from armwright.program.source import Source
-    from armwright.program.trying import answer
+    from armwright.program.explanations.explaining import explanation
+    from armwright.program.explanations.trying import answer
+    from armwright.program.text.source import Source
 
     page = explanation(code)
     source = Source("wrong.rlo", page.wrong)
@@ -58,7 +58,7 @@ def _list(*, as_json: bool) -> None:
     """Print all codes with their titles."""
     import json
 
-    from armwright.program.explaining import explanation, ranges
+    from armwright.program.explanations.explaining import explanation, ranges
 
     if as_json:
         rows = [
@@ -79,7 +79,7 @@ def _print_json(page: "Page", said: "Sequence[Diagnostic]", source: "Source") ->
 
     import attrs
 
-    from armwright.program.diagnostics import to_json
+    from armwright.program.messages.diagnostics import to_json
 
     data: dict[str, Any] = {**attrs.asdict(page), "diagnostics": [to_json(one, source) for one in said]}
     print(json.dumps(data, indent=2, ensure_ascii=False))
@@ -87,7 +87,7 @@ def _print_json(page: "Page", said: "Sequence[Diagnostic]", source: "Source") ->
 
 def _plain(page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:
     """Return a page as lines of plain text."""
-    from armwright.program.rendering import render
+    from armwright.program.messages.rendering import render
 
     yield f"{page.code}: {page.title}"
     for paragraph in page.text.split("\n\n"):
@@ -108,7 +108,7 @@ def _show(console: "Console", page: "Page", said: "Sequence[Diagnostic]", source
     from rich.markdown import Markdown
     from rich.text import Text
 
-    from armwright.program.rendering import render_rich
+    from armwright.program.messages.rendering import render_rich
 
     console.print(Text(f"{page.code}: {page.title}\n", "bold"))
     console.print(Markdown(page.text), width=min(console.width, _WIDTH))
@@ -124,7 +124,7 @@ def _coloured(program: str) -> "Text":
     from rich.syntax import Syntax
     from rich.text import Text
 
-    from armwright.program.highlight import RloLexer
+    from armwright.program.text.highlight import RloLexer
 
     text = Syntax(program, RloLexer(), theme="ansi_dark", background_color="default").highlight(program)
     lines = text.split("\n", allow_blank=False)

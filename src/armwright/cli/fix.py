@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.programs import Std
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cell.model import Cell
@@ -97,7 +97,7 @@ def _print(result: "Fixed", *, done: str) -> None:
 
 def _as_data(result: "Fixed") -> dict[str, Any]:
     from armwright.cli.programs import diagnostics_data
-    from armwright.program.diagnostics import to_json
+    from armwright.program.messages.diagnostics import to_json
 
     cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.what} for cure in result.cures]
     return {**diagnostics_data(result.compilation), "cures": cures}

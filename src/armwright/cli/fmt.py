@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.programs import Std
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.source import Source
+    from armwright.program.text.source import Source
 
 
 def fmt(  # noqa: PLR0917 - Typer reads one parameter per option

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cell.model import Cell
     from armwright.program import Compilation, Source
-    from armwright.program.diagnostics import Diagnostic
-    from armwright.program.known import ReadImport
+    from armwright.program.meaning.known import ReadImport
+    from armwright.program.messages.diagnostics import Diagnostic
 
 # The text form of intermediate code.
 CODE_SUFFIX = ".rlc"
@@ -53,7 +53,7 @@ def translate_file(
 
 def import_reader(folder: Path) -> "ReadImport":
     """Return what reads the files that a program of this folder IMPORTs."""
-    from armwright.program.known import Imported
+    from armwright.program.meaning.known import Imported
 
     def read(name: str) -> Imported:
         from armwright.cell.reader import read_cell
@@ -95,7 +95,7 @@ def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, 
 
     from rich.console import Console
 
-    from armwright.program.rendering import render, render_rich
+    from armwright.program.messages.rendering import render, render_rich
 
     console = Console(stderr=to_errors)
     if console.is_terminal:
@@ -106,7 +106,7 @@ def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, 
 
 def diagnostics_data(compiled: "Compilation") -> dict[str, Any]:
     """Return what is wrong with a program as plain data."""
-    from armwright.program.diagnostics import to_json
+    from armwright.program.messages.diagnostics import to_json
 
     errors = sum(one.is_error for one in compiled.diagnostics)
     return {

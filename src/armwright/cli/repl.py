@@ -14,7 +14,7 @@ import typer
 
 from armwright.cli.programs import CellFile, Std
 from armwright.errors import ArmwrightError
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cli.repl_commands import Commands
@@ -214,7 +214,7 @@ class _Json(_Talk):
 
 
 def _as_data(answer: "Answer") -> dict[str, Any]:
-    from armwright.program.diagnostics import to_json
+    from armwright.program.messages.diagnostics import to_json
 
     return {
         "ok": not answer.is_wrong,

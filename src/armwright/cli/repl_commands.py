@@ -130,7 +130,7 @@ class Commands:
             FileFormatError: it cannot be read.
         """
         from armwright.files.document import read_text
-        from armwright.program.source import Source
+        from armwright.program.text.source import Source
 
         # What a file imports it names as seen from its own folder.
         return self._session.load(Source(path.name, read_text(path)), lambda name: os.path.normpath(path.parent / name))
@@ -164,8 +164,8 @@ class Commands:
         from armwright.cell.simulator import Simulator
         from armwright.cli.programs import in_its_cell
         from armwright.files.output import write_folder
-        from armwright.program import tree
-        from armwright.program.interpret import interpret, warnings
+        from armwright.program.running.interpret import interpret, warnings
+        from armwright.program.syntax import tree
         from armwright.report.files import Origin, result_files
 
         folder, session = _path(argument), self._session

@@ -101,9 +101,9 @@ def completions(session: "Session", commands: tuple[str, ...], before: str, word
         before: the line in front of the word.
         word: its beginning; it may be empty.
     """
-    from armwright.program.functions import FUNCTIONS
     from armwright.program.interactive.showing import names
-    from armwright.program.words import SENSORS, VOCABULARIES, Standard
+    from armwright.program.meaning.functions import FUNCTIONS
+    from armwright.program.text.words import SENSORS, VOCABULARIES, Standard
 
     start = before.lstrip()
     if start == ":":

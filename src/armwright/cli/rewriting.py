@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from armwright.program.source import Source
+    from armwright.program.text.source import Source
 
 # The program that stands for what is typed or piped in.
 INPUT = Path("-")
@@ -17,7 +17,7 @@ def read_program(path: Path) -> "Source":
         FileFormatError: it cannot be read, or is not UTF-8 text.
     """
     from armwright.files.document import read_text
-    from armwright.program.source import Source
+    from armwright.program.text.source import Source
 
     return Source("standard input", _typed()) if path == INPUT else Source(str(path), read_text(path))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
     from armwright.cell.model import Cell
     from armwright.program import Source
-    from armwright.program.code import Code
-    from armwright.program.diagnostics import Diagnostic
-    from armwright.program.interpret import Limits, RunError
-    from armwright.program.recording import Recording, RunStage
+    from armwright.program.intermediate.code import Code
+    from armwright.program.messages.diagnostics import Diagnostic
+    from armwright.program.running.interpret import Limits, RunError
+    from armwright.program.running.recording import Recording, RunStage
 
 
 class Around(enum.StrEnum):
@@ -77,7 +77,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 
     from armwright.cli.programs import print_diagnostics
     from armwright.files.output import write_folder
-    from armwright.program.interpret import Limits, RunError, warnings
+    from armwright.program.running.interpret import Limits, RunError, warnings
     from armwright.report.files import Origin, result_files, summary
 
     given = None if cell is None else _read(cell)
@@ -120,8 +120,8 @@ def _translated(
     """Return the code of a program, its cell, what was said of it, and the files that it imports."""
     from armwright.cli.programs import in_its_cell
     from armwright.files.document import read_text
-    from armwright.program import tree
-    from armwright.program.assembly import assemble
+    from armwright.program.intermediate.assembly import assemble
+    from armwright.program.syntax import tree
 
     if program.suffix == CODE_SUFFIX:
         if given is None:
@@ -165,7 +165,7 @@ def _interpret(code: "Code", place: "Cell", limits: "Limits", *, watched: bool) 
     from rich.progress import Progress, SpinnerColumn, TextColumn
 
     from armwright.cell.simulator import Simulator
-    from armwright.program.interpret import interpret
+    from armwright.program.running.interpret import interpret
 
     simulator = Simulator(place)
     console = Console(stderr=True)
@@ -194,7 +194,7 @@ def _fail(
     import json
 
     from armwright.cli.programs import print_diagnostics
-    from armwright.program.diagnostics import to_json
+    from armwright.program.messages.diagnostics import to_json
 
     if as_json:
         data = {"program": source.name, "diagnostics": [to_json(one, source) for one in diagnostics]}

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from armwright.program.compiler import Compilation as Compilation
     from armwright.program.compiler import compile as compile  # noqa: A004 - what a translator does
-    from armwright.program.known import KnownCell as KnownCell
-    from armwright.program.known import known_cell as known_cell
-    from armwright.program.source import Source as Source
+    from armwright.program.meaning.known import KnownCell as KnownCell
+    from armwright.program.meaning.known import known_cell as known_cell
+    from armwright.program.text.source import Source as Source
 
 # Loaded when they are asked for: the command line needs some words of the language for its --help, and no compiler.
 _HOMES = {
     "Compilation": "compiler",
     "compile": "compiler",
-    "KnownCell": "known",
-    "known_cell": "known",
-    "Source": "source",
+    "KnownCell": "meaning.known",
+    "known_cell": "meaning.known",
+    "Source": "text.source",
 }
 
 __all__ = ["Compilation", "KnownCell", "Source", "compile", "known_cell"]

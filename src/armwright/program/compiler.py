@@ -6,18 +6,20 @@ from contextlib import contextmanager
 
 import attrs
 
-from armwright.program import check, flow, tree
-from armwright.program.code import Code
-from armwright.program.diagnostics import Diagnostic, in_order
-from armwright.program.flow import Flow
-from armwright.program.known import Imported, KnownCell, ReadImport
-from armwright.program.names import Symbols
-from armwright.program.numbering import without_numbers
-from armwright.program.parse import parse
-from armwright.program.source import Source, Span
-from armwright.program.tokens import Token, TokenKind, scan
-from armwright.program.translate import translate
-from armwright.program.words import Standard
+from armwright.program.following import flow
+from armwright.program.following.flow import Flow
+from armwright.program.intermediate.code import Code
+from armwright.program.intermediate.translate import translate
+from armwright.program.meaning import check
+from armwright.program.meaning.known import Imported, KnownCell, ReadImport
+from armwright.program.meaning.names import Symbols
+from armwright.program.messages.diagnostics import Diagnostic, in_order
+from armwright.program.syntax import tree
+from armwright.program.syntax.parse import parse
+from armwright.program.text.numbering import without_numbers
+from armwright.program.text.source import Source, Span
+from armwright.program.text.tokens import Token, TokenKind, scan
+from armwright.program.text.words import Standard
 
 
 @attrs.frozen(kw_only=True)

@@ -13,9 +13,9 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.motion.plan import Stage
-from armwright.program.code import Code
-from armwright.program.diagnostics import Diagnostic, to_json
-from armwright.program.recording import Recording, RunStage, motion_rows
+from armwright.program.intermediate.code import Code
+from armwright.program.messages.diagnostics import Diagnostic, to_json
+from armwright.program.running.recording import Recording, RunStage, motion_rows
 from armwright.report.page import run_page
 from armwright.report.recorded import page_of
 from armwright.spatial.poses import to_noap

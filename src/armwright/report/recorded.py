@@ -9,11 +9,11 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell, CellArm, base_name
 from armwright.kinematics.forward import link_poses
-from armwright.program.code import Code
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.obstacles import note_of
-from armwright.program.recording import Effect as RunEffect
-from armwright.program.recording import Recording, RunStage, Stream
+from armwright.program.intermediate.code import Code
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.running.obstacles import note_of
+from armwright.program.running.recording import Effect as RunEffect
+from armwright.program.running.recording import Recording, RunStage, Stream
 from armwright.report.page import (
     Animation,
     ArmRecord,

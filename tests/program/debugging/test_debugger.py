@@ -8,7 +8,7 @@ from armwright.program.debugging.breakpoints import CountError
 from armwright.program.debugging.debugger import Command, Debugger, DebuggerError
 from armwright.program.debugging.evaluating import ExpressionError
 from armwright.program.debugging.variables import Shown
-from armwright.program.interpret import Limits, interpret
+from armwright.program.running.interpret import Limits, interpret
 from program.running import cell_of, code_of, corpus_text, down
 
 HEAD = "VAR f, g : FRAME ;\n    n, m : SCALAR ;\n    t : TRANS ;\n    e : EVENT ;\n"

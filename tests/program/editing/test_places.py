@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.program.editing.places import NO_DRIFT, Edit, Ruler, drift, edited
-from armwright.program.source import Span
+from armwright.program.text.source import Span
 
 TEXTS = st.text(st.sampled_from(["a", "b", " ", "\n", "\r", "é", "€", "🤖", "\u2028", "\f"]), max_size=30)
 ENCODINGS = st.sampled_from(["utf-8", "utf-16", "utf-32"])

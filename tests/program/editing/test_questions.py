@@ -20,9 +20,9 @@ from armwright.program.editing.quickfixes import all_fixes, quickfixes
 from armwright.program.editing.renames import rename
 from armwright.program.editing.semantic import difference, encoded, line_stretches, patched
 from armwright.program.editing.signatures import signature_at
-from armwright.program.functions import FUNCTIONS
-from armwright.program.source import Span
-from armwright.program.words import VOCABULARIES, Standard
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.text.source import Span
+from armwright.program.text.words import VOCABULARIES, Standard
 from program.shelf import ACCEPTED, CORPUS
 
 STANFORD = CORPUS / "cell1.json"

@@ -12,11 +12,11 @@ from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
 from armwright.program.interactive.session import Answer, Session
 from armwright.program.interactive.showing import arms, frames, to_zyx
-from armwright.program.interpret import Limits, interpret
-from armwright.program.known import Imported
-from armwright.program.machine import Machine
-from armwright.program.source import Source
-from armwright.program.words import Standard
+from armwright.program.meaning.known import Imported
+from armwright.program.running.interpret import Limits, interpret
+from armwright.program.running.machine import Machine
+from armwright.program.text.source import Source
+from armwright.program.text.words import Standard
 from armwright.spatial.poses import pose
 from program.running import DOWN, EXACT, cell_of, code_of, corpus_text, down
 

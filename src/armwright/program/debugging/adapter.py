@@ -18,7 +18,7 @@ from armwright.program.debugging import breaking, looking
 from armwright.program.debugging.debugger import Command
 from armwright.program.debugging.editor import EditorSession, Launch, Load, Save
 from armwright.program.debugging.protocol import Arguments, Noise, RequestError, framed, messages
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 
 # How long the program runs before the next request is looked for [s].
 _SLICE = 0.02

@@ -9,11 +9,11 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import ArmwrightError
-from armwright.program.code import Kind
 from armwright.program.debugging.statements import Start
 from armwright.program.debugging.timeline import Path
 from armwright.program.debugging.views import mover
-from armwright.program.machine import Machine
+from armwright.program.intermediate.code import Kind
+from armwright.program.running.machine import Machine
 
 # A frame that is farther from where it was than this has moved [m], and entries of rotations.
 _MOVED = 1e-9

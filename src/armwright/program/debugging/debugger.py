@@ -10,7 +10,6 @@ import numpy as np
 
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
-from armwright.program.code import Code, Kind
 from armwright.program.debugging import variables
 from armwright.program.debugging.breakpoints import Breakpoint, CountError, Watch, counts
 from armwright.program.debugging.evaluating import (
@@ -29,11 +28,12 @@ from armwright.program.debugging.stopping import Stop
 from armwright.program.debugging.timeline import Path
 from armwright.program.debugging.variables import Shown
 from armwright.program.debugging.views import Frame, mover, process_of, stack
-from armwright.program.hanging import is_arm
-from armwright.program.interpret import Limits, RunError
-from armwright.program.machine import Machine
-from armwright.program.process import Element, Process
-from armwright.program.recording import Effect, Recording
+from armwright.program.following.hanging import is_arm
+from armwright.program.intermediate.code import Code, Kind
+from armwright.program.running.interpret import Limits, RunError
+from armwright.program.running.machine import Machine
+from armwright.program.running.process import Element, Process
+from armwright.program.running.recording import Effect, Recording
 
 # To the next stop; to the next statement, over calls, into them, out of them; to the next stage of a MOVE; to the next
 # servo tick; back to the statement before, the tick before, the breakpoint before.

@@ -8,18 +8,18 @@ import attrs
 
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
-from armwright.program.code import Code
 from armwright.program.debugging.breakpoints import Breakpoint
 from armwright.program.debugging.debugger import Command, Debugger
 from armwright.program.debugging.protocol import Arguments, RequestError
 from armwright.program.debugging.stopping import Stop
 from armwright.program.debugging.timeline import Path as ProcessPath
 from armwright.program.debugging.variables import Shown
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.recording import Recording
-from armwright.program.rendering import render
-from armwright.program.source import Span
-from armwright.program.words import Standard
+from armwright.program.intermediate.code import Code
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.messages.rendering import render
+from armwright.program.running.recording import Recording
+from armwright.program.text.source import Span
+from armwright.program.text.words import Standard
 
 _DESCRIPTIONS = {"start": "back at the start", "data breakpoint": "something has changed"}
 # What the protocol has a word for.

@@ -6,22 +6,23 @@ from collections.abc import Mapping, Sequence
 import attrs
 
 from armwright.errors import ArmwrightError
-from armwright.program import kinds, tree
-from armwright.program.acting import HANDLERS
-from armwright.program.code import Code, Instruction, Kind, Op, Operand, Place, Type
-from armwright.program.cursor import LostError, Tokens
 from armwright.program.debugging.views import Frame
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.emitting import Emitter
-from armwright.program.expressions import expression
-from armwright.program.machine import Machine, RunError
-from armwright.program.names import PREDECLARED
-from armwright.program.naming import Names
-from armwright.program.process import Activation, Process, Value
-from armwright.program.sorts import FITTING, OF_KIND, Sort, is_what
-from armwright.program.source import Source
-from armwright.program.tokens import scan
-from armwright.program.words import Standard
+from armwright.program.intermediate.code import Code, Instruction, Kind, Op, Operand, Place, Type
+from armwright.program.intermediate.emitting import Emitter
+from armwright.program.meaning import kinds
+from armwright.program.meaning.names import PREDECLARED
+from armwright.program.meaning.naming import Names
+from armwright.program.meaning.sorts import FITTING, OF_KIND, Sort, is_what
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.running.acting import HANDLERS
+from armwright.program.running.machine import Machine, RunError
+from armwright.program.running.process import Activation, Process, Value
+from armwright.program.syntax import tree
+from armwright.program.syntax.cursor import LostError, Tokens
+from armwright.program.syntax.expressions import expression
+from armwright.program.text.source import Source
+from armwright.program.text.tokens import scan
+from armwright.program.text.words import Standard
 from armwright.spatial.poses import from_noap
 
 

@@ -7,7 +7,6 @@ from typing import TypeAlias
 import attrs
 
 from armwright.cell.model import Cell
-from armwright.program.code import Code
 from armwright.program.debugging.breakpoints import Breakpoint, Watch, counts
 from armwright.program.debugging.evaluating import ExpressionError, Parsed, compute, names_at, parse
 from armwright.program.debugging.statements import Statements
@@ -16,9 +15,10 @@ from armwright.program.debugging.stopping import Stop
 from armwright.program.debugging.timeline import Path, Timeline
 from armwright.program.debugging.variables import result
 from armwright.program.debugging.views import mover, process_of, seen, stack
-from armwright.program.interpret import Limits, RunError
-from armwright.program.machine import Machine
-from armwright.program.process import Process
+from armwright.program.intermediate.code import Code
+from armwright.program.running.interpret import Limits, RunError
+from armwright.program.running.machine import Machine
+from armwright.program.running.process import Process
 
 # A way to the next stop; it can be left whenever it yields.
 Way: TypeAlias = Generator[None, None, Stop]

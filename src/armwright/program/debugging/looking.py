@@ -10,8 +10,8 @@ from armwright.program.debugging.evaluating import names_at
 from armwright.program.debugging.protocol import Arguments, RequestError
 from armwright.program.debugging.timeline import Path
 from armwright.program.debugging.variables import Shown
-from armwright.program.functions import FUNCTIONS
-from armwright.program.rendering import render
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.messages.rendering import render
 
 # So many elements are sent to an editor that does not say how many it wants.
 _MOST_ELEMENTS = 1000

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import attrs
 
-from armwright.program.code import Code, Op
-from armwright.program.source import Span
+from armwright.program.intermediate.code import Code, Op
+from armwright.program.text.source import Span
 
 # What stands behind the last statement of a part, though it belongs to a statement around it.
 _TRAILING = frozenset((Op.JMP, Op.ENDT, Op.ENDR, Op.UNLK, Op.RET, Op.QUIT))

@@ -6,8 +6,8 @@ import attrs
 
 from armwright.program.debugging.timeline import Path
 from armwright.program.debugging.views import process_of
-from armwright.program.machine import Machine
-from armwright.program.process import Process
+from armwright.program.running.machine import Machine
+from armwright.program.running.process import Process
 
 # To the next statement; the next at the same level or further out; further out only; the next stage of a MOVE.
 StepKind: TypeAlias = Literal["in", "next", "out", "stage"]

@@ -5,7 +5,7 @@ from typing import Literal, TypeAlias
 import attrs
 
 from armwright.program.debugging.timeline import Path
-from armwright.program.diagnostics import Diagnostic
+from armwright.program.messages.diagnostics import Diagnostic
 
 Reason: TypeAlias = Literal[
     "entry", "breakpoint", "data breakpoint", "step", "exception", "pause", "start", "end", "failed"

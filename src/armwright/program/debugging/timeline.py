@@ -17,11 +17,11 @@ from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
 from armwright.motion.plan import Stage
 from armwright.motion.trajectory import Trajectory
-from armwright.program.code import Code, Op, Type
-from armwright.program.interpret import Limits, Machine, advance, due, ready
-from armwright.program.process import Process
-from armwright.program.recording import Effect, Run, RunStage
-from armwright.program.source import Span
+from armwright.program.intermediate.code import Code, Op, Type
+from armwright.program.running.interpret import Limits, Machine, advance, due, ready
+from armwright.program.running.process import Process
+from armwright.program.running.recording import Effect, Run, RunStage
+from armwright.program.text.source import Span
 
 # Things that never change are not copied but held.
 _HELD = (Code, Cell, FrameTree, Stage, Trajectory, Limits, Type, Effect, Run, RunStage, Span, np.ndarray)

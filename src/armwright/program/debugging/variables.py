@@ -10,10 +10,10 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.model import base_name
 from armwright.kinematics.forward import forward
-from armwright.program.code import Kind, Type
 from armwright.program.debugging.views import Frame
-from armwright.program.machine import Machine
-from armwright.program.process import Process, Value
+from armwright.program.intermediate.code import Kind, Type
+from armwright.program.running.machine import Machine
+from armwright.program.running.process import Process, Value
 from armwright.spatial.poses import to_noap
 
 _NOTHING = "no value yet"

@@ -8,10 +8,10 @@ from armwright.cell.model import base_name
 from armwright.kinematics.forward import forward
 from armwright.program.debugging.statements import Statements
 from armwright.program.debugging.timeline import Path, in_action
-from armwright.program.hanging import is_arm
-from armwright.program.machine import Machine
-from armwright.program.process import Activation, Process
-from armwright.program.source import Span
+from armwright.program.following.hanging import is_arm
+from armwright.program.running.machine import Machine
+from armwright.program.running.process import Activation, Process
+from armwright.program.text.source import Span
 
 
 def seen(machine: Machine, ticks: int) -> Machine:

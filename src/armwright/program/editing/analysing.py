@@ -11,9 +11,9 @@ from armwright.program.compiler import Compilation
 from armwright.program.compiler import compile as translate
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.cells import CellFile, Cells
-from armwright.program.known import Imported, known_cell
-from armwright.program.source import Source
-from armwright.program.words import Standard
+from armwright.program.meaning.known import Imported, known_cell
+from armwright.program.text.source import Source
+from armwright.program.text.words import Standard
 
 
 @attrs.frozen(kw_only=True)

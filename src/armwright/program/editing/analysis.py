@@ -10,14 +10,14 @@ import attrs
 
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
-from armwright.program import tree
 from armwright.program.compiler import Compilation
 from armwright.program.editing.occurrences import Extents, Occurrence, extents_of, occurrences
 from armwright.program.editing.places import Drift, drift
-from armwright.program.names import Scope
-from armwright.program.source import Source, Span
-from armwright.program.tokens import Token, TokenKind, scan
-from armwright.program.words import CLOSING, OPENING
+from armwright.program.meaning.names import Scope
+from armwright.program.syntax import tree
+from armwright.program.text.source import Source, Span
+from armwright.program.text.tokens import Token, TokenKind, scan
+from armwright.program.text.words import CLOSING, OPENING
 
 # How many tokens in front of a place are looked at to find out what may stand there.
 _REACH = 1000

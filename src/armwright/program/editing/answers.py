@@ -18,7 +18,7 @@ from armwright.program.editing.renames import nameable, rename
 from armwright.program.editing.semantic import KINDS, MODIFIERS, Stretch, difference, encoded, patched
 from armwright.program.editing.server import RloServer, refusal
 from armwright.program.editing.signatures import signature_at
-from armwright.program.source import Source, Span
+from armwright.program.text.source import Source, Span
 
 _FIX_ALL = lsp.CodeActionKind.SourceFixAll
 # A kind of its own, so that an editor may fix programs when it saves them, and nothing else.

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import attrs
 
 from armwright.program.editing.pieces import Piece
-from armwright.program.tokens import TokenKind
+from armwright.program.text.tokens import TokenKind
 
 _NAME = TokenKind.NAME
 _OPERANDS = frozenset((TokenKind.NAME, TokenKind.NUMBER, TokenKind.ARM, TokenKind.STRING))

@@ -11,7 +11,7 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.document import Document
-from armwright.program.known import Imported
+from armwright.program.meaning.known import Imported
 
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
 _ARM = re.compile(r"ARM[-_]0*([0-9]+)", re.IGNORECASE)

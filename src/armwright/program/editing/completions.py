@@ -5,15 +5,15 @@ from collections.abc import Iterator
 
 import attrs
 
-from armwright.program.code import Kind, Type
 from armwright.program.editing.analysis import Before, View
 from armwright.program.editing.explained import explained
 from armwright.program.editing.hovers import signature
 from armwright.program.editing.wanted import Wanted, wanted
-from armwright.program.hanging import is_arm
-from armwright.program.known import WORLD
-from armwright.program.names import PREDECLARED
-from armwright.program.source import Span
+from armwright.program.following.hanging import is_arm
+from armwright.program.intermediate.code import Kind, Type
+from armwright.program.meaning.known import WORLD
+from armwright.program.meaning.names import PREDECLARED
+from armwright.program.text.source import Span
 
 
 class Sort(enum.Enum):

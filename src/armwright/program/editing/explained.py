@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import attrs
 
-from armwright.program.code import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
+from armwright.program.intermediate.code import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
 
 
 @attrs.frozen

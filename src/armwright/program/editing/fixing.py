@@ -8,9 +8,9 @@ from typing import TypeAlias
 import attrs
 
 from armwright.program.compiler import Compilation
-from armwright.program.diagnostics import Diagnostic, Fix
 from armwright.program.editing.places import Edit, edited
-from armwright.program.source import Source
+from armwright.program.messages.diagnostics import Diagnostic, Fix
+from armwright.program.text.source import Source
 
 # How often a program is looked at again: one cure may bring the next slip to light.
 ROUNDS = 10

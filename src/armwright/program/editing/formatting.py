@@ -3,16 +3,16 @@
 import gc
 
 from armwright.errors import InvalidValueError
-from armwright.program.diagnostics import Diagnostic, in_order
 from armwright.program.editing.blanks import set_blanks
 from armwright.program.editing.filling import lines_of
 from armwright.program.editing.pieces import pieces_of
 from armwright.program.editing.rows import rows_of
-from armwright.program.numbering import without_numbers
-from armwright.program.parse import parse
-from armwright.program.source import Source
-from armwright.program.tokens import scan
-from armwright.program.words import Standard
+from armwright.program.messages.diagnostics import Diagnostic, in_order
+from armwright.program.syntax.parse import parse
+from armwright.program.text.numbering import without_numbers
+from armwright.program.text.source import Source
+from armwright.program.text.tokens import scan
+from armwright.program.text.words import Standard
 
 # How long a line may be, in characters.
 WIDTH = 80

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 
 import attrs
 
-from armwright.program import tree
-from armwright.program.code import stages_text
 from armwright.program.editing.analysis import Analysis
-from armwright.program.hanging import is_arm
-from armwright.program.source import Span
-from armwright.program.translate import form_of
+from armwright.program.following.hanging import is_arm
+from armwright.program.intermediate.code import stages_text
+from armwright.program.intermediate.translate import form_of
+from armwright.program.syntax import tree
+from armwright.program.text.source import Span
 
 # A statement that starts further in front of a place does not reach it.
 _REACH = 4000

@@ -4,17 +4,17 @@ import attrs
 
 from armwright.arrays import Array
 from armwright.cell.model import base_name
-from armwright.program import tree
-from armwright.program.code import Kind, Type
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.explained import explained
 from armwright.program.editing.occurrences import Occurrence, What
-from armwright.program.functions import FUNCTIONS
-from armwright.program.hanging import is_arm
-from armwright.program.names import PREDECLARED
-from armwright.program.source import Span
-from armwright.program.tokens import Token, TokenKind
-from armwright.program.units import UNITS, UnitSystem, convert, dimension
+from armwright.program.following.hanging import is_arm
+from armwright.program.intermediate.code import Kind, Type
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.meaning.names import PREDECLARED
+from armwright.program.meaning.units import UNITS, UnitSystem, convert, dimension
+from armwright.program.syntax import tree
+from armwright.program.text.source import Span
+from armwright.program.text.tokens import Token, TokenKind
 from armwright.spatial.poses import to_noap
 
 # Smaller numbers in a pose are roundings.

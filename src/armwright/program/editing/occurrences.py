@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import attrs
 
-from armwright.program.code import Type
-from armwright.program.functions import AXES, FUNCTIONS
-from armwright.program.names import Scope, Symbols
-from armwright.program.source import Span
-from armwright.program.tokens import Token, TokenKind
-from armwright.program.words import SENSORS
+from armwright.program.intermediate.code import Type
+from armwright.program.meaning.functions import AXES, FUNCTIONS
+from armwright.program.meaning.names import Scope, Symbols
+from armwright.program.text.source import Span
+from armwright.program.text.tokens import Token, TokenKind
+from armwright.program.text.words import SENSORS
 
 # Behind these words and signs a statement begins.
 OPENERS = frozenset((";", "BEGIN", "THEN", "ELSE", "DO", "TRY", "RECOVER", "REPEAT", "COBEGIN"))

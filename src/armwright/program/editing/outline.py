@@ -6,12 +6,12 @@ from itertools import pairwise
 
 import attrs
 
-from armwright.program import tree
-from armwright.program.code import Kind, Type
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.hovers import signature
-from armwright.program.source import Source, Span
-from armwright.program.tokens import Token, TokenKind
+from armwright.program.intermediate.code import Kind, Type
+from armwright.program.syntax import tree
+from armwright.program.text.source import Source, Span
+from armwright.program.text.tokens import Token, TokenKind
 
 
 class Part(enum.Enum):

@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import attrs
 
-from armwright.program import tree
-from armwright.program.functions import AXES, FUNCTIONS
-from armwright.program.source import Span
-from armwright.program.tokens import Scanned, Token, TokenKind
-from armwright.program.words import SENSORS
+from armwright.program.meaning.functions import AXES, FUNCTIONS
+from armwright.program.syntax import tree
+from armwright.program.text.source import Span
+from armwright.program.text.tokens import Scanned, Token, TokenKind
+from armwright.program.text.words import SENSORS
 
 _NAME, _KEYWORD, _ARM, _SYMBOL = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.SYMBOL
 # Behind these an empty statement needs no `;`.

@@ -8,7 +8,7 @@ from itertools import takewhile
 
 import attrs
 
-from armwright.program.source import Span
+from armwright.program.text.source import Span
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 # What a character takes where editors count bytes or halves of words; in UTF-32 each takes one.

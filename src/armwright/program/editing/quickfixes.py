@@ -4,10 +4,10 @@ from collections.abc import Iterable
 
 import attrs
 
-from armwright.program.diagnostics import Diagnostic
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.places import Edit
-from armwright.program.source import Source, Span
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.text.source import Source, Span
 
 # A longer text is not repeated in a title.
 _LONGEST_SHOWN = 30

@@ -6,9 +6,9 @@ from armwright.errors import InvalidValueError
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.occurrences import Occurrence, What
 from armwright.program.editing.places import Edit
-from armwright.program.functions import FUNCTIONS
-from armwright.program.names import PREDECLARED
-from armwright.program.words import VOCABULARIES, is_later
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.meaning.names import PREDECLARED
+from armwright.program.text.words import VOCABULARIES, is_later
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ARM = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)

@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 
 from lsprotocol import types as lsp
 
-from armwright.program.diagnostics import Diagnostic
 from armwright.program.editing.analysis import Analysis, View
 from armwright.program.editing.completions import Completion, Sort
 from armwright.program.editing.hints import Hint
@@ -12,7 +11,8 @@ from armwright.program.editing.hovers import Hover
 from armwright.program.editing.outline import Entry, Fold, Part
 from armwright.program.editing.places import Edit, Ruler
 from armwright.program.editing.signatures import Signature
-from armwright.program.source import Span
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.text.source import Span
 
 _ITEMS = {
     Sort.WORD: lsp.CompletionItemKind.Keyword,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import attrs
 
 from armwright.program.editing.pieces import Comment, Piece
-from armwright.program.tokens import TokenKind
+from armwright.program.text.tokens import TokenKind
 
 # Blanks per level, in front of what goes on from the line above, and of the clauses of a MOVE.
 LEVEL, GOES_ON, CLAUSE = 2, 4, 5

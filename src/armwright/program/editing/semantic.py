@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 
-from armwright.program.code import Kind
 from armwright.program.editing.analysis import Analysis, View
 from armwright.program.editing.occurrences import Occurrence, What, occurrences
 from armwright.program.editing.places import Drift, Ruler
-from armwright.program.numbering import without_numbers
-from armwright.program.source import Source, Span
-from armwright.program.tokens import Token, TokenKind, scan
-from armwright.program.units import UNITS
-from armwright.program.words import LATER_TYPES, TYPES
+from armwright.program.intermediate.code import Kind
+from armwright.program.meaning.units import UNITS
+from armwright.program.text.numbering import without_numbers
+from armwright.program.text.source import Source, Span
+from armwright.program.text.tokens import Token, TokenKind, scan
+from armwright.program.text.words import LATER_TYPES, TYPES
 
 KINDS = (
     *("keyword", "type", "variable", "parameter", "event", "function"),

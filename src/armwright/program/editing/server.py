@@ -17,7 +17,7 @@ from armwright.program.editing.analysing import Settings
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.documents import Changed, Document, Known, Office
 from armwright.program.editing.places import Ruler
-from armwright.program.words import Standard
+from armwright.program.text.words import Standard
 from armwright.version import __version__
 
 SECTION = "armwright"

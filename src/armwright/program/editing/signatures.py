@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import attrs
 
-from armwright.program import tree
 from armwright.program.editing.analysis import View
 from armwright.program.editing.explained import explained
 from armwright.program.editing.hovers import signature
-from armwright.program.functions import FUNCTIONS
-from armwright.program.tokens import Token, TokenKind
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.syntax import tree
+from armwright.program.text.tokens import Token, TokenKind
 
 _TAKES = {
     **dict.fromkeys(("ROTX", "ROTY", "ROTZ"), ("angle",)),

@@ -4,15 +4,15 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 
-from armwright.program.code import Kind
 from armwright.program.editing.analysis import Before
 from armwright.program.editing.occurrences import OPENERS
 from armwright.program.editing.signatures import open_call
-from armwright.program.functions import AXES, FUNCTIONS
-from armwright.program.names import Symbols
-from armwright.program.tokens import Token, TokenKind
-from armwright.program.units import DECLARABLE
-from armwright.program.words import SENSORS, VOCABULARIES, Standard
+from armwright.program.intermediate.code import Kind
+from armwright.program.meaning.functions import AXES, FUNCTIONS
+from armwright.program.meaning.names import Symbols
+from armwright.program.meaning.units import DECLARABLE
+from armwright.program.text.tokens import Token, TokenKind
+from armwright.program.text.words import SENSORS, VOCABULARIES, Standard
 
 _OPERANDS = (TokenKind.NAME, TokenKind.ARM, TokenKind.NUMBER, TokenKind.STRING)
 _STEPS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV")

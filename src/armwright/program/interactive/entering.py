@@ -10,14 +10,14 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import attrs
 
 from armwright.errors import closest
-from armwright.program import tree
-from armwright.program.diagnostics import Diagnostic, in_order
-from armwright.program.functions import FUNCTIONS
-from armwright.program.numbering import without_numbers
-from armwright.program.parse import parse
-from armwright.program.source import Source, Span
-from armwright.program.tokens import Token, TokenKind, scan
-from armwright.program.words import CLOSING, OPENING, VOCABULARIES, Standard, Vocabulary
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.messages.diagnostics import Diagnostic, in_order
+from armwright.program.syntax import tree
+from armwright.program.syntax.parse import parse
+from armwright.program.text.numbering import without_numbers
+from armwright.program.text.source import Source, Span
+from armwright.program.text.tokens import Token, TokenKind, scan
+from armwright.program.text.words import CLOSING, OPENING, VOCABULARIES, Standard, Vocabulary
 
 # No expression begins like a line of a numbered program.
 _NUMBERED = re.compile(r"\s*[0-9]+[ \t]+[A-Za-z]")

@@ -4,13 +4,13 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 
 import attrs
 
-from armwright.program import tree
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.functions import FUNCTIONS
 from armwright.program.interactive.entering import Entry
 from armwright.program.interactive.renaming import Redeclared, declared, own_names, redeclare
-from armwright.program.units import UNITS, dimension
-from armwright.program.words import VOCABULARIES, Standard
+from armwright.program.meaning.functions import FUNCTIONS
+from armwright.program.meaning.units import UNITS, dimension
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.syntax import tree
+from armwright.program.text.words import VOCABULARIES, Standard
 
 
 class NotNowError(Exception):

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from armwright.program import tree
 from armwright.program.editing.formatting import formatted
-from armwright.program.source import Source
-from armwright.program.words import Standard
+from armwright.program.syntax import tree
+from armwright.program.text.source import Source
+from armwright.program.text.words import Standard
 
 
 def program_text(

@@ -8,14 +8,14 @@ import attrs
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
-from armwright.program.code import Code, Kind, Op, Type
-from armwright.program.diagnostics import Diagnostic
-from armwright.program.interpret import advance, due, warnings
-from armwright.program.machine import Hand, Limits, Machine
-from armwright.program.names import PREDECLARED
-from armwright.program.process import Activation, Process
-from armwright.program.recording import Recording
-from armwright.program.source import Source, Span
+from armwright.program.intermediate.code import Code, Kind, Op, Type
+from armwright.program.meaning.names import PREDECLARED
+from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.running.interpret import advance, due, warnings
+from armwright.program.running.machine import Hand, Limits, Machine
+from armwright.program.running.process import Activation, Process
+from armwright.program.running.recording import Recording
+from armwright.program.text.source import Source, Span
 from armwright.spatial.poses import from_noap
 
 

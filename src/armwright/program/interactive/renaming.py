@@ -5,8 +5,8 @@ from typing import Any
 
 import attrs
 
-from armwright.program import tree
-from armwright.program.source import Span
+from armwright.program.syntax import tree
+from armwright.program.text.source import Span
 
 # Functions whose argument is an axis, not a variable.
 _WITH_AXIS = ("FORCE",)

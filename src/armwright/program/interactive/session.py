@@ -11,10 +11,8 @@ from collections.abc import Callable, Mapping
 import attrs
 
 from armwright.cell.model import Cell
-from armwright.program import check, flow, tree
-from armwright.program.code import Code
-from armwright.program.diagnostics import Diagnostic, in_order
-from armwright.program.flow import Flow
+from armwright.program.following import flow
+from armwright.program.following.flow import Flow
 from armwright.program.interactive.entering import Entry, moved, read
 from armwright.program.interactive.headings import Heading, NotNowError, merged
 from armwright.program.interactive.listing import program_text, title
@@ -29,13 +27,17 @@ from armwright.program.interactive.moments import (
     with_code,
 )
 from armwright.program.interactive.taken_back import SILENT, taken_back
-from armwright.program.known import Imported, ReadImport, known_cell
-from armwright.program.machine import Limits, Machine, RunError
-from armwright.program.names import Symbols
-from armwright.program.recording import Effect
-from armwright.program.source import Source, Span
-from armwright.program.translate import translate
-from armwright.program.words import Standard
+from armwright.program.intermediate.code import Code
+from armwright.program.intermediate.translate import translate
+from armwright.program.meaning import check
+from armwright.program.meaning.known import Imported, ReadImport, known_cell
+from armwright.program.meaning.names import Symbols
+from armwright.program.messages.diagnostics import Diagnostic, in_order
+from armwright.program.running.machine import Limits, Machine, RunError
+from armwright.program.running.recording import Effect
+from armwright.program.syntax import tree
+from armwright.program.text.source import Source, Span
+from armwright.program.text.words import Standard
 
 # What a declaration is good for shows later than in a whole program.
 _TOO_EARLY = ("L304",)

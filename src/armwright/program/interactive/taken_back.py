@@ -3,8 +3,8 @@
 import numpy as np
 
 from armwright.cell.frames import WORLD
-from armwright.program.hanging import is_arm
-from armwright.program.machine import Machine
+from armwright.program.following.hanging import is_arm
+from armwright.program.running.machine import Machine
 
 # Effects that say nothing of their own in a trace.
 SILENT = ("PLACE", "LOCK", "END", "STOP")

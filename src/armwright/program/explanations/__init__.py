@@ -1,0 +1,1 @@
+"""A page for every message, with programs that are tried."""

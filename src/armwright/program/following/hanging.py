@@ -1,0 +1,369 @@
+"""The frame table of the checker: what hangs on what and since where, what has a value, what each hand is doing."""
+
+from collections.abc import Iterator
+
+import attrs
+
+from armwright.program.following.facts import Book, Facts, base, either, same
+from armwright.program.meaning.known import STATION, WORLD, KnownCell
+from armwright.program.text.source import Span
+
+# Where a hand stands, or what it holds, when nobody knows.
+UNKNOWN = "?"
+# Names that wipe where all hands are and what their fingers do, and what they hold.
+HANDS, GRIPS = "(hands)", "(grips)"
+
+
+@attrs.frozen
+class Link:
+    """One affixment.
+
+    Attributes:
+        parent: the frame above; None when nobody knows whether there is one.
+        span: the AFFIX that made it; None where the cell did.
+        rigid: whether the frame above comes along when this one is given another place.
+    """
+
+    parent: str | None
+    span: Span | None = None
+    rigid: bool = False
+
+
+@attrs.frozen
+class Assignment:
+    """One value given to a frame: in which order, where, and whether the frame stood somewhere before."""
+
+    order: int
+    span: Span
+    moved: bool
+
+
+@attrs.frozen
+class Hand:
+    """What is known of one hand, but for what it holds.
+
+    Attributes:
+        open: whether the fingers are open; None at the start of a program.
+        doubtful: whether nobody knows what the program did to the fingers.
+        at: the frame at which the hand stands.
+        arrival: the MOVE of the arm itself that brought it there.
+        arrived_open: whether the fingers were open then.
+        opened: the OPEN since then.
+    """
+
+    open: bool | None = None
+    doubtful: bool = False
+    at: str | None = None
+    arrival: Span | None = None
+    arrived_open: bool | None = None
+    opened: Span | None = None
+
+
+@attrs.frozen
+class Grip:
+    """What a hand holds: the frame at which the fingers closed, and the GRASP that closed them."""
+
+    frame: str
+    span: Span | None = None
+
+
+_ANY_LINK = Link(None)
+_ANY_HAND = Hand(doubtful=True, at=UNKNOWN)
+_ANY_GRIP = Grip(UNKNOWN)
+
+
+def _joined_links(one: Link | None, other: Link | None) -> Link | None:
+    if one == other:
+        return one
+    if one is None or other is None or (one.parent, one.rigid) != (other.parent, other.rigid):
+        return _ANY_LINK
+    return one
+
+
+def _joined_hands(one: Hand, other: Hand) -> Hand:
+    if one == other:
+        return one
+    return Hand(
+        open=same(one.open, other.open),
+        doubtful=one.doubtful or other.doubtful or one.open != other.open,
+        at=one.at if one.at == other.at else UNKNOWN,
+    )
+
+
+def _joined_grips(one: Grip | None, other: Grip | None) -> Grip | None:
+    if one is None or other is None or one.frame != other.frame:
+        return one if one == other else _ANY_GRIP
+    return one
+
+
+class Hanging:
+    """Frames and hands, as far as one can know."""
+
+    def __init__(self, cell: KnownCell | None, facts: Facts, *, rigid: bool = False) -> None:
+        """Start with what the cell says.
+
+        Args:
+            cell: frames that have a value from the start; None when any may have.
+            facts: where to keep what is known.
+            rigid: whether any frame of the program may hang rigidly.
+        """
+        self._facts, self._rigid = facts, rigid
+        self._children: dict[str, int] = {}
+        self._count = self._carried = self._doubts = self._assignments = self._order = 0
+        self.links: Book[Link | None] = Book(
+            facts, default=None, unknown=_ANY_LINK, joined=_joined_links, watch=self._watch
+        )
+        self.valued = Book(facts, default=False, unknown=True, joined=either)
+        self.assigned: Book[Assignment | None] = Book(facts, default=None, unknown=None, joined=same)
+        self.hands = Book(facts, default=Hand(), unknown=_ANY_HAND, joined=_joined_hands, group=HANDS)
+        self.grips: Book[Grip | None] = Book(facts, default=None, unknown=_ANY_GRIP, joined=_joined_grips, group=GRIPS)
+        frames = dict(cell.frames) if cell else {}
+        for name in (WORLD, STATION, *frames):
+            self.valued.put(name, True)
+        for name, parent in frames.items():
+            if parent != WORLD:
+                self.links.put(name, Link(parent))
+
+    # ---- looking ---------------------------------------------------------------------------------------------------
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no frame has been given a value and none hangs on another."""
+        return not self._assignments and not self._count
+
+    def above(self, name: str) -> Iterator[str]:
+        """Walk up from the frame that ``name`` hangs on, as far as one can know."""
+        while (link := self.links[name]) is not None and link.parent is not None:
+            name = link.parent
+            yield name
+
+    def would_ring(self, child: str, parent: str) -> bool:
+        """Whether hanging ``child`` on ``parent`` certainly closes a ring."""
+        if is_any(child):
+            return False
+        # What nothing hangs on can be hung anywhere: no long way up for the common case.
+        return child == parent or (self._children.get(child, 0) > 0 and child in self.above(parent))
+
+    def carrier(self, name: str) -> str | None:
+        """Return the arm that a frame hangs on, directly or through others; None if there is none."""
+        # The way up may be long: it is not gone where it leads nowhere.
+        return next((above for above in self.above(name) if is_arm(above)), None) if self._carried else None
+
+    def unknown(self, name: str) -> bool:
+        """Whether one cannot know what a frame hangs on."""
+        if not self._doubts and not self._facts.wipes:
+            return is_any(name)
+        while not is_any(name):
+            link = self.links[name]
+            if link is None:
+                return False
+            if link.parent is None:
+                return True
+            name = link.parent
+        return True
+
+    def leader(self, name: str) -> str | None:
+        """Return the frame that is given another place when ``name`` is; None when one cannot know."""
+        while self._rigid:
+            link = self.links[name]
+            if link is None or not (link.rigid or link.parent is None):
+                break
+            if link.parent is None:
+                return None
+            name = link.parent
+        return name
+
+    def holder(self, name: str) -> str | None:
+        """Return the arm whose hand closed on a frame; UNKNOWN when one may have, None when none has."""
+        grips = {arm: grip.frame for arm, grip in self.grips.items() if grip is not None}
+        if UNKNOWN in grips.values() or self.grips[""] is not None:
+            return UNKNOWN
+        return next((arm for arm, frame in grips.items() if frame == name), None)
+
+    # ---- changing --------------------------------------------------------------------------------------------------
+
+    def hang(self, child: str, parent: str, span: Span | None, *, rigid: bool = False) -> None:
+        """Hang a frame on another."""
+        if is_any(child):
+            self.forget(child)
+            return
+        link = _ANY_LINK if is_any(parent) else Link(parent, span, rigid)
+        self.links.put(child, link)
+        self.valued.put(child, True)
+        if self._facts.shaky and not self._steady(child):
+            self.lose()
+
+    def cut(self, child: str) -> None:
+        """Cut a frame loose."""
+        if is_any(child):
+            self.forget(child)
+        elif self.links[child] is not None:
+            self.links.put(child, None)
+
+    def assign(self, name: str, span: Span) -> None:
+        """Give a frame a value, and thereby another place."""
+        self._assignments += 1
+        self._order += 1
+        if is_any(name):
+            self.forget(name)
+            return
+        self.assigned.put(name, Assignment(self._order, span, moved=self.valued[name]))
+        self.valued.put(name, True)
+        leader = self.leader(name)
+        if leader is None:
+            self.lose()
+        else:
+            self.displace(leader)
+
+    def displace(self, name: str, by: str | None = None) -> None:
+        """Put a frame elsewhere; what hangs on it follows, and no hand stands at it or holds it any more.
+
+        Args:
+            name: the frame, or the arm that carries what hangs on it.
+            by: the arm that did it, if one did: what it carries goes along with its own hand.
+        """
+        for arm, hand in self.hands.items():
+            if arm != by and (at := self._left(hand.at, name)) != hand.at:
+                self.hands.put(arm, attrs.evolve(hand, at=at, arrival=None))
+        for arm, grip in self.grips.items():
+            if arm != by and grip is not None:
+                self._hold(arm, grip, self._left(grip.frame, name))
+
+    def arrive(self, arm: str, at: str | None, by: Span | None) -> None:
+        """Move a hand and all that it carries.
+
+        Args:
+            arm: the arm.
+            at: the frame to which it has come, or that it has taken there; UNKNOWN when one cannot know.
+            by: the MOVE if it moved the arm itself.
+        """
+        self.displace(arm, by=arm)
+        hand, grip = self.hands[arm], self.grips[arm]
+        if grip is not None and grip.frame not in (UNKNOWN, at):
+            gone = UNKNOWN if at == UNKNOWN else None
+            self._hold(arm, grip, {True: grip.frame, False: gone, None: UNKNOWN}[self._on(grip.frame, arm)])
+        if by and at not in (None, UNKNOWN) and (along := self._on(at, arm)) is not False:
+            # The goal has gone along: the hand stands only at what it stood at before and has taken with it.
+            at, by = (self._taken(hand.at, arm) if along else UNKNOWN), None
+        elif at not in (None, UNKNOWN) and not self._steady(at):
+            at = UNKNOWN
+        arrival = None if hand.doubtful or at == UNKNOWN else by
+        self.hands.put(arm, attrs.evolve(hand, at=at, arrival=arrival, arrived_open=hand.open, opened=None))
+
+    def open(self, arm: str, span: Span) -> None:
+        """Open the fingers."""
+        self.hands.put(arm, attrs.evolve(self.hands[arm], open=True, doubtful=False, opened=span))
+        self.grips.put(arm, None)
+
+    def close(self, arm: str, span: Span) -> None:
+        """Close the fingers."""
+        hand = self.hands[arm]
+        self.hands.put(arm, attrs.evolve(hand, open=False, doubtful=False))
+        self.grips.put(arm, Grip(hand.at, span) if hand.at else None)
+
+    # ---- forgetting ------------------------------------------------------------------------------------------------
+
+    def forget(self, name: str) -> None:
+        """Give up what is known of a frame, and of hands that may have had to do with it."""
+        if is_any(name):
+            self._facts.wipe(name)
+        else:
+            self.links.put(name, self.links.unknown)
+            self.valued.put(name, True)
+            self.assigned.put(name, None)
+        self.lose()
+
+    def forget_hand(self, arm: str | None, *, grasps: bool) -> None:
+        """Give up what is known of a hand.
+
+        Args:
+            arm: the arm; None when it may be any.
+            grasps: whether it may have closed its fingers on something.
+        """
+        if arm is not None:
+            self.hands.put(arm, self.hands.unknown)
+            self.grips.put(arm, self.grips.unknown if grasps else self.grips[arm])
+        else:
+            for name in (HANDS, GRIPS) if grasps else (HANDS,):
+                self._facts.wipe(name)
+        self.lose()
+
+    def shift(self, name: str) -> None:
+        """Take note that a frame may have been given another place; what it hangs on stays known."""
+        if is_any(name):
+            self._facts.wipe(name)
+        else:
+            self.valued.put(name, True)
+            self.assigned.put(name, None)
+
+    def lose(self) -> None:
+        """Take note that any frame may have been moved: where hands stand and what they hold is unknown."""
+        for arm, hand in self.hands.items():
+            if hand.at not in (None, UNKNOWN):
+                self.hands.put(arm, attrs.evolve(hand, at=UNKNOWN, arrival=None))
+        for arm, grip in self.grips.items():
+            if grip is not None:
+                self._hold(arm, grip, UNKNOWN)
+
+    def drop(self, name: str, *, array: bool = False) -> None:
+        """Take a frame, or an array of them, away: what hung on it keeps its place."""
+        if array or self._children.get(name, 0):
+            for child, link in self.links.items():
+                parent = link.parent if link else None
+                if parent == name or (array and parent is not None and parent.startswith(f"{name}[")):
+                    self.cut(child)
+
+    # ---- inside ----------------------------------------------------------------------------------------------------
+
+    def _hold(self, arm: str, grip: Grip, frame: str | None) -> None:
+        """Let a hand hold something else than before, or nothing, or nobody knows what."""
+        if frame != grip.frame:
+            self.grips.put(arm, attrs.evolve(grip, frame=frame) if frame is not None else None)
+
+    def _taken(self, at: str | None, arm: str) -> str | None:
+        """Return where a hand stands that stood at ``at`` and has taken along what hangs on it."""
+        if at is None or at == UNKNOWN:
+            return at
+        return {True: at, False: None, None: UNKNOWN}[self._on(at, arm)]
+
+    def _left(self, held: str | None, moved: str) -> str | None:
+        """Return where a hand stands, or what it holds, after ``moved`` was put elsewhere."""
+        if held is None or held == UNKNOWN:
+            return held
+        return {True: None, False: held, None: UNKNOWN}[self._on(held, moved)]
+
+    def _on(self, name: str, above: str) -> bool | None:
+        """Whether a frame is another or hangs on it; None when one cannot know."""
+        if name == above or (self._children.get(above, 0) > 0 and above in self.above(name)):
+            return True
+        return None if self.unknown(name) or is_any(above) else False
+
+    def _steady(self, name: str) -> bool:
+        """Whether nobody else moves a frame."""
+        facts = self._facts
+        if not facts.shaky:
+            return True
+        if any(one.places for one in facts.shaky) or self.unknown(name):
+            return False
+        return not any(facts.is_shaky(one) for one in (name, *self.above(name)))
+
+    def _watch(self, link: Link | None, change: int) -> None:
+        if link is not None and link.parent is None:
+            self._doubts += change
+        elif link is not None and link.parent is not None:
+            self._count += change
+            self._carried += change * is_arm(link.parent)
+            self._children[link.parent] = self._children.get(link.parent, 0) + change
+
+
+def is_arm(name: str) -> bool:
+    """Whether a canonical name is that of an arm; no other name has its form."""
+    return name.startswith("ARM_") and name[4:].isdecimal()
+
+
+def is_any(name: str) -> bool:
+    """Whether a name stands for some element of an array, nobody knows which."""
+    return name.endswith("[]")
+
+
+__all__ = ["HANDS", "UNKNOWN", "Assignment", "Hand", "Hanging", "Link", "base", "is_any", "is_arm"]

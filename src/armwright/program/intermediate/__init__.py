@@ -1,0 +1,1 @@
+"""Intermediate code: what a program becomes, how it is made, and its text form."""

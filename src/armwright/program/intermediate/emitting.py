@@ -1,0 +1,147 @@
+"""Writing instructions: places that are known later, values in passing, and the code of expressions."""
+
+from armwright.program.intermediate.code import Constant, Instruction, Op, Operand, Place
+from armwright.program.meaning import matrices
+from armwright.program.meaning.units import UnitSystem, convert
+from armwright.program.syntax import tree
+from armwright.program.text.source import Source, Span
+
+# A place that will be known later.
+LATER = Place(-1)
+
+_OPERATIONS = {
+    "*": Op.MUL,
+    "/": Op.DIV,
+    "+": Op.ADD,
+    "-": Op.SUB,
+    "<": Op.LT,
+    "<=": Op.LE,
+    "=": Op.EQ,
+    "<>": Op.NE,
+    ">=": Op.GE,
+    ">": Op.GT,
+}
+
+
+class Emitter:
+    """The instructions of a program so far."""
+
+    def __init__(self, source: Source, units: UnitSystem) -> None:
+        """Start with nothing."""
+        self.source, self.units = source, units
+        self.instructions: list[Instruction] = []
+        self.constants: list[tuple[float, ...] | float] = []
+        self._passing = 0
+        self._begins = False
+
+    @property
+    def here(self) -> Place:
+        """Where the next instruction will stand."""
+        return Place(len(self.instructions))
+
+    def begin(self) -> None:
+        """A statement begins: its first instruction is marked."""
+        self._begins = True
+
+    def passing(self) -> str:
+        """Return the name of a new value in passing."""
+        self._passing += 1
+        return f"%{self._passing}"
+
+    def emit(self, op: Op, *operands: Operand, span: Span, comment: str = "") -> int:
+        """Write an instruction; return its number."""
+        begins, self._begins = self._begins, False
+        self.instructions.append(Instruction(op=op, operands=operands, span=span, begins=begins, comment=comment))
+        return len(self.instructions) - 1
+
+    def land(self, number: int, place: Place | None = None) -> None:
+        """Let an instruction that was written with a place still open lead here, or to ``place``."""
+        old = self.instructions[number]
+        target = self.here if place is None else place
+        operands = tuple(target if operand == LATER else operand for operand in old.operands)
+        self.instructions[number] = Instruction(
+            op=old.op, operands=operands, span=old.span, begins=old.begins, comment=old.comment
+        )
+
+    def constant(self, value: tuple[float, ...] | float) -> Constant:
+        """Keep a constant."""
+        self.constants.append(value)
+        return Constant(len(self.constants) - 1)
+
+    # ---- expressions -----------------------------------------------------------------------------------------------
+
+    def value(self, node: tree.Expression, into: str | None = None) -> Operand:
+        """Write the code of an expression.
+
+        Args:
+            node: a checked expression.
+            into: a variable or value in passing that shall hold the value; where it goes by itself when left out.
+
+        Returns:
+            The operand that has the value: ``into`` if given.
+        """
+        match node:
+            case tree.Number() | tree.Name() | tree.ArmName():
+                operand = convert(node, self.units) if isinstance(node, tree.Number) else node.key
+                if into is None:
+                    return operand
+                self.emit(Op.COPY, into, operand, span=node.span)
+            case tree.Index(name=name, indices=indices):
+                element = self.passing()
+                numbers = [self.value(index) for index in indices]
+                self.emit(Op.ELEM, element, name.key, *numbers, span=node.span)
+                if into is None:
+                    return element
+                self.emit(Op.COPY, into, element, span=node.span)
+            case tree.Binary(operation="AND" | "OR"):
+                return self._chained(node, into or self.passing())
+            case tree.Matrix():
+                return self._matrix(node, into or self.passing())
+            case _:
+                return self._operation(node, into)
+        return _given(into)
+
+    def _operation(self, node: tree.Expression, into: str | None) -> Operand:
+        match node:
+            case tree.Function(name=name, arguments=arguments):
+                op, operands = Op(name.key), [self.value(argument) for argument in arguments]
+            case tree.Unary(operation=operation, operand=operand):
+                op, operands = Op.NOT if operation == "NOT" else Op.NEG, [self.value(operand)]
+            case tree.Binary(operation=operation, left=left, right=right):
+                op, operands = _OPERATIONS[operation], [self.value(left), self.value(right)]
+            case _:
+                raise AssertionError(f"a checked program has no {type(node).__name__}")
+        to = into or self.passing()
+        self.emit(op, to, *operands, span=node.span)
+        return to
+
+    def _chained(self, node: tree.Binary, to: str) -> str:
+        """AND and OR look at the right side only where it matters: ``n > 0 AND a[n] > 2``."""
+        self.value(node.left, to)
+        decides = to
+        if node.operation == "OR":
+            decides = self.passing()
+            self.emit(Op.NOT, decides, to, span=node.left.span)
+        over = self.emit(Op.JZ, decides, LATER, span=node.span)
+        self.value(node.right, to)
+        self.land(over)
+        return to
+
+    def _matrix(self, node: tree.Matrix, to: str) -> str:
+        if all(isinstance(item, tree.Number) for item in node.items):
+            numbers = matrices.constant(node)
+            metres = self.units.metres
+            shift = [convert(item, self.units) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
+            self.emit(Op.LOADM, to, self.constant((*numbers[:9], *shift)), span=node.span)
+        else:
+            self.emit(Op.MATX, to, *(self.value(item) for item in node.items), span=node.span)
+        return to
+
+    def text(self, node: tree.Expression) -> str:
+        """Return an expression as the program writes it, on one line."""
+        return " ".join(self.source.slice(node.span).split())
+
+
+def _given(into: str | None) -> str:
+    assert into is not None  # noqa: S101 - the cases without were returned from
+    return into

@@ -1,0 +1,1 @@
+"""What is said about a program: diagnostics, and how people and tools read them."""

@@ -1,0 +1,106 @@
+"""Diagnostics as people read them: the lines of the program with marks under the places that matter."""
+
+import unicodedata
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeAlias
+
+from armwright.program.messages.diagnostics import Diagnostic, Label, Severity, count_line, in_order
+from armwright.program.text.source import Source
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+# A piece of a row and its style, in the words of rich; the style is empty for plain text.
+Piece: TypeAlias = tuple[str, str]
+Row: TypeAlias = list[Piece]
+
+_TAB = 4
+_NARROWEST_GUTTER = 2
+_LOUD = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow"}
+_QUIET = "bold blue"
+
+
+def render(diagnostics: Iterable[Diagnostic], source: Source) -> str:
+    """Return all diagnostics as plain text, sorted by place, with a count at the end."""
+    return "".join("".join(text for text, _ in row).rstrip() + "\n" for row in _page(diagnostics, source))
+
+
+def render_rich(diagnostics: Iterable[Diagnostic], source: Source) -> "Text":
+    """Return the same in colour."""
+    from rich.text import Text  # noqa: PLC0415 - only who watches waits for it
+
+    page = Text(no_wrap=True)
+    for row in _page(diagnostics, source):
+        for text, style in row:
+            page.append(text, style or None)
+        page.append("\n")
+    return page
+
+
+def _page(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
+    ordered = in_order(diagnostics)
+    for diagnostic in ordered:
+        yield from _block(diagnostic, source)
+        yield [("", "")]
+    yield [(count_line(ordered, source), "bold" if ordered else "")]
+
+
+def _block(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
+    loud = _LOUD[diagnostic.severity]
+    labels = [Label(diagnostic.span, diagnostic.label), *diagnostic.secondary]
+    numbers = sorted({source.line(label.span.start) for label in labels})
+    width = max(_NARROWEST_GUTTER, len(str(numbers[-1])))
+    yield [(f"{diagnostic.severity.value}[{diagnostic.code}]", loud), (f": {diagnostic.message}", "bold")]
+    place = f"{source.name}:{source.line(diagnostic.span.start)}:{source.column(diagnostic.span.start)}"
+    yield [(" " * width + "--> ", _QUIET), (place, "")]
+    yield [(" " * width + " |", _QUIET)]
+    before = numbers[0]
+    for number in numbers:
+        if number > before + 1:
+            yield [("...", _QUIET)]
+        before = number
+        shown = "".join(_cells(source.line_text(number)))
+        yield [(f"{number:>{width}} | ", _QUIET), (shown, "")]
+        here = [label for label in labels if source.line(label.span.start) == number]
+        for label in sorted(here, key=lambda one: one.span.start):
+            mark, style = ("^", loud) if label is labels[0] else ("-", _QUIET)
+            yield [(" " * width + " | ", _QUIET), *_marks(label, mark, style, source)]
+    for head, texts in (("note", diagnostic.notes), ("help", diagnostic.helps)):
+        for text in texts:
+            yield [(" " * width + " = ", _QUIET), (f"{head}: ", "bold"), (text, "")]
+
+
+def _marks(label: Label, mark: str, style: str, source: Source) -> Row:
+    """Return the blanks, the marks and the words under one place; a place of several lines is marked in its first."""
+    cells = _cells(source.line_text(source.line(label.span.start)))
+    first = source.column(label.span.start) - 1
+    last = min(first + label.span.end - label.span.start, len(cells))
+    # Beyond the end of the line every character that is not there counts one.
+    indent = sum(map(len, cells[:first])) + max(0, first - len(cells))
+    length = sum(_width(cell) for cell in cells[first:last])
+    indent += sum(_width(cell) - len(cell) for cell in cells[:first])
+    return [(" " * indent, ""), (mark * max(1, length), style), (f" {label.text}" if label.text else "", style)]
+
+
+def _cells(line: str) -> Sequence[str]:
+    """Return what is shown for each character of a line: blanks up to the next stop for a tab."""
+    shown: list[str] = []
+    column = 0
+    for character in line:
+        cell = " " * (_TAB - column % _TAB) if character == "\t" else _visible(character)
+        column += _width(cell)
+        shown.append(cell)
+    return shown
+
+
+def _visible(character: str) -> str:
+    """Return the character, or a stand-in for one that would disturb the terminal."""
+    return "\N{REPLACEMENT CHARACTER}" if unicodedata.category(character) in ("Cc", "Cf", "Cs") else character
+
+
+def _width(cell: str) -> int:
+    """Return how many columns of a terminal a shown character takes."""
+    return sum(
+        0 if unicodedata.combining(character) else 2 if unicodedata.east_asian_width(character) in "WF" else 1
+        for character in cell
+    )

@@ -1,0 +1,1 @@
+"""Programs at work: processes, motions, effects, and what a run leaves."""

@@ -1,0 +1,360 @@
+"""Jumps, procedures, processes, events, locks, attempts, and the end of a program."""
+
+import math
+from collections.abc import Callable, Mapping
+
+from armwright.program.intermediate.code import Instruction, Kind, Op, Place
+from armwright.program.messages.diagnostics import Label
+from armwright.program.running.acting import HANDLERS as ACTIONS
+from armwright.program.running.machine import Machine, RunError
+from armwright.program.running.moving import halt, move, release, stop
+from armwright.program.running.process import Activation, Attempt, Pending, Process, Waiting
+from armwright.program.text.source import Span
+
+Handler = Callable[[Machine, Process, Instruction], None]
+
+# A last pass that rounding would leave out is made.
+_ROUNDING = 1e-9
+# The longest pause; more is a slip of units [s].
+_LONGEST_PAUSE = 1e6
+
+
+def _place(step: Instruction, at: int) -> int:
+    place = step.operands[at]
+    assert isinstance(place, Place)  # noqa: S101 - the translator lands them
+    return place.index
+
+
+def _jump(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    process.at = _place(step, 0)
+
+
+def _jump_if_not(run: Machine, process: Process, step: Instruction) -> None:
+    if not run.read(process, step.operands[0], step):
+        process.at = _place(step, 1)
+
+
+def _for(run: Machine, process: Process, step: Instruction) -> None:
+    variable, count, *bounds = step.operands[:5]
+    done = run.number(process, count, step)
+    first, last, by = (run.number(process, bound, step) for bound in bounds)
+    if by == 0:
+        run.fail(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
+    if done > math.floor((last - first) / by + _ROUNDING):
+        process.at = _place(step, 5)
+        return
+    run.write(process, variable, first + done * by, step)
+    run.write(process, count, done + 1, step)
+
+
+# ---- procedures ----------------------------------------------------------------------------------------------------
+
+
+def _call(run: Machine, process: Process, step: Instruction) -> None:
+    name = str(step.operands[0])
+    procedure = run.code.procedures[name]
+    if len(process.stack) > run.limits.depth:
+        text = f"procedures call one another more than {run.limits.depth} deep"
+        run.fail(process, "E505", text, step.span, f"`{run.spelled(name)}` is called once more")
+    run.activations += 1
+    bindings, own = {}, []
+    for key, kind in procedure.types.items():
+        kept = f"{key}'{run.activations}"
+        if key in procedure.parameters:
+            operand = step.operands[1 + procedure.parameters.index(key)]
+            by_value = not kind.sizes and kind.kind in (Kind.SCALAR, Kind.TRANS)
+            if not by_value and run.names_variable(process, operand):
+                bindings[key] = run.name(process, operand)
+                continue
+            if not by_value:
+                run.grow(run.tree.place(kept, run.pose(process, operand, step)), kept, step.span)
+            elif kind.kind is Kind.SCALAR:
+                run.values[kept] = run.number(process, operand, step)
+            else:
+                run.values[kept] = run.pose(process, operand, step)
+        bindings[key] = kept
+        run.types[kept] = kind
+        own.append(kept)
+    process.stack.append(
+        Activation(
+            kind="procedure",
+            name=name,
+            bindings=bindings,
+            back=process.at,
+            called=step.span,
+            own=tuple(own),
+            locks=len(process.locks),
+        )
+    )
+    process.at = procedure.start
+
+
+def _return(run: Machine, process: Process, step: Instruction) -> None:
+    process.at = process.now.back
+    _leave(run, process, step.span)
+
+
+def _leave(run: Machine, process: Process, span: Span) -> None:
+    """Leave the present activation: its variables are gone, its locks given back."""
+    activation = process.stack.pop()
+    release(run, process, activation.locks)
+    for kept in activation.own:
+        kind = run.types.pop(kept)
+        elements = [name for name in run.tree if name.startswith(f"{kept}[")] if kind.sizes else []
+        for name in (kept, *elements):
+            if kind.kind is Kind.FRAME and name in run.tree:
+                run.grow(run.tree.without(name), name, span)
+                run.written.pop(name, None)
+        for name in [one for one in run.values if one == kept or one.startswith(f"{kept}[")]:
+            del run.values[name]
+        run.events.pop(kept, None)
+
+
+# ---- processes -----------------------------------------------------------------------------------------------------
+
+
+def _fork(run: Machine, process: Process, step: Instruction) -> None:
+    now = process.now
+    rank = run.number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
+    branch = Process(
+        path=(*process.path, len(process.branches)),
+        priority=rank,
+        at=_place(step, 0),
+        wake=run.ticks,
+        stack=[Activation(kind="main", bindings=now.bindings, passing=dict(now.passing), wrote=dict(now.wrote))],
+        parent=process,
+        last_arm=process.last_arm,
+    )
+    process.branches.append(branch)
+
+
+def _join(run: Machine, process: Process, step: Instruction) -> None:
+    """Let the branches go, all at once, and wait for them."""
+    run.processes += process.branches
+    for branch in process.branches:
+        branch.wake = run.ticks
+    process.waiting = Waiting("branches", (), step.span)
+
+
+def _quit(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    end(run, process)
+    parent = process.parent
+    assert parent is not None  # noqa: S101 - only branches end so
+    if all(branch.done for branch in parent.branches):
+        parent.branches = []
+        parent.waiting, parent.wake = None, run.ticks
+
+
+def end(run: Machine, process: Process) -> None:
+    """Take a process out of the run."""
+    release(run, process, 0)
+    process.done = True
+    process.motion = process.pending = process.waiting = None
+    run.processes.remove(process)
+
+
+def _signal(run: Machine, process: Process, step: Instruction) -> None:
+    name = run.name(process, step.operands[0])
+    run.events[name] = run.events.get(name, 0) + 1
+    for other in run.processes:
+        if other.waiting and other.waiting.what == "event" and name in other.waiting.names:
+            other.waiting, other.wake = None, run.ticks
+    run.effect("SIGNAL", f"SIGNAL {run.spelled(name)}", step.span)
+
+
+def _wait(run: Machine, process: Process, step: Instruction) -> None:
+    name = run.name(process, step.operands[0])
+    if run.events.get(name, 0) > 0:
+        run.events[name] -= 1
+        run.effect("WAIT", f"WAIT {run.spelled(name)}", step.span)
+        return
+    # When the event comes the same instruction is looked at again.
+    process.at -= 1
+    process.waiting = Waiting("event", (name,), step.span)
+
+
+def _pause(run: Machine, process: Process, step: Instruction) -> None:
+    seconds = run.number(process, step.operands[0], step)
+    if not 0 <= seconds <= _LONGEST_PAUSE:
+        text = f"a PAUSE of {seconds:g} s is not possible"
+        run.fail(process, "E231", text, step.span, f"expected 0 to {_LONGEST_PAUSE:g} s")
+    text = f"PAUSE {seconds:g}"
+    run.take_time(process, seconds, Pending(kind="PAUSE", text=text, since=run.ticks, span=step.span))
+
+
+def _lock(run: Machine, process: Process, step: Instruction) -> None:
+    names = sorted({run.name(process, operand) for operand in step.operands})
+    if any(run.locks.get(name, process) is not process for name in names):
+        process.at -= 1
+        process.waiting = Waiting("locks", tuple(names), step.span)
+        return
+    for name in names:
+        run.locks[name] = process
+    process.locks += names
+    run.effect("LOCK", f"LOCK {', '.join(map(run.spelled, names))}", step.span)
+
+
+def _unlock(run: Machine, process: Process, step: Instruction) -> None:
+    names = {run.name(process, operand) for operand in step.operands}
+    release(run, process, len(process.locks) - len(names))
+
+
+# ---- attempts and ends ---------------------------------------------------------------------------------------------
+
+
+def _try(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    attempt = Attempt(process.at - 1, _place(step, 0), recovering=False, locks=len(process.locks))
+    process.now.attempts.append(attempt)
+
+
+def _well(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    process.now.attempts.pop()
+    process.at = _place(step, 0)
+
+
+def _recovered(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    process.now.attempts.pop()
+
+
+def _retry(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    attempts = process.now.attempts
+    while not attempts[-1].recovering:
+        attempts.pop()
+    release(run, process, attempts[-1].locks)
+    # TRY itself is run again and puts the attempt back.
+    process.at = attempts.pop().start
+
+
+def _halt(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    finish(run, step.span, "HALT")
+
+
+def _stop(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    finish(run, step.span, "END")
+
+
+def rest(run: Machine, span: Span) -> None:
+    """Bring every arm to rest and switch every device off; the clock goes on until all is still."""
+    run.ticks = max([run.ticks, *(_still(run, process, span) for process in run.processes)])
+
+
+def _still(run: Machine, process: Process, span: Span) -> int:
+    """Give up the motion of a process, if it makes one; return when its arm is at rest."""
+    if process.motion is None:
+        return run.ticks
+    arm, end_of_motion = process.motion.arm, stop(run, process, span)
+    process.motion = None
+    run.effect("STOP", f"{arm} stops", span, arm=arm)
+    return end_of_motion
+
+
+def finish(run: Machine, span: Span, word: str) -> None:
+    """End the program: arms at rest, devices off, the frame table true."""
+    rest(run, span)
+    off = sorted(run.hardware.running())
+    for device in off:
+        run.hardware.operate(device, on=False)
+    words = "".join(f"; {run.spelled(device)} OFF" for device in off)
+    run.effect("END", f"{word}{words}", span, data={"switched_off": off})
+    run.over = True
+
+
+def recover(run: Machine, process: Process, error: RunError) -> bool:
+    """Go on in the RECOVER part of the innermost TRY around what went wrong.
+
+    What the process had begun is stopped: its branches, its motion; branches without a TRY of their own hand the
+    error to the process that began them.
+
+    Returns:
+        Whether there is one.
+    """
+    span = error.diagnostic.span
+    while True:
+        ends = [_cancel(run, branch, span) for branch in process.branches]
+        process.branches = []
+        process.wake = max([*ends, _still(run, process, span)])
+        process.pending = process.waiting = None
+        if (attempt := _attempt(run, process, span)) is not None:
+            process.at = attempt.recovery
+            release(run, process, attempt.locks)
+            said = f"{error.diagnostic.code} in line {run.code.source.line(span.start)}: {error.diagnostic.message}"
+            run.effect("ERROR", said, span, data={"code": error.diagnostic.code})
+            return True
+        if process.parent is None:
+            run.ticks = process.wake
+            return False
+        process = process.parent
+
+
+def _attempt(run: Machine, process: Process, span: Span) -> Attempt | None:
+    """Return the innermost attempt that has not failed yet, now failed, with all activations inside it left."""
+    while True:
+        attempts = process.now.attempts
+        while attempts:
+            attempt = attempts.pop()
+            if not attempt.recovering:
+                failed = Attempt(attempt.start, attempt.recovery, recovering=True, locks=attempt.locks)
+                attempts.append(failed)
+                return failed
+        if len(process.stack) == 1:
+            return None
+        _leave(run, process, span)
+
+
+def _cancel(run: Machine, process: Process, span: Span) -> int:
+    """End a branch with all its own; return when its arms are at rest."""
+    if process.done:
+        return run.ticks
+    ends = [_cancel(run, branch, span) for branch in process.branches]
+    ends.append(_still(run, process, span))
+    end(run, process)
+    return max(ends)
+
+
+def deadlock(run: Machine) -> RunError:
+    """Return the error of processes that all wait for one another."""
+    stuck = [one for one in run.processes if one.waiting and one.waiting.what != "branches"]
+    stuck.sort(key=lambda one: one.path)
+    says = []
+    for one in stuck:
+        assert one.waiting is not None  # noqa: S101 - chosen so
+        names = ", ".join(map(run.spelled, one.waiting.names))
+        what = f"waits for {names}" if one.waiting.what == "event" else f"waits for the lock of {names}"
+        says.append((one.waiting.span, f"{one.title} {what}"))
+    (span, label), *others = says
+    text = f"{len(says)} processes wait for ever" if others else "the program waits for ever"
+    try:
+        run.fail(stuck[0], "E501", text, span, label, secondary=[Label(*other) for other in others])
+    except RunError as error:
+        return error
+
+
+HANDLERS: Mapping[Op, Handler] = {
+    **ACTIONS,
+    Op.MVEND: move,
+    Op.MVHLT: halt,
+    Op.JMP: _jump,
+    Op.JZ: _jump_if_not,
+    Op.FOR: _for,
+    Op.CALL: _call,
+    Op.RET: _return,
+    Op.FORK: _fork,
+    Op.JOIN: _join,
+    Op.QUIT: _quit,
+    Op.SIG: _signal,
+    Op.WAIT: _wait,
+    Op.PAUSE: _pause,
+    Op.LOCK: _lock,
+    Op.UNLK: _unlock,
+    Op.TRY: _try,
+    Op.ENDT: _well,
+    Op.ENDR: _recovered,
+    Op.RETRY: _retry,
+    Op.HALT: _halt,
+    Op.STOP: _stop,
+    # The parts of a MOVE are gathered by its end.
+    **dict.fromkeys(
+        (Op.MVBEG, Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON),
+        lambda *_: None,
+    ),
+}

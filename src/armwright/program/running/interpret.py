@@ -1,0 +1,172 @@
+"""The interpreter: intermediate code acts on the frame tree and on a cell, and leaves a recording.
+
+All processes of a program share one clock. Of those that are due at the same tick the one with the highest priority is
+served first, then the one that comes first in the text; so a run is the same on any machine.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.hardware import Hardware
+from armwright.cell.model import Cell
+from armwright.program.intermediate.code import Code
+from armwright.program.messages.diagnostics import Diagnostic, Severity
+from armwright.program.running.control import HANDLERS, deadlock, recover, rest
+from armwright.program.running.machine import Limits, Machine, RunError
+from armwright.program.running.moving import go_on
+from armwright.program.running.obstacles import detour_warning
+from armwright.program.running.process import Process
+from armwright.program.running.recording import Recording, RunStage, efforts
+
+# Called now and then: the time on the clock [s], the line of the next statement.
+Progress = Callable[[float, int], None]
+
+__all__ = ["Limits", "Machine", "Progress", "RunError", "advance", "due", "interpret", "ready", "run", "warnings"]
+
+
+def interpret(
+    code: Code, cell: Cell, hardware: Hardware, progress: Progress | None = None, *, limits: Limits | None = None
+) -> Recording:
+    """Run a program in a cell.
+
+    Args:
+        code: translated without errors against this cell.
+        cell: arms, frames, servo period and deviation.
+        hardware: the cell at work, simulated or real.
+        progress: told before each statement.
+        limits: when a program is taken to run for ever.
+
+    Returns:
+        All that happened, tick by tick.
+
+    Raises:
+        RunError: a goal is out of reach, a joint would pass its limits, the camera found nothing, a device is
+            missing, a value is missing or out of range, processes wait for one another, or a limit of the run is
+            passed, and no TRY was around it. The arms are at rest and the devices off then, as at the end.
+    """
+    machine = Machine(code, cell, hardware, limits)
+    run(machine, progress)
+    return machine.recording()
+
+
+def run(machine: Machine, progress: Progress | None = None) -> None:
+    """Run a program on to its end.
+
+    Raises:
+        RunError: as ``interpret`` does.
+    """
+    instructions = machine.code.instructions
+    while not machine.over:
+        process = due(machine)
+        if progress and instructions[process.at].begins:
+            progress(machine.now, machine.code.line(instructions[process.at]))
+        advance(machine, process)
+
+
+def due(machine: Machine) -> Process:
+    """Return the process that is served next.
+
+    Raises:
+        RunError: all wait for one another.
+    """
+    process = ready(machine)
+    if process is None:
+        raise _stopped(machine, deadlock(machine))
+    return process
+
+
+def ready(machine: Machine) -> Process | None:
+    """Return the process that is served next; None where all wait for one another."""
+    best = None
+    for process in machine.processes:
+        if process.waiting is None:
+            rank = (process.wake, -process.priority, process.path)
+            if best is None or rank < best[0]:
+                best = (rank, process)
+    return None if best is None else best[1]
+
+
+def advance(machine: Machine, process: Process) -> None:
+    """Let a process do its next instruction, or what its time has come for.
+
+    Raises:
+        RunError: something went wrong that no TRY is around.
+    """
+    try:
+        _advance(machine, process)
+    except RunError as error:
+        if not recover(machine, process, error):
+            raise _stopped(machine, error) from None
+
+
+def _advance(machine: Machine, process: Process) -> None:
+    if process.wake > machine.ticks:
+        machine.ticks, machine.idle = process.wake, 0
+        if machine.now > machine.limits.time:
+            step = machine.code.instructions[process.at]
+            text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
+            machine.fail(process, "E506", text, step.span, "it has come to here")
+    if (pending := process.pending) is not None:
+        process.pending = None
+        if pending.place is not None:
+            machine.place(process, *pending.place, pending.span)
+        machine.effect(pending.kind, pending.text, pending.span, since=pending.since, arm=pending.arm)
+        return
+    if process.motion is not None and process.now.kind != "action" and not _in_action(process):
+        go_on(machine, process)
+        return
+    step = machine.code.instructions[process.at]
+    machine.idle += 1
+    if machine.idle > machine.limits.steps:
+        text = f"the program has done {machine.limits.steps} steps and no time has gone by"
+        help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
+        machine.fail(process, "E504", text, step.span, "it is still running here", helps=[help_])
+    process.at += 1
+    HANDLERS[step.op](machine, process, step)
+
+
+def _in_action(process: Process) -> bool:
+    """Whether a process is in the action of a guard, perhaps in a procedure that it calls."""
+    return any(activation.kind == "action" for activation in process.stack)
+
+
+def _stopped(machine: Machine, error: RunError) -> RunError:
+    """Return the error with the frames as they are when all arms are at rest and all devices off."""
+    rest(machine, error.diagnostic.span)
+    for device in sorted(machine.hardware.running()):
+        machine.hardware.operate(device, on=False)
+    machine.over = True
+    return RunError(error.diagnostic, machine.tree, machine.now)
+
+
+def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
+    """Return a warning for every straight line that was gone round, and for every joint asked for too much effort."""
+    found = []
+    for stage in recording.stages:
+        detour = detour_warning(stage)
+        found += [] if detour is None else [detour]
+        arm = recording.cell.arms[stage.arm].arm
+        over = stage.peak_effort / arm.limit("effort")
+        if (over <= 1).all():
+            continue
+        t, tau = efforts(arm, stage.stage.trajectory, recording.cell.period)
+        found += [_effort_warning(stage, arm, joint, t, tau[:, joint]) for joint in np.flatnonzero(over > 1).tolist()]
+    return tuple(found)
+
+
+def _effort_warning(stage: RunStage, arm: Arm, joint: int, t: Array, tau: Array) -> Diagnostic:
+    worst = int(np.abs(tau).argmax())
+    unit = "N m" if arm.joints[joint].revolute else "N"
+    limit = arm.joints[joint].limits.effort
+    return Diagnostic(
+        code="W401",
+        severity=Severity.WARNING,
+        message=f"joint {joint + 1} of {stage.arm} would need {abs(tau[worst]):.1f} {unit}, "
+        f"{(abs(tau[worst]) / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
+        span=stage.span,
+        label=f"at {stage.t0 + t[worst]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
+        helps=(f"a lower speed than {stage.speed:g} asks for less where it is motion and not weight that costs",),
+    )

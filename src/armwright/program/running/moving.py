@@ -1,0 +1,356 @@
+"""MOVE at work: planning its stages, following them tick by tick, guards, contact, and stopping on the way."""
+
+import math
+from collections.abc import Sequence
+from typing import NoReturn
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.model import base_name
+from armwright.kinematics.forward import forward
+from armwright.motion.braking import brake
+from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
+from armwright.motion.trajectory import hold, whole_ticks
+from armwright.program.following.hanging import is_arm
+from armwright.program.intermediate.code import (
+    Instruction,
+    Op,
+    Place,
+    StagePlan,
+    stages_of,
+    stages_text,
+)
+from armwright.program.messages.diagnostics import Label
+from armwright.program.running.acting import HANDLERS as VALUES
+from armwright.program.running.asking import Asked, Goal, asked_of
+from armwright.program.running.machine import Machine
+from armwright.program.running.obstacles import CODES, stopped, ways_round, where_and_why
+from armwright.program.running.process import Activation, Guard, Motion, Process
+from armwright.program.running.recording import Run, RunStage, efforts
+from armwright.program.text.source import Span
+from armwright.spatial.poses import inverse
+
+# A place this many times farther than the arm reaches was probably typed in another unit.
+_OTHER_UNIT = 50.0
+# A hand that closed on a frame still stands at it when both are so near [m], and entries of rotations.
+_SAME_PLACE = 1e-6
+# A guarded motion finds something out by the place at which it stops; it keeps to its line this much more closely.
+_GUARDED = 0.05
+# A duration so little too short is rounding.
+_ROUNDING = 1e-9
+
+
+def move(run: Machine, process: Process, step: Instruction) -> None:
+    """Plan a MOVE and begin its first stage."""
+    asked = asked_of(run, process, step)
+    moved = run.name(process, asked.begin.operands[0])
+    arm, implied = _carrier(run, process, moved, asked.begin)
+    run.claim(process, arm, step.span)
+    stages = _plan(run, process, asked, arm, moved)
+    spelled = run.spelled(moved)
+    who = arm if moved == arm else f"{arm} [{spelled}]"
+    manner = f"@{asked.speed:g}" if asked.duration is None else f"in {asked.duration:g} s"
+    process.motion = Motion(
+        arm=arm,
+        moved=moved,
+        tip=run.tree.relation(moved, arm),
+        span=step.span,
+        text=f"{who} MOVE: {stages_text(asked.form).replace(' / ', '; ')} {manner}",
+        data={"moved": moved, "goal": _goal_name(run, process, asked), "speed": asked.speed, "implied_affix": implied},
+        stages=stages,
+        speed=asked.speed,
+        begun=run.ticks,
+        since=run.ticks,
+        until=run.ticks,
+        guards=asked.guards,
+    )
+    _start(run, process, process.motion)
+
+
+def go_on(run: Machine, process: Process) -> None:
+    """Follow a motion at a tick at which something may happen: a guard, the end of a stage, the end of the MOVE."""
+    motion = process.motion
+    assert motion is not None  # noqa: S101 - asked for only then
+    for guard in motion.guards:
+        if not guard.done and _holds(run, process, motion, guard):
+            guard.done = True
+            run.set_hand(motion.arm, motion.span)
+            now = process.now
+            action = Activation(
+                kind="action", bindings=now.bindings, passing=now.passing, wrote=now.wrote, back=process.at
+            )
+            action.locks = len(process.locks)
+            process.stack.append(action)
+            process.at = guard.action
+            return
+    if run.ticks < motion.until:
+        process.wake = run.ticks + 1 if any(not guard.done for guard in motion.guards) else motion.until
+    elif run.hardware.stopped_at(motion.arm) is not None and not motion.data.get("halted"):
+        run.set_hand(motion.arm, motion.span)
+        _blocked(run, process, motion, "and nothing in the program ends the motion there")
+    elif motion.stages:
+        _start(run, process, motion)
+    else:
+        _finish(run, process, motion)
+
+
+def halt(run: Machine, process: Process, step: Instruction) -> None:
+    """End the motion from inside an action: the arm stops in a controlled way, and the MOVE is over."""
+    motion = process.motion
+    assert motion is not None  # noqa: S101 - an action belongs to one
+    action = process.stack.pop()
+    assert action.kind == "action"  # noqa: S101 - HALT in a procedure is another instruction
+    release(run, process, action.locks)
+    process.at = action.back
+    motion.until = process.wake = stop(run, process, step.span)
+    motion.stages, motion.guards = [], []
+    motion.data["halted"] = True
+    motion.text += "; halted"
+
+
+def stop(run: Machine, process: Process, span: Span) -> int:
+    """Stop the arm of a process in a controlled way; return when it is at rest [ticks].
+
+    The frame table holds the place where it comes to rest from now on.
+    """
+    motion, period = process.motion, run.cell.period
+    assert motion is not None  # noqa: S101 - asked for only then
+    arm, runs = motion.arm, run.runs[motion.arm]
+    end, last = run.ticks, runs[-1] if runs else None
+    local = run.now - last.t0 if last else 0.0
+    if last and local < last.duration - _ROUNDING:
+        limit = run.cell.arms[arm].arm.limit("acceleration")
+        limit = np.where(np.isfinite(limit), limit, np.maximum(np.abs(last.trajectory(local, 2)), 1.0))
+        braking = brake(last.trajectory, local, limit, period=period)
+        runs[-1] = attrs.evolve(last, duration=local)
+        run.hardware.begin(arm, braking, run.now, motion.tip)
+        blocked = run.hardware.stopped_at(arm)
+        duration = braking.duration if blocked is None else blocked - run.now
+        runs.append(Run(t0=run.now, trajectory=braking, duration=duration))
+        end += math.ceil(duration / period - _ROUNDING)
+    else:
+        run.hardware.begin(arm, hold(run.hardware.posture(arm, run.now), period), run.now, motion.tip)
+    if motion.record >= 0:
+        record = run.stages[motion.record]
+        run.stages[motion.record] = attrs.evolve(record, duration=max(0.0, end * period - record.t0))
+    ticks, run.ticks = run.ticks, end
+    q = run.hardware.posture(arm, run.now)
+    run.ticks = ticks
+    X_BH = forward(run.cell.arms[arm].arm, q)
+    run.grow(run.tree.place(arm, run.tree.world(base_name(arm)) @ X_BH), arm, span)
+    return end
+
+
+def release(run: Machine, process: Process, keep: int) -> None:
+    """Give back the locks that a process took after its first ``keep``; whoever waits for one looks again."""
+    for name in process.locks[keep:]:
+        if name not in process.locks[:keep]:
+            run.locks.pop(name, None)
+    del process.locks[keep:]
+    for other in run.processes:
+        if other.waiting and other.waiting.what == "locks":
+            other.waiting, other.wake = None, run.ticks
+
+
+# ---- planning ------------------------------------------------------------------------------------------------------
+
+
+def _goal_name(run: Machine, process: Process, asked: Asked) -> str:
+    goal = asked.begin.operands[1]
+    return run.name(process, goal) if run.names_variable(process, goal) else asked.form.goal
+
+
+def _carrier(run: Machine, process: Process, moved: str, begin: Instruction) -> tuple[str, bool]:
+    """Return the arm that carries what is moved, and whether it hangs there only from now on."""
+    if is_arm(moved):
+        return moved, False
+    run.held(moved, begin, process)
+    above = run.tree.ancestors(moved)
+    if (arm := next((name for name in above if is_arm(name)), None)) is not None:
+        return arm, False
+    X_WM = run.tree.world(moved)
+    for name, hand in run.hands.items():
+        if hand.holds == moved and np.allclose(run.tree.world(name), X_WM, rtol=0, atol=_SAME_PLACE):
+            run.grow(run.tree.affix(moved, name), moved, begin.span)
+            return name, True
+    return _not_carried(run, process, moved, begin, above[0])
+
+
+def _not_carried(run: Machine, process: Process, moved: str, begin: Instruction, above: str) -> NoReturn:
+    spelled = run.spelled(moved)
+    where = [Label(run.written[moved], f"{spelled} got its place here")] if moved in run.written else []
+    run.fail(
+        process,
+        "E301",
+        f"`{spelled}` cannot be moved: it is not affixed to an arm",
+        begin.span,
+        f"hangs on {run.spelled(above)}, not on an arm",
+        secondary=where,
+        helps=[f"grasp it and write `AFFIX {spelled} TO {process.last_arm or min(run.cell.arms, default='ARM_1')}`"],
+    )
+
+
+def _plan(run: Machine, process: Process, asked: Asked, arm: str, moved: str) -> list[tuple[Stage, tuple[str, ...]]]:
+    """Return the stages of a MOVE with the names of where they lead.
+
+    Source:
+        TR-83-008, third paper: ARM-1' = Base^-1 f2 f1^-1, where f1 is the relation from the arm to it.
+    """
+    cell, place = run.cell, run.cell.arms[arm]
+    plans = stages_of(asked.form)
+    X_BW = inverse(run.tree.world(base_name(arm)))
+    X_MH = inverse(run.tree.relation(moved, arm))
+    goals = [
+        StageGoal(
+            kind=one.kind.value,
+            poses=np.stack([X_BW @ _pose(run, process, asked.goals[label]) @ X_MH for label in one.frames]),
+            blend=asked.blend,
+        )
+        for one in plans
+    ]
+    deviation = cell.deviation * (_GUARDED if asked.guards else 1.0)
+    manner = Manner(speed=asked.speed, deviation=deviation, period=cell.period, around=cell.around)
+    try:
+        stages = plan(place.arm, run.hardware.posture(arm, run.now), goals, manner)
+    except StageError as error:
+        _fail_move(run, process, error.obstacle, asked=asked, stage=plans[error.stage], arm=arm)
+    if asked.duration is not None:
+        stages = _timed(run, process, asked, stages)
+    return [(stage, one.frames) for stage, one in zip(stages, plans, strict=True)]
+
+
+def _pose(run: Machine, process: Process, goal: Goal) -> Array:
+    return run.pose(process, goal.operand, goal.step)
+
+
+def _timed(run: Machine, process: Process, asked: Asked, stages: Sequence[Stage]) -> list[Stage]:
+    """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
+    asked_for, least = asked.duration, sum(stage.trajectory.duration for stage in stages)
+    assert asked_for is not None  # noqa: S101 - asked for only then
+    if asked_for < least - run.cell.period:
+        text = f"this MOVE cannot be done in {asked_for:g} s"
+        run.fail(process, "E405", text, asked.span, f"it takes {least:.3f} s or more")
+    factor = max(1.0, asked_for / least) if least else 1.0
+    slow = (whole_ticks(stage.trajectory.slowed(factor), run.cell.period) for stage in stages)
+    return [attrs.evolve(stage, trajectory=one) for stage, one in zip(stages, slow, strict=True)]
+
+
+def _fail_move(
+    run: Machine, process: Process, obstacle: Obstacle, *, asked: Asked, stage: StagePlan, arm: str
+) -> NoReturn:
+    label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
+    goal, kind = asked.goals[label], stage.kind.value
+    secondary = []
+    if run.names_variable(process, goal.operand) and (name := run.name(process, goal.operand)) in run.written:
+        secondary.append(Label(run.written[name], f"`{label}` got its place here"))
+    run.fail(
+        process,
+        CODES[obstacle.cause],
+        stopped(obstacle, label, arm),
+        goal.step.span,
+        "cannot be reached",
+        secondary=secondary,
+        notes=(where_and_why(obstacle, kind, stage.frames, arm),),
+        helps=(*_other_unit(run, process, goal, arm), *ways_round(obstacle, kind, run.cell.around)),
+    )
+
+
+def _other_unit(run: Machine, process: Process, goal: Goal, arm: str) -> tuple[str, ...]:
+    """Say what lengths are counted in, where a place so far off can only be meant in another unit."""
+    X_BW = inverse(run.tree.world(base_name(arm)))
+    away = np.linalg.norm((X_BW @ _pose(run, process, goal))[:3, 3])
+    if away <= _OTHER_UNIT * run.cell.arms[arm].arm.reach:
+        return ()
+    unit = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches"}[run.code.units.length]
+    return (f"`{goal.label}` is {away:.4g} m away: lengths in this program are {unit}",)
+
+
+# ---- on the way ----------------------------------------------------------------------------------------------------
+
+
+def _start(run: Machine, process: Process, motion: Motion) -> None:
+    """Begin the next stage of a motion."""
+    stage, to = motion.stages.pop(0)
+    arm, period = run.cell.arms[motion.arm].arm, run.cell.period
+    trajectory = stage.trajectory
+    _, tau = efforts(arm, trajectory, period)
+    run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
+    blocked = run.hardware.stopped_at(motion.arm)
+    if blocked is not None and not motion.guards:
+        run.hardware.begin(motion.arm, hold(trajectory(0.0), period), run.now, motion.tip)
+        _blocked(run, process, motion, "and no ON of this MOVE looks out for it", to=to[-1])
+    motion.record = len(run.stages)
+    run.stages.append(
+        RunStage(
+            t0=run.now,
+            arm=motion.arm,
+            span=motion.span,
+            to=to,
+            speed=motion.speed,
+            stage=stage,
+            peak_effort=np.abs(tau).max(axis=0),
+            duration=trajectory.duration,
+        )
+    )
+    duration = trajectory.duration if blocked is None else blocked - run.now
+    run.runs[motion.arm].append(Run(t0=run.now, trajectory=trajectory, duration=duration))
+    motion.since, motion.until = run.ticks, run.ticks + round(trajectory.duration / period)
+    if any(guard.looks for guard in motion.guards):
+        looks = np.minimum(np.arange(motion.until - motion.since + 1) * period, duration)
+        X_WB = run.tree.world(base_name(motion.arm))
+        motion.hands = X_WB @ forward(arm, trajectory(looks))
+    process.wake = run.ticks if motion.guards else motion.until
+
+
+def _holds(run: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
+    """Whether the condition of a guard holds now, with the arm where it is now."""
+    tree, now, back = run.tree, process.now, process.at
+    if guard.looks and len(motion.hands):
+        at = min(run.ticks - motion.since, len(motion.hands) - 1)
+        run.tree = tree.place(motion.arm, motion.hands[at])
+    process.stack.append(
+        Activation(kind="condition", bindings=now.bindings, passing=now.passing, wrote=now.wrote, back=back)
+    )
+    at = guard.condition
+    # Conditions have values only: AND and OR jump forwards, nothing else jumps.
+    while (step := run.code.instructions[at]).op is not Op.RET:
+        at += 1
+        if step.op is Op.JZ:
+            target = step.operands[1]
+            assert isinstance(target, Place)  # noqa: S101 - the translator lands them
+            at = at if run.read(process, step.operands[0], step) else target.index
+        else:
+            VALUES[step.op](run, process, step)
+    process.stack.pop()
+    run.tree = tree
+    return bool(now.passing[guard.truth])
+
+
+def _blocked(run: Machine, process: Process, motion: Motion, why: str, to: str = "") -> NoReturn:
+    plane = run.cell.contact_height
+    height = "" if plane is None else f" at z = {plane * 1e3:g} mm"
+    way = f" on its way to `{to}`" if to else ""
+    run.fail(
+        process,
+        "E404",
+        f"`{run.spelled(motion.moved)}` comes down on the plane{height}{way}",
+        motion.span,
+        f"this MOVE is stopped there, {why}",
+        helps=["look out for the contact: `ON FORCE(Z) > 10 DO HALT`"],
+    )
+
+
+def _finish(run: Machine, process: Process, motion: Motion) -> None:
+    """The MOVE is over: the frame table and the trace know where the arm is."""
+    arm = motion.arm
+    run.set_hand(arm, motion.span)
+    hand = run.hands[arm]
+    goal = str(motion.data["goal"])
+    reached = not motion.data.get("halted") and run.has_place(goal) and goal in run.tree
+    hand.at = motion.moved if motion.moved != arm else goal if reached else None
+    if hand.holds and hand.holds != hand.at and arm not in run.tree.ancestors(hand.holds):
+        hand.holds = None
+    run.effect("MOVE", motion.text, motion.span, since=motion.begun, arm=arm, data=motion.data)
+    process.motion = None

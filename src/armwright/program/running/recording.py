@@ -1,0 +1,223 @@
+"""What a run leaves: every effect with its place in the program, every stage, every servo tick of every arm."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Literal, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.frames import FrameTree
+from armwright.cell.model import Cell
+from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.motion.plan import Stage
+from armwright.motion.trajectory import Trajectory
+from armwright.program.text.source import Span
+
+# Rows that are computed and written together.
+_ROWS_AT_ONCE = 16384
+# A time this part of a period behind a tick is on it.
+_ON_A_TICK = 1e-6
+
+EffectKind: TypeAlias = Literal[
+    "PLACE",
+    "AFFIX",
+    "UNFIX",
+    "OPEN",
+    "GRASP",
+    "OPERATE",
+    "READ",
+    "MOVE",
+    "STOP",
+    "SIGNAL",
+    "WAIT",
+    "PAUSE",
+    "LOCK",
+    "PRINT",
+    "ERROR",
+    "END",
+]
+# Not of the trace: assignments, locks and the end of the text.
+_SILENT = ("PLACE", "LOCK", "END")
+
+
+@attrs.frozen(kw_only=True)
+class Effect:
+    """One thing a program did.
+
+    Attributes:
+        t0: when it began [s].
+        t1: when it was done [s].
+        kind: what it was.
+        span: the statement in the program.
+        text: one line of the trace, such as ``ARM_1 [obj1] MOVE: PTP obj2 @100``.
+        arm: the arm that did it, or None.
+        data: further facts by name, as JSON can carry them.
+    """
+
+    t0: float
+    t1: float
+    kind: EffectKind
+    span: Span
+    text: str
+    arm: str | None = None
+    data: Mapping[str, Any] = attrs.field(factory=dict)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class RunStage:
+    """One stage of a MOVE, as it was run.
+
+    Attributes:
+        t0: when it began [s].
+        arm: the arm that made it.
+        span: the MOVE in the program.
+        to: the frames it went to, as the program spells them.
+        speed: that was asked for, 100 being normal.
+        stage: its motion.
+        peak_effort: (n,) largest efforts on its servo ticks [N m] or [N].
+        duration: how long it ran [s]; less than its motion takes where it was stopped.
+    """
+
+    t0: float
+    arm: str
+    span: Span
+    to: tuple[str, ...]
+    speed: float
+    stage: Stage
+    peak_effort: Array
+    duration: float
+
+    @property
+    def t1(self) -> float:
+        """When it ended [s]."""
+        return self.t0 + self.duration
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Run:
+    """What one arm did for a while: a trajectory, as far as it came.
+
+    Attributes:
+        t0: when it began [s].
+        trajectory: from then on.
+        duration: how long the arm followed it [s]; then it rested.
+    """
+
+    t0: float
+    trajectory: Trajectory
+    duration: float
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Stream:
+    """What one arm does at every servo tick.
+
+    Attributes:
+        arm: its name.
+        t: (N,) [s].
+        q: (N, n) joint positions [rad] or [m].
+        qd: (N, n) speeds.
+        qdd: (N, n) accelerations; at a tick where they jump, those just after it.
+        tau: (N, n) efforts by inverse dynamics, drives included [N m] or [N].
+    """
+
+    arm: str
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Recording:
+    """A run.
+
+    Attributes:
+        cell: in which it ran.
+        duration: [s], a whole number of servo periods.
+        effects: in order of time.
+        stages: in order of time.
+        streams: one per arm.
+        trees: the frame tree at the start and after each change, with the time of the change [s].
+        postures: by arm, the posture (n,) at the end.
+    """
+
+    cell: Cell
+    duration: float
+    effects: tuple[Effect, ...]
+    stages: tuple[RunStage, ...]
+    streams: tuple[Stream, ...]
+    trees: tuple[tuple[float, FrameTree], ...]
+    postures: Mapping[str, Array]
+
+    @property
+    def tree(self) -> FrameTree:
+        """The frame tree at the end."""
+        return self.trees[-1][1]
+
+    def trace(self) -> list[str]:
+        """Return the lines of the trace."""
+        return [effect.text for effect in self.effects if effect.kind not in _SILENT]
+
+
+def stream(name: str, arm: Arm, start: Array, runs: Sequence[Run], *, duration: float, period: float) -> Stream:
+    """Sample what an arm does at every servo tick.
+
+    Args:
+        name: of the arm in the cell.
+        arm: its model.
+        start: (n,) posture at the start.
+        runs: in order; the arm rests between.
+        duration: of the whole run [s].
+        period: of the servo [s].
+    """
+    ticks = round(duration / period) + 1
+    q = np.empty((ticks, arm.n))
+    qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
+    first, posture = 0, start
+    for run in runs:
+        # A run that was stopped by an obstacle ends between two ticks.
+        begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _ON_A_TICK)
+        q[first:begin] = posture
+        local = np.arange(end - begin) * period
+        q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))
+        first, posture = end, run.trajectory(run.duration)
+    q[first:] = posture
+    t: Array = np.arange(ticks, dtype=np.float64) * period
+    tau = np.empty((ticks, arm.n))
+    for rows in _chunks(ticks):
+        tau[rows] = inverse_dynamics(arm, q[rows], qd[rows], qdd[rows])
+    return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
+
+
+def efforts(arm: Arm, trajectory: Trajectory, period: float) -> tuple[Array, Array]:
+    """Return the servo ticks of a trajectory (k,) [s] and the efforts there (k, n), the last tick included."""
+    t: Array = np.arange(round(trajectory.duration / period) + 1, dtype=np.float64) * period
+    return t, inverse_dynamics(arm, trajectory(t), trajectory(t, 1), trajectory(t, 2))
+
+
+def motion_rows(streams: Iterable[Stream]) -> Iterable[str]:
+    """Give the lines of motion.csv: time, arm, and per joint position, speed, acceleration and effort, in SI."""
+    streams = tuple(streams)
+    joints = max((s.q.shape[1] for s in streams), default=0)
+    columns = [f"{quantity}{i + 1}" for quantity in ("q", "qd", "qdd", "tau") for i in range(joints)]
+    yield ",".join(["t", "arm", *columns]) + "\n"
+    for s in streams:
+        n = s.q.shape[1]
+        # Twelve digits hold a position to 1e-12, so that differences over a tick still show the speed.
+        blank = "," * (joints - n)
+        cell = ",".join(["%.12g"] * n) + blank
+        line = f"%.12g,{s.arm},{cell},{cell},{cell},{cell}\n"
+        for rows in _chunks(len(s.t)):
+            block = np.concatenate([s.t[rows, None], s.q[rows], s.qd[rows], s.qdd[rows], s.tau[rows]], axis=1)
+            # Adding 0 turns -0 into 0, which reads better.
+            yield from (line % tuple(row) for row in (block + 0.0).tolist())
+
+
+def _chunks(count: int) -> Iterator[slice]:
+    """Cut so many rows into pieces that a long run needs no more memory than its own arrays."""
+    return (slice(first, first + _ROWS_AT_ONCE) for first in range(0, count, _ROWS_AT_ONCE))

@@ -1,0 +1,212 @@
+"""Parsing declarations: VAR parts, types, and what is wrong with them."""
+
+import math
+
+from armwright.errors import closest
+from armwright.program.messages.diagnostics import Fix
+from armwright.program.syntax import beyond, tree
+from armwright.program.syntax.cursor import LostError, Tokens, shown
+from armwright.program.syntax.expressions import listed, number
+from armwright.program.syntax.values import check_length
+from armwright.program.text.tokens import TokenKind
+from armwright.program.text.words import LATER_TYPES
+
+
+def passed_over(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
+    """Pass over the rest of a declaration; return what was perhaps declared, of no known type."""
+    start = tokens.now
+    stops = ("BEGIN", *tokens.words.headers, *tokens.words.statements)
+    while not tokens.done and not tokens.sees(";", "END", *stops):
+        token = tokens.take()
+        if token.kind is TokenKind.NAME:
+            names.append(tree.Name(token.span, token.text, token.key))
+    tokens.accept(";")
+    span = tokens.since(start)
+    return tree.Declaration(span, tuple(name for name in names if name), tree.TypeName(span, "", None))
+
+
+# var_part = "VAR" decl { decl } ;
+def var_part(tokens: Tokens) -> list[tree.Declaration]:
+    """Read VAR and what it declares."""
+    word = tokens.take()
+    if tokens.sees(","):
+        tokens.found.say("E111", "expected a name after VAR", tokens.now.span, "found `,`")
+        tokens.take()
+    if tokens.now.kind not in (TokenKind.NAME, TokenKind.ARM) and not _reserved(tokens):
+        tokens.found.say("E111", "VAR declares nothing", word.span, "expected a name after VAR")
+        return []
+    return declarations(tokens)
+
+
+def _reserved(tokens: Tokens) -> bool:
+    """Whether a reserved word stands where a declared name should."""
+    token = tokens.now
+    outside = ("VAR", "BEGIN", "END")
+    return token.kind is TokenKind.KEYWORD and token.key not in outside and tokens.ahead().key in (",", ":")
+
+
+def declarations(tokens: Tokens) -> list[tree.Declaration]:
+    """Read declarations, as many as there are."""
+    found = []
+    depth = tokens.depth
+    while _goes_on(tokens):
+        at = tokens.at
+        names: list[tree.Name | None] = []
+        try:
+            found.append(_declaration(tokens, names))
+        except LostError:
+            tokens.depth = depth
+            found.append(passed_over(tokens, names))
+        if tokens.at == at:
+            tokens.take()
+    return found
+
+
+def _goes_on(tokens: Tokens) -> bool:
+    """Whether one more declaration follows, and not BEGIN, a statement or a header of RLO-2."""
+    token, after = tokens.now, tokens.ahead()
+    if token.kind is TokenKind.KEYWORD:
+        return _reserved(tokens)
+    if token.kind not in (TokenKind.NAME, TokenKind.ARM) or after.key in ("=", ":=", "(", "["):
+        return False
+    if after.key in (",", ":"):
+        return True
+    if tokens.later:
+        return not closest(token.text, ["BEGIN", *tokens.words.headers, *tokens.words.statements])
+    return not beyond.starts_header(tokens) and not closest(token.text, ["BEGIN", *tokens.words.statements])
+
+
+# decl = name { "," name } ":" type ";" ;
+def _declaration(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
+    """Read one declaration; put its names also where they are safe if the rest makes no sense."""
+    start = tokens.now
+    names_of(tokens, names)
+    kind = type_name(tokens)
+    span = tokens.since(start)
+    _close(tokens)
+    return tree.Declaration(span, tuple(name for name in names if name), kind)
+
+
+# name { "," name } ":"
+def names_of(tokens: Tokens, names: list[tree.Name | None]) -> None:
+    """Read what is declared, up to the type.
+
+    Raises:
+        LostError: there is no type.
+    """
+    names.append(_declared(tokens))
+    while True:
+        if tokens.accept(","):
+            if tokens.sees(":"):
+                tokens.found.say("E111", "expected a name after `,`", tokens.now.span, "found `:`")
+                break
+            names.append(_declared(tokens))
+        elif tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ":"):
+            gap = tokens.gap()
+            tokens.found.say("E112", "missing `,` between two names", gap, "expected `,` here", fixes=(Fix(gap, ","),))
+            names.append(_declared(tokens))
+        else:
+            break
+    if not tokens.accept(":"):
+        gap = tokens.gap()
+        tokens.found.say("E112", "missing `:` before the type", gap, "expected `:` and a type here")
+        if not tokens.sees(*tokens.words.types, "ARRAY"):
+            raise LostError
+
+
+def _declared(tokens: Tokens) -> tree.Name | None:
+    """Read one name; None for a word that cannot be one."""
+    token = tokens.now
+    if token.kind is TokenKind.NAME:
+        tokens.take()
+        name = tree.Name(token.span, token.text, token.key)
+        check_length(tokens, name)
+        tokens.declared.add(name.key)
+        return name
+    if token.kind is TokenKind.ARM:
+        if not token.damaged:
+            tokens.found.say("E107", f"`{token.text}` is an arm and needs no declaration", token.span, "leave it out")
+        tokens.take()
+        return None
+    if _reserved(tokens):
+        tokens.refuse_reserved()
+        tokens.take()
+        return None
+    return tokens.lost("expected a name", f"found {shown(token)}")
+
+
+# type = "SCALAR" | "TRANS" | "FRAME" ;                                                           (* RLO-83 *)
+# type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;   (* RLO-2 *)
+def type_name(tokens: Tokens) -> tree.TypeName:
+    """Read a type.
+
+    Raises:
+        LostError: there is none.
+    """
+    start = tokens.now
+    sizes = _sizes(tokens) if tokens.accept("ARRAY") else ()
+    token = tokens.now
+    types = tokens.words.types
+    expected = f"expected {', '.join(types[:-1])} or {types[-1]}"
+    if tokens.accept(*types):
+        span = tokens.since(start)
+        return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
+    if tokens.sees_word(*LATER_TYPES):
+        return beyond.type_name(tokens)
+    if token.kind is not TokenKind.NAME:
+        tokens.lost("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
+    near = closest(token.text, types)
+    tokens.found.say(
+        "E205",
+        f"unknown type `{token.text}`",
+        token.span,
+        expected,
+        helps=(f"did you mean `{near}`?",) if near else (),
+    )
+    tokens.take()
+    return tree.TypeName(tokens.since(start), token.text, near, sizes)
+
+
+def _sizes(tokens: Tokens) -> tuple[tree.Number, ...]:
+    """Read what stands between ARRAY and the type of its elements."""
+    if tokens.sees("OF"):
+        gap = tokens.gap()
+        tokens.say_once("E111", "an array needs its sizes", gap, "expected `[` and a number here")
+        sizes: tuple[tree.Number, ...] = (tree.Number(gap, "", math.nan),)
+    else:
+        sizes = listed(tokens, _size, "a number", "after ARRAY", "[")
+        if tokens.ahead(-2).key == ",":
+            sizes = (*sizes, tree.Number(tokens.gap(), "", math.nan))
+    tokens.expect("OF", "before the type of the elements", statement=True)
+    return sizes or (tree.Number(tokens.gap(), "", math.nan),)
+
+
+def _size(tokens: Tokens, wants: str, where: str) -> tree.Number:
+    if tokens.now.kind is TokenKind.NUMBER:
+        return number(tokens)
+    start = tokens.now
+    if start.kind is not TokenKind.NAME and start.key != "-":
+        tokens.lost(f"expected {wants} {where or f'after `{tokens.before.text}`'}", f"found {shown(start)}")
+    tokens.say_once("E111", "the size of an array is a plain number", start.span, "such as `6`")
+    tokens.take()
+    if start.key == "-":
+        tokens.take()
+    span = tokens.since(start)
+    return tree.Number(span, tokens.source.slice(span), math.nan)
+
+
+def _close(tokens: Tokens) -> None:
+    if tokens.accept(";"):
+        return
+    gap = tokens.gap()
+    tokens.found.say(
+        "E104",
+        "missing `;` after the declaration",
+        gap,
+        "expected `;` here",
+        helps=(f"insert `;` after `{tokens.before.text}`",),
+        fixes=(Fix(gap, ";"),),
+    )
+    words = tokens.words
+    if not tokens.sees("BEGIN", *words.headers, *words.statements) and tokens.ahead().key not in (",", ":", "="):
+        raise LostError

@@ -1,0 +1,130 @@
+"""The parser: one function for each rule of the grammar, with the rule above it. It never stops at the first error.
+
+What is missing and obvious is put in, what is misspelt is replaced, and what makes no sense is passed over up to the
+next statement; each is reported once.
+"""
+
+# ruff: noqa: ERA001 - each rule of the grammar stands above its function
+
+from collections.abc import Collection, Mapping, Sequence
+
+from armwright.program.messages.diagnostics import Diagnostic, Fix
+from armwright.program.syntax import blocks, plain, tree
+from armwright.program.syntax.clauses import move
+from armwright.program.syntax.cursor import Rule, Tokens
+from armwright.program.syntax.prologue import head, late
+from armwright.program.syntax.statements import statements
+from armwright.program.text.source import Source, Span
+from armwright.program.text.tokens import Token, TokenKind
+from armwright.program.text.words import Standard
+
+# statement = init | affix | unfix | open | grasp | operate | read | move ;
+_RULES_83: Mapping[str, Rule] = {
+    "AFFIX": plain.affix,
+    "UNFIX": plain.unfix,
+    "OPEN": plain.open_hand,
+    "GRASP": plain.grasp,
+    "OPERATE": plain.operate,
+    "READ": plain.read,
+    "MOVE": move,
+    "VAR": late,  # reported: it belongs in front of BEGIN
+}
+# statement = assign | affix | ... | move | block | "IF" ... | "WHILE" ... | "REPEAT" ... | ... | name "(" ... ")" ;
+_RULES_2: Mapping[str, Rule] = {
+    **_RULES_83,
+    "BEGIN": blocks.block,
+    "IF": blocks.if_,
+    "WHILE": blocks.while_,
+    "REPEAT": blocks.repeat,
+    "FOR": blocks.for_,
+    "COBEGIN": blocks.cobegin,
+    "SIGNAL": plain.signal,
+    "WAIT": plain.wait,
+    "PAUSE": plain.pause,
+    "LOCK": blocks.lock,
+    "TRY": blocks.try_,
+    "RETRY": plain.retry,
+    "HALT": plain.halt,
+    "PRINT": plain.printing,
+    "IMPORT": late,
+    "UNITS": late,
+    "PROCEDURE": late,
+}
+_RULES = {Standard.RLO_83: _RULES_83, Standard.RLO_2: _RULES_2}
+
+
+def parse(
+    source: Source,
+    tokens: Sequence[Token],
+    standard: Standard = Standard.RLO_2,
+    *,
+    declared: Collection[str] = (),
+    procedures: Collection[str] = (),
+) -> tuple[tree.Program, list[Diagnostic]]:
+    """Return the syntax tree of a program and what is wrong with its syntax.
+
+    Args:
+        source: the text, for messages.
+        tokens: of the text, the last being its end.
+        standard: the language; the tokens are of the same.
+        declared: names of variables that were declared before this text.
+        procedures: names of procedures that were.
+    """
+    cursor = Tokens(source, tokens, standard, _RULES[standard])
+    cursor.declared.update(declared)
+    cursor.procedures.update(procedures)
+    return program(cursor), cursor.found
+
+
+# program = { header } block "." ;
+# block   = "BEGIN" statements "END" ;
+def program(tokens: Tokens) -> tree.Program:
+    """Read a whole program."""
+    start = tokens.now
+    headers = head(tokens)
+    found: list[tree.Statement] = []
+    if not tokens.done:
+        found += _statements(tokens)
+        while not tokens.done and not _ends(tokens):
+            found += _statements(tokens)
+    elif not tokens.silent:
+        at = tokens.gap() if headers else Span(0, 0)
+        text = "the program has no statements" if headers else "there is no program here"
+        tokens.found.say("E115", text, at, "expected `BEGIN ... END.`")
+    return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(found), tokens.before.span)
+
+
+def _statements(tokens: Tokens) -> tuple[tree.Statement, ...]:
+    """Read statements up to END, which stays."""
+    found = statements(tokens, "END")
+    if tokens.done:
+        tokens.say_once("E115", "the program has no END", tokens.gap(), "expected `END.` here")
+    return found
+
+
+def _ends(tokens: Tokens) -> bool:
+    """Read END and the point behind it; whether the program is over."""
+    end = tokens.take()
+    gap = tokens.gap()
+    if tokens.accept("."):
+        if not tokens.done:
+            last = tokens.now
+            tokens.found.say("E114", "text after the end of the program", last.span, "the program ended with `END.`")
+            while not tokens.done:
+                tokens.take()
+            return True
+    elif tokens.done or (tokens.sees(";") and tokens.ahead().kind is TokenKind.END):
+        if not tokens.now.damaged:
+            semicolon = tokens.accept(";")
+            tokens.found.say(
+                "E110",
+                "the program does not end with `.`",
+                gap,
+                "expected `.` here",
+                notes=("the last END of an RLO program is written `END.`",),
+                fixes=(Fix(gap.to(semicolon.span) if semicolon else gap, "."),),
+            )
+    else:
+        tokens.found.say("E114", "END closes the program, but more follows", end.span, "the program would end here")
+        return False
+    return True
