@@ -71,13 +71,13 @@ def compile(  # noqa: A001 - what a translator does
     Returns:
         Tree, diagnostics and, where there are no errors, code. A wrong program raises nothing.
     """
-    with _no_collection():
+    with no_collection():
         return _compile(source, cell, strict=strict, std=std, read_import=read_import)
 
 
 @contextmanager
-def _no_collection() -> Iterator[None]:
-    """Keep the collector of rings away: a translation makes many small things and no rings, and it looks at them all.
+def no_collection() -> Iterator[None]:
+    """Keep the collector of rings away: a translation makes many small things and few rings, and it looks at them all.
 
     Of a program of ten thousand lines that is half the time.
     """

@@ -1,8 +1,7 @@
 """Laying a program out: every program that says the same in the same words looks the same."""
 
-import gc
-
 from armwright.errors import InvalidValueError
+from armwright.program.compiler import no_collection
 from armwright.program.editing.blanks import set_blanks
 from armwright.program.editing.filling import lines_of
 from armwright.program.editing.pieces import pieces_of
@@ -55,14 +54,8 @@ def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | 
     for what, value in (("numbers", numbers), ("width", width)):
         if value is not None and value < 1:
             raise InvalidValueError(f"{what}: expected 1 or more, got {value}")
-    collecting = gc.isenabled()
-    # Words make no rings, and the collector would look at all of them again and again: half of the time.
-    gc.disable()
-    try:
+    with no_collection():
         lines = _lines(Source(source.name, source.text.replace("\r\n", "\n").replace("\r", "\n")), std, width)
-    finally:
-        if collecting:
-            gc.enable()
     return "\n".join((*(_numbered(lines, numbers) if numbers else lines), ""))
 
 

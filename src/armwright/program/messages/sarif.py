@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
+from armwright.program.explanations.explaining import explanation
 from armwright.program.messages.diagnostics import Diagnostic, Severity
 from armwright.program.text.source import Source, Span
 from armwright.version import __version__
@@ -30,7 +31,7 @@ def to_sarif(diagnostics: Sequence[Diagnostic], source: Source, path: str | None
                     "driver": {
                         "name": "armwright",
                         "version": __version__,
-                        "rules": [{"id": code} for code in codes],
+                        "rules": [_rule(code) for code in codes],
                     }
                 },
                 "columnKind": "unicodeCodePoints",
@@ -38,6 +39,11 @@ def to_sarif(diagnostics: Sequence[Diagnostic], source: Source, path: str | None
             }
         ],
     }
+
+
+def _rule(code: str) -> dict[str, Any]:
+    page = explanation(code)
+    return {"id": code, "shortDescription": {"text": page.title}, "fullDescription": {"text": page.text}}
 
 
 def _result(one: Diagnostic, source: Source, uri: str, codes: list[str]) -> dict[str, Any]:

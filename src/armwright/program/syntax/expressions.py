@@ -353,7 +353,7 @@ def _no_value(tokens: Tokens, wants: str, where: str) -> tree.Poison:
         tokens.refuse_reserved()
         tokens.take()
         return tree.Poison(token.span, frozenset((token.key,)))
-    return tokens.lost(f"expected {wants} {where}", f"found {shown(token)}")
+    return tokens.lost(f"expected {wants} {where}".rstrip(), f"found {shown(token)}")
 
 
 def reserved_as_name(tokens: Tokens) -> bool:
