@@ -129,9 +129,10 @@ def _declared(tokens: Tokens) -> tree.Name | None:
         tokens.take()
         return None
     if _reserved(tokens):
+        # It was meant as a name: a procedure has one parameter less without it, and calls would be wrong too.
         tokens.refuse_reserved()
         tokens.take()
-        return None
+        return tree.Name(token.span, token.text, token.key)
     return tokens.lost("expected a name", f"found {shown(token)}")
 
 
