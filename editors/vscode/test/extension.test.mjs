@@ -6,6 +6,7 @@ import Module, { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { test } from "node:test";
+import { setTimeout } from "node:timers/promises";
 
 const require = createRequire(import.meta.url);
 
@@ -88,7 +89,13 @@ test("the server is `armwright lsp`, the debugger `armwright debug`, of the armw
 
   const { factory, provider } = given;
   const launch = provider.provider.resolveDebugConfiguration(undefined, {});
-  const [args, ...asked] = readFileSync(`${path}.log`, "utf8").trim().split("\n");
+  // The server is another process: what it was told last may be written a moment later.
+  let said = [];
+  for (let looks = 0; looks < 200 && said.at(-1) !== "exit"; looks++) {
+    await setTimeout(50);
+    said = readFileSync(`${path}.log`, "utf8").trim().split("\n");
+  }
+  const [args, ...asked] = said;
   assert.equal(args, '["lsp"]');
   assert.deepEqual(asked, ["initialize", "initialized", "shutdown", "exit"]);
   assert.deepEqual([factory.type, provider.type], ["rlo", "rlo"]);
