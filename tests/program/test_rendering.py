@@ -138,3 +138,29 @@ def test_json_of_labels() -> None:
     data = to_json(Diagnostic(code="E101", message="m", span=Span(0, 2), secondary=(label,), fixes=(fix,)), source)
 
     assert data["secondary"] == [{"line": 2, "column": 1, "start": 3, "end": 5, "label": "there"}]
+
+
+def test_very_long_lines() -> None:
+    """Of a line of thousands of characters the part around the place is shown, and the marks stand under it."""
+    text = "VAR n : SCALAR ; BEGIN n = " + "1 + " * 2000 + "m" + " + 1" * 2000 + " END."
+    source = Source("long.rlo", text)
+    label = Diagnostic(code="E202", message="`m`", span=Span(text.index("m"), text.index("m") + 1), label="here")
+    rows = render([label], source).splitlines()
+    line, marks = rows[3], rows[4]
+
+    assert len(line) < 260
+    assert line.startswith(" 1 | ...")
+    assert line.endswith("...")
+    assert line[marks.index("^")] == "m"
+
+
+def test_places_outside_the_part_that_is_shown() -> None:
+    """A second place far off in the same line is marked at the edge of the part that is shown."""
+    text = "ab" * 2000
+    label = Diagnostic(
+        code="E202", message="far", span=Span(2000, 2002), label="here", secondary=(Label(Span(4, 6), "there"),)
+    )
+    rows = render([label], Source("long.rlo", text)).splitlines()
+
+    assert rows[4].endswith("-- there") or rows[4].endswith("- there")
+    assert rows[3][rows[5].index("^^") :][:2] == "ab"

@@ -16,6 +16,8 @@ Row: TypeAlias = list[Piece]
 
 _TAB = 4
 _NARROWEST_GUTTER = 2
+# Longer lines are shown in part, from so many characters before the first place on.
+_LONGEST_LINE, _AROUND, _CUT = 240, 60, "..."
 _LOUD = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow"}
 _QUIET = "bold blue"
 
@@ -59,26 +61,52 @@ def _block(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
         if number > before + 1:
             yield [("...", _QUIET)]
         before = number
-        shown = "".join(_cells(source.line_text(number)))
-        yield [(f"{number:>{width}} | ", _QUIET), (shown, "")]
         here = [label for label in labels if source.line(label.span.start) == number]
+        cells = _cells(source.line_text(number))
+        anchor = labels[0] if labels[0] in here else here[0]
+        first, last = _window(len(cells), source.column(anchor.span.start) - 1)
+        before_it, behind_it = _CUT if first else "", _CUT if last < len(cells) else ""
+        shown = before_it + "".join(cells[first:last]) + behind_it
+        yield [(f"{number:>{width}} | ", _QUIET), (shown, "")]
         for label in sorted(here, key=lambda one: one.span.start):
             mark, style = ("^", loud) if label is labels[0] else ("-", _QUIET)
-            yield [(" " * width + " | ", _QUIET), *_marks(label, mark, style, source)]
+            yield [
+                (" " * width + " | " + " " * len(before_it), _QUIET),
+                *_marks(label, mark, style, source, (first, last)),
+            ]
     for head, texts in (("note", diagnostic.notes), ("help", diagnostic.helps)):
         for text in texts:
             yield [(" " * width + " = ", _QUIET), (f"{head}: ", "bold"), (text, "")]
 
 
-def _marks(label: Label, mark: str, style: str, source: Source) -> Row:
-    """Return the blanks, the marks and the words under one place; a place of several lines is marked in its first."""
+def _window(length: int, column: int) -> tuple[int, int]:
+    """Return which characters of a line are shown: all, or of a very long line those around a place."""
+    if length <= _LONGEST_LINE:
+        return 0, length
+    first = max(0, column - _AROUND)
+    return first, min(length, first + _LONGEST_LINE)
+
+
+def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int, int]) -> Row:
+    """Return the blanks, the marks and the words under one place; a place of several lines is marked in its first.
+
+    Args:
+        label: the place and its words.
+        mark: what it is marked with.
+        style: of marks and words.
+        source: the program.
+        shown: the first character of the line that is shown, and the one behind the last.
+    """
+    begin, end = shown
     cells = _cells(source.line_text(source.line(label.span.start)))
-    first = source.column(label.span.start) - 1
-    last = min(first + label.span.end - label.span.start, len(cells))
+    column = source.column(label.span.start) - 1
+    # What lies in a part that is not shown is marked at its edge.
+    first = column if end == len(cells) and column >= begin else min(max(column, begin), end)
+    last = min(column + label.span.end - label.span.start, len(cells), end)
     # Beyond the end of the line every character that is not there counts one.
-    indent = sum(map(len, cells[:first])) + max(0, first - len(cells))
+    indent = sum(map(len, cells[begin:first])) + max(0, first - len(cells))
     length = sum(_width(cell) for cell in cells[first:last])
-    indent += sum(_width(cell) - len(cell) for cell in cells[:first])
+    indent += sum(_width(cell) - len(cell) for cell in cells[begin:first])
     return [(" " * indent, ""), (mark * max(1, length), style), (f" {label.text}" if label.text else "", style)]
 
 
