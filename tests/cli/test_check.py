@@ -1,12 +1,12 @@
 """The command ``armwright check``, as a user calls it."""
 
 import json
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from cli_calls import armwright
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 STACKING = EXAMPLES / "stacking.rlo"
@@ -15,14 +15,7 @@ CELL = EXAMPLES / "stanford_cell.toml"
 
 def check(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """Call the command in a terminal of 100 columns that nobody watches."""
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", "check", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
-        timeout=120,
-    )
+    return armwright("check", *arguments, columns=100)
 
 
 @pytest.fixture

@@ -1,12 +1,12 @@
 """The command ``armwright fix``, as a user calls it."""
 
 import json
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from cli_calls import armwright
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 WRONG = "VAR f : FRAME\nBEGIN\n  READ VISIONS (f) ;\n  MVOE ARM_1 TO f ;\n  OPEN ARM - 1\n  GRASP\nEND\n"
@@ -15,14 +15,7 @@ CURED = "VAR f : FRAME;\nBEGIN\n  READ VISIONS (f) ;\n  MVOE ARM_1 TO f ;\n  OPE
 
 def fix(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """Call the command in a terminal of 100 columns that nobody watches."""
-    return subprocess.run(
-        [sys.executable, "-m", "armwright", "fix", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
-        timeout=120,
-    )
+    return armwright("fix", *arguments, columns=100)
 
 
 @pytest.fixture

@@ -7,14 +7,14 @@ import attrs
 
 from armwright.errors import ArmwrightError
 from armwright.program.debugging.views import Frame
-from armwright.program.intermediate.code import Code, Instruction, Kind, Op, Operand, Place, Type
+from armwright.program.intermediate.code import Code, Instruction, Kind, Op, Operand, Type
 from armwright.program.intermediate.emitting import Emitter
 from armwright.program.meaning import kinds
 from armwright.program.meaning.names import PREDECLARED
 from armwright.program.meaning.naming import Names
 from armwright.program.meaning.sorts import FITTING, OF_KIND, Sort, is_what
 from armwright.program.messages.diagnostics import Diagnostic
-from armwright.program.running.acting import HANDLERS
+from armwright.program.running.acting import work_out
 from armwright.program.running.machine import Machine, RunError
 from armwright.program.running.process import Activation, Process, Value
 from armwright.program.syntax import tree
@@ -168,16 +168,7 @@ def _worked_out(machine: Machine, process: Process, frame: Frame, parsed: Parsed
     here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
     here.constants = [from_noap(one) if isinstance(one, tuple) else float(one) for one in emitter.constants]
     asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
-    at = 0
-    while at < len(steps):
-        step = steps[at]
-        at += 1
-        if step.op is Op.JZ:
-            target = step.operands[1]
-            assert isinstance(target, Place)  # noqa: S101 - the emitter lands them
-            at = at if here.read(asking, step.operands[0], step) else target.index
-        else:
-            HANDLERS[step.op](here, asking, step)
+    work_out(here, asking, steps)
     return here, asking, operand
 
 

@@ -54,10 +54,9 @@ class Emitter:
         self.instructions.append(Instruction(op=op, operands=operands, span=span, begins=begins, comment=comment))
         return len(self.instructions) - 1
 
-    def land(self, number: int, place: Place | None = None) -> None:
-        """Let an instruction that was written with a place still open lead here, or to ``place``."""
-        old = self.instructions[number]
-        target = self.here if place is None else place
+    def land(self, number: int) -> None:
+        """Let an instruction that was written with a place still open lead here."""
+        old, target = self.instructions[number], self.here
         operands = tuple(target if operand == LATER else operand for operand in old.operands)
         self.instructions[number] = Instruction(
             op=old.op, operands=operands, span=old.span, begins=old.begins, comment=old.comment

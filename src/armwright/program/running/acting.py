@@ -1,13 +1,13 @@
 """What the instructions do to values, frames, tools and sensors."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import DeviceError
 from armwright.program.following.hanging import is_arm
-from armwright.program.intermediate.code import Constant, Instruction, Op, Text
+from armwright.program.intermediate.code import Constant, Instruction, Op, Place, Text
 from armwright.program.messages.diagnostics import Label
 from armwright.program.running.evaluate import IN_UNITS, PLAIN, ValueFault
 from armwright.program.running.machine import Machine
@@ -210,3 +210,16 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.READS: _read_arm,
     Op.PRINT: _print,
 }
+
+
+def work_out(run: Machine, process: Process, steps: Sequence[Instruction], at: int = 0) -> None:
+    """Do instructions that only give values, up to RET or the last: those of a condition or an expression."""
+    while at < len(steps) and (step := steps[at]).op is not Op.RET:
+        at += 1
+        if step.op is Op.JZ:
+            # AND and OR jump forwards; nothing else in an expression jumps.
+            target = step.operands[1]
+            assert isinstance(target, Place)  # noqa: S101 - the translator lands them
+            at = at if run.read(process, step.operands[0], step) else target.index
+        else:
+            HANDLERS[step.op](run, process, step)

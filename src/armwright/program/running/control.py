@@ -233,9 +233,18 @@ def _stop(run: Machine, process: Process, step: Instruction) -> None:  # noqa: A
     finish(run, step.span, "END")
 
 
-def rest(run: Machine, span: Span) -> None:
-    """Bring every arm to rest and switch every device off; the clock goes on until all is still."""
+def rest(run: Machine, span: Span) -> list[str]:
+    """Bring every arm to rest and switch every device off: the run is over once all is still.
+
+    Returns:
+        The devices that were on.
+    """
     run.ticks = max([run.ticks, *(_still(run, process, span) for process in run.processes)])
+    off = sorted(run.hardware.running())
+    for device in off:
+        run.hardware.operate(device, on=False)
+    run.over = True
+    return off
 
 
 def _still(run: Machine, process: Process, span: Span) -> int:
@@ -250,13 +259,9 @@ def _still(run: Machine, process: Process, span: Span) -> int:
 
 def finish(run: Machine, span: Span, word: str) -> None:
     """End the program: arms at rest, devices off, the frame table true."""
-    rest(run, span)
-    off = sorted(run.hardware.running())
-    for device in off:
-        run.hardware.operate(device, on=False)
+    off = rest(run, span)
     words = "".join(f"; {run.spelled(device)} OFF" for device in off)
     run.effect("END", f"{word}{words}", span, data={"switched_off": off})
-    run.over = True
 
 
 def recover(run: Machine, process: Process, error: RunError) -> bool:

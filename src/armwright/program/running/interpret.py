@@ -136,9 +136,6 @@ def _in_action(process: Process) -> bool:
 def _stopped(machine: Machine, error: RunError) -> RunError:
     """Return the error with the frames as they are when all arms are at rest and all devices off."""
     rest(machine, error.diagnostic.span)
-    for device in sorted(machine.hardware.running()):
-        machine.hardware.operate(device, on=False)
-    machine.over = True
     return RunError(error.diagnostic, machine.tree, machine.now)
 
 

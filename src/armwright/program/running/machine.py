@@ -15,7 +15,7 @@ from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
 from armwright.program.following.hanging import is_arm
 from armwright.program.intermediate.code import Code, Instruction, Kind, Operand, Type
-from armwright.program.messages.diagnostics import Diagnostic, Fix, Label
+from armwright.program.messages.diagnostics import Diagnostic, Label
 from armwright.program.running.process import Activation, Element, Pending, Process, Value
 from armwright.program.running.recording import Effect, EffectKind, Recording, Run, RunStage, stream
 from armwright.program.text.source import Span
@@ -219,9 +219,9 @@ class Machine:
             self.fail(process, "E310", text, span, "cannot be placed")
         self.grow(self.tree.place(name, X), name, span)
 
-    def set_hand(self, arm: str, span: Span) -> None:
-        """Let the frame table know where an arm is now."""
-        q = self.hardware.posture(arm, self.now)
+    def set_hand(self, arm: str, span: Span, *, at: int | None = None) -> None:
+        """Let the frame table know where an arm is now, or will be at a later tick."""
+        q = self.hardware.posture(arm, self.now if at is None else at * self.cell.period)
         X_BH = forward(self.cell.arms[arm].arm, q)
         self.grow(self.tree.place(arm, self.tree.world(base_name(arm)) @ X_BH), arm, span)
 
@@ -287,7 +287,6 @@ class Machine:
         secondary: Sequence[Label] = (),
         notes: Sequence[str] = (),
         helps: Sequence[str] = (),
-        fixes: Sequence[Fix] = (),
     ) -> NoReturn:
         """Say why a process cannot go on.
 
@@ -305,6 +304,5 @@ class Machine:
             secondary=(*secondary, *calls[:3]),
             notes=tuple(notes),
             helps=tuple(helps),
-            fixes=tuple(fixes),
         )
         raise RunError(diagnostic, self.tree, self.now)

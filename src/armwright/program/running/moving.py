@@ -16,14 +16,12 @@ from armwright.motion.trajectory import hold, whole_ticks
 from armwright.program.following.hanging import is_arm
 from armwright.program.intermediate.code import (
     Instruction,
-    Op,
-    Place,
     StagePlan,
     stages_of,
     stages_text,
 )
 from armwright.program.messages.diagnostics import Label
-from armwright.program.running.acting import HANDLERS as VALUES
+from armwright.program.running.acting import work_out
 from armwright.program.running.asking import Asked, Goal, asked_of
 from armwright.program.running.machine import Machine
 from armwright.program.running.obstacles import CODES, stopped, ways_round, where_and_why
@@ -135,11 +133,7 @@ def stop(run: Machine, process: Process, span: Span) -> int:
     if motion.record >= 0:
         record = run.stages[motion.record]
         run.stages[motion.record] = attrs.evolve(record, duration=max(0.0, end * period - record.t0))
-    ticks, run.ticks = run.ticks, end
-    q = run.hardware.posture(arm, run.now)
-    run.ticks = ticks
-    X_BH = forward(run.cell.arms[arm].arm, q)
-    run.grow(run.tree.place(arm, run.tree.world(base_name(arm)) @ X_BH), arm, span)
+    run.set_hand(arm, span, at=end)
     return end
 
 
@@ -306,23 +300,12 @@ def _start(run: Machine, process: Process, motion: Motion) -> None:
 
 def _holds(run: Machine, process: Process, motion: Motion, guard: Guard) -> bool:
     """Whether the condition of a guard holds now, with the arm where it is now."""
-    tree, now, back = run.tree, process.now, process.at
+    tree, now = run.tree, process.now
     if guard.looks and len(motion.hands):
         at = min(run.ticks - motion.since, len(motion.hands) - 1)
         run.tree = tree.place(motion.arm, motion.hands[at])
-    process.stack.append(
-        Activation(kind="condition", bindings=now.bindings, passing=now.passing, wrote=now.wrote, back=back)
-    )
-    at = guard.condition
-    # Conditions have values only: AND and OR jump forwards, nothing else jumps.
-    while (step := run.code.instructions[at]).op is not Op.RET:
-        at += 1
-        if step.op is Op.JZ:
-            target = step.operands[1]
-            assert isinstance(target, Place)  # noqa: S101 - the translator lands them
-            at = at if run.read(process, step.operands[0], step) else target.index
-        else:
-            VALUES[step.op](run, process, step)
+    process.stack.append(Activation(kind="condition", bindings=now.bindings, passing=now.passing, wrote=now.wrote))
+    work_out(run, process, run.code.instructions, guard.condition)
     process.stack.pop()
     run.tree = tree
     return bool(now.passing[guard.truth])
@@ -348,7 +331,7 @@ def _finish(run: Machine, process: Process, motion: Motion) -> None:
     run.set_hand(arm, motion.span)
     hand = run.hands[arm]
     goal = str(motion.data["goal"])
-    reached = not motion.data.get("halted") and run.has_place(goal) and goal in run.tree
+    reached = not motion.data.get("halted") and run.has_place(goal)
     hand.at = motion.moved if motion.moved != arm else goal if reached else None
     if hand.holds and hand.holds != hand.at and arm not in run.tree.ancestors(hand.holds):
         hand.holds = None
