@@ -62,7 +62,7 @@ editor:           ## Build, check and package the VS Code extension (needs npm)
 
 fuzz: $(VENV)/test  ## Fuzz everything that reads what a user types, a million inputs each (hours; TARGET=cell RUNS=1000)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
-	for target in $(or $(TARGET),tokens program format cell code); do \
+	for target in $(or $(TARGET),tokens tree cell code program format); do \
 	    $(BIN)/python fuzz/fuzz.py $$target -runs=$(or $(RUNS),1000000) || exit 1; done
 
 clean:            ## Remove what was built

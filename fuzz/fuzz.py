@@ -1,14 +1,14 @@
 """Coverage-guided fuzzing of everything that reads what a user types: `python fuzz/fuzz.py TARGET [-runs=N]`.
 
-Targets are `tokens` (the lexer), `program` (lexer, parser, checker, flow and translator, both languages), `format` (the
-formatter on what has no errors), `cell` (cell files, TOML and JSON) and `code` (the text form of intermediate code).
+Targets are `tokens` (the lexer), `tree` (lexer and parser), `program` (lexer, parser, checker, flow and translator),
+all three in both languages, `format` (the formatter on what has no errors), `cell` (cell files, TOML and JSON) and
+`code` (the text form of intermediate code).
 An input fails when anything but the reader's own error is raised, when it takes more than a second, or when memory
 grows beyond 2 GB. Inputs that reach new code are kept in `out/fuzz/TARGET`; a run without limits goes on from them.
 """
 
 import contextlib
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,6 +26,7 @@ with atheris.instrument_imports(include=["armwright"]):
     from armwright.program.editing.formatting import formatted
     from armwright.program.intermediate.assembly import assemble, assembly
     from armwright.program.messages.rendering import render
+    from armwright.program.syntax.parse import parse
     from armwright.program.text.numbering import without_numbers
     from armwright.program.text.tokens import scan
     from armwright.program.text.words import VOCABULARIES, Standard
@@ -46,6 +47,16 @@ def tokens(data: bytes) -> None:
         for token in found.tokens:
             assert at <= token.start <= token.end <= len(text)
             at = token.start
+
+
+def tree(data: bytes) -> None:
+    """A text has a tree, and what is wrong with it lies inside it."""
+    source = Source("fuzz.rlo", _text(data))
+    text, _ = without_numbers(source)
+    for std in Standard:
+        _, diagnostics = parse(source, scan(source, text, std).tokens, std)
+        for one in diagnostics:
+            assert 0 <= one.span.start <= one.span.end <= len(source.text)
 
 
 def program(data: bytes) -> None:
@@ -71,13 +82,12 @@ def layout(data: bytes) -> None:
 
 def cell(data: bytes) -> None:
     """A cell file is read, or refused with file and line."""
-    with tempfile.TemporaryDirectory() as folder:
-        for suffix in (".toml", ".json"):
-            path = Path(folder) / f"cell{suffix}"
-            path.write_bytes(data)
-            # Anything else than this error is a fault of the reader.
-            with contextlib.suppress(FileFormatError):
-                read_cell(path)
+    for suffix in (".toml", ".json"):
+        path = KEPT / f"cell{suffix}"
+        path.write_bytes(data)
+        # Anything else than this error is a fault of the reader.
+        with contextlib.suppress(FileFormatError):
+            read_cell(path)
 
 
 def code(data: bytes) -> None:
@@ -91,6 +101,7 @@ def code(data: bytes) -> None:
 
 TARGETS: dict[str, Callable[[bytes], None]] = {
     "tokens": tokens,
+    "tree": tree,
     "program": program,
     "format": layout,
     "cell": cell,

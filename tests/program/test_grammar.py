@@ -11,7 +11,7 @@ from armwright.program.messages.diagnostics import Diagnostic
 from armwright.program.syntax import tree
 from armwright.program.syntax.cursor import DEEPEST
 from armwright.program.syntax.parse import parse
-from armwright.program.text.source import Source
+from armwright.program.text.source import Source, Span
 from armwright.program.text.tokens import scan
 from armwright.program.text.words import Standard
 
@@ -83,10 +83,10 @@ def test_operations(text: str, meant: str) -> None:
 @pytest.mark.parametrize(
     ("text", "number"),
     [
-        ("-5", tree.Number(tree.Span(10, 12), "-5", -5.0)),
-        ("- 5", tree.Number(tree.Span(10, 13), "-5", -5.0)),
-        ("2.5cm", tree.Number(tree.Span(10, 15), "2.5cm", 2.5, "CM")),
-        ("-1e2deg", tree.Number(tree.Span(10, 17), "-1e2deg", -100.0, "DEG")),
+        ("-5", tree.Number(Span(10, 12), "-5", -5.0)),
+        ("- 5", tree.Number(Span(10, 13), "-5", -5.0)),
+        ("2.5cm", tree.Number(Span(10, 15), "2.5cm", 2.5, "CM")),
+        ("-1e2deg", tree.Number(Span(10, 17), "-1e2deg", -100.0, "DEG")),
     ],
 )
 def test_numbers(text: str, number: tree.Number) -> None:

@@ -129,25 +129,33 @@ class Course:
         now = self.now
         return now.bindings.get(key) if now.scope.is_local(key) else key
 
-    def variable(self, node: object, kind: Kind) -> str | None:
-        """Return where a single variable or an element of one kind is kept; None for anything else.
+    def variable(self, node: object, kind: Kind | None = None) -> str | None:
+        """Return where a single variable or an element is kept; None for anything else.
 
         ``SLOT[1,2]`` is an element, ``SLOT[]`` one of which the indices are unknown.
+
+        Args:
+            node: what may name one.
+            kind: what it must be; None for any kind that has values.
         """
-        match node:
-            case tree.Name(key=key):
-                single = self.now.scope.type(key)
-                fits = single is not None and single.kind is kind and not single.sizes
-                return self.bound(key) if fits else None
-            case tree.Index(name=name, indices=indices):
-                array, base = self.now.scope.type(name.key), self.bound(name.key)
-                if array is None or array.kind is not kind or not array.sizes or base is None:
-                    return None
-                numbers = [self._index(*pair) for pair in zip(indices, array.sizes, strict=False)]
-                known = [str(number) for number in numbers if number is not None]
-                return f"{base}[{','.join(known) if len(known) == len(array.sizes) else ''}]"
-            case _:
-                return None
+        indices: tuple[tree.Expression, ...] = ()
+        if isinstance(node, tree.Name):
+            key = node.key
+        elif isinstance(node, tree.Index):
+            key, indices = node.name.key, node.indices
+        else:
+            return None
+        found = self.now.scope.type(key)
+        if found is None or bool(found.sizes) is not bool(indices):
+            return None
+        if found.kind is not kind if kind else found.kind is Kind.EVENT:
+            return None
+        kept = self.bound(key)
+        if not indices or kept is None:
+            return kept
+        numbers = [self._index(*pair) for pair in zip(indices, found.sizes, strict=False)]
+        known = [str(number) for number in numbers if number is not None]
+        return f"{kept}[{','.join(known) if len(known) == len(found.sizes) else ''}]"
 
     def frame(self, node: object) -> str | None:
         """Return where a FRAME is kept, or an arm; None for anything else or what is unknown."""
@@ -187,24 +195,22 @@ class Course:
         waiting = [node for node in reversed(nodes) if node is not None]
         while waiting:
             node = waiting.pop()
-            match node:
-                case tree.Name() | tree.Index():
-                    if isinstance(node, tree.Index):
-                        self.need(*node.indices)
-                    self._need_variable(node)
-                case tree.ArmName():
-                    self.look_up(node.key, node.span)
-                case tree.Binary(operation=operation, left=left, right=right):
-                    # AND and OR look at the right side only where it matters.
-                    waiting += [left] if operation in ("AND", "OR") else [right, left]
-                case tree.Unary(operand=operand):
-                    waiting.append(operand)
-                case tree.Function(name=name, arguments=items) if name.key != "FORCE":
-                    waiting += reversed(items)
-                case tree.Matrix(items=items):
-                    waiting += [item for item in reversed(items) if not isinstance(item, tree.Number)]
-                case _:
-                    pass
+            if isinstance(node, tree.Name):
+                self._need_variable(node)
+            elif isinstance(node, tree.Matrix):
+                waiting += [item for item in reversed(node.items) if not isinstance(item, tree.Number)]
+            elif isinstance(node, tree.Binary):
+                # AND and OR look at the right side only where it matters.
+                waiting += [node.left] if node.operation in ("AND", "OR") else [node.right, node.left]
+            elif isinstance(node, tree.Index):
+                self.need(*node.indices)
+                self._need_variable(node)
+            elif isinstance(node, tree.Function):
+                waiting += reversed(node.arguments if node.name.key != "FORCE" else ())
+            elif isinstance(node, tree.ArmName):
+                self.look_up(node.key, node.span)
+            elif isinstance(node, tree.Unary):
+                waiting.append(node.operand)
 
     def need_indices(self, *nodes: object) -> None:
         """Say what is needed to find the variables that are written or named."""
@@ -214,8 +220,7 @@ class Course:
 
     def has_value(self, node: tree.Expression) -> bool:
         """Whether a variable may have a value."""
-        kind = self._kind(node)
-        name = None if kind is None else self.variable(node, kind)
+        name = self.variable(node)
         return name is None or is_any(name) or is_arm(name) or self.table.valued[name]
 
     def _kind(self, node: tree.Expression) -> Kind | None:

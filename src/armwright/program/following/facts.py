@@ -154,6 +154,7 @@ class Book(Generic[V]):
         """
         self._facts, self._group, self._watch = facts, group, watch
         self.default, self.unknown, self.joined = default, unknown, joined
+        self._none = (default, 0)
         self._entries: dict[str, tuple[V, int]] = {}
 
     def __getitem__(self, key: str) -> V:
@@ -161,16 +162,16 @@ class Book(Generic[V]):
         wipes = self._facts.wipes
         if wipes:
             return self.under(key, wipes)
-        entry = self._entries.get(key)
-        return self.default if entry is None else entry[0]
+        return self._entries.get(key, self._none)[0]
 
     def under(self, key: str, wipes: Mapping[str, int]) -> V:
         """Return what holds of a name if these names have been forgotten."""
-        entry = self._entries.get(key)
-        wiped = max(wipes.get(EVERYTHING, 0), wipes.get(self._group, 0), wipes.get(base(key), 0))
-        if entry is None:
-            return self.unknown if wiped else self.default
-        return entry[0] if entry[1] >= wiped else self.unknown
+        value, tick = self._entries.get(key, self._none)
+        array, bracket, _ = key.partition("[")
+        wiped = wipes.get(f"{array}[]" if bracket else key, 0)
+        if tick < wiped or tick < wipes.get(EVERYTHING, 0) or tick < wipes.get(self._group, 0):
+            return self.unknown
+        return value
 
     def items(self) -> Iterator[tuple[str, V]]:
         """Give what was written, as it holds now."""

@@ -68,7 +68,7 @@ def read_arm(course: Course, node: tree.ReadSystem) -> None:
     """Ask the sensors of an arm where it is."""
     if isinstance(node.arm, tree.ArmName):
         course.mention(node.arm)
-        course.use(node.arm.key, node.span.to(node.arm.span))
+        course.use(node.arm.key, node.span)
         # They may find the arm elsewhere, and with it what hangs on it.
         course.table.displace(node.arm.key, by=node.arm.key)
 

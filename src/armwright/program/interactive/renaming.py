@@ -133,6 +133,8 @@ def own_names(procedure: tree.Procedure) -> set[str]:
 def mentioned(node: object) -> set[str]:
     """Return the keys of the variables and procedures that a part of a program uses."""
     match node:
+        case Span():
+            found = set()
         case tree.Name(key=key):
             found = {key}
         case tree.Function(name=name, arguments=arguments):
@@ -150,6 +152,8 @@ def renamed(node: Any, new: Mapping[str, tree.Name]) -> Any:
     """Return a part of a program that uses other names; devices, axes and a procedure's own names stay."""
     changed = node
     match node:
+        case Span():
+            pass
         case tree.Name():
             changed = _named(node, new)
         case tree.Function(name=name, arguments=arguments):
@@ -173,6 +177,6 @@ def _named(name: tree.Name, new: Mapping[str, tree.Name]) -> tree.Name:
 def _values(node: object) -> dict[str, object]:
     """Return the parts of a node in which there can be names of variables; none of anything else."""
     kind = type(node)
-    if not attrs.has(kind) or isinstance(node, Span | tree.Operate):
+    if not attrs.has(kind) or isinstance(node, tree.Operate):
         return {}
     return {field.name: getattr(node, field.name) for field in attrs.fields(kind)}

@@ -1,6 +1,7 @@
 """The parser's finger on the tokens: looking, taking, and saying what is missing."""
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import accumulate
 from typing import NoReturn, TypeAlias
 
 from armwright.errors import closest
@@ -46,6 +47,7 @@ class Tokens:
         procedures: the names of the procedures read so far.
         missed: the words whose absence has been reported.
         in_procedure: whether the place lies in one.
+        spare: how many ENDs have been reported that close nothing but the program.
     """
 
     def __init__(
@@ -69,9 +71,11 @@ class Tokens:
         self.procedures: set[str] = set()
         self.missed: set[str] = set()
         self.in_procedure = False
+        self.spare = 0
         self._refused: set[str] = set()
         self._silent = -1
         self._next_begin = -1
+        self._to_close: list[int] | None = None
 
     # ---- looking and taking
 
@@ -144,6 +148,14 @@ class Tokens:
             here = (at for at in rest if self._tokens[at].key == "BEGIN")
             self._next_begin = next(here, self._last)
         return self._next_begin if self._next_begin < self._last else -1
+
+    def more_ends(self) -> bool:
+        """Whether more ENDs follow than the statements around this place and those further on wait for."""
+        if self._to_close is None:
+            steps = [(token.key == "END") - (token.key in ("BEGIN", "TRY")) for token in reversed(self._tokens)]
+            self._to_close = list(accumulate(steps))[::-1]
+        waiting = sum("END" in words or "RECOVER" in words for words in self.waiting)
+        return self._to_close[self.at] > waiting
 
     # ---- places
 
@@ -232,12 +244,22 @@ class Tokens:
         self.say_once(code, message, span, label, helps=helps)
         raise LostError
 
-    def insert(self, key: str, what: str, *, code: str = "E112", helps: tuple[str, ...] = ()) -> None:
-        """Say that ``key`` is missing behind the token read last, and go on as if it had been there."""
+    def insert(
+        self, key: str, what: str, *, code: str = "E112", helps: tuple[str, ...] = (), alone: bool = True
+    ) -> None:
+        """Say that ``key`` is missing behind the token read last, and go on as if it had been there.
+
+        Args:
+            key: what is missing.
+            what: the place in words.
+            code: of the diagnostic.
+            helps: of the diagnostic.
+            alone: whether nothing else is missing, so that putting it in is a cure.
+        """
         gap = self.gap()
         # A word needs blanks around it; a sign goes where it is missing.
-        fix = Fix(gap, f" {key}" if key[0].isalpha() else key)
-        self.say_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", helps=helps, fixes=(fix,))
+        fixes = (Fix(gap, f" {key}" if key[0].isalpha() else key),) if alone else ()
+        self.say_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", helps=helps, fixes=fixes)
 
     def expect(self, key: str, where: str, *, statement: bool = False) -> None:
         """Read ``key``; or say that it is missing, and go on as if it had been there.
@@ -258,8 +280,11 @@ class Tokens:
             )
             self.take()
             return
-        self.insert(key, where, helps=(f"insert `{key}` after `{self.before.text}`",))
-        if key not in (")", "]") and not statement and (self.done or self.sees(";", "END", *self.words.statements)):
+        closing = key in (")", "]")
+        ends = not closing and not statement and (self.done or self.sees(";", "END", *self.words.statements))
+        alone = closing or not (ends or self.sees(",", ")", "]", "="))
+        self.insert(key, where, helps=(f"insert `{key}` after `{self.before.text}`",), alone=alone)
+        if ends:
             raise LostError
 
     def _misspelt(self, key: str) -> bool:
@@ -272,14 +297,17 @@ class Tokens:
         return after.kind in (_NAME, TokenKind.ARM) and self.same_line()
 
     def refuse_reserved(self) -> None:
-        """Say that the word that stands here cannot be a name; of a word of RLO-2 once."""
+        """Say once of the word that stands here that it cannot be a name."""
         token = self.now
+        if token.key in self._refused:
+            return
+        self._refused.add(token.key)
         helps: tuple[str, ...] = ()
-        if self.later and is_later(token.key):
+        # Only what looks alike: T0 for TO.
+        if near := closest(token.text, self.declared, limit=0):
+            helps = (f"did you mean `{near}`?",)
+        elif self.later and is_later(token.key):
             helps = (f"take another name; a program of RLO-83 that uses `{token.text}` is translated with `--std=83`",)
-            if token.key in self._refused:
-                return
-            self._refused.add(token.key)
         text = f"`{token.text}` is a reserved word and cannot be a name"
         self.found.say("E107", text, token.span, "a word of the language", helps=helps)
 

@@ -217,7 +217,7 @@ def variable(tokens: Tokens, wants: str, where: str) -> tree.Variable:
         LostError: there is none.
     """
     if tokens.now.kind is _ARM:
-        tokens.say_once("E111", f"expected {wants} {where}", tokens.now.span, "an arm is none")
+        tokens.say_once("E111", f"expected {wants} {where}".rstrip(), tokens.now.span, "an arm is none")
         return tree.Poison(tokens.take().span)
     return _lvalue(tokens, wants, where)
 

@@ -88,9 +88,11 @@ def program(tokens: Tokens) -> tree.Program:
         while not tokens.done and not _ends(tokens):
             found += _statements(tokens)
     elif not tokens.silent:
-        at = tokens.gap() if headers else Span(0, 0)
+        begun = tokens.before.key == "BEGIN"
+        at = tokens.gap() if headers or begun else Span(0, 0)
         text = "the program has no statements" if headers else "there is no program here"
-        tokens.found.say("E115", text, at, "expected `BEGIN ... END.`")
+        text, expected = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
+        tokens.found.say("E115", text, at, f"expected `{expected}`")
     return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(found), tokens.before.span)
 
 
@@ -126,5 +128,6 @@ def _ends(tokens: Tokens) -> bool:
             )
     else:
         tokens.found.say("E114", "END closes the program, but more follows", end.span, "the program would end here")
+        tokens.spare += 1
         return False
     return True

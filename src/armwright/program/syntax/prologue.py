@@ -12,6 +12,12 @@ from armwright.program.syntax.values import check_length
 from armwright.program.text.source import Span
 from armwright.program.text.tokens import Token, TokenKind
 
+# What other languages call a procedure.
+_PROCEDURES = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
+_BY_REFERENCE = (
+    "a procedure changes what it is given as a FRAME, an EVENT or an array, and all variables of the program"
+)
+
 
 def head(tokens: Tokens) -> list[tree.Header]:
     """Read everything up to and including BEGIN; at the end of the text BEGIN may be missing."""
@@ -71,7 +77,8 @@ def _misspelt_header(tokens: Tokens) -> str | None:
     token, after = tokens.now, tokens.ahead()
     if token.kind is not TokenKind.NAME or after.kind not in (TokenKind.NAME, TokenKind.STRING):
         return None
-    near = closest(token.text, (*tokens.words.headers, "BEGIN"))
+    elsewhere = token.key in _PROCEDURES and tokens.later
+    near = "PROCEDURE" if elsewhere else closest(token.text, (*tokens.words.headers, "BEGIN"))
     return near if near != "BEGIN" and (after.kind is TokenKind.NAME or near == "IMPORT") else None
 
 
@@ -154,6 +161,7 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
     tokens.procedures.add(name.key)
     parameters = _parameters(tokens) if tokens.sees("(") else []
     above = tokens.since(start)
+    _no_result(tokens)
     _semicolon(tokens, "after the head of the procedure")
     own = var_part(tokens) if tokens.sees("VAR") else []
     while tokens.sees("VAR"):
@@ -200,6 +208,10 @@ def _parameters(tokens: Tokens) -> list[tree.Declaration]:
         return found
     while True:
         start = tokens.now
+        if tokens.sees("VAR"):
+            text = "a parameter has no VAR in front"
+            tokens.say_once("E117", text, start.span, "leave it out", notes=(_BY_REFERENCE,))
+            tokens.take()
         names: list[tree.Name | None] = []
         try:
             names_of(tokens, names)
@@ -215,6 +227,18 @@ def _parameters(tokens: Tokens) -> list[tree.Declaration]:
     if not tokens.accept(")"):
         tokens.insert(")", "after the parameters")
     return found
+
+
+def _no_result(tokens: Tokens) -> None:
+    """Pass over the type of what a procedure was meant to give back."""
+    if not tokens.sees(":"):
+        return
+    start = tokens.take()
+    while not tokens.done and not tokens.sees(";", "VAR", "BEGIN"):
+        tokens.take()
+    tokens.say_once(
+        "E117", "a procedure gives nothing back", tokens.since(start), "leave this out", notes=(_BY_REFERENCE,)
+    )
 
 
 def _another(tokens: Tokens) -> bool:
@@ -234,11 +258,7 @@ def _another(tokens: Tokens) -> bool:
 
 
 def _body(tokens: Tokens, above: Span) -> tree.Block:
-    """Read the statements of a procedure, also where BEGIN or END is missing.
-
-    Raises:
-        LostError: there are none.
-    """
+    """Read the statements of a procedure, also where BEGIN or END is missing."""
     token = tokens.now
     if token.kind is TokenKind.NAME and token.key not in tokens.declared and closest(token.text, ("BEGIN",)):
         _misspelt(tokens, "BEGIN")
@@ -248,7 +268,7 @@ def _body(tokens: Tokens, above: Span) -> tree.Block:
         fixes = (fix,) if token.kind is TokenKind.NAME or tokens.sees(*tokens.words.statements) else ()
         tokens.say_once("E115", "the procedure has no BEGIN", gap, "expected `BEGIN` here", fixes=fixes)
         if not fixes:
-            raise LostError
+            return tree.Block(gap, (), gap)
     tokens.in_procedure = True
     found = block(tokens)
     tokens.in_procedure = False

@@ -10,19 +10,10 @@ from armwright.program.syntax.plain import call
 from armwright.program.syntax.values import assign
 from armwright.program.text.source import Span
 from armwright.program.text.tokens import Token, TokenKind
-from armwright.program.text.words import CLOSING, OPENING
+from armwright.program.text.words import ABSENT, CLOSING, ELSEWHERE, LATER_STATEMENTS, OPENING
 
 _NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.NUMBER
 _ASSIGNING = ("=", ":=", "==")
-# What other languages call a statement.
-_ELSEWHERE = {
-    **dict.fromkeys(("STOP", "EXIT", "QUIT", "ABORT"), "HALT"),
-    **dict.fromkeys(("DELAY", "SLEEP"), "PAUSE"),
-    **dict.fromkeys(("WRITE", "WRITELN", "SAY"), "PRINT"),
-    **dict.fromkeys(("CLOSE", "GRIP"), "GRASP"),
-    "ATTACH": "AFFIX",
-    "DETACH": "UNFIX",
-}
 # What opens the stretch that a word ends, for one that ends none.
 _OPENED_BY = {
     "UNTIL": "REPEAT",
@@ -159,17 +150,20 @@ def _named(tokens: Tokens, after: Token) -> tree.Statement:
         return assign(tokens)
     if tokens.later and after.key == "(" and tokens.ahead(2).kind is not TokenKind.STRING:
         return call(tokens)
-    elsewhere = tokens.later and token.key in _ELSEWHERE and not _is_known(tokens, token)
+    known = token.key in tokens.declared or token.key in tokens.procedures
+    if not tokens.later and token.key in LATER_STATEMENTS and not known:
+        return beyond.statement(tokens)
+    elsewhere = tokens.later and not known and (token.key in ELSEWHERE or token.key in ABSENT)
+    near = None if elsewhere or (known and tokens.later) else closest(token.text, tokens.words.statements)
     # In front of a number or a matrix only the sign of equality is missing.
     number = tokens.ahead(2) if after.key in ("(", "-") else after
-    if not elsewhere and (number.kind is _NUMBER or (number.key == "-" and number is not after)):
+    valued = number.kind is _NUMBER or (number.key == "-" and number is not after)
+    if valued and not elsewhere and not (near and tokens.later):
         return assign(tokens)
     if not tokens.later and beyond.starts_statement(tokens):
         return beyond.statement(tokens)
     if number.kind is TokenKind.STRING and number is not after:
-        near: str | None = "PRINT"
-    else:
-        near = None if elsewhere or _is_known(tokens, token) else closest(token.text, tokens.words.statements)
+        near = "PRINT"
     if near:
         misspelt(tokens, near)
     return statement(tokens) if near else _no_statement(tokens)
@@ -200,8 +194,10 @@ def _no_statement(tokens: Tokens) -> tree.Statement:
     if _is_known(tokens, token):
         _value_missing(tokens)
     helps: tuple[str, ...] = (f"statements begin with {', '.join(tokens.words.statements)}, or with a name and `=`",)
-    if tokens.later and token.key in _ELSEWHERE:
-        helps = (f"did you mean `{_ELSEWHERE[token.key]}`?",)
+    if tokens.later and token.key in ELSEWHERE:
+        helps = (f"did you mean `{ELSEWHERE[token.key]}`?",)
+    elif tokens.later and token.key in ABSENT:
+        helps = (ABSENT[token.key],)
     elif tokens.later:
         helps = ("statements begin with a word such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`",)
     notes = ("line numbers count only in a text whose first line has one",) if token.kind is _NUMBER else ()
@@ -248,6 +244,10 @@ def close(tokens: Tokens, key: str, opening: Token) -> Span | None:
         point = tokens.ahead()
         if key != "END" or point.key != ".":
             return tokens.take().span
+        if tokens.spare and tokens.ahead(2).kind is TokenKind.END:
+            # An END too many stands further above, and was reported.
+            tokens.spare -= 1
+            return None
         if tokens.ahead(2).kind is not TokenKind.END:
             # More follows, so this was not meant to be the last END.
             tokens.take()
@@ -255,14 +255,18 @@ def close(tokens: Tokens, key: str, opening: Token) -> Span | None:
             tokens.take()
             tokens.hush()
             return token.span
-    gap = tokens.gap()
+    # An END that nothing else waits for was meant to be this word.
+    instead = key not in ("END", "RECOVER") and tokens.sees("END") and tokens.more_ends()
     tokens.say_once(
         "E115",
         f"{opening.text} has no {key}",
-        gap,
+        token.span if instead else tokens.gap(),
         f"expected `{key}` here",
         secondary=(Label(opening.span, "opened here"),),
+        fixes=(Fix(token.span, key),) if instead and key == "COEND" else (),
     )
+    if instead:
+        tokens.take()
     tokens.hush()
     return None
 

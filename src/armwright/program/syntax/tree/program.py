@@ -1,0 +1,93 @@
+"""A whole program and what stands in front of its statements."""
+
+from typing import TypeAlias
+
+import attrs
+
+from armwright.program.syntax.tree.statements import Block, Statement
+from armwright.program.syntax.tree.values import Name, Number, String
+from armwright.program.text.source import Span
+
+
+@attrs.frozen
+class TypeName:
+    """The type of a declaration.
+
+    Attributes:
+        span: where it stands.
+        text: as written.
+        key: SCALAR, TRANS, FRAME or EVENT; None when it is none of them.
+        sizes: of an array, one for each index; empty for a single thing.
+    """
+
+    span: Span
+    text: str
+    key: str | None
+    sizes: tuple[Number, ...] = ()
+
+
+@attrs.frozen
+class Declaration:
+    """``a, b : TYPE``, in a VAR part or as a parameter."""
+
+    span: Span
+    names: tuple[Name, ...]
+    type: TypeName
+
+
+@attrs.frozen
+class Import:
+    """``IMPORT "file"``."""
+
+    span: Span
+    path: String
+
+
+@attrs.frozen
+class Units:
+    """``UNITS unit, unit``."""
+
+    span: Span
+    units: tuple[Name, ...]
+
+
+@attrs.frozen
+class Procedure:
+    """``PROCEDURE name (parameters) ; VAR ... BEGIN ... END``; ``head`` reaches up to the closing parenthesis."""
+
+    span: Span
+    head: Span
+    name: Name
+    parameters: tuple[Declaration, ...]
+    declarations: tuple[Declaration, ...]
+    body: Block
+
+
+Header: TypeAlias = Declaration | Import | Units | Procedure
+
+
+@attrs.frozen
+class Program:
+    """A whole program.
+
+    Attributes:
+        span: from the first token to the last.
+        headers: declarations, imports, units and procedures, in the order of the text.
+        statements: in order.
+        end: the closing END.
+    """
+
+    span: Span
+    headers: tuple[Header, ...]
+    statements: tuple[Statement, ...]
+    end: Span
+
+    @property
+    def declarations(self) -> tuple[Declaration, ...]:
+        """The declarations of the VAR parts."""
+        return tuple(header for header in self.headers if isinstance(header, Declaration))
+
+    @property
+    def procedures(self) -> tuple[Procedure, ...]:
+        """The procedures."""
+        return tuple(header for header in self.headers if isinstance(header, Procedure))

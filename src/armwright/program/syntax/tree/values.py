@@ -1,0 +1,113 @@
+"""Names, numbers and what is worked out from them. Names are compared by ``key``, shown by ``text``."""
+
+from typing import TypeAlias
+
+import attrs
+
+from armwright.program.text.source import Span
+
+
+@attrs.frozen
+class Name:
+    """A name as used: of a variable, a station, a device."""
+
+    span: Span
+    text: str
+    key: str
+
+
+@attrs.frozen
+class ArmName:
+    """An arm; ``key`` is the canonical ``ARM_1``."""
+
+    span: Span
+    text: str
+    key: str
+
+
+@attrs.frozen
+class Poison:
+    """Something that was reported and is passed over from here on: what it contains is unknown.
+
+    Attributes:
+        span: where it stands.
+        names: the keys of the names that occur in it.
+    """
+
+    span: Span
+    names: frozenset[str] = frozenset()
+
+
+@attrs.frozen
+class Number:
+    """A number with its sign.
+
+    Attributes:
+        span: where it stands.
+        text: as written, sign and unit included.
+        value: in the unit it is written in; NaN when it was reported.
+        unit: in upper case, such as ``MM``; None without one.
+    """
+
+    span: Span
+    text: str
+    value: float
+    unit: str | None = None
+
+
+@attrs.frozen
+class String:
+    """``"characters"``; the value is what stands between the marks."""
+
+    span: Span
+    value: str
+
+
+@attrs.frozen
+class Index:
+    """``name[i, j]``: an element of an array."""
+
+    span: Span
+    name: Name
+    indices: tuple["Expression", ...]
+
+
+@attrs.frozen
+class Function:
+    """``NAME(arguments)`` as a value."""
+
+    span: Span
+    name: Name
+    arguments: tuple["Expression", ...]
+
+
+@attrs.frozen
+class Unary:
+    """``-x`` or ``NOT x``; a minus right before a number is the number's sign and no operation."""
+
+    span: Span
+    operation: str
+    operand: "Expression"
+
+
+@attrs.frozen
+class Binary:
+    """``a * b``; the operation is one of ``+ - * / < <= = <> >= > AND OR``."""
+
+    span: Span
+    operation: str
+    left: "Expression"
+    right: "Expression"
+
+
+@attrs.frozen
+class Matrix:
+    """Values in parentheses; twelve if all is well, n, o, a, p column by column."""
+
+    span: Span
+    items: tuple["Expression", ...]
+
+
+Variable: TypeAlias = Name | Index | Poison
+Mobile: TypeAlias = Name | Index | ArmName | Poison
+Expression: TypeAlias = Number | Name | Index | ArmName | Function | Unary | Binary | Matrix | Poison
