@@ -84,6 +84,7 @@ def test_messages_from_code() -> None:
         ("LOADM  STATION c0", "LOADM  STATION c9", "there is no constant c9"),
         ("MVSPD  100.0", "MVSPD  1e999", "'1e999' is no operand"),
         ("constant c0 ", "constant c1 ", "expected c0"),
+        ("constant c0 ", "constant\nconstant c0 ", "expected c0 and 1 or 12 numbers"),
         ("units M DEG", "units FOOT", "unknown unit 'FOOT'"),
         ("\nsource\n", "\n", "the program text is missing"),
         ("STOP", "OPEN   ARM_1", "runs on behind"),

@@ -211,7 +211,7 @@ class _Reader:
             procedure.parameters.append(self._name(name))
 
     def _read_constant(self, rest: str) -> None:
-        name, *numbers = rest.split()
+        name, *numbers = rest.split() or [""]
         if name != f"c{len(self._constants)}" or len(numbers) not in (1, 12):
             self._fail(f"expected c{len(self._constants)} and 1 or 12 numbers")
         values = tuple(map(self._float, numbers))
