@@ -3,7 +3,8 @@
 A message says what, what was got, what was expected and, where there is one, the nearest valid choice.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
 
 # Glyphs that a scan, a listing or a tired eye takes for one another.
@@ -123,7 +124,8 @@ def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
     return best[1] if best else None
 
 
-def edit_distance(a: Sequence[str], b: Sequence[str]) -> int:
+@lru_cache(maxsize=4096)
+def edit_distance(a: str, b: str) -> int:
     """Count the insertions, deletions, changes and neighbour swaps that turn ``a`` into ``b``.
 
     Source:

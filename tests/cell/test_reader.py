@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -420,6 +421,16 @@ def test_mistake_in_the_file_of_an_arm(tmp_path: Path) -> None:
 
     with pytest.raises(FileFormatError, match=r"cell.toml:2: arms, ARM_1, model: .*arm.toml:2: joint 1, kind: expect"):
         cell(tmp_path, '[arms.ARM_1]\nmodel = "arm.toml"\n')
+
+
+def test_a_long_chain(tmp_path: Path) -> None:
+    """A thousand frames, each on the one before, are read in no more time than it takes to follow them."""
+    rows = (f"F{at} = {{ on = '{f'F{at - 1}' if at else 'WORLD'}', at = {IDENTITY} }}\n" for at in range(1000))
+    text = f"{ARM}[frames]\n{''.join(rows)}"
+    begin = time.perf_counter()
+
+    assert len(cell(tmp_path, text).frames) == 1000
+    assert time.perf_counter() - begin < 3
 
 
 # Slips that leave most of a file as it was, so that all of the reader is reached.

@@ -60,6 +60,17 @@ def test_code_that_makes_no_sense(tmp_path: Path) -> None:
     assert f"{path}:1: expected text" in result.stderr
 
 
+def test_code_that_does_not_fit_together(tmp_path: Path) -> None:
+    """Code that can be read and still means nothing, as a branch that ends where none began, is told with its file."""
+    path = tmp_path / "bad.rlc"
+    path.write_text(armwright("code", EXAMPLES / "bench.rlo", "--full").stdout.replace("GRASP  ARM_1", "QUIT", 1))
+    result = armwright("run", path, "--cell", CELL)
+
+    assert result.returncode == 1
+    assert result.stderr.startswith(f"armwright: {path}: ")
+    assert "Traceback" not in result.stderr
+
+
 def test_the_cell_is_imported(importing: Path) -> None:
     """Without --cell the program runs in the first cell that it imports, with the frames of all files."""
     result = armwright("run", importing, "-o", importing.parent / "out")

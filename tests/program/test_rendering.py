@@ -1,6 +1,7 @@
 """Diagnostics on the page: marks under the right characters, whatever stands before them."""
 
 import json
+import time
 
 import pytest
 
@@ -9,6 +10,9 @@ from armwright.program import compile as translate
 from armwright.program.messages.diagnostics import Diagnostic, Fix, Label, Severity, to_json
 from armwright.program.messages.rendering import render, render_rich
 from armwright.program.text.source import Span
+
+# Two thousand messages take a quarter of a second [s]; looking at the whole line for each takes minutes.
+GENEROUS = 5.0
 
 
 def one(text: str, marked: str, *, secondary: tuple[Label, ...] = ()) -> list[str]:
@@ -164,3 +168,17 @@ def test_places_outside_the_part_that_is_shown() -> None:
 
     assert rows[4].endswith("-- there") or rows[4].endswith("- there")
     assert rows[3][rows[5].index("^^") :][:2] == "ab"
+
+
+def test_thousands_in_one_line() -> None:
+    """A program may be one line: thousands of messages about it take no longer than about as many lines."""
+    text = "x ;" * 20_000
+    diagnostics = [
+        Diagnostic(code="E105", message="what", span=Span(at, at + 1), label="here")
+        for at in range(0, len(text), len(text) // 2000)
+    ]
+    started = time.process_time()
+    rows = render(diagnostics, Source("t.rlo", text)).splitlines()
+
+    assert len(rows) > 10_000
+    assert time.process_time() - started < GENEROUS

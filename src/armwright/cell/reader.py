@@ -168,10 +168,11 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
 
 def _way_up(name: str, frames: Mapping[str, Node]) -> list[str]:
     """Return the frames of the file from ``name`` upwards, none twice."""
-    way = [name]
-    while (above := frames[way[-1]].parent) in frames and above not in way:
-        way.append(above)
-    return way
+    way, above = {name: None}, frames[name].parent
+    while above in frames and above not in way:
+        way[above] = None
+        above = frames[above].parent
+    return list(way)
 
 
 def _visions(table: Table) -> dict[str, tuple[Array, ...]]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.programs import CellFile, Std
+from armwright.cli.programs import CODE_SUFFIX, CellFile, Std
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -67,12 +67,19 @@ def load(launch: "Launch") -> "Loaded":
         FileFormatError: a file cannot be read.
     """
     from armwright.cell.reader import read_cell
-    from armwright.cli.programs import in_its_cell
+    from armwright.cli.programs import imported_files, in_its_cell
+    from armwright.files.document import read_text
     from armwright.program.debugging.editor import Loaded, LoadError
+    from armwright.program.intermediate.assembly import assemble
     from armwright.program.messages.diagnostics import count_line
     from armwright.program.messages.rendering import render
 
     given = None if launch.cell is None else read_cell(launch.cell)
+    if launch.program.suffix == CODE_SUFFIX:
+        if given is None:
+            message = f"{launch.program.name} needs a cell to run in"
+            raise LoadError(message, f"{message}\n")
+        return Loaded(code=assemble(read_text(launch.program), str(launch.program)), cell=given, is_listed=True)
     compiled, place = in_its_cell(launch.program, given, strict=False, std=launch.std)
     if compiled.code is None:
         raise LoadError(
@@ -81,7 +88,8 @@ def load(launch: "Launch") -> "Loaded":
     if place is None:
         message = f"{launch.program.name} needs a cell to run in, and IMPORTs none"
         raise LoadError(message, f"{message}\n")
-    return Loaded(code=compiled.code, cell=place, diagnostics=compiled.diagnostics)
+    imports = imported_files(launch.program, compiled)
+    return Loaded(code=compiled.code, cell=place, diagnostics=compiled.diagnostics, imports=imports)
 
 
 def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
@@ -98,6 +106,7 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
     origin = Origin(
         program=launch.program,
         cell=launch.cell,
+        imports=loaded.imports,
         command="armwright debug",
         seed=0,
         options={"std": launch.std.value},

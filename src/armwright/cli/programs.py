@@ -73,9 +73,15 @@ def in_its_cell(path: Path, cell: "Cell | None", *, strict: bool, std: Standard)
     compiled = translate_file(path, cell, strict=strict, std=std)
     if cell is None:
         cell = next((one.cell for one in compiled.imports if one.cell and one.cell.arms), None)
-        if cell is not None:
-            compiled = translate_file(path, cell, strict=strict, std=std)
     return compiled, None if cell is None else with_imports(cell, compiled)
+
+
+def imported_files(program: Path, compiled: "Compilation") -> tuple[Path, ...]:
+    """Return the files that a program imports."""
+    from armwright.program.syntax import tree
+
+    imports = (node for node in compiled.tree.headers if isinstance(node, tree.Import))
+    return tuple(program.parent / node.path.value for node in imports)
 
 
 def with_imports(cell: "Cell", compiled: "Compilation") -> "Cell":

@@ -162,10 +162,9 @@ class Commands:
     def report(self, argument: str) -> Reply:
         """Write the program and what it did: motion, events, frames, and a page that shows the arms moving."""
         from armwright.cell.simulator import Simulator
-        from armwright.cli.programs import in_its_cell
+        from armwright.cli.programs import imported_files, in_its_cell
         from armwright.files.output import write_folder
         from armwright.program.running.interpret import interpret, warnings
-        from armwright.program.syntax import tree
         from armwright.report.files import Origin, result_files
 
         folder, session = _path(argument), self._session
@@ -176,12 +175,11 @@ class Commands:
         assert place is not None  # noqa: S101 - it was given
         recording = interpret(compiled.code, place, Simulator(place))
         diagnostics = (*compiled.diagnostics, *warnings(recording))
-        imports = [program.parent / one.path.value for one in compiled.tree.headers if isinstance(one, tree.Import)]
         command = ["armwright", "run", str(program), *(["--cell", str(self._cell)] if self._cell else [])]
         origin = Origin(
             program=program,
             cell=self._cell,
-            imports=imports,
+            imports=imported_files(program, compiled),
             command=shlex.join(command),
             seed=0,
             options={"std": session.std.value},

@@ -76,6 +76,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     import json
 
     from armwright.cli.programs import print_diagnostics
+    from armwright.errors import FileFormatError
     from armwright.files.output import write_folder
     from armwright.program.running.interpret import Limits, RunError, warnings
     from armwright.report.files import Origin, result_files, summary
@@ -88,6 +89,11 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         recording = _interpret(code, place, limits, watched=not (quiet or as_json))
     except RunError as error:
         _fail(code.source, [*said, error.diagnostic], error, code, as_json=as_json)
+    except (AssertionError, LookupError, TypeError, ValueError) as error:
+        if program.suffix != CODE_SUFFIX:
+            raise
+        text = "its instructions do not fit together: no program is translated to such code"
+        raise FileFormatError(program, None, "", text) from error
     diagnostics = (*said, *warnings(recording))
     if output is not None:
         options = {
@@ -118,10 +124,9 @@ def _translated(
     program: Path, given: "Cell | None", *, strict: bool, std: Standard, as_json: bool
 ) -> "tuple[Code, Cell, tuple[Diagnostic, ...], tuple[Path, ...]]":
     """Return the code of a program, its cell, what was said of it, and the files that it imports."""
-    from armwright.cli.programs import in_its_cell
+    from armwright.cli.programs import imported_files, in_its_cell
     from armwright.files.document import read_text
     from armwright.program.intermediate.assembly import assemble
-    from armwright.program.syntax import tree
 
     if program.suffix == CODE_SUFFIX:
         if given is None:
@@ -132,8 +137,7 @@ def _translated(
         _fail(compiled.source, compiled.diagnostics, as_json=as_json)
     if place is None:
         _no_cell(program)
-    imports = [node.path.value for node in compiled.tree.headers if isinstance(node, tree.Import)]
-    return compiled.code, place, compiled.diagnostics, tuple(program.parent / name for name in imports)
+    return compiled.code, place, compiled.diagnostics, imported_files(program, compiled)
 
 
 def _no_cell(program: Path) -> NoReturn:

@@ -2,16 +2,18 @@
 
 import gc
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 
 import attrs
 
+from armwright.errors import ArmwrightError
 from armwright.program.following import flow
 from armwright.program.following.flow import Flow
 from armwright.program.intermediate.code import Code
 from armwright.program.intermediate.translate import translate
 from armwright.program.meaning import check
-from armwright.program.meaning.known import Imported, KnownCell, ReadImport
+from armwright.program.meaning.known import Imported, KnownCell, ReadImport, known_cell
 from armwright.program.meaning.names import Symbols
 from armwright.program.messages.diagnostics import Diagnostic, in_order
 from armwright.program.syntax import tree
@@ -63,7 +65,8 @@ def compile(  # noqa: A001 - what a translator does
 
     Args:
         source: the text.
-        cell: what the program will act on; without one, some questions stay open.
+        cell: what the program will act on; without one, the first that it IMPORTs and that has arms, or else some
+            questions stay open.
         strict: whether an AFFIX that is only implied is an error.
         std: the language: RLO-2, or RLO-83 with nothing more than the report has.
         read_import: how to read what an IMPORT names; without it, imports stay unknown.
@@ -90,12 +93,27 @@ def no_collection() -> Iterator[None]:
             gc.enable()
 
 
+def _imported(program: tree.Program, read_import: ReadImport) -> KnownCell | None:
+    """Return the first cell with arms that a program imports; None without one."""
+    for header in program.headers:
+        if isinstance(header, tree.Import):
+            # What cannot be read is told when names are checked.
+            with suppress(ArmwrightError):
+                cell = read_import(header.path.value).cell
+                if cell is not None and cell.arms:
+                    return known_cell(cell)
+    return None
+
+
 def _compile(
     source: Source, cell: KnownCell | None, *, strict: bool, std: Standard, read_import: ReadImport | None
 ) -> Compilation:
     text, found = without_numbers(source)
     scanned = scan(source, text, std)
     program, slips = parse(source, scanned.tokens, std)
+    if read_import is not None:
+        read_import = cache(read_import)
+        cell = _imported(program, read_import) if cell is None else cell
     symbols, wrong, imports = check.check(program, cell, std=std, read_import=read_import)
     spelling = {token.key: token.text for token in reversed(scanned.tokens) if token.kind is TokenKind.NAME}
     found += [*scanned.found, *slips]

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from armwright.program.intermediate.assembly import assembly
 from program.debugging.client import Client
-from program.running import CORPUS
+from program.running import CORPUS, cell_of, code_of
 
 P02, P08 = CORPUS / "p02.rlo", CORPUS / "p08.rlo"
 
@@ -308,6 +309,52 @@ def test_lines_and_columns_from_0(client: Client) -> None:
     assert client.line() == 4
 
 
+def test_columns_are_halves_of_words(client: Client, written: Any) -> None:
+    """A character beyond the basic plane takes two columns, in what editors are told and in what they ask for."""
+    program = written("VAR n : SCALAR ;\nBEGIN\n  { \U0001f916\U0001f916 } n = 1 ; { \U0001f600 } n = 2 ;\nEND.\n")
+    client.launch(program, stopOnEntry=True)
+    client.wait("stopped")
+
+    (frame,) = client.stack()
+    assert (frame["column"], frame["endColumn"]) == (12, 17)
+    asked = [{"line": 3, "column": column} for column in (12, 13, 27)]
+    bound = client.ask("setBreakpoints", source={"path": str(program)}, breakpoints=asked)["breakpoints"]
+    assert [one["column"] for one in bound] == [12, 27, 27]
+    (word,) = client.ask("completions", text="\U0001f916 DI", column=6)["targets"]
+    assert (word["label"], word["start"]) == ("DIST", 4)
+
+
+def test_what_was_imported_is_recorded(client: Client, tmp_path: Path, written: Any) -> None:
+    """The record of a run that was debugged names the files that the program imported."""
+    (tmp_path / "cell.json").write_bytes((CORPUS / "cell1.json").read_bytes())
+    program = written('IMPORT "cell.json" ;\nBEGIN\n  OPEN ARM_1\nEND.\n')
+    client.ask("initialize", adapterID="rlo")
+    client.ask("launch", program=str(program), output=str(tmp_path / "out"))
+    client.ask("configurationDone")
+    client.wait("terminated")
+
+    (imported,) = json.loads((tmp_path / "out" / "run.json").read_text())["inputs"]["imports"]
+    assert Path(imported["path"]).name == "cell.json"
+
+
+def test_code_that_was_written_out(client: Client, tmp_path: Path) -> None:
+    """A file of code is debugged by the text of the program that it holds, which the editor asks for."""
+    path = tmp_path / "p02.rlc"
+    text = P02.read_text(encoding="utf-8")
+    path.write_text(assembly(code_of(text, cell_of("cell1"))), encoding="utf-8")
+    client.launch(path, stopOnEntry=True)
+    client.wait("stopped")
+
+    (frame,) = client.stack()
+    number = frame["source"]["sourceReference"]
+    assert client.ask("source", sourceReference=number)["content"].splitlines() == text.splitlines()
+    for source, verified in (({"path": str(path)}, False), ({"sourceReference": number}, True)):
+        (bound,) = client.ask("setBreakpoints", source=source, breakpoints=[{"line": 10}])["breakpoints"]
+        assert bound["verified"] == verified
+    assert client.step("continue")["reason"] == "breakpoint"
+    assert client.line() == 10
+
+
 ODD_REQUESTS: list[tuple[str, dict[str, Any], str]] = [
     ("fly", {}, "knows no request `fly`"),
     ("stackTrace", {}, "threadId: missing"),
@@ -321,6 +368,7 @@ ODD_REQUESTS: list[tuple[str, dict[str, Any], str]] = [
     ("next", {"threadId": 1, "granularity": "mile"}, "granularity: expected"),
     ("setDataBreakpoints", {"breakpoints": [{}]}, "dataId: missing"),
     ("evaluate", {"expression": ["n"]}, "expected a text"),
+    ("evaluate", {"expression": "ARM_9"}, "the cell has no arm ARM_9"),
     ("launch", {"program": str(P02)}, "launched already"),
     ("setVariable", {"variablesReference": 1, "name": "n", "value": "1"}, "nothing to open"),
     ("completions", {"text": "", "column": None}, "column: missing"),

@@ -9,6 +9,7 @@ from armwright.program.debugging.debugger import Command, Debugger, DebuggerErro
 from armwright.program.debugging.evaluating import ExpressionError
 from armwright.program.debugging.variables import Shown
 from armwright.program.running.interpret import Limits, interpret
+from armwright.program.text.words import Standard
 from program.running import cell_of, code_of, corpus_text, down
 
 HEAD = "VAR f, g : FRAME ;\n    n, m : SCALAR ;\n    t : TRANS ;\n    e : EVENT ;\n"
@@ -599,6 +600,24 @@ def test_expressions() -> None:
     ):
         with pytest.raises(ExpressionError, match=message):
             debugger.evaluate(text)
+
+
+def test_names_that_are_words_of_the_newer_language() -> None:
+    """In a program of RLO-83 a frame may be called `on`; it is found, and expressions can do all they can elsewhere."""
+    text = (
+        "VAR on, wait : FRAME ;\n    step : SCALAR ;\nBEGIN\n  step = 50 ;\n"
+        "  on = (1,0,0, 0,-1,0, 0,0,-1, 0.4,0,0.1) ;\n"
+        "  wait = (1,0,0, 0,-1,0, 0,0,-1, 0.4,0,0.3) ;\n  OPEN ARM_1 ;\nEND.\n"
+    )
+    cell = cell_of("cell1")
+    debugger = Debugger(code_of(text, cell, std=Standard.RLO_83), cell)
+    debugger.begin()
+    debugger.work()
+    lines(debugger, "next", 3)
+
+    assert debugger.evaluate("DIST(on, wait)").value == "0.2"
+    assert debugger.evaluate("step > 3 AND step < 99").value == "true"
+    assert debugger.break_at(7, condition="step = 51").start is not None
 
 
 def test_looking_changes_nothing() -> None:

@@ -177,3 +177,46 @@ def test_long_program() -> None:
 
     assert len(result.cures) == 1999
     assert len(rounds) == 2
+
+
+def test_one_vain_change_among_thousands() -> None:
+    """One change in vain costs a few translations more, not one for each of the others."""
+    rounds = []
+
+    def counted(source: Source) -> Compilation:
+        rounds.append(source)
+        return translate(source)
+
+    # The commas cure what they are for; the parenthesis shows that END is missing too.
+    result = fixed(Source("t.rlo", "BEGIN PRINT(" + '""' * 500), counted)
+
+    assert len(result.cures) == 499
+    assert len(rounds) < 50
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "VAR f : FRAME ; BEGIN MOVE ARM_1 ; READ VISIONS (f) END.",
+        "VAR f : FRAME ; BEGIN MOVE ARM_1, ARM_2 TO f END.",
+        "VAR f : FRAME ; BEGIN MOVE f * XYZ(0,0,1) TO f END.",
+        "VAR n : SCALAR ; BEGIN n(1, 2, 3) END.",
+        "BEGIN PAUS 3 END.",
+    ],
+)
+def test_no_half_cures(text: str) -> None:
+    """Where more is wrong than what could be put in, nothing is offered."""
+    assert not any(one.fixes for one in translate(Source("t.rlo", text)).diagnostics)
+
+
+@pytest.mark.parametrize(
+    ("text", "cured"),
+    [
+        ("BEGIN PRINT(“seated”) END.", 'BEGIN PRINT("seated") END.'),
+        ("BEGIN PRINT('seated', 1) END.", 'BEGIN PRINT("seated", 1) END.'),
+        ("BEGIN COBEGIN BEGIN HALT END END ; HALT END.", "BEGIN COBEGIN BEGIN HALT END COEND ; HALT END."),
+    ],
+)
+def test_habits_of_other_languages(text: str, cured: str) -> None:
+    """Quotation marks of other languages, and END for COEND, are certain enough to be cured."""
+    assert cure(text).text == cured

@@ -146,6 +146,30 @@ def test_completion(written: str, first: list[str]) -> None:
     assert first or not found
 
 
+@pytest.mark.parametrize(
+    ("known", "since", "first"),
+    [
+        ("", "MOVE ", ["ARM_1", "f", "g"]),
+        ("MO", "VE ", ["ARM_1", "f", "g"]),
+        ("MOVE f", " TO g, ", ["DIRECTLY", "STRAIGHTLY", "VIA", "ON"]),
+        ("", "n = 1 ; put (f, ", ["n", "DIST", "FORCE"]),
+        ("", "TRY n = 1 RECOVER WAIT ", ["e"]),
+        ("", "{ 1 } MOVE ", ["ARM_1", "f", "g"]),
+        ("", "{ MOVE ", []),
+        ("", "// MOVE ", []),
+        ("", 'PRINT ("MOVE ', []),
+    ],
+)
+def test_completion_of_what_is_not_looked_at_yet(known: str, since: str, first: list[str]) -> None:
+    """What was written since the program was last looked at as a whole counts for what may stand behind it."""
+    text, place = f"{HEAD}{known}{since} ; END.", len(HEAD) + len(known) + len(since)
+    view = View(text, analysis_of(f"{HEAD}{known} ; END."))
+
+    found = [one.label for one in completions(view, place)]
+    assert found[: len(first)] == first
+    assert first or not found
+
+
 def test_completion_in_front_of_begin() -> None:
     """In front of BEGIN stand declarations, behind a colon types; none of it is of RLO-2 in RLO-83."""
     assert labels("VAR f : |") == ["SCALAR", "TRANS", "FRAME", "EVENT", "ARRAY"]
@@ -187,6 +211,7 @@ SCOPES = (
         ("p (a :", "b", "the program has a name 'b' already"),
         ("p (a :", "XYZ", "'XYZ' is a function"),
         ("a, b", "World", "'World' is a frame that is predeclared"),
+        ("c : SCALAR", "Station", "'Station' is a frame that is predeclared"),
         ("a, b", "1a", "'1a' is no name"),
         ("VAR", "x", "`VAR` is no name"),
     ],

@@ -1,6 +1,7 @@
 """The language server, as an editor that starts ``armwright lsp`` and talks to it over standard input and output."""
 
 import asyncio
+import json
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Sequence
@@ -232,10 +233,12 @@ async def test_cell_that_changes(editor: Editor) -> None:
     await editor.open(PROGRAM)
     (editor.folder / "bench.toml").write_text(CELL.replace("0, 0.1, 0]", "0, 0.25, 0]"))
     uri = (editor.folder / "bench.toml").as_uri()
+    editor.client.published.clear()
     editor.client.workspace_did_change_watched_files(
         lsp.DidChangeWatchedFilesParams([lsp.FileEvent(uri, lsp.FileChangeType.Changed)])
     )
 
+    await editor.told()
     assert "450,250,0" in await editor.hover("cup")
 
 
@@ -534,6 +537,20 @@ async def test_whole_new_text(editor: Editor) -> None:
         await editor.hover("")
     editor.version += 1
     assert await editor.open(PROGRAM.replace("END.", "END")) != []
+
+
+@pytest.mark.parametrize("asked", [None, {"textDocument": 5}, {"textDocument": {"uri": "file:///x"}}])
+def test_questions_that_make_no_sense(asked: object) -> None:
+    """A question that cannot be read is refused: whoever asked does not wait for an answer for ever."""
+    question = {"jsonrpc": "2.0", "id": 7, "method": lsp.TEXT_DOCUMENT_HOVER, "params": asked}
+    body = json.dumps(question).encode()
+    end = json.dumps({"jsonrpc": "2.0", "method": lsp.EXIT}).encode()
+    messages = b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(one), one) for one in (body, end))
+    command = [sys.executable, "-m", "armwright", "lsp"]
+    said = subprocess.run(command, input=messages, capture_output=True, check=False, timeout=60).stdout
+
+    answer, _ = json.JSONDecoder().raw_decode(said.decode().partition("\r\n\r\n")[2])
+    assert (answer["id"], answer["error"]["code"]) == (7, -32602)
 
 
 def test_without_pygls() -> None:

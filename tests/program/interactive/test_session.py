@@ -316,6 +316,16 @@ def test_an_error_tells_what_it_takes_back() -> None:
     )
 
 
+def test_what_an_error_takes_back_is_told_in_short() -> None:
+    """Of a thousand things that were done before an error the first are named, and the others counted."""
+    talk = session("VAR i : SCALAR", "i = 0")
+
+    (remark,) = talk.enter('BEGIN FOR i = 1 TO 1000 DO PRINT("x") ; i = 1 / (i - 1000) END').remarks
+
+    assert remark.endswith('PRINT "x"; 990 more')
+    assert remark.count("PRINT") == 10
+
+
 def test_statements_before_an_error_stay() -> None:
     """Of several statements those before the one that fails are done, and those behind it are not."""
     talk = session("VAR c : FRAME ; n : SCALAR", f"c = {FAR}")

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from armwright.errors import ArmwrightError
-from armwright.program.debugging.editor import EditorSession
+from armwright.program.debugging.editor import LISTED, EditorSession
 from armwright.program.debugging.protocol import Arguments, RequestError
 
 
@@ -15,7 +15,7 @@ def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, A
     asked = arguments.parts("breakpoints")
     for one in asked:
         one.whole("line")
-    if session.launch is not None and not _same(source.text("path", ""), session.launch.program):
+    if session.launch is not None and not _is_debugged(session, source):
         message = "this is not the program that is debugged"
         return {"breakpoints": [{"id": session.number(), "verified": False, "message": message} for _ in asked]}
     if session.debugger is not None:
@@ -24,8 +24,19 @@ def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, A
     return {"breakpoints": [session.bound(*one) for one in session.wanted]}
 
 
+def _is_debugged(session: EditorSession, source: Arguments) -> bool:
+    """Whether a text is that of the program, which lies in a file of its own or in a file of code."""
+    if session.loaded is not None and session.loaded.is_listed:
+        return source.whole("sourceReference", 0) == LISTED
+    path = source.text("path", "")
+    return bool(path) and session.launch is not None and _same(path, session.launch.program)
+
+
 def _same(path: str, program: Path) -> bool:
-    return bool(path) and os.path.realpath(path) == os.path.realpath(program)
+    try:
+        return os.path.realpath(path) == os.path.realpath(program)
+    except ValueError:  # a zero byte
+        return False
 
 
 def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from armwright.program.debugging.protocol import Arguments, RequestError
 from armwright.program.debugging.stopping import Stop
 from armwright.program.debugging.timeline import Path as ProcessPath
 from armwright.program.debugging.variables import Shown
+from armwright.program.editing.places import UTF_16, Ruler, columns
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic
 from armwright.program.messages.rendering import render
@@ -22,6 +23,8 @@ from armwright.program.text.source import Span
 from armwright.program.text.words import Standard
 
 _DESCRIPTIONS = {"start": "back at the start", "data breakpoint": "something has changed"}
+# The number of the text of a program that was read from a file of code.
+LISTED = 1
 # What the protocol has a word for.
 _REASONS = {"start": "entry"}
 
@@ -55,11 +58,15 @@ class Loaded:
         code: the program.
         cell: what it runs in.
         diagnostics: warnings.
+        imports: the files that it imports.
+        is_listed: whether it was read from a file of code, which holds the text of the program and is not that text.
     """
 
     code: Code
     cell: Cell
     diagnostics: Sequence[Diagnostic] = ()
+    imports: Sequence[Path] = ()
+    is_listed: bool = False
 
 
 class LoadError(ArmwrightError, ValueError):
@@ -291,21 +298,27 @@ class EditorSession:
     def source(self) -> dict[str, Any]:
         """Return what the editor has to know of the text."""
         assert self.launch is not None  # noqa: S101 - asked for only with a program
+        if self.loaded is not None and self.loaded.is_listed:
+            return {"name": self.loaded.code.source.name, "sourceReference": LISTED}
         return {"name": self.launch.program.name, "path": str(self.launch.program)}
 
     def place(self, span: Span, *, whole: bool = True) -> dict[str, int]:
         """Return where a stretch of the text is, in the numbers of the editor."""
         assert self.loaded is not None  # noqa: S101 - asked for only with a program
         source = self.loaded.code.source
-        line, column = self.first_line - 1, self.first_column - 1
-        start = {"line": source.line(span.start) + line, "column": source.column(span.start) + column}
+
+        def place(offset: int) -> tuple[int, int]:
+            line = source.line(offset)
+            # Editors count halves of words, as JavaScript does.
+            before = columns(source.text[source.line_starts[line - 1] : offset], UTF_16)
+            return line - 1 + self.first_line, before + self.first_column
+
+        line, column = place(span.start)
+        start = {"line": line, "column": column}
         if not whole:
             return start
-        return {
-            **start,
-            "endLine": source.line(span.end) + line,
-            "endColumn": source.column(span.end) + column,
-        }
+        line, column = place(span.end)
+        return {**start, "endLine": line, "endColumn": column}
 
     def number(self) -> int:
         """Return a new number for a breakpoint."""
@@ -335,9 +348,13 @@ class EditorSession:
         """Set a breakpoint; return what the editor has to know of it."""
         if self.debugger is None:
             return {"id": number, "verified": False, "message": "no program has been launched"}
-        column = wanted.whole("column") - self.first_column + 1 if "column" in wanted else None
+        line, column = wanted.whole("line") - self.first_line + 1, None
+        if "column" in wanted:
+            source = self.debugger.code.source
+            text = source.line_text(line) if 0 < line <= len(source.line_starts) else ""
+            column = Ruler(text, UTF_16).offset(0, wanted.whole("column") - self.first_column) + 1
         found: Breakpoint = self.debugger.break_at(
-            wanted.whole("line") - self.first_line + 1,
+            line,
             column,
             condition=wanted.text("condition", "").strip(),
             hits=wanted.text("hitCondition", "").strip(),

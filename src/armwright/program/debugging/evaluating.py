@@ -21,7 +21,7 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.cursor import LostError, Tokens
 from armwright.program.syntax.expressions import expression
 from armwright.program.text.source import Source
-from armwright.program.text.tokens import scan
+from armwright.program.text.tokens import TokenKind, scan
 from armwright.program.text.words import Standard
 from armwright.spatial.poses import from_noap
 
@@ -57,7 +57,7 @@ def parse(text: str, types: Mapping[str, Type], code: Code) -> Parsed:
     """Read an expression and check what it is made of.
 
     Args:
-        text: in RLO-2, whatever the program is written in.
+        text: in RLO-2, whatever the program is written in; a word that names something is a name all the same.
         types: of the names that it may use.
         code: the program.
 
@@ -67,7 +67,8 @@ def parse(text: str, types: Mapping[str, Type], code: Code) -> Parsed:
     source = Source("expression", text)
     scanned = scan(source, text)
     _refuse(scanned.found)
-    tokens = Tokens(source, scanned.tokens, Standard.RLO_2, {})
+    named = [attrs.evolve(one, kind=TokenKind.NAME) if one.key in types else one for one in scanned.tokens]
+    tokens = Tokens(source, named, Standard.RLO_2, {})
     try:
         node = expression(tokens)
     except LostError:
@@ -112,9 +113,11 @@ def kept_name(machine: Machine, process: Process, frame: Frame, parsed: Parsed) 
     """Return where an expression is kept, if it is a variable, an element or an arm; None for anything else.
 
     Raises:
-        ExpressionError: an index of it has no value.
+        ExpressionError: an index of it has no value, or the cell has no such arm.
     """
     node = parsed.node
+    if isinstance(node, tree.ArmName) and node.key not in machine.cell.arms:
+        raise ExpressionError(f"the cell has no arm {node.key}")
     if isinstance(node, tree.Name | tree.ArmName):
         return frame.activation.bindings.get(node.key, node.key)
     if not isinstance(node, tree.Index):

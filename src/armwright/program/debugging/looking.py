@@ -10,6 +10,7 @@ from armwright.program.debugging.evaluating import names_at
 from armwright.program.debugging.protocol import Arguments, RequestError
 from armwright.program.debugging.timeline import Path
 from armwright.program.debugging.variables import Shown
+from armwright.program.editing.places import UTF_16, Ruler
 from armwright.program.meaning.functions import FUNCTIONS
 from armwright.program.messages.rendering import render
 
@@ -108,7 +109,9 @@ def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``completions``: names that begin with what has been typed."""
     debugger = session.standing
     column = arguments.whole("column") - session.first_column
-    match = _WORD.search(arguments.text("text")[: max(0, column)])
+    ruler = Ruler(arguments.text("text"), UTF_16)
+    end = ruler.offset(arguments.whole("line", session.first_line) - session.first_line, column)
+    match = _WORD.search(ruler.text[:end])
     typed = match[0] if match else ""
     path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
     procedure = debugger.stack(path)[level].procedure

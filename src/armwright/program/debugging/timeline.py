@@ -91,7 +91,7 @@ class Timeline:
 
     def arrives(self, process: Process) -> bool:
         """Whether the next step of a process begins a statement, or another pass of a loop."""
-        if process.pending is not None or (process.motion is not None and not in_action(process)):
+        if process.pending is not None or process.follows is not None:
             return False
         step = self.machine.code.instructions[process.at]
         if not step.begins or process.path in self.marks.blocked:
@@ -114,7 +114,7 @@ class Timeline:
         at = process.at
         if self.arrives(process):
             marks.visits[at] = marks.visits.get(at, 0) + 1
-        instruction = process.pending is None and (process.motion is None or in_action(process))
+        instruction = process.pending is None and process.follows is None
         advance(machine, process)
         if instruction:
             marks.came[process.path] = at
@@ -186,11 +186,6 @@ class Timeline:
         self.done, self._broken = moment.done, False
         self._begun = time.perf_counter()
         self._change()
-
-
-def in_action(process: Process) -> bool:
-    """Whether a process is in the action of a MOVE, perhaps in a procedure that it calls."""
-    return any(activation.kind == "action" for activation in process.stack)
 
 
 class _Pickler(pickle.Pickler):

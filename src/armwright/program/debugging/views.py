@@ -7,7 +7,7 @@ import attrs
 from armwright.cell.model import base_name
 from armwright.kinematics.forward import forward
 from armwright.program.debugging.statements import Statements
-from armwright.program.debugging.timeline import Path, in_action
+from armwright.program.debugging.timeline import Path
 from armwright.program.following.hanging import is_arm
 from armwright.program.running.machine import Machine
 from armwright.program.running.process import Activation, Process
@@ -78,10 +78,8 @@ def stack(machine: Machine, process: Process, statements: Statements) -> list[Fr
             Frame(title=_title(machine, process, activation), span=span, activation=activation, procedure=procedure)
         )
         index = activation.back
-        if activation.kind == "procedure" and activation.called is not None:
+        if activation.called is not None:
             span = activation.called
-        elif process.motion is not None:
-            span = process.motion.span
     return frames
 
 
@@ -90,8 +88,8 @@ def _where(process: Process, statements: Statements) -> Span:
         return process.waiting.span
     if process.pending is not None:
         return process.pending.span
-    if process.motion is not None and not in_action(process):
-        return process.motion.span
+    if process.follows is not None:
+        return process.follows.span
     return statements.at(process.at).span
 
 

@@ -16,7 +16,7 @@ from armwright.program.editing.places import Drift, drift
 from armwright.program.meaning.names import Scope
 from armwright.program.syntax import tree
 from armwright.program.text.source import Source, Span
-from armwright.program.text.tokens import Token, TokenKind, scan
+from armwright.program.text.tokens import Scanned, Token, TokenKind, scan
 from armwright.program.text.words import CLOSING, OPENING
 
 # How many tokens in front of a place are looked at to find out what may stand there.
@@ -171,18 +171,16 @@ class View:
             start -= 1
         word = Span(_word_start(self.text, start, offset), offset)
         analysis, known = self.analysis, self.analysis.compiled.tokens
-        if (at := self.old(word.start)) is not None and not self.drift.start < word.start < self.drift.new_end:
+        # Right behind what was written since, that counts too.
+        written_since = self.drift.start < word.start <= self.drift.new_end
+        if (at := None if written_since else self.old(word.start)) is not None:
             count = bisect_left(analysis.token_starts, at)
             front: tuple[Token, ...] = known[max(0, count - _REACH) : count]
             depth = analysis.depths[count]
             behind = known[count : count + _REACH] if self.fresh else ()
         else:
-            # The last token in front of what has changed may have been a part of a longer one now.
-            count = bisect_left(analysis.token_starts, self.drift.start)
-            while count and known[count - 1].end >= self.drift.start:
-                count -= 1
-            safe = known[count - 1].end if count else 0
-            written = self._scanned(Span(safe, word.start))
+            count, safe = self._unchanged()
+            written = self._scanned(Span(safe, word.start)).tokens[:-1]
             front = (*known[max(0, count - _REACH) : count], *written)
             depth = analysis.depths[count] + sum(_DEEPER.get(token.key, 0) for token in written)
             behind = ()
@@ -195,12 +193,27 @@ class View:
             scope=analysis.extents.scope(self.drift.start if place is None else place),
         )
 
-    def _scanned(self, span: Span) -> tuple[Token, ...]:
+    def _unchanged(self) -> tuple[int, int]:
+        """Return how many tokens in front of what has changed are as they were, and where the last of them ends."""
+        known = self.analysis.compiled.tokens
+        count = bisect_left(self.analysis.token_starts, self.drift.start)
+        # The last one may have become a part of a longer one.
+        while count and known[count - 1].end >= self.drift.start:
+            count -= 1
+        return count, known[count - 1].end if count else 0
+
+    def _scanned(self, span: Span) -> Scanned:
         text = self.text[span.start : span.end]
-        return scan(Source("", text), text, self.analysis.compiled.standard).tokens[:-1]
+        return scan(Source("", text), text, self.analysis.compiled.standard)
 
     def in_comment(self, offset: int) -> bool:
         """Whether a place lies in a comment or a text in quotes, where nothing is to be completed."""
+        if self.drift.start < offset <= self.drift.new_end:
+            _, safe = self._unchanged()
+            scanned = self._scanned(Span(safe, offset))
+            last = self.text[safe + scanned.comments[-1].start : offset] if scanned.comments else ""
+            beside = last.startswith("//") and not set(last) & set("\r\n")
+            return beside or any(one.code in ("E102", "E120") for one in scanned.found)
         place = self.old(offset)
         if place is None:
             return False

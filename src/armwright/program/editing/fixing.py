@@ -14,6 +14,8 @@ from armwright.program.text.source import Source
 
 # How often a program is looked at again: one cure may bring the next slip to light.
 ROUNDS = 10
+# How often a program is translated at most to find out which changes help, in one round.
+_MOST_TRIALS = 200
 # A longer text is not shown whole.
 _LONGEST_SHOWN = 30
 
@@ -77,7 +79,7 @@ def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixe
             break
         after = translate(_with(now.source, wanted))
         if not _helps(wanted, now, after):
-            wanted, after = _one_by_one(wanted, now, translate)
+            wanted, after = _that_help(wanted, now, translate)
             vain |= {_line_of(one, now.source) for one in offered if one not in wanted}
         cures += [Cure(now.source, one) for one in wanted]
         now = after
@@ -144,16 +146,26 @@ class _Changes:
         return offset + self._longer[first], offset + self._longer[last]
 
 
-def _one_by_one(
+def _that_help(
     wanted: Sequence[Diagnostic], before: Compilation, translate: Translate
 ) -> tuple[list[Diagnostic], Compilation]:
-    """Return the changes that help together, tried one after the other, and what becomes of the program."""
+    """Return the changes that help together, and what becomes of the program.
+
+    Few do not as a rule, so that changes are tried many at a time, and half of them where those are too many.
+    """
     found: list[Diagnostic] = []
     after = before
-    for one in wanted:
-        tried = translate(_with(before.source, [*found, one]))
-        if _helps([*found, one], before, tried):
-            found, after = [*found, one], tried
+    waiting = [list(wanted)]
+    for _ in range(_MOST_TRIALS):
+        if not waiting:
+            break
+        several = waiting.pop()
+        tried = translate(_with(before.source, [*found, *several]))
+        if _helps([*found, *several], before, tried):
+            found, after = [*found, *several], tried
+        elif len(several) > 1:
+            half = len(several) // 2
+            waiting += [several[half:], several[:half]]
     return found, after
 
 

@@ -104,6 +104,8 @@ def _require_unused(analysis: Analysis, one: Occurrence, new: str) -> None:
         _require_unused_globally(analysis, one, new)
         return
     procedure = symbols.procedures[one.owner]
+    if key in PREDECLARED:
+        raise InvalidValueError(f"'{new}' is a frame that is predeclared")
     if key in procedure.types:
         raise InvalidValueError(f"procedure `{procedure.node.name.text}` has a name '{new}' already")
     span = procedure.node.span

@@ -36,6 +36,19 @@ class _Protocol(LanguageServerProtocol):
     def lsp_text_document__did_change(self, params: lsp.DidChangeTextDocumentParams) -> Any:
         yield self.fm.features[lsp.TEXT_DOCUMENT_DID_CHANGE], (params,), None
 
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        """Return a message as it came in; whoever asks what cannot be read is told so, and does not wait for ever.
+
+        Raises:
+            JsonRpcException: it makes no sense.
+        """
+        try:
+            return super().structure_message(data)
+        except JsonRpcException as error:
+            if "method" in data and isinstance(data.get("id"), int | str):
+                self._send_response(data["id"], None, error.to_response_error())
+            raise
+
 
 class RloServer(LanguageServer):
     """The server: open documents, settings, and what the editor can do."""

@@ -10,6 +10,7 @@ from armwright.program.meaning.moves import SPEED_NOTE
 from armwright.program.meaning.sorts import written
 from armwright.program.messages.diagnostics import Label, Severity
 from armwright.program.syntax import tree
+from armwright.program.text.words import Standard
 
 # ---- the hand ------------------------------------------------------------------------------------------------------
 
@@ -31,6 +32,8 @@ def grasp(course: Course, node: tree.Grasp) -> None:
         return
     if arm is None:
         help_ = f"write `GRASP {course.some_arm()}`"
+        if course.symbols.std is Standard.RLO_83:
+            help_ = f"name one before, as `OPEN {course.some_arm()}` does"
         text = "GRASP does not say which arm, and none has been used yet"
         course.say("E307", text, node.span, "which arm?", helps=(help_,))
         return

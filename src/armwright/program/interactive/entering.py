@@ -118,7 +118,8 @@ def _is_complete(tokens: Sequence[Token], found: Sequence[Diagnostic]) -> bool:
     if any(one.code == "E102" for one in found) or (tokens and _depth(tokens) > 0):
         return False
     first = next((one for one in in_order(found) if one.is_syntax), None)
-    if first is None or not tokens or first.span.start < tokens[-1].end:
+    # A character that RLO does not have stays wrong whatever follows, a comment of another language too.
+    if first is None or first.code == "E101" or not tokens or first.span.start < tokens[-1].end:
         return True
     # Whoever forgets the parentheses of a call believes that nothing is missing.
     return any(fix.replacement == "()" for fix in first.fixes)

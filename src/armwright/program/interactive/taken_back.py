@@ -8,6 +8,8 @@ from armwright.program.running.machine import Machine
 
 # Effects that say nothing of their own in a trace.
 SILENT = ("PLACE", "LOCK", "END", "STOP")
+# Nobody reads more of what is no longer so.
+_MOST_SAID = 10
 # What is nearer than this was not moved: rounding [m], [rad], and of entries of rotations.
 _ROUNDING = 1e-9
 
@@ -20,6 +22,8 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
         after: what the statement had come to.
     """
     done = [effect.text for effect in after.effects[len(before.effects) :] if effect.kind not in SILENT]
+    left = len(done) - _MOST_SAID
+    done = [*done[:_MOST_SAID], f"{left} more"] if left > 1 else done
     said = [f"before that it had done: {'; '.join(done)}"] if done else []
     back = _arms(before, after)
     if frames := [after.spelled(name) for name in _frames(before, after)]:

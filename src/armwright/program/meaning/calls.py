@@ -11,9 +11,11 @@ from armwright.program.meaning.sorts import OF_KIND, a_type, called
 from armwright.program.messages.diagnostics import Fix, Label
 from armwright.program.syntax import tree
 from armwright.program.text.source import Span
+from armwright.program.text.words import ABSENT, ELSEWHERE
 
 # What a misspelt call with parentheses may have been meant as, beside a procedure.
 _STATEMENTS = ("PRINT", "LOCK")
+_NUMBERS_OF_A_PLACE = 12
 
 
 @attrs.frozen
@@ -164,14 +166,16 @@ def _unknown(names: Names, node: tree.Call) -> None:
         if not kind.sizes and node.arguments:
             # No other statement begins with a variable.
             help_ = f"to give it a value write `{name.text} = ...`"
-            fixes = (Fix(Span(name.span.end, name.span.end), " ="),)
+            numbers = (1,) if kind.kind is Kind.SCALAR else (1, _NUMBERS_OF_A_PLACE)
+            fixes = (Fix(Span(name.span.end, name.span.end), " ="),) if len(node.arguments) in numbers else ()
     elif name.key in FUNCTIONS:
         message, label = f"`{name.key}` is a function and no statement", "its value goes nowhere"
         help_ = f"write what its value goes to: `... = {name.text}(...)`"
     else:
-        near = names.near(name.text, lambda: [*_spelled(names), *_STATEMENTS])
+        near = ELSEWHERE.get(name.key) or names.near(name.text, lambda: [*_spelled(names), *_STATEMENTS])
         message, label = f"unknown procedure `{name.text}`", "unknown procedure"
-        help_ = f"did you mean `{near}`?" if near else "declare it with PROCEDURE before BEGIN"
+        otherwise = ABSENT.get(name.key, "declare it with PROCEDURE before BEGIN")
+        help_ = f"did you mean `{near}`?" if near else otherwise
     names.found.say(
         "E227", message, name.span, label, secondary=secondary, helps=(help_,) if help_ else (), fixes=fixes
     )

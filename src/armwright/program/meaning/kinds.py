@@ -1,5 +1,6 @@
 """The kinds of expressions: what each one is, and whether that is what its place needs."""
 
+import math
 from collections.abc import Callable
 
 import attrs
@@ -92,6 +93,11 @@ def condition(names: Names, node: tree.Expression, who: str) -> None:
     need(names, node, Sort.CONDITION, "E219", f"{who} needs a condition", helps=helps)
 
 
+def _number(_names: Names, node: tree.Number) -> Sort | None:
+    # A number that was reported before is NaN; it may have been meant as a name.
+    return None if math.isnan(node.value) else Sort.SCALAR
+
+
 def _name(names: Names, node: tree.Name) -> Sort | None:
     kind = names.type(node)
     return None if kind is None else elements.single(names, node, kind)
@@ -157,7 +163,7 @@ def _binary(names: Names, node: tree.Binary) -> Sort | None:
     return operations.result(names, node, sort(names, node.left), sort(names, node.right))
 
 
-def _matrix(names: Names, node: tree.Matrix) -> Sort:
+def _matrix(names: Names, node: tree.Matrix) -> Sort | None:
     fault = matrices.check(node, names.units)
     if fault is not None:
         if len(node.items) == 3 and names.std is Standard.RLO_2:
@@ -170,11 +176,11 @@ def _matrix(names: Names, node: tree.Matrix) -> Sort:
             turns = place < 9
             what = "n, o, a of a matrix have no unit" if turns else "the last three numbers of a matrix are lengths"
             measure(names, item, None if turns else "length", what)
-    return Sort.MATRIX
+    return None if fault is not None and fault.is_error else Sort.MATRIX
 
 
 _SORTS: dict[type, Callable[..., Sort | None]] = {
-    tree.Number: lambda _names, _node: Sort.SCALAR,
+    tree.Number: _number,
     tree.ArmName: lambda _names, _node: Sort.FRAME,
     tree.Name: _name,
     tree.Index: _index,

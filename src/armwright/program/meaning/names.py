@@ -8,6 +8,7 @@ from armwright.program.intermediate.code import Kind, Type
 from armwright.program.meaning.known import STATION, WORLD
 from armwright.program.meaning.units import UnitSystem
 from armwright.program.syntax import tree
+from armwright.program.text.words import Standard
 
 PREDECLARED: Mapping[str, Type] = {WORLD: Type(Kind.FRAME), STATION: Type(Kind.FRAME)}
 
@@ -42,6 +43,7 @@ class Symbols:
         poisoned: names of which something has been said, so that they give no second message.
         units: what bare numbers count.
         imported: the frames that IMPORT has brought.
+        std: the language.
     """
 
     types: Mapping[str, Type | None]
@@ -50,6 +52,7 @@ class Symbols:
     poisoned: frozenset[str] = frozenset()
     units: UnitSystem = attrs.field(factory=UnitSystem)
     imported: frozenset[str] = frozenset()
+    std: Standard = Standard.RLO_2
 
     def scope(self, procedure: str | None) -> "Scope":
         """Return the names as the statements of a procedure see them, or those of the main program for None.

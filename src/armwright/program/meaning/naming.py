@@ -78,6 +78,7 @@ class Names:
             poisoned=frozenset(self.main.poisoned),
             units=self.units,
             imported=frozenset(self.imported),
+            std=self.std,
         )
 
     @contextmanager
@@ -213,6 +214,9 @@ class Names:
             text = f"`{name.text}` is a procedure and no variable"
             help_ = f"a procedure is called by a statement of its own: `{name.text}(...)`"
             self.found.say("E227", text, name.span, "a procedure", helps=(help_,))
+            return
+        if not name.text.isascii():
+            # Told of as a name that cannot be one.
             return
         if self.cell is not None and name.key in self.cell.frames:
             helps = (f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`",)

@@ -2,6 +2,7 @@
 
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 from armwright.program.messages.diagnostics import Diagnostic, Label, Severity, count_line, in_order
@@ -110,6 +111,8 @@ def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int
     return [(" " * indent, ""), (mark * max(1, length), style), (f" {label.text}" if label.text else "", style)]
 
 
+# Diagnostics that follow one another are often about the same line, and a program may be one line.
+@lru_cache(maxsize=4)
 def _cells(line: str) -> Sequence[str]:
     """Return what is shown for each character of a line: blanks up to the next stop for a tab."""
     shown: list[str] = []
@@ -118,7 +121,7 @@ def _cells(line: str) -> Sequence[str]:
         cell = " " * (_TAB - column % _TAB) if character == "\t" else _visible(character)
         column += _width(cell)
         shown.append(cell)
-    return shown
+    return tuple(shown)
 
 
 def _visible(character: str) -> str:

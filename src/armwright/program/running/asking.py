@@ -16,6 +16,9 @@ from armwright.program.running.machine import Machine
 from armwright.program.running.process import Guard, Process
 from armwright.program.text.source import Span
 
+# The longest MOVE; more is a slip of units [s].
+_LONGEST = 1e6
+
 
 class Goal(NamedTuple):
     """One frame of a MOVE: as its stages are called by, its operand, the clause that names it."""
@@ -101,15 +104,18 @@ def _quantity(run: Machine, process: Process, part: Instruction) -> float:
     """Return speed, blend [m] or duration [s], checked."""
     operand = part.operands[0]
     value = run.number(process, operand, part)
-    name = run.label(process, operand) if isinstance(operand, str) else f"{value:g}"
+    name = f"{run.label(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
     if part.op is Op.MVSPD:
         if not LOWEST_SPEED <= value <= HIGHEST_SPEED:
-            message = f"speed {name} = {value:g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
+            message = f"speed {name} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
             run.fail(process, "E207", message, part.span, "out of range")
         return value
+    what = "the blend" if part.op is Op.MVBLD else "the duration"
+    if part.op is Op.MVDUR and value > _LONGEST:
+        text = f"{what} {name} s is not possible"
+        run.fail(process, "E231", text, part.span, f"expected {_LONGEST:g} s or less")
     if value <= 0:
-        what = "the blend" if part.op is Op.MVBLD else "the duration"
-        run.fail(process, "E231", f"{what} {name} = {value:g} is not above 0", part.span, "expected more than 0")
+        run.fail(process, "E231", f"{what} {name} is not above 0", part.span, "expected more than 0")
     return value * run.code.units.metres if part.op is Op.MVBLD else value
 
 

@@ -1,6 +1,5 @@
 """Jumps, procedures, processes, events, locks, attempts, and the end of a program."""
 
-import math
 from collections.abc import Callable, Mapping
 
 from armwright.program.intermediate.code import Instruction, Kind, Op, Place
@@ -40,7 +39,7 @@ def _for(run: Machine, process: Process, step: Instruction) -> None:
     first, last, by = (run.number(process, bound, step) for bound in bounds)
     if by == 0:
         run.fail(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
-    if done > math.floor((last - first) / by + _ROUNDING):
+    if done > (last - first) / by + _ROUNDING:
         process.at = _place(step, 5)
         return
     run.write(process, variable, first + done * by, step)
@@ -105,6 +104,8 @@ def _leave(run: Machine, process: Process, span: Span) -> None:
             if kind.kind is Kind.FRAME and name in run.tree:
                 run.grow(run.tree.without(name), name, span)
                 run.written.pop(name, None)
+                for hand in run.hands.values():
+                    hand.forget(name)
         for name in [one for one in run.values if one == kept or one.startswith(f"{kept}[")]:
             del run.values[name]
         run.events.pop(kept, None)
@@ -115,6 +116,7 @@ def _leave(run: Machine, process: Process, span: Span) -> None:
 
 def _fork(run: Machine, process: Process, step: Instruction) -> None:
     now = process.now
+    _room(run, process, step)
     rank = run.number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
     branch = Process(
         path=(*process.path, len(process.branches)),
@@ -126,6 +128,20 @@ def _fork(run: Machine, process: Process, step: Instruction) -> None:
         last_arm=process.last_arm,
     )
     process.branches.append(branch)
+
+
+def _room(run: Machine, process: Process, step: Instruction) -> None:
+    """See to it that there is room for one process more: a procedure may begin a COBEGIN in which it is called again.
+
+    Raises:
+        RunError: there are too many of them.
+    """
+    most = run.limits.processes
+    deep = len(process.path) >= most // 10
+    if not deep and len(run.processes) + len(process.branches) < most:
+        return
+    text = f"COBEGINs begin one another more than {most // 10} deep" if deep else f"more than {most} processes run"
+    run.fail(process, "E505", text, step.span, "one more would begin here")
 
 
 def _join(run: Machine, process: Process, step: Instruction) -> None:
@@ -325,7 +341,9 @@ def deadlock(run: Machine) -> RunError:
         assert one.waiting is not None  # noqa: S101 - chosen so
         names = ", ".join(map(run.spelled, one.waiting.names))
         what = f"waits for {names}" if one.waiting.what == "event" else f"waits for the lock of {names}"
-        says.append((one.waiting.span, f"{one.title} {what}"))
+        holders = {run.locks[name] for name in one.waiting.names if name in run.locks} - {one}
+        held = ", ".join(holder.title for holder in sorted(holders, key=lambda holder: holder.path))
+        says.append((one.waiting.span, f"{one.title} {what}{f', held by {held}' if held else ''}"))
     (span, label), *others = says
     text = f"{len(says)} processes wait for ever" if others else "the program waits for ever"
     try:

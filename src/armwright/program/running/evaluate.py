@@ -28,7 +28,7 @@ class ValueFault(Exception):  # noqa: N818 - it never leaves the interpreter
 
 
 def _multiply(a: Any, b: Any) -> Any:
-    return _number(a * b) if isinstance(a, float) else a @ b
+    return _number(a * b) if isinstance(a, float) else _near(a @ b)
 
 
 def _divide(a: float, b: float) -> float:
@@ -41,6 +41,12 @@ def _number(value: float) -> float:
     if not abs(value) <= LARGEST:
         raise ValueFault("E240", "the result is larger than any number of a robot", "too large")
     return value
+
+
+def _near(X: Array) -> Array:
+    """Return a place or a step whose lengths are numbers of a robot."""
+    _number(float(np.abs(X[:3, 3]).max()))
+    return X
 
 
 def _turn(axis: int) -> Callable[[float, UnitSystem], Array]:

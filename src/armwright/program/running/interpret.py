@@ -4,6 +4,7 @@ All processes of a program share one clock. Of those that are due at the same ti
 served first, then the one that comes first in the text; so a run is the same on any machine.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -20,6 +21,9 @@ from armwright.program.running.moving import go_on
 from armwright.program.running.obstacles import detour_warning
 from armwright.program.running.process import Process
 from armwright.program.running.recording import Recording, RunStage, efforts
+
+# No TRY helps a program that runs for ever: what is tried again would run for ever again.
+_FINAL = ("E504", "E506")
 
 # Called now and then: the time on the clock [s], the line of the next statement.
 Progress = Callable[[float, int], None]
@@ -98,24 +102,27 @@ def advance(machine: Machine, process: Process) -> None:
     try:
         _advance(machine, process)
     except RunError as error:
-        if not recover(machine, process, error):
+        if error.diagnostic.code in _FINAL or not recover(machine, process, error):
             raise _stopped(machine, error) from None
 
 
 def _advance(machine: Machine, process: Process) -> None:
     if process.wake > machine.ticks:
+        last = machine.limits.time / machine.cell.period
         machine.ticks, machine.idle = process.wake, 0
-        if machine.now > machine.limits.time:
-            step = machine.code.instructions[process.at]
+        if process.wake > last:
+            # The clock stops there, and arms that are on their way have come as far as that.
+            machine.ticks = max(0, math.floor(last))
+            under_way = process.pending or process.motion or machine.code.instructions[process.at]
             text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
-            machine.fail(process, "E506", text, step.span, "it has come to here")
+            machine.fail(process, "E506", text, under_way.span, "it has come to here")
     if (pending := process.pending) is not None:
         process.pending = None
         if pending.place is not None:
             machine.place(process, *pending.place, pending.span)
         machine.effect(pending.kind, pending.text, pending.span, since=pending.since, arm=pending.arm)
         return
-    if process.motion is not None and process.now.kind != "action" and not _in_action(process):
+    if process.follows is not None:
         go_on(machine, process)
         return
     step = machine.code.instructions[process.at]
@@ -126,11 +133,6 @@ def _advance(machine: Machine, process: Process) -> None:
         machine.fail(process, "E504", text, step.span, "it is still running here", helps=[help_])
     process.at += 1
     HANDLERS[step.op](machine, process, step)
-
-
-def _in_action(process: Process) -> bool:
-    """Whether a process is in the action of a guard, perhaps in a procedure that it calls."""
-    return any(activation.kind == "action" for activation in process.stack)
 
 
 def _stopped(machine: Machine, error: RunError) -> RunError:

@@ -45,13 +45,15 @@ class Limits:
     """When a program is taken to run for ever.
 
     Attributes:
-        steps: instructions without any time going by.
+        steps: instructions without any time going by; a MOVE counts as many of them, because it is planned.
         depth: procedures inside procedures.
+        processes: processes side by side, and COBEGINs inside COBEGINs a tenth of that.
         time: on the clock of the cell [s].
     """
 
     steps: int = 1_000_000
     depth: int = 1000
+    processes: int = 1000
     time: float = 3600.0
 
 
@@ -61,6 +63,11 @@ class Hand:
 
     at: str | None = None
     holds: str | None = None
+
+    def forget(self, name: str) -> None:
+        """Know nothing any more of a frame that there is no more."""
+        self.at = None if self.at == name else self.at
+        self.holds = None if self.holds == name else self.holds
 
 
 class Machine:
@@ -153,6 +160,7 @@ class Machine:
     def held(self, name: str, step: Instruction, process: Process) -> Value:
         """Return what a kept name holds."""
         if self.type_of(name).kind is Kind.FRAME:
+            self.look(process, name)
             if not self.has_place(name):
                 text = f"frame `{self.spelled(name)}` is used before it has a value"
                 self.fail(process, "E304", text, step.span, "no value here")
@@ -210,6 +218,7 @@ class Machine:
         Raises:
             RunError: it cannot be placed.
         """
+        self.look(process, name)
         leader = self.tree.leader(name)
         if is_arm(name) or name == WORLD:
             text = f"`{self.spelled(name)}` cannot be given a value"
@@ -224,6 +233,17 @@ class Machine:
         q = self.hardware.posture(arm, self.now if at is None else at * self.cell.period)
         X_BH = forward(self.cell.arms[arm].arm, q)
         self.grow(self.tree.place(arm, self.tree.world(base_name(arm)) @ X_BH), arm, span)
+
+    def look(self, process: Process, name: str) -> None:
+        """Let the frame table know where a frame is now, if an arm that is on its way carries it."""
+        if name not in self.tree or not any(one.motion for one in self.processes):
+            return
+        arm = next((one for one in (name, *self.tree.ancestors(name)) if is_arm(one)), None)
+        mover = next((one for one in self.processes if one.motion and one.motion.arm == arm), None)
+        # A condition of a MOVE finds the arm of this MOVE where it is.
+        if arm is not None and mover is not None and not (mover is process and process.now.kind == "condition"):
+            X_BH = forward(self.cell.arms[arm].arm, self.hardware.posture(arm, self.now))
+            self.tree = self.tree.place(arm, self.tree.world(base_name(arm)) @ X_BH)
 
     def grow(self, tree: FrameTree, name: str, span: Span) -> None:
         """Take another frame tree, in which ``name`` got its place or its parent."""
@@ -294,14 +314,16 @@ class Machine:
             RunError: always.
         """
         calls = [
-            Label(one.called, f"{self.spelled(one.name)} is called here") for one in process.stack[:0:-1] if one.called
+            Label(one.called, f"{self.spelled(one.name)} is called here")
+            for one in process.stack[:0:-1]
+            if one.kind == "procedure" and one.called
         ]
         diagnostic = Diagnostic(
             code=code,
             message=message,
             span=span,
             label=label,
-            secondary=(*secondary, *calls[:3]),
+            secondary=(*secondary, *list(dict.fromkeys(calls))[:3]),
             notes=tuple(notes),
             helps=tuple(helps),
         )

@@ -36,16 +36,22 @@ _OTHER_UNIT = 50.0
 _SAME_PLACE = 1e-6
 # A guarded motion finds something out by the place at which it stops; it keeps to its line this much more closely.
 _GUARDED = 0.05
+# Planning a MOVE takes as long as so many steps of other kinds, whether it can be made or not.
+_STEPS_OF_A_MOVE = 1000
 # A duration so little too short is rounding.
 _ROUNDING = 1e-9
 
 
 def move(run: Machine, process: Process, step: Instruction) -> None:
-    """Plan a MOVE and begin its first stage."""
+    """Plan a MOVE and begin its first stage; in the action of a MOVE, when that one has come to rest."""
+    if process.motion is not None and not _made_way(run, process, process.motion, step.span):
+        return
     asked = asked_of(run, process, step)
     moved = run.name(process, asked.begin.operands[0])
     arm, implied = _carrier(run, process, moved, asked.begin)
     run.claim(process, arm, step.span)
+    _one_at_a_time(run, process, arm, step.span)
+    run.idle += _STEPS_OF_A_MOVE
     stages = _plan(run, process, asked, arm, moved)
     spelled = run.spelled(moved)
     who = arm if moved == arm else f"{arm} [{spelled}]"
@@ -59,6 +65,7 @@ def move(run: Machine, process: Process, step: Instruction) -> None:
         data={"moved": moved, "goal": _goal_name(run, process, asked), "speed": asked.speed, "implied_affix": implied},
         stages=stages,
         speed=asked.speed,
+        depth=len(process.stack),
         begun=run.ticks,
         since=run.ticks,
         until=run.ticks,
@@ -76,11 +83,17 @@ def go_on(run: Machine, process: Process) -> None:
             guard.done = True
             run.set_hand(motion.arm, motion.span)
             now = process.now
-            action = Activation(
-                kind="action", bindings=now.bindings, passing=now.passing, wrote=now.wrote, back=process.at
+            process.stack.append(
+                Activation(
+                    kind="action",
+                    bindings=now.bindings,
+                    passing=now.passing,
+                    wrote=now.wrote,
+                    back=process.at,
+                    called=motion.span,
+                    locks=len(process.locks),
+                )
             )
-            action.locks = len(process.locks)
-            process.stack.append(action)
             process.at = guard.action
             return
     if run.ticks < motion.until:
@@ -96,16 +109,32 @@ def go_on(run: Machine, process: Process) -> None:
 
 def halt(run: Machine, process: Process, step: Instruction) -> None:
     """End the motion from inside an action: the arm stops in a controlled way, and the MOVE is over."""
-    motion = process.motion
-    assert motion is not None  # noqa: S101 - an action belongs to one
-    action = process.stack.pop()
+    motion, action = process.motion, process.stack.pop()
     assert action.kind == "action"  # noqa: S101 - HALT in a procedure is another instruction
     release(run, process, action.locks)
     process.at = action.back
-    motion.until = process.wake = stop(run, process, step.span)
+    if motion is None:
+        # An error has stopped the arm before, and a TRY in the action has gone on from there.
+        return
+    _break_off(run, process, motion, step.span)
+
+
+def _break_off(run: Machine, process: Process, motion: Motion, span: Span) -> None:
+    motion.until = process.wake = stop(run, process, span)
     motion.stages, motion.guards = [], []
     motion.data["halted"] = True
     motion.text += "; halted"
+
+
+def _made_way(run: Machine, process: Process, motion: Motion, span: Span) -> bool:
+    """Whether the MOVE around an action is over, so that another can begin; its arm is brought to rest before."""
+    if motion.data.get("halted"):
+        _finish(run, process, motion)
+        return True
+    _break_off(run, process, motion, span)
+    # When the arm is at rest the same instruction is looked at again.
+    process.at -= 1
+    return False
 
 
 def stop(run: Machine, process: Process, span: Span) -> int:
@@ -186,6 +215,20 @@ def _not_carried(run: Machine, process: Process, moved: str, begin: Instruction,
     )
 
 
+def _one_at_a_time(run: Machine, process: Process, arm: str, span: Span) -> None:
+    """See to it that no process around this one is in the middle of a MOVE of the same arm, with an action of that.
+
+    Raises:
+        RunError: one is.
+    """
+    other = next((one for one in run.processes if one.motion and one.motion.arm == arm), None)
+    if other is None or other.motion is None:
+        return
+    text = f"{arm} cannot begin a MOVE in {process.title} before that of {other.title} is over"
+    on_its_way = Label(other.motion.span, f"{arm} is on this way")
+    run.fail(process, "E503", text, span, "begins in the middle of the other", secondary=[on_its_way])
+
+
 def _plan(run: Machine, process: Process, asked: Asked, arm: str, moved: str) -> list[tuple[Stage, tuple[str, ...]]]:
     """Return the stages of a MOVE with the names of where they lead.
 
@@ -226,7 +269,11 @@ def _timed(run: Machine, process: Process, asked: Asked, stages: Sequence[Stage]
     if asked_for < least - run.cell.period:
         text = f"this MOVE cannot be done in {asked_for:g} s"
         run.fail(process, "E405", text, asked.span, f"it takes {least:.3f} s or more")
-    factor = max(1.0, asked_for / least) if least else 1.0
+    if not least:
+        # Nothing is to be moved: the arm stands still for so long.
+        still = hold(stages[0].trajectory(0.0), asked_for)
+        return [attrs.evolve(stages[0], trajectory=whole_ticks(still, run.cell.period)), *stages[1:]]
+    factor = max(1.0, asked_for / least)
     slow = (whole_ticks(stage.trajectory.slowed(factor), run.cell.period) for stage in stages)
     return [attrs.evolve(stage, trajectory=one) for stage, one in zip(stages, slow, strict=True)]
 
@@ -269,7 +316,10 @@ def _start(run: Machine, process: Process, motion: Motion) -> None:
     stage, to = motion.stages.pop(0)
     arm, period = run.cell.arms[motion.arm].arm, run.cell.period
     trajectory = stage.trajectory
-    _, tau = efforts(arm, trajectory, period)
+    ticks = round(trajectory.duration / period)
+    # A run that lasts longer comes to its end before.
+    counted = min(ticks, math.ceil(max(0.0, run.limits.time - run.now) / period))
+    _, tau = efforts(arm, trajectory, period, counted)
     run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
     blocked = run.hardware.stopped_at(motion.arm)
     if blocked is not None and not motion.guards:
@@ -289,10 +339,10 @@ def _start(run: Machine, process: Process, motion: Motion) -> None:
         )
     )
     duration = trajectory.duration if blocked is None else blocked - run.now
-    run.runs[motion.arm].append(Run(t0=run.now, trajectory=trajectory, duration=duration))
-    motion.since, motion.until = run.ticks, run.ticks + round(trajectory.duration / period)
+    run.runs[motion.arm].append(Run(t0=run.now, trajectory=trajectory, duration=duration, tau=tau))
+    motion.since, motion.until = run.ticks, run.ticks + ticks
     if any(guard.looks for guard in motion.guards):
-        looks = np.minimum(np.arange(motion.until - motion.since + 1) * period, duration)
+        looks = np.minimum(np.arange(counted + 1) * period, duration)
         X_WB = run.tree.world(base_name(motion.arm))
         motion.hands = X_WB @ forward(arm, trajectory(looks))
     process.wake = run.ticks if motion.guards else motion.until

@@ -19,6 +19,8 @@ _ON_THE_WAY = {
     "limits": "the way to `{goal}` leads {joint} of {arm} beyond its limits",
     "singular": "`{goal}` cannot be reached by {arm} on this path: the arm is singular on the way",
 }
+# Farther away nobody counts tenths [mm].
+_FAR = 1e6
 _BY = {"via": "by a via pose", "damped": "by damped rates"}
 
 
@@ -103,5 +105,4 @@ def detour_warning(run: RunStage) -> Diagnostic | None:
 
 
 def _place(p: Array) -> str:
-    x, y, z = p * 1e3
-    return f"({x:.1f}, {y:.1f}, {z:.1f})"
+    return f"({', '.join(f'{x:.1f}' if abs(x) < _FAR else f'{x:.4g}' for x in (p * 1e3).tolist())})"

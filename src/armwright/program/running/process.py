@@ -50,7 +50,7 @@ class Activation:
         wrote: the part of the program that gave each of them.
         back: the instruction to go on with afterwards.
         attempts: the TRYs it is in, innermost last.
-        called: the statement that called it.
+        called: the statement that called it; of an action, its MOVE.
         own: where its own variables are kept, gone with it.
         locks: how many locks the process held when it began.
     """
@@ -99,6 +99,7 @@ class Motion:
         data: further facts for the trace.
         stages: what is still to do after the present stage, with the names of where they lead.
         speed: as asked for.
+        depth: how many activations its process had when it began; those after them belong to its actions.
         begun: when the MOVE began [ticks].
         since: when the present stage began [ticks].
         until: when it will end [ticks].
@@ -115,6 +116,7 @@ class Motion:
     data: dict[str, object]
     stages: list[tuple[Stage, tuple[str, ...]]]
     speed: float
+    depth: int
     begun: int
     since: int
     until: int
@@ -202,6 +204,14 @@ class Process:
     def title(self) -> str:
         """How people call it: ``program``, or ``branch 2``, ``branch 2.1``."""
         return f"branch {'.'.join(str(number + 1) for number in self.path)}" if self.path else "program"
+
+    @property
+    def follows(self) -> Motion | None:
+        """The MOVE that is followed now; None in an action of it, or in a procedure that an action calls."""
+        motion = self.motion
+        if motion is None or any(one.kind == "action" for one in self.stack[motion.depth :]):
+            return None
+        return motion
 
     def descends_from(self, other: "Process") -> bool:
         """Whether another process began this one, directly or through others, or is this one."""

@@ -104,11 +104,13 @@ class Run:
         t0: when it began [s].
         trajectory: from then on.
         duration: how long the arm followed it [s]; then it rested.
+        tau: (k, n) efforts on its first servo ticks, as far as they are known [N m] or [N].
     """
 
     t0: float
     trajectory: Trajectory
     duration: float
+    tau: Array | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -178,6 +180,7 @@ def stream(name: str, arm: Arm, start: Array, runs: Sequence[Run], *, duration: 
     ticks = round(duration / period) + 1
     q = np.empty((ticks, arm.n))
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
+    tau, known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
     first, posture = 0, start
     for run in runs:
         # A run that was stopped by an obstacle ends between two ticks.
@@ -185,19 +188,37 @@ def stream(name: str, arm: Arm, start: Array, runs: Sequence[Run], *, duration: 
         q[first:begin] = posture
         local = np.arange(end - begin) * period
         q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))
+        if run.tau is not None:
+            done = min(end - begin, len(run.tau))
+            tau[begin : begin + done], known[begin : begin + done] = run.tau[:done], True
         first, posture = end, run.trajectory(run.duration)
     q[first:] = posture
     t: Array = np.arange(ticks, dtype=np.float64) * period
-    tau = np.empty((ticks, arm.n))
-    for rows in _chunks(ticks):
-        tau[rows] = inverse_dynamics(arm, q[rows], qd[rows], qdd[rows])
+    left = np.flatnonzero(~known)
+    for rows in _chunks(len(left)):
+        at = left[rows]
+        tau[at] = inverse_dynamics(arm, q[at], qd[at], qdd[at])
     return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
 
 
-def efforts(arm: Arm, trajectory: Trajectory, period: float) -> tuple[Array, Array]:
-    """Return the servo ticks of a trajectory (k,) [s] and the efforts there (k, n), the last tick included."""
-    t: Array = np.arange(round(trajectory.duration / period) + 1, dtype=np.float64) * period
-    return t, inverse_dynamics(arm, trajectory(t), trajectory(t, 1), trajectory(t, 2))
+def efforts(arm: Arm, trajectory: Trajectory, period: float, ticks: int | None = None) -> tuple[Array, Array]:
+    """Return servo ticks of a trajectory and the efforts there.
+
+    Args:
+        arm: that follows it.
+        trajectory: on whole servo periods.
+        period: of the servo [s].
+        ticks: how far; to its end when left out.
+
+    Returns:
+        times (k,) [s] and efforts (k, n), the last tick included.
+    """
+    ticks = round(trajectory.duration / period) if ticks is None else ticks
+    t: Array = np.arange(ticks + 1, dtype=np.float64) * period
+    tau = np.empty((len(t), arm.n))
+    for rows in _chunks(len(t)):
+        tau[rows] = inverse_dynamics(arm, trajectory(t[rows]), trajectory(t[rows], 1), trajectory(t[rows], 2))
+    return t, tau
 
 
 def motion_rows(streams: Iterable[Stream]) -> Iterable[str]:

@@ -282,7 +282,8 @@ class Tokens:
             return
         closing = key in (")", "]")
         ends = not closing and not statement and (self.done or self.sees(";", "END", *self.words.statements))
-        alone = closing or not (ends or self.sees(",", ")", "]", "="))
+        # What a word stands in front of begins with no sign but a parenthesis.
+        alone = not key[0].isalpha() or not (ends or (self.now.kind is _SYMBOL and self.now.key != "("))
         self.insert(key, where, helps=(f"insert `{key}` after `{self.before.text}`",), alone=alone)
         if ends:
             raise LostError

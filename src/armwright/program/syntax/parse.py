@@ -127,7 +127,8 @@ def _ends(tokens: Tokens) -> bool:
                 fixes=(Fix(gap.to(semicolon.span) if semicolon else gap, "."),),
             )
     else:
-        tokens.found.say("E114", "END closes the program, but more follows", end.span, "the program would end here")
+        text, helps = "END closes the program, but more follows", ("leave it out, or write BEGIN before what it ends",)
+        tokens.found.say("E114", text, end.span, "the program would end here", helps=helps)
         tokens.spare += 1
         return False
     return True

@@ -1,7 +1,5 @@
 """Parsing statements that hold no others, but for MOVE."""
 
-# ruff: noqa: ERA001 - each rule of the grammar stands above its function
-
 from armwright.errors import closest
 from armwright.program.syntax import beyond, tree
 from armwright.program.syntax.cursor import Tokens
@@ -71,7 +69,8 @@ def open_hand(tokens: Tokens) -> tree.Open:
     return tree.Open(tokens.since(start), arm, width)
 
 
-# grasp = "GRASP" [ arm ] ;
+# grasp = "GRASP" ;                                                                              (* RLO-83 *)
+# grasp = "GRASP" [ arm ] ;                                                                      (* RLO-2 *)
 def grasp(tokens: Tokens) -> tree.Grasp:
     """Read one GRASP."""
     start = tokens.take()
@@ -81,6 +80,8 @@ def grasp(tokens: Tokens) -> tree.Grasp:
         near = tokens.same_line() or (tokens.later and kind is TokenKind.ARM)
         if near and not _starts_another(tokens):
             arm = mobile(tokens, _ARM, "after GRASP")
+            if not tokens.later:
+                beyond.report(tokens, "GRASP with an arm", arm.span, "RLO-83 closes the hand of the arm named last")
     return tree.Grasp(tokens.since(start), arm)
 
 

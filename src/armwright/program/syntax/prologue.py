@@ -171,6 +171,9 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
         own += var_part(tokens)
     body = _body(tokens, above)
     found = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
+    if tokens.sees("END") and tokens.ahead().key != ".":
+        tokens.say_once("E127", "`END` without BEGIN", tokens.now.span, "the procedure has ended before")
+        tokens.take()
     if tokens.sees("."):
         fix = Fix(tokens.now.span, ";")
         tokens.say_once("E104", "a procedure ends with `;`", tokens.now.span, "write `;`", fixes=(fix,))

@@ -94,7 +94,7 @@ def _ends_nothing(tokens: Tokens) -> bool:
 def _misspelt_end(tokens: Tokens) -> bool:
     """Whether END or another word that is waited for stands here, misspelt."""
     token, after = tokens.now, tokens.ahead()
-    if after.key in (*_ASSIGNING, "(", "[") or _is_known(tokens, token):
+    if after.key in (*_ASSIGNING, "(", "[") or token.key in ABSENT or _is_known(tokens, token):
         return False
     if after.key == ".":
         near = closest(token.text, ("END",))
@@ -292,7 +292,8 @@ def _separator(tokens: Tokens) -> None:
             fixes=(Fix(gap, ";"),),
         )
         return
-    tokens.lost(f"{shown(token)} does not belong here", "expected `;`", code="E117")
+    helps = (ABSENT[token.key],) if tokens.later and token.key in ABSENT else ()
+    tokens.lost(f"{shown(token)} does not belong here", "expected `;`", code="E117", helps=helps)
 
 
 def _starts_statement(tokens: Tokens) -> bool:

@@ -145,7 +145,7 @@ def _value(tokens: Tokens) -> tree.Matrix | tree.Number | tree.Poison:
     if tokens.sees("("):
         found = len(tokens.found)
         matrix = _matrix(tokens)
-        if matrix is not None and not tokens.sees(*beyond.OPERATORS):
+        if matrix is not None and len(matrix.items) > 1 and not tokens.sees(*beyond.OPERATORS):
             return matrix
         # Not a list of numbers but an expression that begins with a parenthesis.
         del tokens.found[found:]

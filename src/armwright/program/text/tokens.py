@@ -3,6 +3,7 @@
 import enum
 import math
 import re
+from bisect import bisect_left
 
 import attrs
 
@@ -100,7 +101,8 @@ _WITH_UNIT = re.compile(rf"({_DIGITS}){_UNIT}", re.VERBOSE)
 _AFTER_TEXT = re.compile(r"[ \t]*\)?[ \t]*;?[ \t]*\Z")
 
 # Characters of other keyboards that stand for one of the language; each takes one place, like the one it stands for.
-LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94)} | {
+# Those of `"` and `}` are none: they may stand in a text or a comment without ending it.
+LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94) if chr(0x21 + i) not in '"}'} | {
     ord(other): meant
     for meant, others in {
         " ": "\u00a0\u3000\u2002\u2003\u2009\u202f",
@@ -119,6 +121,12 @@ _HINTS = {
     "#": "a comment is written { ... } or // ...",
     "}": "no comment is open here",
 }
+# A text between the quotation marks of other languages, and of programs that set them by themselves.
+_TEXT_ELSEWHERE = re.compile(
+    '[\u201c\u201d\u201e\uff02\u00ab][^"\u201c\u201d\u201e\uff02\u00bb\r\n]*["\u201c\u201d\uff02\u00bb]'
+    "|(?<!\\w)['`\u2018][^\"'`\u2019\r\n]*['`\u2019]"
+)
+_COMMENT_ELSEWHERE = re.compile(r"[#!](?=[ \t#!])[^\r\n]*")
 _QUOTES = {Standard.RLO_83: "RLO has no quotation marks", Standard.RLO_2: 'a text stands between two `"`'}
 
 
@@ -160,6 +168,7 @@ class _Scanner:
         end = len(self._text)
         self._tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
         self._found += [_stray(character, spans, self._standard) for character, spans in self._strays.items()]
+        self._hush()
         return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), found=tuple(self._found))
 
     def _stretch(self, position: int, limit: int) -> int:
@@ -189,8 +198,7 @@ class _Scanner:
         if what == _OPEN:
             return self._comment(word, start)
         if what == _STRAY:
-            self._strays.setdefault(self._written[start], []).append(Span(start, end))
-            return end
+            return self._stray(start, end)
         if what == _STRING:
             token = self._string(start, end)
         elif what == _WORD:
@@ -279,6 +287,27 @@ class _Scanner:
         self._say("E101", f"`{opening}` does not open a comment in RLO", here, "write `{ ... }`", fixes=fixes)
         self._comments.append(Span(start, end + 2))
         return end + 2
+
+    def _stray(self, start: int, end: int) -> int:
+        """Take note of a character that does not belong to the language; return where the text goes on."""
+        text = _TEXT_ELSEWHERE.match(self._written, start) if self._standard is Standard.RLO_2 else None
+        if text is None:
+            self._strays.setdefault(self._written[start], []).append(Span(start, end))
+            comment = _COMMENT_ELSEWHERE.match(self._written, start)
+            return comment.end() if comment else end
+        first, last = Span(start, start + 1), Span(text.end() - 1, text.end())
+        fixes = (Fix(first, '"'), *([Fix(last, '"')] if text[0][-1] != '"' else []))
+        self._say("E101", f"`{text[0][0]}` does not open a text in RLO", first, 'write `"..."`', fixes=fixes)
+        self._tokens.append(Token(TokenKind.STRING, f'"{text[0][1:-1]}"', '"', start, text.end(), damaged=True))
+        return text.end()
+
+    def _hush(self) -> None:
+        """Take what stands behind such a character, in its line, for something that has been told of."""
+        starts = [token.start for token in self._tokens] if self._strays else []
+        for character, spans in self._strays.items():
+            for span in spans if ord(character) not in LOOK_ALIKES else ():
+                token = self._tokens[bisect_left(starts, span.end)]
+                token.damaged |= "\n" not in self._written[span.end : token.start]
 
     def _look_alikes(self, start: int, end: int) -> None:
         if self._written[start:end] == self._text[start:end]:

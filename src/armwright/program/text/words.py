@@ -44,6 +44,28 @@ LATER_HEADERS = {
 LATER_TYPES = {"ARRAY": "RLO-83 has no arrays", "EVENT": "RLO-83 has no events"}
 LATER_WITH = ("BLEND", "DURATION")
 
+# What other languages call a statement, and what they have and RLO has not.
+ELSEWHERE = {
+    **dict.fromkeys(("STOP", "EXIT", "QUIT", "ABORT"), "HALT"),
+    **dict.fromkeys(("DELAY", "SLEEP"), "PAUSE"),
+    **dict.fromkeys(("WRITE", "WRITELN", "SAY"), "PRINT"),
+    **dict.fromkeys(("CLOSE", "GRIP"), "GRASP"),
+    "ATTACH": "AFFIX",
+    "DETACH": "UNFIX",
+}
+ABSENT = {
+    **dict.fromkeys(("GOTO", "GO", "JUMP"), "nothing can be jumped to; write WHILE, REPEAT or FOR"),
+    **dict.fromkeys(("BREAK", "CONTINUE"), "a loop goes on by its own condition alone; write WHILE or REPEAT with it"),
+    **dict.fromkeys(("CASE", "SWITCH"), "write `IF ... THEN ... ELSE IF ... THEN ...`"),
+    **dict.fromkeys(("LET", "SET"), "a value is given without a word in front: `name = value`"),
+    **dict.fromkeys(
+        ("ENDIF", "ENDWHILE", "ENDFOR", "ENDDO", "FI", "OD"),
+        "IF, WHILE and FOR hold one statement and need no word at its end; write `BEGIN ... END` around several",
+    ),
+    "CALL": "a procedure is called by its name: `name(...)`",
+    "RETURN": "a procedure goes back at its END, and gives nothing back",
+}
+
 # What opens and closes a stretch of statements in RLO-2.
 OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
 CLOSING = frozenset(("END", "COEND", "UNTIL"))
