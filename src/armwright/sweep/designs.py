@@ -1,0 +1,230 @@
+"""Which runs a sweep is made of: full factorial, Latin hypercube, Sobol, or points given by hand.
+
+A design is the table of its points, one row per run, and tells how it was made. The same call makes the same points,
+bit for bit.
+"""
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arrays import LARGEST, Array, by_fields, content, floats
+from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, shown
+
+KINDS = ("given", "full factorial", "latin hypercube", "sobol")
+# More runs than this are a slip in a level, not a plan.
+MOST_RUNS = 10_000_000
+
+
+def _names(value: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(value, str):
+        raise KindError(f"names: expected names of parameters, one per column, got the one text {shown(value)}")
+    names = tuple(value)
+    for name in names:
+        if not isinstance(name, str) or not name.isidentifier():
+            raise InvalidValueError(f"names: expected a word of letters, digits and _, got {shown(name)}")
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidValueError(f"names: '{twice}' stands there twice")
+    return names
+
+
+def _points(value: Any) -> Array:
+    points = floats(value, "points")
+    if points.ndim != 2 or 0 in points.shape:
+        raise ShapeError(
+            f"points: expected one row per run and one column per parameter, neither empty, got shape {points.shape}"
+        )
+    points.setflags(write=False)
+    return points
+
+
+def _table(value: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
+    return {name: tuple(float(number) for number in numbers) for name, numbers in value.items()}
+
+
+def _seed(value: int | None) -> int | None:
+    return None if value is None else whole(value, "seed", least=0)
+
+
+@attrs.frozen(kw_only=True)
+class Design:
+    """The runs of a sweep. A design made by hand is of the kind ``given``.
+
+    Attributes:
+        names: k parameters.
+        points: (n, k) their values, one row per run.
+        units: of every parameter; "1" where there is none.
+        kind: how the points were made, one of ``KINDS``.
+        seed: what chance they were made with.
+        ranges: by parameter, the levels of a full factorial or the two bounds of the others; empty for ``given``.
+    """
+
+    names: tuple[str, ...] = attrs.field(converter=_names)
+    points: Array = attrs.field(converter=_points, eq=content)
+    units: Mapping[str, str] = attrs.field(factory=dict, hash=False)
+    kind: str = "given"
+    seed: int | None = attrs.field(default=None, converter=_seed)
+    ranges: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, converter=_table, hash=False)
+
+    __reduce__ = by_fields
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse a column without a name, and what is told of a parameter that there is not."""
+        if len(self.names) != self.points.shape[1]:
+            raise ShapeError(f"design: {len(self.names)} names, but points of {self.points.shape[1]} parameters")
+        one_of("kind of design", self.kind, KINDS)
+        for name in (*self.units, *self.ranges):
+            one_of("parameter", name, self.names)
+        object.__setattr__(self, "units", {name: str(self.units.get(name, "1")) for name in self.names})
+
+    def __len__(self) -> int:
+        """Return the number of runs."""
+        return len(self.points)
+
+
+def full_factorial(levels: Mapping[str, Sequence[float]], *, units: Mapping[str, str] | None = None) -> Design:
+    """Return every combination of levels; the last parameter changes fastest.
+
+    Args:
+        levels: by parameter, its levels.
+        units: by parameter, where it has one.
+
+    Raises:
+        InvalidValueError: there is no parameter, one has no level or the same one twice, a level is not finite, or
+            there are more than ten million combinations.
+        KindError: a level is no number.
+        UnknownNameError: a unit is told of something that is no parameter.
+    """
+    _refuse_none(levels, "levels")
+    columns = {name: floats(values, f"levels of {name}") for name, values in levels.items()}
+    for name, column in columns.items():
+        if column.ndim != 1 or not column.size:
+            raise ShapeError(f"levels of {name}: expected one level or more, got {shown(levels[name])}")
+        if len(np.unique(column)) < column.size:
+            raise InvalidValueError(f"levels of {name}: a level stands there twice: {shown(levels[name])}")
+    runs = 1
+    for column in columns.values():
+        runs *= column.size
+    _refuse_many(runs)
+    grids = np.meshgrid(*columns.values(), indexing="ij")
+    points = np.stack([grid.ravel() for grid in grids], axis=-1)
+    ranges = {name: tuple(column.tolist()) for name, column in columns.items()}
+    return Design(names=tuple(columns), points=points, units=units or {}, kind="full factorial", ranges=ranges)
+
+
+def latin_hypercube(
+    bounds: Mapping[str, tuple[float, float]], n: int, seed: int, *, units: Mapping[str, str] | None = None
+) -> Design:
+    """Return n points of which every parameter has one in each n-th of its range.
+
+    Args:
+        bounds: by parameter, the lower and the upper bound.
+        n: how many points.
+        seed: what chance they are made with; the same seed makes the same points.
+        units: by parameter, where it has one.
+
+    Raises:
+        InvalidValueError: there is no parameter, bounds are reversed, equal or not finite, or ``n`` or ``seed`` is
+            out of range.
+        KindError: a bound is no number, or ``n`` or ``seed`` no whole number.
+        ShapeError: there are not two bounds.
+        UnknownNameError: a unit is told of something that is no parameter.
+
+    Source:
+        McKay, Beckman & Conover (1979), as in ``scipy.stats.qmc.LatinHypercube``.
+    """
+    from scipy.stats import qmc  # noqa: PLC0415 - slow to load, and only designs by chance need it
+
+    lower, upper = _bounds(bounds)
+    n, seed = whole(n, "n", least=1), whole(seed, "seed", least=0)
+    _refuse_many(n)
+    unit = qmc.LatinHypercube(len(bounds), rng=np.random.default_rng(seed)).random(n)
+    return _scaled("latin hypercube", bounds, lower + (upper - lower) * unit, seed, units)
+
+
+def sobol(
+    bounds: Mapping[str, tuple[float, float]], n: int, seed: int, *, units: Mapping[str, str] | None = None
+) -> Design:
+    """Return n points of a scrambled Sobol sequence, which fills the ranges evenly.
+
+    Args:
+        bounds: by parameter, the lower and the upper bound.
+        n: how many points, a power of two: with another number the sequence is out of balance.
+        seed: what it is scrambled with; the same seed makes the same points.
+        units: by parameter, where it has one.
+
+    Raises:
+        InvalidValueError: there is no parameter, bounds are reversed, equal, not finite or beyond 1e100, ``n`` is
+            no power of two, or ``seed`` is below 0.
+        KindError: a bound is no number, or ``n`` or ``seed`` no whole number.
+        ShapeError: there are not two bounds.
+        UnknownNameError: a unit is told of something that is no parameter.
+
+    Source:
+        Sobol (1967), scrambled after Matousek (1998), as in ``scipy.stats.qmc.Sobol``.
+    """
+    from scipy.stats import qmc  # noqa: PLC0415 - slow to load, and only designs by chance need it
+
+    lower, upper = _bounds(bounds)
+    n, seed = whole(n, "n", least=1), whole(seed, "seed", least=0)
+    _refuse_many(n)
+    exponent = n.bit_length() - 1
+    if n != 2**exponent:
+        raise InvalidValueError(
+            f"n: a Sobol design has a power of two of points, got {n}; the nearest are {2**exponent} and "
+            f"{2 ** (exponent + 1)}"
+        )
+    unit = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed)).random_base2(exponent)
+    return _scaled("sobol", bounds, lower + (upper - lower) * unit, seed, units)
+
+
+def _scaled(
+    kind: str, bounds: Mapping[str, tuple[float, float]], points: Array, seed: int, units: Mapping[str, str] | None
+) -> Design:
+    return Design(names=tuple(bounds), points=points, units=units or {}, kind=kind, seed=seed, ranges=bounds)
+
+
+def _bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+    """Return the lower and the upper bounds, (k,) each."""
+    _refuse_none(bounds, "bounds")
+    pairs = []
+    for name, pair in bounds.items():
+        ends = floats(pair, f"bounds of {name}", LARGEST)
+        if ends.shape != (2,):
+            raise ShapeError(f"bounds of {name}: expected a lower and an upper one, got {shown(pair)}")
+        lower, upper = ends
+        if not lower < upper:
+            turned = "they are reversed" if lower > upper else "they are equal"
+            raise InvalidValueError(f"bounds of {name}: {turned}: from {lower:g} to {upper:g}")
+        pairs.append(ends)
+    lower, upper = np.transpose(pairs)
+    return lower, upper
+
+
+def _refuse_none(table: Mapping[str, Any], what: str) -> None:
+    if not isinstance(table, Mapping):
+        raise KindError(f"{what}: expected numbers by parameter, {{'name': (...)}}, got {shown(table)}")
+    if not table:
+        raise InvalidValueError(f"{what}: expected one parameter or more, got none")
+
+
+def _refuse_many(runs: int) -> None:
+    if runs > MOST_RUNS:
+        raise InvalidValueError(f"design: {runs} runs are more than {MOST_RUNS}; take fewer levels or points")
+
+
+def whole(value: int, what: str, *, least: int) -> int:
+    """Return a whole number not below ``least``."""
+    try:
+        number = operator.index(value)
+    except TypeError as error:
+        raise KindError(f"{what}: expected a whole number, got {shown(value)}") from error
+    if isinstance(value, bool):
+        raise KindError(f"{what}: expected a whole number, got {value}")
+    if number < least:
+        raise InvalidValueError(f"{what}: expected a whole number not below {least}, got {number}")
+    return number

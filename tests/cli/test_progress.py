@@ -1,0 +1,65 @@
+"""The progress bar of sweeps."""
+
+import pytest
+
+from armwright.cli.progress import progress_text, sweep_bar
+from armwright.sweep.progress import Counter, Progress
+
+
+def progress(**changes: float) -> Progress:
+    told = {"runs": 729, "done": 129, "found": 29, "failed": 0, "damaged": 0, "seconds": 50.0}
+    return Progress(**{**told, **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        # 100 runs in 50 s; the 600 that are left take 300 s.
+        ({}, "2 runs/s, 0:05:00 left"),
+        ({"done": 29}, ""),
+        ({"done": 729}, "14 runs/s"),
+        ({"runs": 20129}, "2 runs/s, 2:46:40 left"),
+        ({"failed": 3, "damaged": 1}, "2 runs/s, 0:05:00 left, 3 failed, 1 damaged blocks made again"),
+    ],
+)
+def test_words(changes: dict[str, float], text: str) -> None:
+    """Rate and time left count what this start did, not what it found."""
+    assert progress_text(progress(**changes)) == text
+
+
+def test_nobody_watches(capfd: pytest.CaptureFixture[str]) -> None:
+    """Where the error output is no terminal there is no bar."""
+    with sweep_bar("sweep") as bar:
+        assert bar is None
+
+    assert capfd.readouterr() == ("", "")
+
+
+def test_person_watches(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """On a terminal the bar shows title, runs and failures on the error output; quiet, it shows nothing."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    with sweep_bar("five-bar") as bar:
+        assert bar is not None
+        bar(progress(failed=3))
+    with sweep_bar("slider-crank", quiet=True) as none:
+        assert none is None
+
+    out, shown = capsys.readouterr()
+    assert out == ""
+    assert "five-bar" in shown
+    assert "129/729" in shown
+    assert "3 failed" in shown
+    assert "slider-crank" not in shown
+
+
+def test_counter() -> None:
+    """What an earlier start had done counts as done."""
+    counter = Counter(100, 40, 1)
+    counter.add(10, 2)
+
+    now = counter.now()
+
+    assert (now.runs, now.done, now.found, now.failed) == (100, 50, 40, 3)
+    assert now.seconds >= 0.0

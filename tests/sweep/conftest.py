@@ -1,0 +1,25 @@
+"""What the tests of sweeps share."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.sweep.designs import Design, full_factorial
+
+
+@pytest.fixture(scope="module")
+def local_cluster() -> Iterator[Any]:
+    """Start a Dask cluster whose two workers are threads of this process."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as started:
+        yield started
+
+
+@pytest.fixture
+def speeds() -> Design:
+    """Forty start speeds, from 0 to 39 m/s."""
+    return full_factorial({"speed": np.arange(40.0)}, units={"speed": "m/s"})

@@ -1,0 +1,103 @@
+"""A Dask cluster as the crew of a sweep."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.sweep import crew
+from armwright.sweep.designs import Design, full_factorial
+from armwright.sweep.errors import SweepError
+from armwright.sweep.progress import Progress
+from armwright.sweep.run import run
+from armwright.sweep.task import Status
+from armwright.sweep.worker import ready
+from sweep_tasks import Fall, calls_of
+
+pytest.importorskip("xarray")
+dask = pytest.importorskip("dask")
+distributed = pytest.importorskip("distributed")
+
+
+def test_each_block_once(local_cluster: Any, speeds: Design, tmp_path: Path) -> None:
+    """The cluster does every block once; rows that raise are rows with a status there too."""
+    task = Fall(calls=tmp_path / "calls", raises_above=38.5)
+
+    results = run(task, speeds, tmp_path / "out", block=8, scheduler=local_cluster.scheduler_address)
+
+    assert results.status.values.tolist() == [Status.DONE] * 39 + [Status.FAILED]
+    blocks = [row for _, row in calls_of(tmp_path / "calls") if len(row) == 8]
+    assert sorted(blocks) == [tuple(range(k, k + 8)) for k in range(0, 40, 8)]
+
+
+def test_begun_on_the_cluster(
+    local_cluster: Any, speeds: Design, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A sweep that was stopped on a cluster goes on without it, and the other way round; nothing is printed."""
+
+    def stop(now: Progress) -> None:
+        if now.done in {8, 24}:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        run(Fall(), speeds, tmp_path / "out", block=8, scheduler=local_cluster.scheduler_address, progress=stop)
+    with pytest.raises(InterruptedError):
+        run(Fall(), speeds, tmp_path / "out", workers=1, progress=lambda now: stop(now) if now.done > 8 else None)
+    results = run(Fall(), speeds, tmp_path / "out", scheduler=local_cluster.scheduler_address)
+
+    np.testing.assert_array_equal(results.depth, run(Fall(), speeds, tmp_path / "whole", workers=1).depth)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_killed_worker(tmp_path: Path) -> None:
+    """A row that kills its Dask worker is a row with a status; the cluster does the others."""
+    design = full_factorial({"speed": np.arange(6.0)})
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+        ) as cluster,
+    ):
+        results = run(Fall(kills_above=4.5), design, tmp_path / "out", block=2, scheduler=cluster.scheduler_address)
+
+        assert results.status.values.tolist() == [Status.DONE] * 5 + [Status.KILLED]
+        np.testing.assert_allclose(results.depth[:5], 4.905 - np.arange(5.0))
+
+
+def test_nobody_answers(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where there is no scheduler it is said which address did not answer."""
+    monkeypatch.setattr(crew, "PATIENCE", 0.3)
+
+    with pytest.raises(SweepError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:1'"):
+        run(Fall(), speeds, tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+
+
+def test_address_that_is_none(speeds: Design, tmp_path: Path) -> None:
+    """What is no address is no scheduler."""
+    with pytest.raises(SweepError, match="no Dask scheduler answers at 'carrier-pigeon://roof'"):
+        run(Fall(), speeds, tmp_path / "out", scheduler="carrier-pigeon://roof")
+
+
+def test_cluster_without_workers(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cluster without workers would keep everybody waiting."""
+    monkeypatch.setattr(crew, "PATIENCE", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as cluster,
+        pytest.raises(SweepError, match=r"the Dask scheduler at 'inproc://.*' has had no worker for 0.5 s"),
+    ):
+        run(Fall(), speeds, tmp_path / "out", scheduler=cluster.scheduler_address)
+
+
+def test_worker_of_another_version() -> None:
+    """A worker with another armwright refuses to work: its bits could differ."""
+    with pytest.raises(SweepError, match=r"a worker has armwright .*, here it is 0.0.1; results could differ"):
+        ready("0.0.1", b"")
+
+
+def test_worker_that_cannot_load_the_task() -> None:
+    """A task from a module that a worker has not is told apart from a dead worker."""
+    from armwright.version import __version__
+
+    with pytest.raises(SweepError, match=r"a worker cannot load the task: ModuleNotFoundError.*imports? a task from"):
+        ready(__version__, b"cno_such_module\nTask\n.")

@@ -1,0 +1,73 @@
+"""Who does the work: how much is in work at a time, and on how many threads."""
+
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.sweep.crew import together
+from armwright.sweep.designs import Design
+from armwright.sweep.run import run
+from armwright.sweep.task import Rows, evaluate
+from sweep_tasks import Fall, Threads
+
+pytest.importorskip("xarray")
+pytest.importorskip("distributed")
+
+
+class Threaded:
+    """A crew of three threads."""
+
+    again = 0
+
+    def __init__(self) -> None:
+        self.pool = ThreadPoolExecutor(3)
+
+    def size(self) -> int:
+        """Three."""
+        return 3
+
+    def submit(self, points: np.ndarray) -> Future[Rows]:
+        """Begin a piece."""
+        return self.pool.submit(evaluate, Fall(), points)
+
+    def renew(self) -> None:
+        """Not asked for: no thread dies."""
+        raise AssertionError
+
+
+def test_few_blocks_at_a_time() -> None:
+    """However long a sweep is, no more than two blocks per worker are begun and not yet handed on."""
+    begun: list[int] = []
+
+    def pieces() -> Iterator[tuple[int, np.ndarray]]:
+        for number in range(500):
+            begun.append(number)
+            yield number, np.array([[float(number)]])
+
+    handed = []
+    for number, rows in together(Threaded(), Fall(), pieces()):
+        handed.append(number)
+        assert len(begun) - len(handed) < 2 * 3
+        assert rows.values["depth"].tolist() == [4.905 - number]
+
+    assert sorted(handed) == list(range(500))
+
+
+@pytest.mark.parametrize("way", ["here", "processes", "cluster"])
+def test_one_thread_each(way: str, local_cluster: Any, speeds: Design, tmp_path: Path) -> None:
+    """Linear algebra has one thread in every worker, and the caller's own number again afterwards."""
+    ways: dict[str, dict[str, Any]] = {
+        "here": {"workers": 1},
+        "processes": {"workers": 2},
+        "cluster": {"scheduler": local_cluster.scheduler_address},
+    }
+    before = Threads().most()
+
+    results = run(Threads(), speeds, tmp_path / "out", block=10, **ways[way])
+
+    assert results.threads.values.tolist() == [1] * 40
+    assert Threads().most() == before

@@ -1,0 +1,330 @@
+"""A sweep that is stopped: by a kill, a full disk, a damaged file; and who else may use its folder."""
+
+import contextlib
+import errno
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.errors import FileFormatError, OutputError
+from armwright.sweep import folder as folder_module
+from armwright.sweep.designs import Design, full_factorial
+from armwright.sweep.errors import SweepError
+from armwright.sweep.folder import held
+from armwright.sweep.progress import Progress
+from armwright.sweep.results import load
+from armwright.sweep.run import run
+from armwright.sweep.task import Status
+from sweep_tasks import Fall, calls_of
+
+pytest.importorskip("xarray")
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from armwright.sweep.designs import full_factorial
+from armwright.sweep.run import run
+from sweep_tasks import Fall
+
+if __name__ == "__main__":
+    design = full_factorial({"speed": range(40)}, units={"speed": "m/s"})
+    task = Fall(calls=Path(sys.argv[2]), seconds=0.15)
+    run(task, design, sys.argv[1], block=2, workers=int(sys.argv[3]))
+"""
+
+
+def until(true: Callable[[], Any], seconds: float = 30.0) -> None:
+    """Wait for something."""
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not come about"
+        time.sleep(0.01)
+
+
+def runs_on(process: int) -> bool:
+    """Whether a process is alive; one that ended and was not asked for is not."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+def blocks(out: Path) -> list[Path]:
+    return sorted((out / "blocks").glob("??????.npz"))
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="asks Linux which processes are alive")
+@pytest.mark.parametrize(
+    ("how", "workers"), [(signal.SIGKILL, 1), (signal.SIGKILL, 2), (signal.SIGTERM, 2), (signal.SIGINT, 2)]
+)
+def test_kill(how: signal.Signals, workers: int, speeds: Design, tmp_path: Path) -> None:
+    """A sweep killed half-way goes on: nothing finished is lost or done twice, and no worker stays behind."""
+    out, calls = tmp_path / "out", tmp_path / "calls"
+    (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
+    with subprocess.Popen(
+        [sys.executable, tmp_path / "script.py", out, calls, str(workers)],
+        env={"PYTHONPATH": ":".join(sys.path)},
+        stderr=subprocess.DEVNULL,  # Python counts what a killed process had
+    ) as process:
+        until(lambda: len(blocks(out)) >= 3)
+        # Meanwhile nobody else may use the folder.
+        with pytest.raises(SweepError, match=f"'{out}' is in use: process {process.pid} on .* works on it"):
+            run(Fall(), speeds, out, workers=1)
+        process.send_signal(how)
+    kept = [int(path.stem) for path in blocks(out)]
+    until(lambda: not any(runs_on(worker) for worker, _ in calls_of(calls)))
+
+    told: list[Progress] = []
+    results = run(Fall(calls=calls), speeds, out, block=40, workers=1, progress=told.append)
+
+    assert 3 <= len(kept) < 20
+    assert told[0].found == 2 * len(kept)
+    rows = [row for _, row in calls_of(calls)]
+    for number in range(20):
+        times = rows.count((2.0 * number, 2.0 * number + 1))
+        assert times == 1 if number in kept else times in (1, 2)
+    np.testing.assert_allclose(results.depth, 4.905 - np.arange(40.0))
+
+
+def test_finished_sweep(speeds: Design, tmp_path: Path) -> None:
+    """A finished sweep is not done again."""
+    first = run(Fall(), speeds, tmp_path / "out", workers=1).load()
+    told: list[Progress] = []
+
+    again = run(Fall(calls=tmp_path / "calls"), speeds, tmp_path / "out", workers=1, progress=told.append)
+
+    assert again.identical(first)
+    assert not (tmp_path / "calls").exists()
+    assert [(now.done, now.found) for now in told] == [(40, 40)]
+
+
+class Stop(Exception):  # noqa: N818 - it is no error
+    """The person has seen enough."""
+
+
+def stop_after(runs: int) -> Callable[[Progress], None]:
+    """Interrupt a sweep after some runs."""
+
+    def progress(now: Progress) -> None:
+        if now.done >= runs:
+            raise Stop
+
+    return progress
+
+
+@pytest.fixture
+def half(speeds: Design, tmp_path: Path) -> Path:
+    """A folder with three of five blocks."""
+    with pytest.raises(Stop):
+        run(Fall(), speeds, tmp_path / "out", block=8, workers=1, progress=stop_after(24))
+    assert len(blocks(tmp_path / "out")) == 3
+    return tmp_path / "out"
+
+
+def test_unfinished_results(half: Path, tmp_path: Path) -> None:
+    """Results are had of a sweep that is finished."""
+    with pytest.raises(SweepError, match="the sweep is not finished; run it again to go on"):
+        load(half)
+    with pytest.raises(SweepError, match="the sweep is not there"):
+        load(tmp_path / "nowhere")
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-30])
+
+
+def flip(path: Path) -> None:
+    """Change one digit of a number, and the checksum of the archive with it."""
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays["output_depth"][3] += 1e-12
+    np.savez(path, **arrays)
+
+
+def swap(path: Path) -> None:
+    """The wrong block."""
+    path.write_bytes(path.with_name("000002.npz").read_bytes())
+
+
+@pytest.mark.parametrize("damage", [cut, flip, swap, lambda path: path.write_bytes(b""), Path.unlink])
+def test_damaged_block(damage: Callable[[Path], Any], half: Path, speeds: Design, tmp_path: Path) -> None:
+    """A block that was damaged on the disk is found and made again, and only that."""
+    damage(half / "blocks" / "000001.npz")
+    told: list[Progress] = []
+
+    results = run(Fall(calls=tmp_path / "calls"), speeds, half, workers=1, progress=told.append)
+
+    assert [row[0] for _, row in calls_of(tmp_path / "calls")] == [8.0, 24.0, 32.0]
+    assert (told[0].found, told[0].damaged) == (16, 0 if damage is Path.unlink else 1)
+    np.testing.assert_array_equal(results.depth, run(Fall(), speeds, tmp_path / "whole", workers=1).depth)
+
+
+def test_halves_are_removed(half: Path, speeds: Design) -> None:
+    """What a killed process had half written is gone after the next start."""
+    for path in (half / "blocks" / "000004.npz.tmp.npz", half / "results.nc.tmp"):
+        path.write_bytes(b"half")
+
+    run(Fall(), speeds, half, workers=1)
+
+    assert not [path for path in half.rglob("*") if ".tmp" in path.name]
+
+
+OTHER: list[tuple[Fall, Callable[[Design], Design], str]] = [
+    (Fall(gravity=1.62), lambda design: design, "settings.gravity is 9.81 there, 1.62 here"),
+    (Fall(name="rise"), lambda design: design, "task is 'fall' there, 'rise' here"),
+    (Fall(), lambda design: attrs.evolve(design, units={"speed": "km/h"}), "design.parameters is .*'m/s'.* there"),
+    (Fall(), lambda design: attrs.evolve(design, points=design.points + 1), "design.points is '"),
+    (Fall(samples=9), lambda _: full_factorial({"v": [1]}), "; and 4 more. Give this one a folder of its own"),
+]
+
+
+@pytest.mark.parametrize("number", range(len(OTHER)))
+def test_folder_of_another_sweep(number: int, half: Path, speeds: Design) -> None:
+    """A folder of another sweep is refused with what differs, and stays as it is."""
+    task, change, text = OTHER[number]
+
+    with pytest.raises(SweepError, match=text):
+        run(task, change(speeds), half, workers=1)
+    assert len(blocks(half)) == 3
+
+
+def test_another_version(half: Path, speeds: Design) -> None:
+    """Blocks of another armwright are not mixed with those of this one."""
+    path = half / "sweep.json"
+    told = json.loads(path.read_text(encoding="utf-8"))
+    told["sweep"]["armwright"] = "0.0.1"
+    path.write_text(json.dumps(told), encoding="utf-8")
+
+    with pytest.raises(SweepError, match=r"armwright is '0.0.1' there"):
+        run(Fall(), speeds, half, workers=1)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 7, "sweep": {}, "made": {}, "block": 1}'])
+def test_damaged_manifest(text: str, half: Path, speeds: Design) -> None:
+    """A manifest that cannot be read is named; nothing is written over."""
+    (half / "sweep.json").write_text(text, encoding="utf-8")
+
+    with pytest.raises(FileFormatError, match=r"sweep.json: "):
+        run(Fall(), speeds, half, workers=1)
+    assert len(blocks(half)) == 3
+
+
+@pytest.mark.parametrize("damaged", [lambda _: b"", lambda _: b"no results", lambda whole: whole[:-100]])
+def test_damaged_results(damaged: Callable[[bytes], bytes], speeds: Design, tmp_path: Path) -> None:
+    """Results that cannot be opened are named; they are made again of the blocks, none of which is done again."""
+    whole = run(Fall(), speeds, tmp_path / "out", workers=1).load()
+    path = tmp_path / "out" / "results.nc"
+    path.write_bytes(damaged(path.read_bytes()))
+
+    with pytest.raises(FileFormatError, match=r"results.nc: damaged; remove this file and run the sweep again"):
+        run(Fall(), speeds, tmp_path / "out", workers=1)
+    path.unlink()
+    again = run(Fall(calls=tmp_path / "calls"), speeds, tmp_path / "out", workers=1)
+
+    assert again.identical(whole)
+    assert not (tmp_path / "calls").exists()
+
+
+def test_folder_of_other_things(speeds: Design, tmp_path: Path) -> None:
+    """A folder with other files in it is refused, and nothing is written there."""
+    (tmp_path / "thesis.tex").touch()
+
+    with pytest.raises(SweepError, match=r"holds no sweep, but other things \('thesis.tex'\)"):
+        run(Fall(), speeds, tmp_path, workers=1)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_folder_that_is_a_file(speeds: Design, tmp_path: Path) -> None:
+    """Where a file stands there can be no folder."""
+    (tmp_path / "out").touch()
+
+    with pytest.raises(OutputError, match=r"cannot write to '.*out': File exists"):
+        run(Fall(), speeds, tmp_path / "out", workers=1)
+
+
+def test_two_in_one_process(speeds: Design, tmp_path: Path) -> None:
+    """Two threads of one process are kept apart too."""
+    with (
+        held(tmp_path / "out", Fall(), speeds, 8),
+        pytest.raises(SweepError, match=f"in use: process {os.getpid()} on"),
+    ):
+        run(Fall(), speeds, tmp_path / "out", workers=1)
+
+
+@pytest.mark.parametrize(("writes", "workers"), [(1, 1), (2, 1), (3, 1), (4, 1), (4, 2), (12, 1), (13, 1)])
+def test_full_disk(writes: int, workers: int, speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a full disk the sweep says so; nothing half written stays, and with room it goes on."""
+    out, calls = tmp_path / "out", tmp_path / "calls"
+    real, count = os.fsync, iter(range(1000))
+
+    def full(handle: int) -> None:
+        if next(count) >= writes - 1:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        real(handle)
+
+    with monkeypatch.context() as room:
+        room.setattr(folder_module.os, "fsync", full)
+        with pytest.raises(OutputError, match=r"No space left on device; what was .* stays. Make room and start again"):
+            run(Fall(calls=calls), speeds, out, block=8, workers=workers)
+
+    assert not [path for path in out.rglob("*") if ".tmp" in path.name]
+    kept = len(blocks(out))
+    done = len(calls_of(calls))
+    results = run(Fall(calls=calls), speeds, out, block=8, workers=1)
+    assert len(calls_of(calls)) - done == 5 - kept
+    np.testing.assert_allclose(results.depth, 4.905 - np.arange(40.0))
+
+
+@pytest.fixture
+def small_files() -> Iterator[None]:
+    """No file may be longer than 60 kB, which the system enforces."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.usefixtures("small_files")
+def test_results_that_do_not_fit(tmp_path: Path) -> None:
+    """Where the blocks fit but not the results, the blocks stay and nothing half written does."""
+    design = full_factorial({"speed": np.arange(40.0)})
+    out = tmp_path / "out"
+
+    with pytest.raises(OutputError, match=r"cannot write '.*results.nc': .*; what was finished before stays"):
+        run(Fall(samples=1000), design, out, block=4, workers=1)
+
+    assert len(blocks(out)) == 10
+    assert sorted(path.name for path in out.iterdir()) == ["blocks", "lock", "sweep.json"]
+
+
+def test_worker_killed_once(speeds: Design, tmp_path: Path) -> None:
+    """A worker that is killed from outside costs nothing but time."""
+    task = Fall(kills_above=20.0, unless=tmp_path / "killed")
+
+    results = run(task, speeds, tmp_path / "out", block=8, workers=2)
+
+    assert (tmp_path / "killed").exists()
+    assert (results.status == Status.DONE).all()
+    np.testing.assert_allclose(results.depth, 4.905 - np.arange(40.0))
+
+
+def test_row_that_kills_its_worker(tmp_path: Path) -> None:
+    """A row that kills whoever does it is a row with a status; its neighbours have their numbers."""
+    design = full_factorial({"speed": np.arange(12.0)})
+
+    results = run(Fall(kills_above=10.5), design, tmp_path / "out", block=2, workers=2)
+
+    assert results.status.values.tolist() == [Status.DONE] * 11 + [Status.KILLED]
+    assert results.message.values[-1] == "the worker process died each time it was tried"
+    np.testing.assert_allclose(results.depth[:11], 4.905 - np.arange(11.0))
+    assert np.isnan(results.depth[11])
