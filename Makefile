@@ -44,6 +44,8 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/two_arms.toml -o out/hand_over
 	$(BIN)/armwright move joint puma560 examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
+	$(BIN)/python examples/measurements.py
+	$(BIN)/armwright iso9283 examples/measured_poses.csv examples/measured_paths.csv -o out/iso9283
 
 pictures: $(VENV)/core  ## Draw the pictures of the physics pages
 	$(BIN)/python docs/pictures/make.py

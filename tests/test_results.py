@@ -14,6 +14,7 @@ from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.differential import differential_inverse
 from doors import OTHER, PUMA, Q
 
+RUN = armwright.Trace(places=((0, 0), (1, 0)), times=(0, 1), angles=((0,), (1,)))
 RESULTS: dict[str, Callable[[], Any]] = {
     "inverse": lambda: armwright.inverse(PUMA, armwright.forward(PUMA, Q)),
     "inverse out of reach": lambda: armwright.inverse(PUMA, np.eye(4) + 9 * np.eye(4, k=3)),
@@ -25,6 +26,9 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "quintic": lambda: armwright.quintic(Q, OTHER, 1.0),
     "sampled": lambda: armwright.quintic(Q, OTHER, 1.0).sampled(0.1),
     "continuity": lambda: armwright.continuity(armwright.quintic(Q, OTHER, 1.0)),
+    "pose_repeatability": lambda: armwright.pose_repeatability(np.eye(3), few=True),
+    "path_deviation": lambda: armwright.path_deviation(RUN, [RUN, RUN], few=True),
+    "trace": lambda: RUN,
 }
 
 

@@ -18,6 +18,7 @@ from armwright.cli.fix import fix
 from armwright.cli.fmt import fmt
 from armwright.cli.forward import forward, jacobian
 from armwright.cli.inverse import inverse
+from armwright.cli.iso9283 import iso9283
 from armwright.cli.kernel import kernel
 from armwright.cli.lsp import lsp
 from armwright.cli.move import move
@@ -58,6 +59,7 @@ app.command()(torque)
 app.command()(singularity)
 app.command()(simulate)
 app.command()(move)
+app.command()(iso9283)
 app.command()(study)
 app.command()(kernel)
 

@@ -1,12 +1,40 @@
 """Printed figures: curves over a common axis, as SVG text that is the same for the same numbers."""
 
+import base64
+import html
 import io
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 from armwright.arrays import Array
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 # Line styles in the order of the curves: the first is the reference, the others are told apart without colour too.
 _STYLES = ("-", "--", "-.", ":")
+
+
+class Drawing(NamedTuple):
+    """One figure.
+
+    Attributes:
+        name: of its file, without the ending.
+        caption: what it shows, in words.
+        svg: text of the file.
+    """
+
+    name: str
+    caption: str
+    svg: str
+
+    @property
+    def html(self) -> str:
+        """The figure as an element of a page, which carries it."""
+        data = base64.b64encode(self.svg.encode()).decode()
+        caption = html.escape(self.caption)
+        image = f'<img src="data:image/svg+xml;base64,{data}" alt="{caption}">'
+        return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
 
 
 def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_label: str) -> str:
@@ -22,8 +50,7 @@ def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_
     Returns:
         An SVG file's text.
     """
-    import matplotlib as mpl  # noqa: PLC0415 - costs half a second, and only figures need it
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
 
     figure = Figure(figsize=(7, 4.2), layout="constrained")
     axes = figure.subplots()
@@ -33,6 +60,13 @@ def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_
     axes.grid(visible=True, alpha=0.3)
     if len(lines) > 1:
         axes.legend()
+    return svg_text(figure)
+
+
+def svg_text(figure: "Figure") -> str:
+    """Return a figure as the text of an SVG file, the same for the same figure."""
+    import matplotlib as mpl  # noqa: PLC0415
+
     text = io.StringIO()
     # Without a date and with fixed names of its parts, a figure changes only when its numbers do.
     with mpl.rc_context({"svg.hashsalt": "armwright"}):

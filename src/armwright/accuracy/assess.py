@@ -1,0 +1,173 @@
+"""Every measure that a set of tests allows."""
+
+from collections.abc import Mapping, Sequence
+
+import attrs
+import numpy as np
+
+from armwright.accuracy.compliance import StaticCompliance, static_compliance
+from armwright.accuracy.corner import corner_deviations
+from armwright.accuracy.cycles import TooFewError
+from armwright.accuracy.distance import distance_accuracy, distance_repeatability
+from armwright.accuracy.measurements import AnyTest, Cloud, PathTest, PoseTest
+from armwright.accuracy.measures import Measure, Result, measures_of
+from armwright.accuracy.path import path_deviation, path_velocity
+from armwright.accuracy.pose import pose_accuracy, pose_repeatability
+from armwright.accuracy.settling import posing_time, settling
+from armwright.accuracy.variation import exchangeability, multidirectional_variation, pose_drift
+from armwright.accuracy.weaving import weaving_deviation
+from armwright.arrays import Array
+from armwright.errors import InvalidValueError, one_of
+
+_AXES = "xyz"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Assessment:
+    """What a set of tests says of a robot.
+
+    Attributes:
+        measures: in the order of the tests.
+        results: for each test, in their order, what its functions returned.
+        tests: as they were read.
+    """
+
+    measures: tuple[Measure, ...]
+    results: tuple[tuple[Result, ...], ...]
+    tests: tuple[AnyTest, ...]
+
+    @property
+    def planar(self) -> bool:
+        """Whether any test was measured in a plane only, without z."""
+        return any(test.size == 2 for test in self.tests)
+
+    @property
+    def few(self) -> bool:
+        """Whether any measure was made of fewer cycles than the standard asks for."""
+        return any(measure.few for measure in self.measures)
+
+    def within(self, limits: Mapping[str, float]) -> "Assessment":
+        """Return the same with limits that measures should keep.
+
+        Args:
+            limits: by symbol, in SI units, without sign.
+
+        Raises:
+            UnknownNameError: nothing has been measured of a symbol.
+        """
+        for symbol in limits:
+            one_of("measure", symbol, {measure.symbol for measure in self.measures})
+        bounded = (attrs.evolve(one, limit=limits.get(one.symbol, one.limit)) for one in self.measures)
+        return attrs.evolve(self, measures=tuple(bounded))
+
+
+def assess(
+    tests: Sequence[AnyTest],
+    *,
+    few: bool = False,
+    band: float | None = None,
+    corners: float = 0.0,
+) -> Assessment:
+    """Return every measure that tests allow.
+
+    Args:
+        tests: as ``read_measurements`` returns them.
+        few: take fewer cycles than the standard asks for.
+        band: radius within which a pose counts as reached, and a leg after a corner as followed [m]; where it is None,
+            RP of the test ``pose`` of that name is taken for a pose, and no length of stabilisation is told for a leg.
+        corners: how near to a corner AT and RT are not taken [m].
+
+    Raises:
+        ArmwrightError: a test lacks something, or has too few cycles; the text says which.
+    """
+    measures: list[Measure] = []
+    results: list[tuple[Result, ...]] = []
+    for test in tests:
+        try:
+            found = _results(test, tests, few=few, band=band, corners=corners)
+        except (InvalidValueError, TooFewError) as error:
+            raise type(error)(f"{_title(test)}: {str(error).removeprefix(f'{test.kind}: ')}") from error
+        results.append(found)
+        for result in found:
+            measures.extend(measures_of(test, result))
+    return Assessment(measures=tuple(measures), results=tuple(results), tests=tuple(tests))
+
+
+def _title(test: AnyTest) -> str:
+    return f"{test.kind} {test.name}{f' ({test.condition})' if test.condition else ''}"
+
+
+def _results(
+    test: AnyTest, tests: Sequence[AnyTest], *, few: bool, band: float | None, corners: float
+) -> tuple[Result, ...]:
+    if isinstance(test, PoseTest):
+        return _of_poses(test, few=few)
+    if test.kind in {"settling", "posing"}:
+        radius = _band_of(test, tests) if band is None else band
+        return ((settling if test.kind == "settling" else posing_time)(test.runs, radius, few=few),)
+    assert test.commanded is not None  # noqa: S101 - no test of the others is read without
+    if test.kind == "cornering":
+        return corner_deviations(test.commanded, test.runs, band=band, few=few)
+    if test.kind == "weaving":
+        return (weaving_deviation(test.commanded, test.runs, _speed(test), few=few),)
+    found: list[Result] = []
+    if test.kind != "velocity":
+        found.append(path_deviation(test.commanded, test.runs, corners=corners, kind=test.kind, few=few))
+    if test.speed is not None:
+        found.append(path_velocity(test.commanded, test.runs, test.speed, few=few))
+    return tuple(found)
+
+
+def _of_poses(test: PoseTest, *, few: bool) -> tuple[Result, ...]:
+    clouds = test.clouds
+    one = clouds[0]
+    places, angles = [cloud.places for cloud in clouds], [cloud.angles for cloud in clouds]
+    if test.kind == "pose":
+        goal = {"angles": one.angles, "commanded_angles": one.commanded_angles}
+        return (
+            pose_accuracy(one.places, _goal(one), **goal, few=few),
+            pose_repeatability(one.places, angles=one.angles, few=few),
+        )
+    if test.kind == "distance":
+        goals = [_goal(cloud) for cloud in clouds]
+        return distance_accuracy(*places, *goals, few=few), distance_repeatability(*places, few=few)
+    if test.kind == "drift":
+        rising = sorted(clouds, key=lambda cloud: cloud.t or 0.0)
+        times = [cloud.t or 0.0 for cloud in rising]
+        return (pose_drift(times, [cloud.places for cloud in rising], _goal(one), few=few),)
+    if test.kind == "compliance":
+        return tuple(_compliance(cloud, test.size, few=few) for cloud in clouds)
+    vary = multidirectional_variation if test.kind == "multidirectional" else exchangeability
+    return (vary(places, angles=angles, few=few),)
+
+
+def _compliance(cloud: Cloud, size: int, *, few: bool) -> StaticCompliance:
+    axis = cloud.label.lstrip("+-").lower()
+    if len(axis) != 1 or axis not in _AXES[:size]:
+        told = ", ".join(f"+{one}, -{one}" for one in _AXES[:size])
+        raise InvalidValueError(f"no direction '{cloud.label}' of a force; expected one of {told}")
+    direction = np.eye(size)[_AXES.index(axis)] * (-1 if cloud.label.startswith("-") else 1)
+    assert cloud.loads is not None  # noqa: S101 - no test of compliance is read without
+    return static_compliance(cloud.loads, cloud.places, direction, few=few)
+
+
+def _goal(cloud: Cloud) -> Array:
+    assert cloud.commanded is not None  # noqa: S101 - no such test is read without
+    return cloud.commanded
+
+
+def _speed(test: PathTest) -> float:
+    assert test.speed is not None  # noqa: S101 - no such test is read without
+    return test.speed
+
+
+def _band_of(test: PathTest, tests: Sequence[AnyTest]) -> float:
+    """Return RP of the pose at which a robot settles."""
+    same = [one for one in tests if isinstance(one, PoseTest) and one.kind == "pose" and one.name == test.name]
+    alike = [one for one in same if one.condition == test.condition] or same
+    if not alike:
+        raise InvalidValueError(
+            f"no band is given, and no test of pose {test.name} is there whose RP could be the band"
+        )
+    # The cycles of that test are counted where it is assessed itself.
+    return pose_repeatability(alike[0].clouds[0].places, few=True).radius

@@ -1,0 +1,140 @@
+"""Cornering: how a sharp corner of a path is rounded off, CR, and overshot, CO."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.accuracy.cycles import checked_cycles
+from armwright.accuracy.measured import Trace, frozen_array, one_size
+from armwright.accuracy.planes import Legs, legs_of
+from armwright.arrays import Array, by_fields, number
+from armwright.errors import InvalidValueError
+
+# Of a leg that ends in another corner, so much belongs to the corner it comes from.
+_SHARE = 0.5
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class CornerDeviation:
+    """What becomes of one corner.
+
+    Attributes:
+        round_off: CR, the smallest distance of the run from the corner, mean of all cycles [m].
+        overshoot: CO, the largest distance from the second leg on the side to which the first one leads on, mean of
+            all cycles [m].
+        settling_length: from the corner along the second leg until the run keeps to the band, mean of all cycles [m];
+            infinite where a run does not, None where no band is given.
+        round_offs: (n,) of each cycle [m].
+        overshoots: (n,) of each cycle [m].
+        place: (2,) or (3,) the corner [m].
+        cycles: n.
+    """
+
+    round_off: float
+    overshoot: float
+    settling_length: float | None
+    round_offs: Array = attrs.field(converter=frozen_array)
+    overshoots: Array = attrs.field(converter=frozen_array)
+    place: Array = attrs.field(converter=frozen_array)
+    cycles: int
+
+    __reduce__ = by_fields
+
+
+def corner_deviations(
+    commanded: Trace, runs: Sequence[Trace], *, band: float | None = None, few: bool = False
+) -> tuple[CornerDeviation, ...]:
+    """Return CR, CO and the stabilisation path length at every corner of a path.
+
+    Args:
+        commanded: its points, from start to end; where it turns by more than 20 deg there is a corner.
+        runs: what was measured, each from start to end.
+        band: distance from the second leg that counts as being on it again, usually AT [m].
+        few: take fewer than 3 cycles.
+
+    Raises:
+        KindError: the band is no number.
+        ShapeError: path and runs have different numbers of columns.
+        InvalidValueError: there are too few cycles, the path has no corner, or a run ends before a corner.
+
+    Source:
+        ISO 9283:1998, 8.5.
+    """
+    count = checked_cycles("cornering", [len(runs)], few=few, least=1)
+    one_size([commanded.places, *(run.places for run in runs)], "cornering")
+    if band is not None and not 0 < number(band, "cornering: band") < np.inf:
+        raise InvalidValueError(f"cornering: the band must be above 0 m, got {band:g}")
+    legs = legs_of(commanded)
+    corners = np.flatnonzero(legs.corners)
+    if not len(corners):
+        raise InvalidValueError("cornering: the commanded path has no corner, no turn of more than 20 deg")
+    found = []
+    for corner in corners.tolist():
+        rows = [_one(legs, corner, run, band, f"cornering: run {j + 1}") for j, run in enumerate(runs)]
+        near, over, lengths = zip(*rows, strict=True)
+        found.append(
+            CornerDeviation(
+                round_off=float(np.mean(near)),
+                overshoot=float(np.mean(over)),
+                settling_length=None if band is None else float(np.mean(lengths)),
+                round_offs=near,
+                overshoots=over,
+                place=legs.places[corner],
+                cycles=count,
+            )
+        )
+    return tuple(found)
+
+
+def _one(legs: Legs, corner: int, run: Trace, band: float | None, name: str) -> tuple[float, float, float]:
+    """Return nearest distance, overshoot and stabilisation path length of one run at one corner."""
+    place = legs.places[corner]
+    near, at = _nearest(run.places, place)
+    u1, u2 = legs.directions[corner - 1], legs.directions[corner]
+    later = np.flatnonzero(legs.corners[corner + 1 :])
+    end = legs.stations[corner + 1] - legs.stations[corner]
+    if len(later):
+        end *= _SHARE
+    relative = run.places[at:] - place
+    along = relative @ u2
+    gone = np.flatnonzero(along > end)
+    relative = relative[: gone[0]] if len(gone) else relative
+    along = along[: len(relative)]
+    on = along >= 0
+    if not on.any():
+        raise InvalidValueError(
+            f"{name} has no sample on the leg after the corner at {legs.stations[corner] * 1e3:.4g} mm of the path"
+        )
+    off = relative - along[:, None] * u2
+    onward = u1 - (u1 @ u2) * u2
+    size = np.linalg.norm(onward)
+    # Where the path turns back on itself there is no such side.
+    beyond = on & (off @ (onward / size) > 0) if size > 0 else np.zeros_like(on)
+    distances = np.linalg.norm(off, axis=1)
+    over = float(distances[beyond].max(initial=0.0))
+    return near, over, _length(along[on], distances[on], band)
+
+
+def _nearest(places: Array, point: Array) -> tuple[float, int]:
+    """Return the smallest distance of a run from a point, and the number of the first sample after it."""
+    starts, ways = places[:-1], np.diff(places, axis=0)
+    squares = np.sum(ways**2, axis=1)
+    part = np.sum((point - starts) * ways, axis=1) / np.where(squares > 0, squares, 1.0)
+    distances = np.linalg.norm(starts + np.clip(part, 0, 1)[:, None] * ways - point, axis=1)
+    piece = int(np.argmin(distances))
+    return float(distances[piece]), piece + 1
+
+
+def _length(along: Array, distances: Array, band: float | None) -> float:
+    """Return where along a leg the distances come within the band for good; infinite where they do not."""
+    if band is None:
+        return np.nan
+    outside = np.flatnonzero(distances > band)
+    if not len(outside):
+        return 0.0
+    last = int(outside[-1])
+    if last + 1 == len(distances):
+        return np.inf
+    part = (distances[last] - band) / (distances[last] - distances[last + 1])
+    return float(along[last] + part * (along[last + 1] - along[last]))

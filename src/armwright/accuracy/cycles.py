@@ -1,0 +1,79 @@
+"""How often the standard asks for each measure to be repeated, and what is done where that was not kept."""
+
+from collections.abc import Sequence
+from typing import Literal, TypeAlias
+
+from armwright.errors import InvalidValueError
+
+Kind: TypeAlias = Literal[
+    "pose",
+    "multidirectional",
+    "distance",
+    "settling",
+    "posing",
+    "drift",
+    "exchangeability",
+    "path",
+    "reorientation",
+    "cornering",
+    "velocity",
+    "compliance",
+    "weaving",
+]
+# Cycles that the standard asks for, by the name of the test.
+ASKED: dict[Kind, int] = {
+    "pose": 30,
+    "multidirectional": 30,
+    "distance": 30,
+    "settling": 3,
+    "posing": 3,
+    "drift": 10,
+    "exchangeability": 30,
+    "path": 10,
+    "reorientation": 10,
+    "cornering": 3,
+    "velocity": 10,
+    "compliance": 3,
+    "weaving": 3,
+}
+# Directions of approach, robots to be exchanged for one another, and loads in steps of 10 % up to the rated one.
+DIRECTIONS, ROBOTS, LOADS = 3, 5, 10
+
+
+class TooFewError(InvalidValueError):
+    """A test was repeated less often than the standard asks for; ``few`` takes it nevertheless."""
+
+
+def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int, what: str = "cycles") -> int:
+    """Return the smallest number of cycles of a test, if it is enough.
+
+    Args:
+        kind: name of the test.
+        counts: cycles of each of its parts, such as of every direction of approach.
+        few: take fewer than the standard asks for.
+        least: what no formula can do without.
+        what: how they are called in a message.
+
+    Raises:
+        InvalidValueError: there are fewer than ``least``.
+        TooFewError: there are fewer than the standard asks for, without ``few``.
+    """
+    count = min(counts, default=0)
+    if count < least:
+        raise InvalidValueError(f"{kind}: needs {least} {what} at least, got {count}")
+    if count < ASKED[kind] and not few:
+        raise TooFewError(f"{kind}: ISO 9283 asks for {ASKED[kind]} {what}, got {count}; few=True takes fewer")
+    return count
+
+
+def checked_parts(kind: Kind, count: int, asked: int, *, few: bool, what: str) -> None:
+    """Refuse too few parts of a test: directions of approach, robots, or loads.
+
+    Raises:
+        InvalidValueError: there are fewer than two.
+        TooFewError: there are fewer than the standard asks for, without ``few``.
+    """
+    if count < 2:
+        raise InvalidValueError(f"{kind}: needs 2 {what} at least, got {count}")
+    if count < asked and not few:
+        raise TooFewError(f"{kind}: ISO 9283 asks for {asked} {what}, got {count}; few=True takes fewer")

@@ -1,0 +1,146 @@
+"""Measured places and traces at the door: shapes checked, copied, read-only."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, read_only
+from armwright.errors import InvalidValueError, ShapeError
+
+# Three angles have names; a measurement may hold fewer.
+ANGLES = ("a", "b", "c")
+
+
+def places_of(value: ArrayLike, what: str = "places") -> Array:
+    """Return measured places as read-only float64.
+
+    Args:
+        value: (n, 2) in a plane or (n, 3) in space [m].
+        what: how they are called in a message.
+
+    Raises:
+        KindError: the value is something else than real numbers.
+        ShapeError: it is no table of two or three columns, or has no rows.
+        InvalidValueError: a number is NaN, infinite, or larger than any of a robot.
+    """
+    array = floats(value, what, LARGEST)
+    if array.ndim != 2 or array.shape[1] not in {2, 3} or not len(array):
+        raise ShapeError(f"{what}: expected shape (n, 2) in a plane or (n, 3) in space, got {array.shape}")
+    array.setflags(write=False)
+    return array
+
+
+def place_of(value: ArrayLike, size: int, what: str = "commanded place") -> Array:
+    """Return one place of ``size`` numbers [m].
+
+    Raises:
+        ShapeError: it has another shape.
+    """
+    array = floats(value, what, LARGEST)
+    if array.shape != (size,):
+        raise ShapeError(f"{what}: expected {size} numbers, as the measured places have, got shape {array.shape}")
+    array.setflags(write=False)
+    return array
+
+
+def angles_of(value: ArrayLike | None, rows: int, what: str = "angles") -> Array:
+    """Return measured angles as read-only float64 (n, k) [rad], k from 0 to 3; none where there is nothing.
+
+    Raises:
+        ShapeError: they are not one row per place, or more than three.
+    """
+    array = np.empty((rows, 0)) if value is None else floats(value, what, LARGEST)
+    if array.ndim != 2 or len(array) != rows or array.shape[1] > len(ANGLES):
+        raise ShapeError(f"{what}: expected shape ({rows}, k) with k up to 3, one row per place, got {array.shape}")
+    array.setflags(write=False)
+    return array
+
+
+def one_size(parts: Sequence[Array], what: str) -> None:
+    """Refuse parts of a test that have different numbers of columns.
+
+    Raises:
+        ShapeError: they have.
+    """
+    sizes = sorted({part.shape[1] for part in parts})
+    if len(sizes) > 1:
+        raise ShapeError(f"{what}: all parts of a test have the same columns, got {' and '.join(map(str, sizes))}")
+
+
+def _trace_places(value: ArrayLike) -> Array:
+    return places_of(value, "trace: places")
+
+
+def _trace_angles(value: ArrayLike | None) -> Array | None:
+    if value is None:
+        return None
+    array = floats(value, "trace: angles", LARGEST)
+    array.setflags(write=False)
+    return array
+
+
+def _trace_times(value: ArrayLike | None) -> Array | None:
+    if value is None:
+        return None
+    array = floats(value, "trace: times", LARGEST)
+    if array.ndim != 1:
+        raise ShapeError(f"trace: times: expected shape (n,), got {array.shape}")
+    if not (np.diff(array) > 0).all():
+        wrong = int(np.argmax(np.diff(array) <= 0)) + 1
+        raise InvalidValueError(
+            f"trace: times: each must be later than the one before, got {array[wrong]:g} after {array[wrong - 1]:g}"
+        )
+    array.setflags(write=False)
+    return array
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Trace:
+    """One measured run, sample by sample, or a commanded path, corner by corner.
+
+    Attributes:
+        places: (n, 2) or (n, 3) [m], two of them at least.
+        times: (n,) rising [s]; None where the measure needs none.
+        angles: (n, k) about a, b, c [rad], k from 1 to 3; None where none were measured.
+    """
+
+    places: Array = attrs.field(converter=_trace_places)
+    times: Array | None = attrs.field(default=None, converter=_trace_times)
+    angles: Array | None = attrs.field(default=None, converter=_trace_angles)
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse what has not one row per sample."""
+        rows = len(self.places)
+        if rows < 2:
+            raise ShapeError(f"trace: expected two samples at least, got {rows}")
+        if self.times is not None and len(self.times) != rows:
+            raise ShapeError(f"trace: {rows} places but {len(self.times)} times")
+        angles_of(self.angles, rows, "trace: angles")
+
+    __reduce__ = by_fields
+
+    @property
+    def size(self) -> int:
+        """2 in a plane, 3 in space."""
+        return int(self.places.shape[1])
+
+    def timed(self, what: str) -> Array:
+        """Return the times (n,) [s].
+
+        Raises:
+            InvalidValueError: there are none.
+        """
+        if self.times is None:
+            raise InvalidValueError(f"{what}: the measure needs the time of every sample")
+        return self.times
+
+
+def turned(angles: Array | None, rows: int) -> Array:
+    """Return angles (n, k) along a trace without jumps of a turn, so that they can be interpolated."""
+    return np.empty((rows, 0)) if angles is None else np.asarray(np.unwrap(angles, axis=0))
+
+
+def frozen_array(value: ArrayLike) -> Array:
+    """Return a read-only copy: the converter of fields of results."""
+    return read_only(np.asarray(value, dtype=np.float64))

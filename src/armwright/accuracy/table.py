@@ -1,0 +1,257 @@
+"""Tables of measurements: CSV whose column names tell the units, read row by row into SI units."""
+
+import csv
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import attrs
+
+from armwright.accuracy.cycles import ASKED, Kind
+from armwright.accuracy.measured import ANGLES
+from armwright.arrays import LARGEST
+from armwright.errors import FileFormatError, closest, shown
+from armwright.files.document import read_text
+
+# SI values of the units that names of columns end in.
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+_ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180}
+_TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+_LOADS = {"n": 1.0, "kn": 1e3}
+_SPEEDS = {"m_per_s": 1.0, "mm_per_s": 1e-3, "m_per_min": 1 / 60, "mm_per_min": 1e-3 / 60}
+_UNITS: dict[str, Mapping[str, float]] = {
+    **dict.fromkeys("xyz", _LENGTHS),
+    **dict.fromkeys(ANGLES, _ANGLES),
+    "t": _TIMES,
+    "load": _LOADS,
+    "speed": _SPEEDS,
+}
+_TEXTS = ("test", "pose", "path", "condition", "cycle", "direction", "robot")
+# Columns whose names begin so are for people.
+_NOTE = "note"
+COMMANDED = "commanded"
+
+
+class Row(NamedTuple):
+    """One line of a table, in SI units; what it does not tell is empty or None.
+
+    Attributes:
+        line: of the file.
+        test: name of the test.
+        name: of the pose or path.
+        condition: such as load and speed, in free words.
+        cycle: from 1; None for what was commanded.
+        direction: of approach, or of a force.
+        robot: which one.
+        t: time [s].
+        load: size of a force [N].
+        speed: commanded speed [m/s].
+        place: two or three coordinates [m].
+        angles: none to three [rad].
+    """
+
+    line: int
+    test: Kind
+    name: str
+    condition: str
+    cycle: int | None
+    direction: str
+    robot: str
+    t: float | None
+    load: float | None
+    speed: float | None
+    place: tuple[float, ...]
+    angles: tuple[float, ...]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Table:
+    """A file of measurements.
+
+    Attributes:
+        path: where it was read.
+        columns: their names.
+        rows: in the order of the file.
+    """
+
+    path: Path
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+
+class _Column(NamedTuple):
+    place: int
+    scale: float
+    header: str
+
+
+def read_table(path: Path | str) -> Table:
+    """Read a file of measurements; docs/iso9283.md has the format.
+
+    Raises:
+        FileFormatError: the file is missing, empty, not separated by commas, or a column or value is not what it should
+            be; the text has file, line and column.
+    """
+    path = Path(path)
+    text = read_text(path)
+    reader = csv.reader(text.splitlines())
+    try:
+        lines = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise FileFormatError(path, reader.line_num + 1, "", f"not valid CSV: {error}") from error
+    if not lines:
+        raise FileFormatError(path, None, "", "the file is empty; its first line should name the columns")
+    head_line, head = lines[0]
+    columns = _columns(path, head_line, head)
+    if len(lines) == 1:
+        raise FileFormatError(path, None, "", "no rows below the names of the columns")
+    rows = tuple(_Line(path, line, cells, len(head), columns).row() for line, cells in lines[1:])
+    return Table(path=path, columns=tuple(columns), rows=rows)
+
+
+def _columns(path: Path, line: int, head: list[str]) -> dict[str, _Column]:
+    """Return the columns by their name without the unit."""
+    if len(head) == 1:
+        for mark, name in ((";", "semicolons"), ("\t", "tabs")):
+            if mark in head[0]:
+                raise FileFormatError(
+                    path,
+                    line,
+                    "",
+                    f"columns are separated by {name}; expected commas between columns and points in numbers",
+                )
+    found: dict[str, _Column] = {}
+    for place, header in enumerate(cell.strip().lower() for cell in head):
+        if header.startswith(_NOTE):
+            continue
+        name, scale = _named(path, line, header)
+        if name in found:
+            raise FileFormatError(path, line, header, f"given twice, as {found[name].header} too")
+        found[name] = _Column(place, scale, header)
+    _complete(path, line, found)
+    return found
+
+
+def _named(path: Path, line: int, header: str) -> tuple[str, float]:
+    """Return name and SI value of the unit of a column."""
+    if header in _TEXTS:
+        return header, 1.0
+    name, _, unit = header.partition("_")
+    if name not in _UNITS:
+        known = [*_TEXTS, *(f"{one}_{next(iter(units))}" for one, units in _UNITS.items())]
+        near = closest(header, known)
+        hint = f" Did you mean '{near}'?" if near else ""
+        raise FileFormatError(
+            path, line, header or "''", f"no such column.{hint} Known: {', '.join(known)}; note for what is for people"
+        )
+    units = _UNITS[name]
+    if unit not in units:
+        told = " or ".join(f"{name}_{one}" for one in units)
+        said = "the name must tell the unit" if not unit else f"unknown unit '{unit}'"
+        raise FileFormatError(path, line, header, f"{said}: {told}")
+    return name, units[unit]
+
+
+def _complete(path: Path, line: int, found: Mapping[str, _Column]) -> None:
+    """Refuse what lacks a column, and groups of columns in different units."""
+    for names, what in ((("x", "y", "z"), "coordinates"), (ANGLES, "angles")):
+        given = [found[name] for name in names if name in found]
+        for one in given:
+            if one.scale != given[0].scale:
+                raise FileFormatError(
+                    path, line, one.header, f"{what} have one unit in a file, and {given[0].header} has another"
+                )
+    for name, expected in (("test", "test"), ("cycle", "cycle"), ("x", "x_mm"), ("y", "y_mm")):
+        if name not in found:
+            raise FileFormatError(
+                path, line, expected, f"no such column; there are {', '.join(one.header for one in found.values())}"
+            )
+    if ("pose" in found) == ("path" in found):
+        both = "there are both" if "pose" in found else "there is neither"
+        raise FileFormatError(path, line, "pose", f"expected a column pose or a column path, {both}")
+
+
+class _Line:
+    """One line of a table while it is read."""
+
+    def __init__(self, path: Path, line: int, cells: list[str], width: int, columns: Mapping[str, _Column]) -> None:
+        self._path, self._line, self._columns = path, line, columns
+        self._cells = [cell.strip() for cell in cells]
+        if len(cells) != width:
+            hint = "; is there a comma in a number?" if len(cells) > width else ""
+            raise self._error("", f"expected {width} values, as there are columns, got {len(cells)}{hint}")
+
+    def row(self) -> Row:
+        """Return what the line says, in SI units."""
+        test = self._text("test").lower()
+        kinds: dict[str, Kind] = {kind: kind for kind in ASKED}
+        if test not in kinds:
+            near = closest(test, kinds)
+            hint = f" Did you mean '{near}'?" if near else ""
+            raise self._error("test", f"no test '{test}'.{hint} Known: {', '.join(kinds)}")
+        name = "pose" if "pose" in self._columns else "path"
+        if not self._text(name):
+            raise self._error(name, "empty; every row belongs to one")
+        return Row(
+            line=self._line,
+            test=kinds[test],
+            name=self._text(name),
+            condition=self._text("condition"),
+            cycle=self._cycle(),
+            direction=self._text("direction"),
+            robot=self._text("robot"),
+            t=self._number("t"),
+            load=self._number("load"),
+            speed=self._number("speed"),
+            place=self._numbers("xyz"),
+            angles=self._numbers(ANGLES),
+        )
+
+    def _text(self, name: str) -> str:
+        return self._cells[self._columns[name].place] if name in self._columns else ""
+
+    def _cycle(self) -> int | None:
+        text = self._text("cycle")
+        if text.lower() == COMMANDED:
+            return None
+        if not (text.isascii() and text.isdigit() and 0 < int(text) < 10**9):
+            raise self._error("cycle", f"expected 1, 2, 3 ... or the word {COMMANDED}, got {shown(text)}")
+        return int(text)
+
+    def _numbers(self, names: Iterable[str]) -> tuple[float, ...]:
+        values = []
+        for name in names:
+            if name in self._columns:
+                value = self._number(name)
+                if value is None:
+                    raise self._error(self._columns[name].header, "empty; expected a number")
+                values.append(value)
+        return tuple(values)
+
+    def _number(self, name: str) -> float | None:
+        """Return a value in SI units; None where there is none."""
+        text = self._text(name)
+        if not text:
+            return None
+        column = self._columns[name]
+        try:
+            value = float(text)
+        except ValueError:
+            said = f"expected a number, got {shown(text)}"
+            hint = "; write a decimal point" if _is_number(text.replace(",", ".")) else ""
+            raise self._error(column.header, said + hint) from None
+        if not abs(value) <= LARGEST:
+            raise self._error(column.header, f"every number must be finite and no larger than {LARGEST:g}, got {text}")
+        return value * column.scale
+
+    def _error(self, key: str, message: str) -> FileFormatError:
+        return FileFormatError(self._path, self._line, key, message)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,162 @@
+"""How a pose moves when something else changes: direction of approach (vAP), robot (E), time (dAP, dRP)."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import attrs
+import numpy as np
+
+from armwright.accuracy.angles import mean_angles, wrapped
+from armwright.accuracy.cycles import DIRECTIONS, ROBOTS, Kind, checked_cycles, checked_parts
+from armwright.accuracy.measured import angles_of, frozen_array, one_size, place_of, places_of
+from armwright.accuracy.pose import repeatability
+from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats
+from armwright.errors import InvalidValueError, ShapeError
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Variation:
+    """How far apart the barycentres of several clouds are.
+
+    Attributes:
+        position: the largest distance between two of them [m].
+        pair: which two, from 0.
+        angles: (k,) the largest difference of mean angles about a, b, c [rad].
+        barycentres: (h, 2) or (h, 3) [m].
+        cycles: of the smallest cloud.
+    """
+
+    position: float
+    pair: tuple[int, int]
+    angles: Array = attrs.field(converter=frozen_array)
+    barycentres: Array = attrs.field(converter=frozen_array)
+    cycles: int
+
+    __reduce__ = by_fields
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class PoseDrift:
+    """How accuracy and repeatability of a pose change while a robot warms up.
+
+    Attributes:
+        accuracy_change: dAP_P, between the first measurement and the last [m].
+        repeatability_change: dRP, likewise [m].
+        times: (m,) of the measurements [s].
+        accuracy: (m,) AP_P at each [m].
+        repeatability: (m,) RP_l at each [m].
+        cycles: of the smallest measurement.
+    """
+
+    accuracy_change: float
+    repeatability_change: float
+    times: Array = attrs.field(converter=frozen_array)
+    accuracy: Array = attrs.field(converter=frozen_array)
+    repeatability: Array = attrs.field(converter=frozen_array)
+    cycles: int
+
+    __reduce__ = by_fields
+
+
+def multidirectional_variation(
+    places: Sequence[ArrayLike], *, angles: Sequence[ArrayLike] | None = None, few: bool = False
+) -> Variation:
+    """Return vAP: how far apart a pose is attained when it is approached from different directions.
+
+    Args:
+        places: (n, 2) or (n, 3) attained places for each of 3 directions of approach [m].
+        angles: (n, k) attained angles about a, b, c for each [rad].
+        few: take fewer than 3 directions, or fewer than 30 cycles of each.
+
+    Raises:
+        KindError: something is no real number.
+        ShapeError: the shapes do not belong together.
+        InvalidValueError: there are too few directions or cycles, or a number is not finite.
+
+    Source:
+        ISO 9283:1998, 7.2.3.
+    """
+    checked_parts("multidirectional", len(places), DIRECTIONS, few=few, what="directions of approach")
+    return _variation("multidirectional", places, angles, few=few)
+
+
+def exchangeability(
+    places: Sequence[ArrayLike], *, angles: Sequence[ArrayLike] | None = None, few: bool = False
+) -> Variation:
+    """Return E: how far apart robots of one type attain the same commanded pose.
+
+    Args:
+        places: (n, 2) or (n, 3) attained places of each of 5 robots, in the same base frame [m].
+        angles: (n, k) attained angles about a, b, c of each [rad].
+        few: take fewer than 5 robots, or fewer than 30 cycles of each.
+
+    Raises:
+        KindError: something is no real number.
+        ShapeError: the shapes do not belong together.
+        InvalidValueError: there are too few robots or cycles, or a number is not finite.
+
+    Source:
+        ISO 9283:1998, 7.7.
+    """
+    checked_parts("exchangeability", len(places), ROBOTS, few=few, what="robots")
+    return _variation("exchangeability", places, angles, few=few)
+
+
+def pose_drift(times: ArrayLike, places: Sequence[ArrayLike], commanded: ArrayLike, *, few: bool = False) -> PoseDrift:
+    """Return dAP and dRP: how accuracy and repeatability change from cold to warm.
+
+    Args:
+        times: (m,) when each measurement was made, rising [s].
+        places: (n, 2) or (n, 3) attained places of each measurement [m].
+        commanded: (2,) or (3,) the commanded place [m].
+        few: take fewer than 10 cycles per measurement.
+
+    Raises:
+        KindError: something is no real number.
+        ShapeError: the shapes do not belong together.
+        InvalidValueError: there are fewer than two measurements, too few cycles, or times that do not rise.
+
+    Source:
+        ISO 9283:1998, 7.6.
+    """
+    t = floats(times, "times", LARGEST)
+    clouds = [places_of(one) for one in places]
+    if t.shape != (len(clouds),):
+        raise ShapeError(f"times: expected one per measurement, {len(clouds)}, got shape {t.shape}")
+    if len(t) < 2 or not (np.diff(t) > 0).all():
+        raise InvalidValueError("drift: needs two measurements at least, each later than the one before")
+    one_size(clouds, "drift")
+    goal = place_of(commanded, clouds[0].shape[1])
+    found = [repeatability("drift", P, angles_of(None, len(P)), few=few) for P in clouds]
+    accuracy = np.array([np.linalg.norm(one.barycentre - goal) for one in found])
+    radius = np.array([one.radius for one in found])
+    return PoseDrift(
+        accuracy_change=float(abs(accuracy[-1] - accuracy[0])),
+        repeatability_change=float(abs(radius[-1] - radius[0])),
+        times=t,
+        accuracy=accuracy,
+        repeatability=radius,
+        cycles=min(one.cycles for one in found),
+    )
+
+
+def _variation(kind: Kind, places: Sequence[ArrayLike], angles: Sequence[ArrayLike] | None, *, few: bool) -> Variation:
+    clouds = [places_of(one) for one in places]
+    if angles is not None and len(angles) != len(clouds):
+        raise ShapeError(f"{kind}: {len(clouds)} clouds of places but {len(angles)} of angles")
+    turns = [angles_of(None if angles is None else angles[h], len(P)) for h, P in enumerate(clouds)]
+    one_size(clouds, kind)
+    one_size(turns, f"{kind}, angles")
+    count = checked_cycles(kind, [len(P) for P in clouds], few=few, least=1)
+    centres = np.array([P.mean(axis=0) for P in clouds])
+    means = np.array([mean_angles(A) for A in turns])
+    pairs = list(combinations(range(len(clouds)), 2))
+    distances = [float(np.linalg.norm(centres[h] - centres[k])) for h, k in pairs]
+    most = int(np.argmax(distances))
+    return Variation(
+        position=distances[most],
+        pair=pairs[most],
+        angles=np.max([np.abs(wrapped(means[h] - means[k])) for h, k in pairs], axis=0),
+        barycentres=centres,
+        cycles=count,
+    )

@@ -1,0 +1,126 @@
+"""Weaving: how far stroke and frequency of a swinging run are from the commanded ones, WS and WF."""
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.accuracy.cycles import checked_cycles
+from armwright.accuracy.measured import Trace, frozen_array, one_size
+from armwright.arrays import Array, by_fields, number
+from armwright.errors import InvalidValueError
+
+# A swing turns round where it has come back by this part of the whole width: more than from the middle to a side.
+_BACK = 0.6
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class WeavingDeviation:
+    """How far a weave is from the commanded one.
+
+    Attributes:
+        stroke: WS, attained less commanded stroke, in parts of the commanded one.
+        frequency: WF, attained less commanded frequency, in parts of the commanded one.
+        commanded_stroke: W_c, from side to side [m].
+        commanded_frequency: f_c [Hz].
+        strokes: (n,) mean stroke of each cycle [m].
+        frequencies: (n,) of each cycle [Hz].
+        cycles: n.
+    """
+
+    stroke: float
+    frequency: float
+    commanded_stroke: float
+    commanded_frequency: float
+    strokes: Array = attrs.field(converter=frozen_array)
+    frequencies: Array = attrs.field(converter=frozen_array)
+    cycles: int
+
+    __reduce__ = by_fields
+
+
+def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, few: bool = False) -> WeavingDeviation:
+    """Return WS and WF of a weave.
+
+    The commanded frequency is the speed along the middle line over the length of one weave; the standard writes it as
+    ten times the speed over the length of ten weaves.
+
+    Args:
+        commanded: the corners of the weave, from the first to the last point of its middle line.
+        runs: what was measured, with times.
+        speed: the commanded one along the middle line [m/s].
+        few: take fewer than 3 cycles.
+
+    Raises:
+        KindError: the speed is no number.
+        ShapeError: path and runs have different numbers of columns.
+        InvalidValueError: there are too few cycles, the speed is not above 0, something does not weave or has no times.
+
+    Source:
+        ISO 9283:1998, 11.
+    """
+    count = checked_cycles("weaving", [len(runs)], few=few, least=1)
+    one_size([commanded.places, *(run.places for run in runs)], "weaving")
+    speed = number(speed, "weaving: commanded speed")
+    if not 0 < speed < np.inf:
+        raise InvalidValueError(f"weaving: the commanded speed must be above 0 m/s, got {speed:g}")
+    line = commanded.places[-1] - commanded.places[0]
+    if not np.linalg.norm(line) > 0:
+        raise InvalidValueError("weaving: the commanded weave ends where it begins, so it has no middle line")
+    forward = line / np.linalg.norm(line)
+    sideways = _sideways(commanded.places - commanded.places[0], forward)
+    swings, turns = _swings(commanded.places @ sideways, "the commanded path")
+    stations = (commanded.places @ forward)[turns]
+    pitch = 2 * (stations[-1] - stations[0]) / (len(turns) - 1)
+    if not pitch > 0:
+        raise InvalidValueError("weaving: the commanded weave does not go along its middle line")
+    strokes, frequencies = [], []
+    for j, run in enumerate(runs):
+        widths, at = _swings(run.places @ sideways, f"run {j + 1}")
+        t = run.timed(f"weaving: run {j + 1}")[at]
+        strokes.append(float(widths.mean()))
+        frequencies.append(float((len(at) - 1) / (2 * (t[-1] - t[0]))))
+    stroke, frequency = float(swings.mean()), float(speed / pitch)
+    return WeavingDeviation(
+        stroke=float(np.mean(strokes)) / stroke - 1,
+        frequency=float(np.mean(frequencies)) / frequency - 1,
+        commanded_stroke=stroke,
+        commanded_frequency=frequency,
+        strokes=strokes,
+        frequencies=frequencies,
+        cycles=count,
+    )
+
+
+def _sideways(relative: Array, forward: Array) -> Array:
+    """Return the direction across the middle line in which a weave is widest."""
+    across = relative - (relative @ forward)[:, None] * forward
+    _, widths, axes = np.linalg.svd(across - across.mean(axis=0), full_matrices=False)
+    if not widths[0] > 0:
+        raise InvalidValueError("weaving: the commanded path is a straight line, so nothing weaves")
+    return np.asarray(axes[0])
+
+
+def _swings(side: Array, name: str) -> tuple[Array, Array]:
+    """Return the widths from side to side and the samples at which a run turns round.
+
+    Raises:
+        InvalidValueError: there are fewer than three turns.
+    """
+    back = _BACK * np.ptp(side)
+    turns: list[int] = []
+    low = high = 0
+    rising: bool | None = None
+    for i, value in enumerate(side.tolist()):
+        low = i if value < side[low] else low
+        high = i if value > side[high] else high
+        if rising is not False and value < side[high] - back:
+            turns.append(high)
+            rising, low = False, i
+        elif rising is not True and value > side[low] + back:
+            turns.append(low)
+            rising, high = True, i
+    if len(turns) < 3:
+        raise InvalidValueError(f"weaving: {name} turns round {len(turns)} times; a weave takes three at least")
+    at = np.array(turns)
+    return np.abs(np.diff(side[at])), at

@@ -1,0 +1,185 @@
+"""``armwright iso9283``: what measured poses and paths say of a robot, by the definitions of ISO 9283."""
+
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.accuracy.assess import Assessment
+    from armwright.accuracy.measures import Measure
+
+_LIMIT = re.compile(r"(?P<symbol>\w+)=(?P<number>[^a-z%/]+)(?P<unit>[a-zA-Z%/]*)")
+
+
+def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
+    files: Annotated[
+        list[Path], typer.Argument(help="Measurements, CSV (docs/iso9283.md); several may belong together.")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for report.html, measures.json and the figures (SVG).")
+    ] = None,
+    few: Annotated[
+        bool, typer.Option("--few", help="Take fewer cycles than the standard asks for, and say so.")
+    ] = False,
+    band_mm: Annotated[
+        float | None,
+        typer.Option(help="What counts as reached; RP of the same pose without it.", show_default=False),
+    ] = None,
+    corners_mm: Annotated[float, typer.Option(help="How near to a corner AT and RT are not taken.")] = 0.0,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(help="What a measure should keep: RP=0.05mm; may be repeated.", show_default=False),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Print the measures of ISO 9283 that measured poses and paths allow, with the cycles of each.
+
+    Accuracy and repeatability of poses (AP, RP, vAP), of distances (AD, RD) and of paths (AT, RT, AV, RV, FV), coming
+    to rest (t, OV, TP), corners (CR, CO), drift, exchangeability, compliance and weaving. A test with fewer cycles than
+    the standard asks for is refused unless --few is given.
+
+    **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
+    """
+    import json
+
+    from armwright.files.output import write_folder
+
+    found = _assessed(files, few=few, band_mm=band_mm, corners_mm=corners_mm, limits=limit or [])
+    text = json.dumps(_plain(found), indent=2, ensure_ascii=False)
+    if output is not None:
+        write_folder(output, _files(found, files, text))
+    if as_json:
+        print(text)
+    elif not quiet:
+        _print(found)
+        if output is not None:
+            print(f"report: {output / 'report.html'}")
+
+
+def _assessed(
+    files: list[Path], *, few: bool, band_mm: float | None, corners_mm: float, limits: list[str]
+) -> "Assessment":
+    """Read the files and work out all measures."""
+    from armwright.accuracy.assess import assess
+    from armwright.accuracy.cycles import TooFewError
+    from armwright.accuracy.measurements import read_measurements
+
+    for name, value, valid in (
+        ("--band-mm", band_mm, band_mm is None or 0 < band_mm < float("inf")),
+        ("--corners-mm", corners_mm, 0 <= corners_mm < float("inf")),
+    ):
+        if not valid:
+            raise typer.BadParameter(f"expected a number above 0, got {value:g}", param_hint=name)
+    bounds = dict(map(_bound, limits))
+    tests = read_measurements(files)
+    try:
+        found = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)
+        return found.within({symbol: _in_si(found, symbol, *bound) for symbol, bound in bounds.items()})
+    except TooFewError as error:
+        raise TooFewError(str(error).replace("few=True takes", "--few takes")) from error
+
+
+def _bound(text: str) -> tuple[str, tuple[float, str]]:
+    """Read a limit such as ``RP=0.05mm``."""
+    match = _LIMIT.fullmatch(text.replace(" ", ""))
+    try:
+        value = float(match["number"]) if match else -1.0
+    except ValueError:
+        value = -1.0
+    if match is None or not 0 <= value < float("inf"):
+        raise typer.BadParameter(
+            f"expected a symbol and a number with its unit, RP=0.05mm, got {text}", param_hint="--limit"
+        )
+    return match["symbol"], (value, match["unit"])
+
+
+def _in_si(found: "Assessment", symbol: str, value: float, unit: str) -> float:
+    """Return a limit in SI units."""
+    from armwright.errors import one_of
+    from armwright.report.accuracy_page import unit_scale
+
+    units = {one.symbol: one.unit for one in found.measures}
+    shown, scale = unit_scale(units[one_of("measure", symbol, units)])
+    if unit != shown:
+        raise typer.BadParameter(
+            f"{symbol} is in {shown}: {symbol}={value:g}{shown}, got '{unit}'", param_hint="--limit"
+        )
+    return value / scale
+
+
+def _plain(found: "Assessment") -> dict[str, Any]:
+    """Return an assessment as plain data in SI units; what is infinite is none."""
+    from math import isfinite
+
+    import attrs
+
+    from armwright.report.accuracy_page import notes_of
+
+    measures = [
+        {**attrs.asdict(one), "value": one.value if isfinite(one.value) else None, "few": one.few, "holds": one.holds}
+        for one in found.measures
+    ]
+    return {"standard": "ISO 9283:1998", "planar": found.planar, "notes": notes_of(found), "measures": measures}
+
+
+def _files(found: "Assessment", files: list[Path], text: str) -> dict[str, str]:
+    """Return the files of an assessment by name."""
+    import shlex
+
+    from armwright.report.accuracy_figures import drawings
+    from armwright.report.accuracy_page import accuracy_page
+
+    drawn = drawings(found)
+    title = f"ISO 9283: {', '.join(path.name for path in files)}"
+    command = shlex.join(["armwright", *sys.argv[1:]])
+    return {
+        "measures.json": text + "\n",
+        "report.html": accuracy_page(found, drawn, title=title, command=command),
+        **{f"{one.name}.svg": one.svg for one in drawn},
+    }
+
+
+def _print(found: "Assessment") -> None:
+    from itertools import groupby
+
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from armwright.report.accuracy_page import notes_of
+
+    console = Console(markup=False, highlight=False)
+    bounded = any(one.limit is not None for one in found.measures)
+    for (test, name, condition), measures in groupby(found.measures, lambda one: (one.test, one.name, one.condition)):
+        title = f"{test} {name}{f', {condition}' if condition else ''}"
+        table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+        table.add_column("", min_width=5)
+        table.add_column("measure", min_width=27, overflow="fold")
+        table.add_column("", min_width=10, justify="right", no_wrap=True)
+        table.add_column("", min_width=4)
+        table.add_column("n", min_width=2, justify="right")
+        if bounded:
+            table.add_column("limit", justify="right")
+        table.add_column("", overflow="fold")
+        for one in measures:
+            table.add_row(*_row(one, bounded=bounded))
+        console.print(table)
+    for note in notes_of(found):
+        console.print(note)
+
+
+def _row(one: "Measure", *, bounded: bool) -> "list[Any]":
+    from rich.text import Text
+
+    from armwright.report.accuracy_page import shown_measure
+
+    seen = shown_measure(one)
+    verdict = Text(seen.verdict, style="bold red" if seen.verdict == "exceeds" else "")
+    note = Text(" ").join(part for part in (verdict, Text(one.note)) if part)
+    # What stands below its whole needs no words: AP_x below AP.
+    what = "" if "_" in one.symbol else one.what
+    return [one.symbol, what, seen.value, seen.unit, seen.cycles, *([seen.limit] if bounded else []), note]

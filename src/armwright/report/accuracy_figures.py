@@ -1,0 +1,198 @@
+"""Figures of measured accuracy: clouds of poses, deviation along paths, coming to rest, corners, speeds, weaves."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armwright.accuracy.assess import Assessment
+from armwright.accuracy.compliance import StaticCompliance
+from armwright.accuracy.corner import CornerDeviation
+from armwright.accuracy.measurements import PathTest, PoseTest
+from armwright.accuracy.path import PathDeviation, PathVelocity
+from armwright.accuracy.pose import PoseRepeatability
+from armwright.accuracy.settling import PosingTime, Settling, attained_place
+from armwright.accuracy.variation import PoseDrift, Variation
+from armwright.accuracy.weaving import WeavingDeviation
+from armwright.arrays import Array
+from armwright.report.figures import Drawing, svg_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Samples of a run that are drawn, and how far round a corner, in parts of its round-off or of the shorter leg.
+_DRAWN, _AROUND, _OF_LEG = 2000, 5.0, 0.15
+_MARKS = "osD^v"
+
+
+def drawings(found: Assessment) -> list[Drawing]:
+    """Return the figures of an assessment, in the order of its tests."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
+
+    drawn: list[Drawing] = []
+    for test, results in zip(found.tests, found.results, strict=True):
+        of = f"{test.name}{f', {test.condition}' if test.condition else ''}"
+        for result in results:
+            if type(result) not in _DRAW:
+                continue
+            draw, caption = _DRAW[type(result)]
+            what = "velocity" if isinstance(result, PathVelocity) else test.kind
+            figure = Figure(figsize=(7.4, 4.2), layout="constrained")
+            draw(figure, test, result)
+            figure.suptitle(_literal(f"{what}: {of}"))
+            drawn.append(Drawing(f"{len(drawn) + 1:02d}-{what}", f"{what} {of}: {caption}", svg_text(figure)))
+    return drawn
+
+
+def _views(figure: "Figure", size: int) -> "list[tuple[Axes, int, int]]":
+    """Return one set of axes in a plane, two in space, with the coordinates that they show."""
+    pairs = [(0, 1)] if size == 2 else [(0, 1), (0, 2)]
+    found = []
+    for axis, (i, j) in zip(figure.subplots(1, len(pairs), squeeze=False)[0], pairs, strict=True):
+        axis.set(xlabel=f"{'xyz'[i]}, mm", ylabel=f"{'xyz'[j]}, mm")
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.grid(visible=True, alpha=0.3)
+        found.append((axis, i, j))
+    return found
+
+
+def _cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability) -> None:
+    from matplotlib.patches import Circle  # noqa: PLC0415
+
+    cloud = test.clouds[0]
+    assert cloud.commanded is not None  # noqa: S101 - no test of a pose is read without
+    places, centre = (cloud.places - cloud.commanded) * 1e3, (result.barycentre - cloud.commanded) * 1e3
+    for axis, i, j in _views(figure, test.size):
+        axis.plot(places[:, i], places[:, j], "o", markersize=3.5, color="C0", label="attained")
+        axis.plot(centre[i], centre[j], "s", markersize=6, color="C1", label="barycentre")
+        axis.plot(0, 0, "+", markersize=13, markeredgewidth=1.8, color="C3", label="commanded")
+        circle = Circle((centre[i], centre[j]), result.radius * 1e3, fill=False, color="C1", linewidth=1.4)
+        axis.add_patch(circle)
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+
+
+def _clouds(figure: "Figure", test: PoseTest, result: Variation) -> None:
+    origin = result.barycentres.mean(axis=0)
+    for axis, i, j in _views(figure, test.size):
+        for number, (cloud, centre) in enumerate(zip(test.clouds, result.barycentres, strict=True)):
+            places, middle = (cloud.places - origin) * 1e3, (centre - origin) * 1e3
+            style: dict[str, Any] = {
+                "marker": _MARKS[number % len(_MARKS)],
+                "color": f"C{number % 10}",
+                "linestyle": "",
+            }
+            axis.plot(places[:, i], places[:, j], **style, markersize=3.5, fillstyle="none", alpha=0.7)
+            axis.plot(middle[i], middle[j], **style, markersize=8, markeredgecolor="k", label=_literal(cloud.label))
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
+
+
+def _drift(figure: "Figure", _test: PoseTest, result: PoseDrift) -> None:
+    axis = _axes(figure, "time, h", "mm")
+    axis.plot(result.times / 3600, result.accuracy * 1e3, "o-", markersize=3.5, label="AP")
+    axis.plot(result.times / 3600, result.repeatability * 1e3, "s--", markersize=3.5, label="RP")
+    axis.set_ylim(bottom=0)
+    axis.legend()
+
+
+def _settling(figure: "Figure", test: PathTest, result: Settling | PosingTime) -> None:
+    axis = _axes(figure, "time, s", "distance from the attained place, mm")
+    for j, run in enumerate(test.runs):
+        t = run.timed("settling")
+        some = _some(len(t))
+        distances = np.linalg.norm(run.places - attained_place(run), axis=1)[some] * 1e3
+        axis.plot(t[some], np.maximum(distances, result.band * 1e1), linewidth=1.1, label=f"cycle {j + 1}")
+        if isinstance(result, Settling):
+            for moment, style in ((result.entered[j], ":"), (result.settled[j], "-")):
+                axis.axvline(moment, color=f"C{j % 10}", linestyle=style, linewidth=0.8)
+    axis.axhline(result.band * 1e3, color="C3", linestyle="--", linewidth=1.2, label="band")
+    axis.set_yscale("log")
+    axis.legend(fontsize="small")
+
+
+def _deviation(figure: "Figure", _test: PathTest, result: PathDeviation) -> None:
+    axis = _axes(figure, "along the path, mm", "mm")
+    s = result.stations * 1e3
+    for name, values, at, style in (
+        ("AT", result.offsets, result.accuracy_at, "-"),
+        ("RT", result.radii, result.repeatability_at, "--"),
+    ):
+        line = axis.plot(s, values * 1e3, style, linewidth=1.4, label=f"{name} {values.max() * 1e3:.4g} mm")[0]
+        axis.plot(at * 1e3, values.max() * 1e3, "o", markersize=5, color=line.get_color())
+    axis.set_ylim(bottom=0)
+    axis.legend()
+
+
+def _speeds(figure: "Figure", test: PathTest, result: PathVelocity) -> None:
+    axis = _axes(figure, "along the path, mm", "speed, mm/s")
+    for speeds in result.speeds:
+        axis.plot(result.stations * 1e3, speeds * 1e3, linewidth=1.0, color="C0", alpha=0.7)
+    assert test.speed is not None  # noqa: S101 - there is no result without
+    axis.axhline(test.speed * 1e3, color="C3", linestyle="--", linewidth=1.2)
+
+
+def _corner(figure: "Figure", test: PathTest, result: CornerDeviation) -> None:
+    assert test.commanded is not None  # noqa: S101 - no test of a corner is read without
+    path = test.commanded.places
+    near = np.linalg.norm(path - result.place, axis=1)
+    reach = max(_AROUND * max(result.round_off, result.overshoot), 1e-6)
+    reach = min(reach, near[near > 0].min()) if result.round_off + result.overshoot > 0 else _OF_LEG * near.max()
+    for axis, i, j in _views(figure, test.size):
+        _lines(axis, [(run.places - result.place)[:, [i, j]] * 1e3 for run in test.runs])
+        axis.plot(*((path - result.place)[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
+        axis.set_aspect("equal", adjustable="box")
+        axis.set(xlim=(-reach * 1e3, reach * 1e3), ylim=(-reach * 1e3, reach * 1e3))
+
+
+def _weave(figure: "Figure", test: PathTest, _result: WeavingDeviation) -> None:
+    assert test.commanded is not None  # noqa: S101 - no test of a weave is read without
+    for axis, i, j in _views(figure, test.size):
+        _lines(axis, [run.places[:, [i, j]] * 1e3 for run in test.runs])
+        axis.plot(*(test.commanded.places[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
+        axis.set_aspect("auto")
+
+
+def _compliance(figure: "Figure", _test: PoseTest, result: StaticCompliance) -> None:
+    axis = _axes(figure, "force, N", "displacement, mm")
+    forces = np.append(0.0, result.loads[-1])
+    for i, name in enumerate("xyz"[: result.components.size]):
+        axis.plot(result.loads, result.deflections[:, i] * 1e3, _MARKS[i], color=f"C{i}", markersize=4, label=name)
+        axis.plot(forces, forces * result.components[i] * 1e3, color=f"C{i}", linewidth=1.0)
+    axis.legend()
+
+
+def _lines(axis: "Axes", runs: Sequence[Array]) -> None:
+    for number, run in enumerate(runs):
+        axis.plot(*run[_some(len(run))].T, linewidth=1.0, color=f"C{number % 10}")
+
+
+def _axes(figure: "Figure", x: str, y: str) -> Any:
+    axis = figure.subplots()
+    axis.set(xlabel=x, ylabel=y)
+    axis.grid(visible=True, alpha=0.3)
+    axis.ticklabel_format(useOffset=False)
+    return axis
+
+
+def _literal(text: str) -> str:
+    """Return a text in which no dollar begins a formula."""
+    return text.replace("$", r"\$")
+
+
+def _some(count: int) -> Array:
+    return np.unique(np.linspace(0, count - 1, _DRAWN).astype(int))
+
+
+# How each result is drawn, and what the figure shows.
+_DRAW: dict[type, tuple[Callable[["Figure", Any, Any], None], str]] = {
+    PoseRepeatability: (_cloud, "attained places about the commanded one, their barycentre, and the circle of RP"),
+    Variation: (_clouds, "attained places by direction or robot, about the mean of all; barycentres filled"),
+    PoseDrift: (_drift, "AP and RP over time"),
+    Settling: (_settling, "distance from the attained place; dotted lines: the band is entered, full lines: for good"),
+    PosingTime: (_settling, "distance from the attained place, from departure to rest"),
+    PathDeviation: (_deviation, "distance of the mean run from the path (AT), and spread of the runs (RT)"),
+    PathVelocity: (_speeds, "speed of every run on the steady part of the path; the commanded one dashed"),
+    CornerDeviation: (_corner, "the runs round the corner, from which places are counted; the commanded path dashed"),
+    WeavingDeviation: (_weave, "the runs; the commanded path dashed"),
+    StaticCompliance: (_compliance, "displacement under load along every axis, and the straight lines fitted"),
+}

@@ -1,0 +1,214 @@
+"""Accuracy and repeatability of poses, distances, and what changes them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from armwright.accuracy.compliance import static_compliance
+from armwright.accuracy.cycles import TooFewError
+from armwright.accuracy.distance import distance_accuracy, distance_repeatability
+from armwright.accuracy.pose import pose_accuracy, pose_repeatability
+from armwright.accuracy.variation import exchangeability, multidirectional_variation, pose_drift
+from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.spatial.rotations import rotation_from_vector
+
+# Rounding of places of a metre.
+ROUNDING = 1e-12
+CROSS = np.array(((1.0, 0.0), (-1.0, 0.0), (0.0, 3.0), (0.0, -3.0)))
+CLOUDS = arrays(np.float64, (30, 3), elements=st.floats(-1, 1))
+VECTORS = arrays(np.float64, 3, elements=st.floats(-3, 3))
+
+
+def test_by_hand() -> None:
+    """Distances 1, 1, 3, 3 from the middle have mean 2 and deviation sqrt(4/3); the middle is (4, 3) off."""
+    found = pose_repeatability(CROSS, few=True)
+    off = pose_accuracy(CROSS + np.array((3.0, 4.0)), (0.0, 0.0), few=True)
+
+    assert found.mean_distance == pytest.approx(2.0)
+    assert found.deviation == pytest.approx(np.sqrt(4 / 3))
+    assert found.radius == pytest.approx(2 + 3 * np.sqrt(4 / 3))
+    assert found.cycles == 4
+    assert off.position == pytest.approx(5.0)
+    np.testing.assert_allclose(off.components, (3, 4))
+
+
+def test_pure_offset() -> None:
+    """A robot that always stops at the same wrong place has AP of the offset and RP 0."""
+    places = np.tile((0.4, 0.1, 0.3), (30, 1)) + np.array((0.001, -0.002, 0.002))
+
+    assert pose_accuracy(places, (0.4, 0.1, 0.3)).position == pytest.approx(0.003, abs=ROUNDING)
+    assert pose_repeatability(places).radius == pytest.approx(0.0, abs=ROUNDING)
+
+
+@pytest.mark.parametrize(("size", "radius"), [(2, 3.2187), (3, 3.6160)])
+def test_gaussian_cloud(size: int, radius: float, rng: np.random.Generator) -> None:
+    """RP of a Gaussian cloud is 3.2187 sigma in a plane and 3.6160 sigma in space."""
+    count = 400_000
+    # l + 3 S of so many: the mean scatters by 0.7 / sqrt(n), the deviation by about the same, five times that.
+    tolerance = 5 * (0.7 + 3 * 0.5) / np.sqrt(count)
+
+    found = pose_repeatability(rng.normal(scale=1e-3, size=(count, size)))
+
+    assert found.radius / 1e-3 == pytest.approx(radius, abs=tolerance)
+
+
+@given(places=CLOUDS, turn=VECTORS, shift=VECTORS)
+def test_rigid_motion_of_poses(places: np.ndarray, turn: np.ndarray, shift: np.ndarray) -> None:
+    """AP, RP and the distances of poses do not depend on the frame in which they are measured."""
+    R, goal = rotation_from_vector(turn), np.array((0.1, 0.2, 0.3))
+    moved = places @ R.T + shift
+    other, other_moved = places[::-1], places[::-1] @ R.T + shift
+
+    one, two = pose_accuracy(places, goal), pose_accuracy(moved, R @ goal + shift)
+
+    assert two.position == pytest.approx(one.position, abs=1e-12)
+    assert pose_repeatability(moved).radius == pytest.approx(pose_repeatability(places).radius, abs=1e-11)
+    spread = distance_repeatability(places, other).distance
+    assert distance_repeatability(moved, other_moved).distance == pytest.approx(spread, abs=1e-11)
+
+
+@given(turns=arrays(np.int64, (30, 1), elements=st.integers(-3, 3)), middle=st.floats(-np.pi, np.pi))
+def test_turns_do_not_matter(turns: np.ndarray, middle: float) -> None:
+    """Angles a turn more or less are the same angles, wherever on the circle they are."""
+    small = 0.01 * np.sin(np.arange(30.0))[:, None]
+    places = np.zeros((30, 2))
+
+    found = pose_repeatability(places, angles=middle + small + 2 * np.pi * turns)
+    off = pose_accuracy(places, (0, 0), angles=middle + small + 2 * np.pi * turns, commanded_angles=[middle - 0.02])
+
+    np.testing.assert_allclose(found.angles, 3 * small.std(axis=0, ddof=1), rtol=1e-9)
+    np.testing.assert_allclose(off.angles, small.mean(axis=0) + 0.02, atol=1e-12)
+
+
+def test_half_a_turn() -> None:
+    """179.9 and -179.9 deg have the mean 180 deg and a deviation of 0.1414 deg, not of 254."""
+    angles = np.radians(((179.9,), (-179.9,)))
+
+    found = pose_repeatability(np.zeros((2, 2)), angles=angles, few=True)
+    off = pose_accuracy(np.zeros((2, 2)), (0, 0), angles=angles, commanded_angles=[np.pi], few=True)
+
+    assert np.degrees(found.angles[0]) == pytest.approx(3 * 0.1 * np.sqrt(2))
+    assert off.angles[0] == pytest.approx(0.0, abs=ROUNDING)
+
+
+def test_directions_of_approach() -> None:
+    """Play of 0.2 mm, felt from both sides, moves the pose by 0.2 mm; the two sides are named."""
+    clouds = [np.full((30, 2), 1.0) + np.array((side, 0.0)) for side in (-1e-4, 1e-4, 0.0)]
+
+    found = multidirectional_variation(clouds)
+
+    assert found.position == pytest.approx(2e-4)
+    assert found.pair == (0, 1)
+
+
+def test_exchanged_robots() -> None:
+    """Of five robots the two that are farthest apart decide; angles across half a turn are near."""
+    clouds = [np.full((30, 3), 1e-3 * k) for k in (0, 2, 5, 1, 3)]
+    angles = [np.full((30, 1), np.pi - 0.01 + 0.005 * k) for k in range(5)]
+
+    found = exchangeability(clouds, angles=angles)
+
+    assert found.position == pytest.approx(5e-3 * np.sqrt(3))
+    assert found.pair == (0, 2)
+    np.testing.assert_allclose(found.angles, [0.02])
+
+
+def test_drift() -> None:
+    """A robot that grows by 1 mm while it warms up drifts by 1 mm, and a cloud twice as wide has twice the RP."""
+    shape = np.vstack([CROSS, -CROSS, CROSS]) * 1e-5
+
+    found = pose_drift([0, 600, 1200], [shape, 2 * shape + (5e-4, 0), 2 * shape + (1e-3, 0)], (0, 0))
+
+    assert found.accuracy_change == pytest.approx(1e-3)
+    np.testing.assert_allclose(found.accuracy, (0, 5e-4, 1e-3), atol=ROUNDING)
+    assert found.repeatability_change == pytest.approx(found.repeatability[0])
+
+
+def test_distances() -> None:
+    """Attained distances of 1.001 and 1.003 for 1: AD is 2 mm, RD three times sqrt(2) mm."""
+    first = np.zeros((2, 2))
+    second = np.array(((0.0, 1.001), (0.0, 1.003)))
+
+    off = distance_accuracy(first, second, (0, 0), (0, 1), few=True)
+    spread = distance_repeatability(first, second, few=True)
+
+    assert off.distance == pytest.approx(0.002)
+    np.testing.assert_allclose(off.components, (0, 0.002), atol=ROUNDING)
+    assert spread.distance == pytest.approx(3e-3 * np.sqrt(2))
+
+
+def test_compliance() -> None:
+    """A spring of 1e5 N/m gives way by 1e-5 m/N along the force, and by a tenth of it across."""
+    loads = np.repeat(np.arange(0.0, 110.0, 10.0), 3)
+    places = np.array((1.0, 2.0, 3.0)) + loads[:, None] * (-1e-5, 1e-6, 0.0)
+
+    found = static_compliance(loads, places, (-2.0, 0.0, 0.0))
+
+    assert found.along == pytest.approx(1e-5)
+    np.testing.assert_allclose(found.components, (-1e-5, 1e-6, 0), atol=1e-15)
+    assert found.cycles == 3
+    assert found.deflections[-1, 0] == pytest.approx(-1e-3)
+
+
+THIRTY = np.zeros((30, 2))
+MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
+    "few": (lambda: pose_accuracy(THIRTY[:12], (0, 0)), TooFewError, "pose: ISO 9283 asks for 30 cycles, got 12"),
+    "one": (lambda: pose_repeatability(THIRTY[:1], few=True), InvalidValueError, "needs 2 cycles at least, got 1"),
+    "directions": (
+        lambda: multidirectional_variation([THIRTY, THIRTY]),
+        TooFewError,
+        "asks for 3 directions of approach, got 2",
+    ),
+    "robots": (lambda: exchangeability([THIRTY], few=True), InvalidValueError, "needs 2 robots at least, got 1"),
+    "few of one robot": (
+        lambda: exchangeability([THIRTY] * 4 + [THIRTY[:9]]),
+        TooFewError,
+        "exchangeability: ISO 9283 asks for 30 cycles, got 9",
+    ),
+    "loads": (lambda: static_compliance([0, 1, 2], THIRTY[:3], (1, 0)), TooFewError, "10 loads besides none, got 2"),
+    "no rest": (lambda: static_compliance([1, 2], THIRTY[:2], (1, 0)), InvalidValueError, "no measurement is without"),
+    "pull": (lambda: static_compliance([0, -2], THIRTY[:2], (1, 0)), InvalidValueError, "turn the direction round"),
+    "no direction": (lambda: static_compliance([0, 2], THIRTY[:2], (0, 0)), InvalidValueError, "direction is 0"),
+    "text": (lambda: pose_repeatability("abc"), KindError, "places: expected numbers, got 'abc'"),
+    "NaN": (lambda: pose_repeatability(THIRTY * np.nan), InvalidValueError, "every number must be finite, got nan"),
+    "columns": (lambda: pose_repeatability(np.zeros((30, 4))), ShapeError, "expected shape (n, 2) in a plane or"),
+    "goal": (lambda: pose_accuracy(THIRTY, (0, 0, 0)), ShapeError, "commanded place: expected 2 numbers"),
+    "angles": (lambda: pose_repeatability(THIRTY, angles=np.zeros((29, 1))), ShapeError, "expected shape (30, k)"),
+    "no goal for angles": (
+        lambda: pose_accuracy(THIRTY, (0, 0), angles=np.zeros((30, 2))),
+        ShapeError,
+        "commanded angles: expected 2 numbers, as many as were measured",
+    ),
+    "all round": (
+        lambda: pose_repeatability(THIRTY, angles=np.linspace(0, 6, 30)[:, None]),
+        InvalidValueError,
+        "only angles within 90 deg have one",
+    ),
+    "two sizes": (
+        lambda: multidirectional_variation([THIRTY, THIRTY, np.zeros((30, 3))]),
+        ShapeError,
+        "multidirectional: all parts of a test have the same columns, got 2 and 3",
+    ),
+    "cycles of a distance": (
+        lambda: distance_repeatability(THIRTY, THIRTY[1:]),
+        ShapeError,
+        "the two poses need the same cycles, got shapes (30, 2) and (29, 2)",
+    ),
+    "time back": (lambda: pose_drift([1, 0], [THIRTY] * 2, (0, 0)), InvalidValueError, "each later than the one"),
+    "times": (lambda: pose_drift([1], [THIRTY] * 2, (0, 0)), ShapeError, "expected one per measurement, 2"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes(name: str) -> None:
+    """What cannot be measured is refused with what was expected."""
+    call, kind, said = MISTAKES[name]
+
+    with pytest.raises(kind) as caught:
+        call()
+
+    assert said in str(caught.value)

@@ -1,0 +1,111 @@
+"""``armwright iso9283`` as a user calls it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cli_calls import armwright
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+POSES, PATHS = EXAMPLES / "measured_poses.csv", EXAMPLES / "measured_paths.csv"
+DOCS = (EXAMPLES.parent / "docs" / "iso9283.md").read_text(encoding="utf-8")
+
+
+def page_example() -> str:
+    """The file that the page shows."""
+    block = DOCS.partition("    test,pose,cycle")[2].partition("\n\n")[0]
+    return "\n".join(line.strip() for line in f"test,pose,cycle{block}".split("\n")) + "\n"
+
+
+def test_report(tmp_path: Path) -> None:
+    """Measures are printed with their cycles and limits; the page, the numbers and a figure per result are written."""
+    done = armwright(
+        "iso9283", POSES, PATHS, "-o", tmp_path / "out", "--limit", "RP=0.05mm", "--limit", "AT=0.2mm", columns=110
+    )
+
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    written = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"report.html", "measures.json", "01-pose.svg", "05-path.svg", "07-cornering.svg"} <= written
+    rows = {line.split()[0]: line for line in done.stdout.split("\n") if line.strip()}
+    assert "exceeds" in rows["RP"]
+    assert "holds" in rows["AT"]
+    assert "planar reduction: settling P1, path line, cornering square measured in a plane" in done.stdout
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.count("<img ") == len(written) - 2
+    assert "http" not in page.replace("http-equiv", "")
+    assert "limit exceeded" in page
+
+
+def test_json() -> None:
+    """JSON has every measure in SI units, with cycles and limit."""
+    done = armwright("iso9283", POSES, "--limit", "RP=0.08 mm", "--json")
+
+    found = json.loads(done.stdout)
+    first = next(one for one in found["measures"] if one["symbol"] == "RP")
+    assert (first["unit"], first["cycles"], first["few"], first["holds"]) == ("m", 30, False, True)
+    assert first["limit"] == pytest.approx(8e-5)
+    assert not found["planar"]
+
+
+def test_the_page_of_the_format(tmp_path: Path) -> None:
+    """The file on the page is read; its two cycles are too few, and with --few it is said how many there are."""
+    path = tmp_path / "today.csv"
+    path.write_text(page_example(), encoding="utf-8")
+
+    refused, taken = armwright("iso9283", path), armwright("iso9283", path, "--few")
+
+    assert refused.returncode == 1
+    assert refused.stderr == "armwright: pose P1: ISO 9283 asks for 30 cycles, got 2; --few takes fewer\n"
+    assert taken.returncode == 0, taken.stderr
+    assert "2 of 30" in taken.stdout
+    assert "fewer cycles than ISO 9283 asks for" in taken.stdout
+    # On average 0.1315, 0.0385 and 0.097 mm off.
+    assert "0.1679" in taken.stdout
+
+
+SLIPS = [
+    ("y_mm", "y_m"),
+    ("x_mm", "x"),
+    (",", ";"),
+    ("400.129", '"400,129"'),
+    ("P1,2,", "P1,1,"),
+    ("commanded,400,0,300", "commanded,0.4,0,0.3"),
+]
+
+
+@pytest.mark.parametrize("slip", range(len(SLIPS)))
+def test_mistakes_of_the_page(slip: int, tmp_path: Path) -> None:
+    """The messages on the page are what these slips are answered with, but for their line."""
+    path = tmp_path / "today.csv"
+    path.write_text(page_example().replace(*SLIPS[slip]), encoding="utf-8")
+
+    done = armwright("iso9283", "today.csv", cwd=tmp_path)
+
+    assert done.returncode == 1
+    said = done.stderr.removeprefix("armwright: ").strip()
+    assert f"`{said}`" in DOCS
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "said"),
+    [
+        ((EXAMPLES / "measured_pose.csv",), 1, "no such file; did you mean"),
+        ((POSES, "--limit", "RP=0.05"), 2, "RP is in mm: RP=0.05mm, got ''"),
+        ((POSES, "--limit", "RP=0.05m"), 2, "RP is in mm: RP=0.05mm, got 'm'"),
+        ((POSES, "--limit", "RP"), 2, "expected a symbol and a number with its unit, RP=0.05mm, got RP"),
+        ((POSES, "--limit", "RQ=1mm"), 1, "no measure 'RQ'"),
+        ((POSES, "--band-mm", "0"), 2, "expected a number above 0, got 0"),
+        ((PATHS,), 1, "settling P1: no band is given, and no test of pose P1 is there"),
+        ((), 2, "Missing argument"),
+    ],
+)
+def test_mistakes(arguments: tuple[Any, ...], status: int, said: str) -> None:
+    """A mistake gets one message that says what to do, and no traceback."""
+    done = armwright("iso9283", *arguments, columns=200)
+
+    assert done.returncode == status
+    assert said in " ".join(done.stderr.split())
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,97 @@
+"""The page and the figures of an assessment by ISO 9283."""
+
+import html
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.accuracy.assess import Assessment, assess
+from armwright.accuracy.measurements import read_measurements
+from armwright.report.accuracy_figures import drawings
+from armwright.report.accuracy_page import accuracy_page, notes_of, shown_measure
+
+NAME = r"P<1>&$\x$"
+
+
+@pytest.fixture
+def everything(tmp_path: Path, rng: np.random.Generator) -> Assessment:
+    """One test of every kind, in a plane and in space; the name of the pose is fit neither for HTML nor for figures."""
+    noise = iter(rng.normal(scale=0.02, size=10_000))
+
+    def place(x: float, y: float) -> str:
+        return f"{x + next(noise):.5f},{y + next(noise):.5f},{next(noise):.5f}"
+
+    poses = ["test,pose,direction,robot,t_h,load_n,cycle,x_mm,y_mm,z_mm"]
+    for kind, name in (("pose", NAME), ("distance", "A"), ("distance", "B"), ("drift", NAME)):
+        x = 400 if name == "B" else 300
+        poses.append(f"{kind},{name},,,,,commanded,{x},0,0")
+        for t in (0, 1, 8) if kind == "drift" else ("",):
+            poses += [f"{kind},{name},,,{t},,{c},{place(x + 0.1 * (t or 0), 0)}" for c in range(1, 11)]
+    poses += [f"multidirectional,{NAME},{d},,,,{c},{place(300, d / 10)}" for d in (1, 2, 3) for c in range(1, 11)]
+    poses += [f"exchangeability,{NAME},,r{r},,,{c},{place(300, r / 5)}" for r in range(5) for c in range(1, 11)]
+    poses += [
+        f"compliance,{NAME},+y,,,{load},{c},{place(300, load / 50)}" for load in range(0, 110, 10) for c in (1, 2)
+    ]
+    paths = ["test,path,cycle,t_s,speed_mm_per_s,x_mm,y_mm"]
+    corners = {"path": ((0, 0), (200, 0)), "cornering": ((0, 0), (200, 0), (200, 200))}
+    zigzag = [(2.5 * k, (0, 5, 0, -5)[k % 4]) for k in range(41)]
+    for kind, path in (*corners.items(), ("weaving", zigzag)):
+        paths += [f"{kind},L,commanded,,{'' if kind == 'cornering' else 100},{x},{y}" for x, y in path]
+        for c in (1, 2, 3):
+            parts = np.linspace(0, len(path) - 1, 161)
+            x, y = (np.interp(parts, range(len(path)), axis) + 0.1 * c for axis in np.array(path).T)
+            paths += [f"{kind},L,{c},{k / 80},,{x[k]:.4f},{y[k]:.4f}" for k in range(161)]
+    for kind in ("settling", "posing"):
+        for c in (1, 2, 3):
+            t = np.linspace(0, 1, 101)
+            x = 300 - 100 * np.exp(-15 * t) * np.cos(30 * t + 0.1 * c) * (t > 0.02) - 100 * (t <= 0.02)
+            paths += [f"{kind},{NAME},{c},{t[k]},,{x[k]:.4f},0" for k in range(101)]
+    files = [tmp_path / "poses.csv", tmp_path / "paths.csv"]
+    for file, lines in zip(files, (poses, paths), strict=True):
+        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return assess(read_measurements(files), few=True, band=0.5e-3)
+
+
+def test_every_measure_is_drawn(everything: Assessment) -> None:
+    """Every kind of test has its figure, each with words about it; a distance is numbers only."""
+    drawn = drawings(everything)
+
+    kinds = {one.name.partition("-")[2] for one in drawn}
+    assert kinds == {test.kind for test in everything.tests} - {"distance"} | {"velocity"}
+    assert len({one.name for one in drawn}) == len(drawn)
+    assert all(one.svg.startswith("<?xml") and len(one.caption) > 20 for one in drawn)
+
+
+def test_symbols(everything: Assessment) -> None:
+    """All measures of the standard are there."""
+    symbols = {one.symbol for one in everything.measures}
+
+    expected = "AP RP vAP AD RD t OV TP dAP dRP E AT RT AV RV FV CR CO SPL C WS WF"
+    assert set(expected.split()) <= symbols
+
+
+def test_page(everything: Assessment) -> None:
+    """The page has a row per measure and says what was reduced; no name on it can be taken for HTML."""
+    page = accuracy_page(everything, drawings(everything), title="A & B", command="armwright iso9283 <x>")
+
+    assert page.count("<tr") == 1 + len(everything.measures)
+    assert "<1>" not in page
+    assert r"P&lt;1&gt;&amp;$\x$" in page
+    assert "A &amp; B" in page
+    assert "armwright iso9283 &lt;x&gt;" in page
+    assert all(html.escape(note) in page for note in notes_of(everything))
+    assert notes_of(everything)[0].startswith("planar reduction: path L, cornering L, weaving L, settling P<1>&")
+
+
+def test_units_for_people(everything: Assessment) -> None:
+    """People read millimetres, degrees and percent, plus and minus where it is one, and how many cycles were asked."""
+    by_symbol = {one.symbol: one for one in everything.within({"RV": 0.5, "RD": 1e-9}).measures}
+
+    assert shown_measure(by_symbol["C"]).unit == "mm/N"
+    assert float(shown_measure(by_symbol["C"]).value) == pytest.approx(0.02, rel=0.02)
+    assert shown_measure(by_symbol["RV"]).value.startswith("± ")
+    assert (shown_measure(by_symbol["RV"]).limit, shown_measure(by_symbol["RV"]).verdict) == ("50", "holds")
+    assert shown_measure(by_symbol["RD"]).verdict == "exceeds"
+    assert shown_measure(by_symbol["RP"]).cycles == "10 of 30"
+    assert shown_measure(by_symbol["t"]).cycles == "3"
