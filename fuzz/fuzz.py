@@ -3,8 +3,9 @@
 Targets are `tokens` (the lexer), `tree` (lexer and parser), `program` (lexer, parser, checker, flow and translator),
 all three in both languages, `format` (the formatter on what has no errors), `cell` (cell files, TOML and JSON) and
 `code` (the text form of intermediate code).
-An input fails when anything but the reader's own error is raised, when it takes more than a second, or when memory
-grows beyond 2 GB. Inputs that reach new code are kept in `out/fuzz/TARGET`; a run without limits goes on from them.
+An input fails when anything but the reader's own error is raised, when it takes more than a second (three under the
+watch, which slows everything down), or when memory grows beyond 2 GB. Inputs that reach new code are kept in
+`out/fuzz/TARGET`; a run without limits goes on from them.
 """
 
 import contextlib
@@ -149,7 +150,7 @@ def main() -> None:
     name = sys.argv[1]
     test = TARGETS[name]
     folder = seeds(name)
-    options = ["-timeout=1", "-rss_limit_mb=2048", "-max_len=4096", f"-dict={dictionary()}", "-print_final_stats=1"]
+    options = ["-timeout=3", "-rss_limit_mb=2048", "-max_len=4096", f"-dict={dictionary()}", "-print_final_stats=1"]
     atheris.Setup([sys.argv[0], *options, f"-artifact_prefix={KEPT}/{name}-", *sys.argv[2:], str(folder)], test)
     atheris.Fuzz()
 

@@ -175,18 +175,70 @@ def emit(
     code = _Code(graph, flat, [_node(graph, x) for x in positive], [x.node for row in lists for x in row])
     operations = operation_count(graph, flat)
     door = _Door(tuple(taken.values()), given, tuple(flags))
-    head = _HEAD.format(title=title, count=sum(operations.values()))
+    top = head(title, sum(operations.values()))
     helpers = "".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations))
     return Emitted(
         title=title,
-        rows=head + helpers + _rows_source(code, door),
-        one=head + helpers + _one_source(code, door),
+        rows=top + helpers + _rows_source(code, door),
+        one=top + helpers + _one_source(code, door),
         inputs=taken,
         outputs=given,
         flags=tuple(flags),
         operations=operations,
         joined=len(code.joined),
     )
+
+
+@attrs.frozen(kw_only=True)
+class Stretch:
+    """Straight-line code that other loops take in: for ``LANES`` configurations side by side.
+
+    Attributes:
+        lines: assignments for lane ``k``, that read ``x[row * LANES + k]`` and write ``y[row * LANES + k]``.
+        helpers: source of the functions that they call.
+        inputs: how many rows are read.
+        outputs: how many rows are written.
+        operations: how many of each kind, per configuration.
+    """
+
+    lines: str
+    helpers: str
+    inputs: int
+    outputs: int
+    operations: dict[str, int]
+
+
+def stretch(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: int) -> Stretch:
+    """Trace an equation for a loop of the caller's.
+
+    Args:
+        equation: takes a list of scalars, returns another.
+        inputs: how many scalars it takes.
+    """
+    graph = Graph()
+    given = graph.inputs(inputs)
+    outputs = [_node(graph, x) for x in equation(list(given))]
+    code = _Code(graph, outputs, [], [])
+    operations = operation_count(graph, outputs)
+    load = [f"x[{row} * {LANES} + k]" for row in range(inputs)]
+    store = [f"y[{row} * {LANES} + k] = {{}}" for row in range(len(outputs))]
+    return Stretch(
+        lines=code.lines(load, store, watched=False),
+        helpers="".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations)),
+        inputs=inputs,
+        outputs=len(outputs),
+        operations=operations,
+    )
+
+
+def head(title: str, count: int) -> str:
+    """Return the first lines of an emitted source.
+
+    Args:
+        title: what it computes, in words.
+        count: operations per configuration.
+    """
+    return _HEAD.format(title=title, count=count)
 
 
 _HELPERS = {"sine_cosine": {"sin", "cos"}, "arc_tangent": {"atan2"}}
@@ -252,12 +304,13 @@ class _Code:
         self.joined = fused(graph, self._order, asked)
         self._gone = set(self.joined.values())
 
-    def lines(self, load: Sequence[str], store: Sequence[str]) -> str:
+    def lines(self, load: Sequence[str], store: Sequence[str], *, watched: bool = True) -> str:
         """Write one assignment per node, and whether the inputs can be trusted.
 
         Args:
             load: where each input comes from.
             store: the statement that takes each output, with a gap for its name.
+            watched: whether to say if the inputs can be trusted.
         """
         lines: list[str] = []
         names: dict[int, str] = {}
@@ -280,6 +333,8 @@ class _Code:
             elif i not in self._gone:
                 lines.append(f"v{i} = {_INFIX[node.op].format(*(names[j] for j in node.operands))}")
         lines += [place.format(names[node]) for place, node in zip(store, self._outputs, strict=True)]
+        if not watched:
+            return "\n".join(lines)
         # Not a number where an input is none; a condition that fails makes it none.
         lines += [f"trust = {' + '.join(names[i] for i in self._inputs)}", "trust = trust - trust"]
         lines += [f"trust = trust if {names[i]} > 0.0 else np.nan" for i in self._positive]

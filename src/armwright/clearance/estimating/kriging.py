@@ -1,0 +1,207 @@
+"""What features say of clearances, learnt from simulations: one Gaussian process per feature.
+
+Source:
+    Thesis, 4.5.3 (Kriging); spec of the clearance, 4.2 and 4.4. Anisotropic squared exponential, with a noise of its
+    own: what impacts leave to chance is noise to a smooth surface.
+"""
+
+import warnings
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+from scipy.linalg import cho_solve
+from scipy.optimize import least_squares
+
+from armwright.arrays import Array, ArrayLike, floats
+from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
+
+# Lengths over which a feature may change, as part of the range of a parameter.
+_LENGTHS = (0.1, 30.0)
+_NOISE = (1e-12, 1e-1)
+# From so many points the surface of a feature is learnt; more cost time with their cube.
+MOST_POINTS = 300
+_STARTS = 12
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Process:
+    """A fitted Gaussian process over the unit cube.
+
+    Attributes:
+        x: (m, k) what it was learnt from.
+        lengths: (k,) over which it changes.
+        amplitude: variance of the smooth part.
+        noise: variance of what chance adds.
+        weights: (m,) of the points.
+        inverse: (m, m) of their covariance.
+        mean: of what was learnt.
+        scale: its deviation, by which all the above is divided.
+    """
+
+    x: Array
+    lengths: Array
+    amplitude: float
+    noise: float
+    weights: Array
+    inverse: Array
+    mean: float
+    scale: float
+
+    def predict(self, unit: Array) -> tuple[Array, Array]:
+        """Return mean and standard deviation (q,) at points (q, k)."""
+        a, b = unit / self.lengths, self.x / self.lengths
+        apart = (a**2).sum(axis=-1)[:, None] + (b**2).sum(axis=-1) - 2 * a @ b.T
+        near = self.amplitude * np.exp(-0.5 * np.maximum(apart, 0.0))
+        left = self.amplitude + self.noise - ((near @ self.inverse) * near).sum(axis=-1)
+        deviation = np.sqrt(np.maximum(left, 0.0))
+        return self.mean + self.scale * (near @ self.weights), np.asarray(self.scale * deviation, dtype=np.float64)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Surrogate:
+    """The features of a linkage as smooth functions of its parameters.
+
+    Attributes:
+        parameters: k names.
+        features: f names.
+        lower: (k,) of the range that was learnt.
+        upper: (k,).
+        processes: one per feature.
+    """
+
+    parameters: tuple[str, ...]
+    features: tuple[str, ...]
+    lower: Array
+    upper: Array
+    processes: tuple[Process, ...]
+
+    def predict(self, points: ArrayLike) -> tuple[Array, Array]:
+        """Return features (m, f) at points (m, k), and their standard deviations.
+
+        The deviation is that of the surface, and of what chance adds to a single run.
+        """
+        unit = (floats(points, "points") - self.lower) / (self.upper - self.lower)
+        found = [process.predict(unit) for process in self.processes]
+        return np.stack([mean for mean, _ in found], axis=-1), np.stack([std for _, std in found], axis=-1)
+
+    def chosen(self, names: Sequence[str]) -> "Surrogate":
+        """Return the surrogate of some of the features."""
+        numbers = [self.features.index(name) for name in names]
+        return attrs.evolve(self, features=tuple(names), processes=tuple(self.processes[i] for i in numbers))
+
+
+def learn(
+    parameters: Sequence[str],
+    points: ArrayLike,
+    features: Sequence[str],
+    values: ArrayLike,
+    *,
+    seed: int = 0,
+    restarts: int = 0,
+    progress: Callable[[str], None] | None = None,
+) -> Surrogate:
+    """Learn features from simulations.
+
+    Args:
+        parameters: k names.
+        points: (m, k) at which was simulated; those that came to nothing (NaN) are left out.
+        features: f names.
+        values: (m, f) what came of it.
+        seed: which points are taken where there are more than ``MOST_POINTS``.
+        restarts: how often the lengths are sought again from another start.
+        progress: told the name of each feature before it is learnt.
+
+    Raises:
+        MissingExtraError: scikit-learn is not installed.
+        ShapeError: the tables do not fit together.
+        InvalidValueError: there are too few points, or a parameter does not vary.
+    """
+    x, y = floats(points, "points"), np.asarray(values, dtype=np.float64)
+    if x.ndim != 2 or y.shape != (len(x), len(features)) or x.shape[1] != len(parameters):
+        raise ShapeError(
+            f"expected (m, {len(parameters)}) points and (m, {len(features)}) values, got {x.shape} and {y.shape}"
+        )
+    kept = np.flatnonzero(np.all(np.isfinite(y), axis=-1))
+    if len(kept) < 4 * (len(parameters) + 1):
+        raise InvalidValueError(
+            f"points: expected {4 * (len(parameters) + 1)} or more that ended well, got {len(kept)}"
+        )
+    if len(kept) > MOST_POINTS:
+        kept = np.sort(np.random.default_rng(seed).choice(kept, MOST_POINTS, replace=False))
+    lower, upper = x[kept].min(axis=0), x[kept].max(axis=0)
+    for name, low, high in zip(parameters, lower, upper, strict=True):
+        if not low < high:
+            raise InvalidValueError(f"parameter {name} does not vary: it is {low:g} in every run")
+    unit = (x[kept] - lower) / (upper - lower)
+    processes = []
+    for i, name in enumerate(features):
+        if progress is not None:
+            progress(name)
+        processes.append(_fitted(unit, y[kept, i], seed, restarts))
+    return Surrogate(
+        parameters=tuple(parameters), features=tuple(features), lower=lower, upper=upper, processes=tuple(processes)
+    )
+
+
+def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | None = None) -> Array:
+    """Return the parameters (k,) whose features come nearest to those seen: the thesis' way.
+
+    Args:
+        surrogate: with f features.
+        seen: (f,) features.
+        weights: (f,) standard deviations by which to compare; those of the surrogate when left out.
+
+    Raises:
+        ShapeError: the features are not f.
+    """
+    goal = floats(seen, "seen")
+    if goal.shape != (len(surrogate.features),):
+        raise ShapeError(f"seen: expected {len(surrogate.features)} features, got shape {goal.shape}")
+    width = surrogate.upper - surrogate.lower
+    middle = (surrogate.lower + surrogate.upper)[None] / 2
+    scale = surrogate.predict(middle)[1][0] if weights is None else floats(weights, "weights")
+
+    def missing(unit: Array) -> Array:
+        mean, _ = surrogate.predict((surrogate.lower + unit * width)[None])
+        return np.asarray((mean[0] - goal) / scale, dtype=np.float64)
+
+    rng = np.random.default_rng(0)
+    starts = rng.random((_STARTS * 40, len(width)))
+    means, _ = surrogate.predict(surrogate.lower + starts * width)
+    order = np.argsort((((means - goal) / scale) ** 2).sum(axis=-1))
+    found = [least_squares(missing, starts[i], bounds=(0.0, 1.0), xtol=1e-12) for i in order[:3]]
+    best = min(found, key=lambda one: float(one.cost))
+    return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)
+
+
+def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
+    try:
+        from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
+        from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
+        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
+        from threadpoolctl import threadpool_limits  # noqa: PLC0415 - comes with scikit-learn
+    except ImportError as error:
+        raise MissingExtraError(
+            'learning from simulations needs scikit-learn: pip install "armwright[clearance]"'
+        ) from error
+    kernel = ConstantKernel(10.0, (1e-2, 1e5)) * RBF([1.0] * unit.shape[1], _LENGTHS) + WhiteKernel(1e-5, _NOISE)
+    # Scaled here, so that the way back is ours too.
+    mean, scale = float(y.mean()), float(y.std()) or 1.0
+    process = GaussianProcessRegressor(kernel, n_restarts_optimizer=restarts, random_state=seed)
+    # The matrices are so small that several cores only wait for one another.
+    with warnings.catch_warnings(), threadpool_limits(1):
+        # A length at its bound is a feature that hardly depends on a parameter.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        process.fit(unit, (y - mean) / scale)
+    smooth, chance = process.kernel_.k1, process.kernel_.k2
+    return Process(
+        x=unit,
+        lengths=np.array(smooth.k2.length_scale, dtype=np.float64),
+        amplitude=float(smooth.k1.constant_value),
+        noise=float(chance.noise_level),
+        weights=np.array(process.alpha_, dtype=np.float64),
+        inverse=np.asarray(cho_solve((process.L_, True), np.eye(len(unit))), dtype=np.float64),
+        mean=mean,
+        scale=scale,
+    )

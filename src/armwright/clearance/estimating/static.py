@@ -1,0 +1,183 @@
+"""Clearances from where the tip rests: each journal leans on its wall, and the tip shows it.
+
+At rest the gap of a pin is its clearance in the direction of the force it carries, so the offset of the tip is nearly
+linear in the clearances: offset = B c. A few poses give more equations than there are clearances. The little that is
+not linear, and the give of the walls, is put right by working the rest out and looking again.
+
+Source:
+    Spec of the clearance, 4.3.
+"""
+
+from collections.abc import Iterable
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, ArrayLike, floats
+from armwright.clearance.ideal import closed, ideal_motion, sensitivity, tip_of
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.preparing import assembled
+from armwright.clearance.rest import at_rest
+from armwright.clearance.settings import contact_stiffness
+from armwright.errors import InvalidValueError, ShapeError
+
+_MOST_ROUNDS = 12
+# The rounds end when no clearance changes by more [m].
+_SETTLED = 1e-12
+# No clearance is taken for smaller while it is sought: contact needs one [m].
+_SMALLEST = 1e-7
+# A clearance is told when its standard deviation is below this part of the range it may lie in.
+_TOLD = 0.1
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Estimate:
+    """Clearances, and how well they are known.
+
+    Attributes:
+        names: of the parameters, p of them.
+        values: (p,) clearances [m].
+        covariance: (p, p) [m²].
+        singular_values: of the equations, largest first; how the offset grows with the best and worst told mixture.
+        residual: root mean square of what is left [m].
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    singular_values: Array
+    residual: float
+
+    @property
+    def deviations(self) -> Array:
+        """(p,) standard deviations [m]."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
+
+    @property
+    def correlation(self) -> Array:
+        """(p, p) correlation of the parameters."""
+        return np.asarray(self.covariance / np.outer(self.deviations, self.deviations), dtype=np.float64)
+
+    def interval(self, level: float = 0.9) -> Array:
+        """Return (p, 2) in which each clearance lies with a probability [m]."""
+        if not 0 < level < 1:
+            raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level:g}")
+        from scipy.stats import norm  # noqa: PLC0415 - a slow import
+
+        half = norm.ppf(0.5 + level / 2) * self.deviations
+        return np.stack([self.values - half, self.values + half], axis=-1)
+
+    def identifiable(self, width: float) -> tuple[bool, ...]:
+        """Whether each clearance is told: its deviation is small beside the range in which it may lie [m]."""
+        return tuple(bool(one < _TOLD * width) for one in self.deviations)
+
+
+def rest_matrix(linkage: Linkage, poses: ArrayLike) -> Array:
+    """Return B: how the resting tip shifts with the clearances.
+
+    Args:
+        linkage: with p pins.
+        poses: (k, 2) places of its tip without play [m].
+
+    Returns:
+        (k, 2, p) shift by clearance.
+    """
+    q = _posed(linkage, poses)
+    still = np.zeros((len(q), 2))
+    reactions = ideal_motion(linkage, q, still, still, by_tip=True).reactions
+    direction = reactions / np.linalg.norm(reactions, axis=-1, keepdims=True)
+    return np.asarray(np.einsum("kapb,kpb->kap", sensitivity(linkage, q), direction), dtype=np.float64)
+
+
+def rest_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike) -> Array:
+    """Return (..., k, 2) by how much the resting tip is off [m].
+
+    Args:
+        linkage: with p pins.
+        poses: (k, 2) places of its tip without play [m].
+        clearances: (..., p) [m].
+    """
+    q = _posed(linkage, poses)
+    c = floats(clearances, "clearances")[..., None, :]
+    return np.asarray(at_rest(linkage, q, c, contact_stiffness(linkage, c)).tip - tip_of(linkage, q), dtype=np.float64)
+
+
+def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noise: float = 1e-6) -> Estimate:
+    """Return the clearances that put the resting tip where it was seen.
+
+    Args:
+        linkage: with p pins.
+        poses: (k, 2) places of its tip without play [m].
+        offsets: (k, 2) by how much it was off there [m].
+        noise: standard deviation of a coordinate of an offset [m].
+
+    Raises:
+        ShapeError: poses and offsets do not fit.
+        InvalidValueError: the poses do not tell all clearances.
+    """
+    places, seen = floats(poses, "poses"), floats(offsets, "offsets")
+    if places.ndim != 2 or places.shape[1] != 2 or seen.shape != places.shape:
+        raise ShapeError(f"expected (k, 2) poses and offsets, got shapes {places.shape} and {seen.shape}")
+    if not noise > 0:
+        raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
+    names = tuple(linkage.clearances)
+    B = rest_matrix(linkage, places).reshape(-1, len(names))
+    singular = np.linalg.svd(B, compute_uv=False)
+    if len(singular) < len(names) or singular[-1] < 1e-6 * singular[0]:
+        raise InvalidValueError(
+            f"{len(places)} poses do not tell {len(names)} clearances from one another; take more, or others"
+        )
+    c = np.maximum(np.linalg.lstsq(B, seen.ravel(), rcond=None)[0], _SMALLEST)
+    for _ in range(_MOST_ROUNDS):
+        missing = (seen - rest_offsets(linkage, places, c)).ravel()
+        new = np.maximum(c + np.linalg.lstsq(B, missing, rcond=None)[0], _SMALLEST)
+        done = np.abs(new - c).max() < _SETTLED
+        c = new
+        if done:
+            break
+    missing = seen - rest_offsets(linkage, places, c)
+    return Estimate(
+        names=names,
+        values=np.asarray(c, dtype=np.float64),
+        covariance=np.asarray(noise**2 * np.linalg.inv(B.T @ B), dtype=np.float64),
+        singular_values=np.asarray(singular, dtype=np.float64),
+        residual=float(np.sqrt(np.mean(missing**2))),
+    )
+
+
+def best_poses(linkage: Linkage, candidates: ArrayLike, count: int) -> list[int]:
+    """Return the numbers of the poses that tell most about all clearances together: D-optimal, taken one by one.
+
+    Args:
+        linkage: with p pins.
+        candidates: (k, 2) places of its tip [m].
+        count: how many to take.
+
+    Raises:
+        InvalidValueError: there are not so many.
+    """
+    places = floats(candidates, "candidates")
+    if not 0 < count <= len(places):
+        raise InvalidValueError(f"count: expected 1 to {len(places)} poses, got {count}")
+    B = rest_matrix(linkage, places)
+    information = 1e-9 * np.eye(B.shape[-1])
+    taken: list[int] = []
+    for _ in range(count):
+        gains = [_gain(information, B[k]) if k not in taken else -np.inf for k in range(len(places))]
+        taken.append(int(np.argmax(gains)))
+        information = information + B[taken[-1]].T @ B[taken[-1]]
+    return taken
+
+
+def _gain(information: Array, rows: Array) -> float:
+    return float(np.linalg.slogdet(information + rows.T @ rows)[1])
+
+
+def _posed(linkage: Linkage, poses: ArrayLike) -> Array:
+    """Return (k, n) closed coordinates with the tip at each pose, each from the one before."""
+    places: Iterable[Array] = floats(poses, "poses").reshape(-1, 2)
+    guess, found = assembled(linkage), []
+    for place in places:
+        guess = closed(linkage, guess, tip=place)
+        found.append(guess)
+    return np.array(found)

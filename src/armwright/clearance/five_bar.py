@@ -1,0 +1,395 @@
+"""The five-bar without play in closed form: where its links stand for a place of the tip, and the other way round.
+
+Two motors turn two cranks; a rod hangs on each, and a pin, the tip, joins the rods. As in the thesis the links are
+numbered from left to right, crank 1, rod 2, rod 3, crank 4, and their angles are measured from the downward vertical,
+counter-clockwise positive: a link points along u = (sin θ, -cos θ).
+
+Source:
+    Thesis eq. (3.8)-(3.12), with the corrections of docs/errata.md.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats
+from armwright.clearance.five_bar_parts import parts_of
+from armwright.clearance.linkage import Linkage, not_negative
+from armwright.clearance.placement import Pair
+from armwright.errors import InvalidValueError, ShapeError, one_of
+from armwright.tracing.scalar import Scalar, atan2, cos, sin, sqrt
+
+# Where the elbows are, seen with the tip below the motors: both outside, as in the thesis, or both inside, or both to
+# one side. It never changes while no arm is stretched or folded.
+Mode: TypeAlias = Literal["out", "left", "right", "in"]
+# Where the tip is, seen from the line that goes from the left elbow to the right one.
+Assembly: TypeAlias = Literal["below", "above"]
+
+# Signs of sin(θ2 - θ1) and sin(θ3 - θ4).
+MODES: Mapping[Mode, tuple[float, float]] = {
+    "out": (1.0, -1.0),
+    "left": (1.0, 1.0),
+    "right": (-1.0, -1.0),
+    "in": (-1.0, 1.0),
+}
+ASSEMBLIES: Mapping[Assembly, float] = {"below": -1.0, "above": 1.0}
+SIDES = ("left", "right")
+# A place so little out of reach is in reach but for rounding [m]; on the border rounding bends an elbow so little.
+_ROUNDING, _STRAIGHT = 1e-12, 1e-7
+
+
+def _lengths(value: ArrayLike) -> Array:
+    lengths = exactly(value, (2,), "lengths", LARGEST)
+    for length in lengths:
+        not_negative(length, "length of a link", zero=False)
+    return lengths
+
+
+def _motors(value: ArrayLike) -> Array:
+    return exactly(value, (2, 2), "motors", LARGEST)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class FiveBar:
+    """A five-bar without play.
+
+    Attributes:
+        motors: (2, 2) where the left and the right motor stand [m].
+        cranks: (2,) lengths of links 1 and 4 [m].
+        rods: (2,) lengths of links 2 and 3 [m].
+    """
+
+    motors: Array = attrs.field(converter=_motors)
+    cranks: Array = attrs.field(converter=_lengths)
+    rods: Array = attrs.field(converter=_lengths)
+
+    @classmethod
+    def symmetric(cls, half_width: float, crank: float, rod: float) -> "FiveBar":
+        """Return a five-bar with equal arms and its motors at (∓half_width, 0).
+
+        Args:
+            half_width: half the distance of the motors [m].
+            crank: length of the cranks [m].
+            rod: length of the rods [m].
+        """
+        return cls(motors=[[-half_width, 0.0], [half_width, 0.0]], cranks=[crank, crank], rods=[rod, rod])
+
+    @classmethod
+    def of(cls, linkage: Linkage) -> "FiveBar":
+        """Return the five-bar that a linkage is when its play is left aside.
+
+        Args:
+            linkage: four bodies and the ground in one loop of pins, with or without play; the motors turn the two
+                bodies on the ground, and the tip is the pin that joins the other two.
+
+        Raises:
+            InvalidValueError: it is no five-bar; the text says why.
+        """
+        parts = parts_of(linkage)
+        lengths = [part.length for part in parts.links]
+        return cls(motors=parts.motors, cranks=[lengths[0], lengths[3]], rods=lengths[1:3])
+
+    @property
+    def half_width(self) -> float:
+        """Half the distance of the motors [m]."""
+        return float(np.linalg.norm(self.motors[1] - self.motors[0])) / 2
+
+    @property
+    def reaches(self) -> Array:
+        """(2, 2) how near to its motor and how far from it each arm brings the tip, left and right [m]."""
+        return np.stack([np.abs(self.cranks - self.rods), self.cranks + self.rods], axis=-1)
+
+
+# ---- over abstract scalars -----------------------------------------------------------------------------------------
+
+
+class ArmAngles(NamedTuple):
+    """Angles of one arm [rad]."""
+
+    crank: Scalar
+    rod: Scalar
+
+
+def direction(angle: Scalar) -> Pair:
+    """Return u = (sin θ, -cos θ), along which a link points."""
+    return Pair(sin(angle), -cos(angle))
+
+
+def arm_angles(reach: Pair, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngles:
+    """Return the angles at which an arm of two links spans from its motor to a place.
+
+    Args:
+        reach: from the motor to the place [m].
+        crank: length [m].
+        rod: length [m].
+        sign: of sin(rod - crank), 1 or -1: on which side the elbow is.
+    """
+    square = reach.dot(reach)
+    along = 0.5 * ((crank * crank - rod * rod) / square + 1.0)
+    across = -sign * sqrt(crank * crank / square - along * along)
+    elbow = reach.times(along).plus(reach.turned().times(across))
+    rest = reach.minus(elbow)
+    return ArmAngles(atan2(elbow.x, -elbow.y), atan2(rest.x, -rest.y))
+
+
+def joined_at(elbows: tuple[Pair, Pair], rods: tuple[Scalar, Scalar], sign: Scalar) -> Pair:
+    """Return where two rods meet.
+
+    Args:
+        elbows: where they begin, left and right [m].
+        rods: their lengths [m].
+        sign: -1 for the place on the right of the way from the left elbow to the right one, below it, or 1.
+    """
+    base = elbows[1].minus(elbows[0])
+    square = base.dot(base)
+    along = 0.5 * ((rods[0] * rods[0] - rods[1] * rods[1]) / square + 1.0)
+    across = sign * sqrt(rods[0] * rods[0] / square - along * along)
+    return elbows[0].plus(base.times(along)).plus(base.turned().times(across))
+
+
+def arm_rates(angles: ArmAngles, crank: Scalar, rod: Scalar, target: Pair) -> ArmAngles:
+    """Return the rates ω of an arm for which crank ω1 u1' + rod ω2 u2' is a target, with u' = (cos θ, sin θ).
+
+    Args:
+        angles: of the arm [rad].
+        crank: length [m].
+        rod: length [m].
+        target: velocity of the tip [m/s]; or its acceleration without the centripetal part [m/s²].
+
+    Source:
+        Thesis eq. (3.11), (3.12): two systems of two equations, with determinant crank · rod · sin(θ2 - θ1).
+    """
+    turn = sin(angles.rod - angles.crank)
+    rod_way, crank_way = direction(angles.rod), direction(angles.crank)
+    return ArmAngles(rod_way.dot(target) / (crank * turn), -crank_way.dot(target) / (rod * turn))
+
+
+def centripetal(angles: ArmAngles, rates: ArmAngles, crank: Scalar, rod: Scalar) -> Pair:
+    """Return the acceleration that the tip of an arm has at constant rates [m/s²]; arguments as of ``arm_rates``."""
+    parts = (direction(angles.crank).times(crank * rates.crank * rates.crank),
+             direction(angles.rod).times(rod * rates.rod * rates.rod))  # fmt: skip
+    return parts[0].plus(parts[1]).times(-1.0)
+
+
+# ---- for batches ---------------------------------------------------------------------------------------------------
+
+
+def inverse(bar: FiveBar, tip: ArrayLike, mode: Mode = "out") -> Array:
+    """Return the angles of the links for places of the tip.
+
+    Args:
+        bar: the five-bar.
+        tip: (..., 2) where its tip is to be [m].
+        mode: where its elbows are.
+
+    Returns:
+        (..., 4) angles θ1 to θ4 from the downward vertical [rad], in (-π, π].
+
+    Raises:
+        InvalidValueError: a place is out of reach; the text says by how much and of which arm.
+        UnknownNameError: there is no such mode.
+
+    Source:
+        Thesis eq. (3.8).
+    """
+    signs = MODES[one_of("assembly mode", mode, MODES)]  # type: ignore[index]
+    places = places_of(tip, "tip")
+    _check_reach(bar, places)
+    found: list[Array] = []
+    for motor, crank, rod, sign in zip(bar.motors, bar.cranks, bar.rods, signs, strict=True):
+        found += arm_angles(_pair(places - motor), float(crank), float(rod), sign)
+    return np.stack([found[0], found[1], found[3], found[2]], axis=-1)
+
+
+def inverse_all(bar: FiveBar, tip: ArrayLike) -> dict[Mode, Array]:
+    """Return the angles for places of the tip in all four modes; arguments and errors as of ``inverse``."""
+    return {mode: inverse(bar, tip, mode) for mode in MODES}
+
+
+def forward(bar: FiveBar, cranks: ArrayLike, assembly: Assembly = "below") -> tuple[Array, Array]:
+    """Return where the tip is, and the angles of all links, for angles of the cranks.
+
+    Args:
+        bar: the five-bar.
+        cranks: (..., 2) angles θ1, θ4 [rad].
+        assembly: on which side of the line through the elbows the tip is.
+
+    Returns:
+        (..., 2) places of the tip [m], and (..., 4) angles θ1 to θ4 [rad].
+
+    Raises:
+        InvalidValueError: the rods do not meet: the elbows are too far from one another, or too near; or they fall
+            together, and equal rods may stand anywhere.
+        UnknownNameError: there is no such assembly.
+    """
+    sign = ASSEMBLIES[one_of("assembly", assembly, ASSEMBLIES)]  # type: ignore[index]
+    given = places_of(cranks, "cranks")
+    places = elbows(bar, given)
+    _check_meeting(bar, places)
+    left, right = (_pair(places[..., i, :]) for i in range(2))
+    tip = joined_at((left, right), (float(bar.rods[0]), float(bar.rods[1])), sign)
+    rods = [atan2(tip.x - one.x, one.y - tip.y) for one in (left, right)]
+    return np.stack(tip, axis=-1), np.stack([given[..., 0], *rods, given[..., 1]], axis=-1)
+
+
+def elbows(bar: FiveBar, cranks: ArrayLike) -> Array:
+    """Return (..., 2, 2) where the left and the right elbow are [m] for angles (..., 2) of the cranks [rad]."""
+    given = places_of(cranks, "cranks")
+    ways = np.stack([np.sin(given), -np.cos(given)], axis=-1)
+    return np.asarray(bar.motors + bar.cranks[:, None] * ways, dtype=np.float64)
+
+
+def speeds(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike) -> Array:
+    """Return (..., 4) speeds of the links [rad/s].
+
+    Args:
+        bar: the five-bar.
+        angles: (..., 4) of its links [rad].
+        velocity: (..., 2) of its tip [m/s].
+
+    Raises:
+        InvalidValueError: an arm is stretched or folded, so that its tip cannot move along it.
+
+    Source:
+        Thesis eq. (3.11).
+    """
+    given, goal = _angles(angles), places_of(velocity, "velocity")
+    _check_bent(given)
+    arms = _arms(bar, given)
+    return _stacked([arm_rates(angle, crank, rod, _pair(goal)) for angle, crank, rod in arms])
+
+
+def accelerations(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Array:
+    """Return (..., 4) accelerations of the links [rad/s²].
+
+    Args:
+        bar: the five-bar.
+        angles: (..., 4) of its links [rad].
+        velocity: (..., 2) of its tip [m/s].
+        acceleration: (..., 2) of its tip [m/s²].
+
+    Raises:
+        InvalidValueError: an arm is stretched or folded.
+
+    Source:
+        Thesis eq. (3.12).
+    """
+    given, goal = _angles(angles), _pair(places_of(acceleration, "acceleration"))
+    qd = speeds(bar, given, velocity)
+    arms, moving = _arms(bar, given), _arms(bar, qd)
+    return _stacked(
+        [
+            arm_rates(angle, crank, rod, goal.minus(centripetal(angle, rates, crank, rod)))
+            for (angle, crank, rod), (rates, _, _) in zip(arms, moving, strict=True)
+        ]
+    )
+
+
+# ---- inside --------------------------------------------------------------------------------------------------------
+
+
+def places_of(value: ArrayLike, what: str) -> Array:
+    """Return (..., 2) numbers.
+
+    Raises:
+        ShapeError: the last axis is not 2 long.
+    """
+    array = floats(value, what, LARGEST)
+    if array.ndim == 0 or array.shape[-1] != 2:
+        raise ShapeError(f"{what}: expected two numbers on the last axis, got shape {array.shape}")
+    return array
+
+
+def _angles(value: ArrayLike) -> Array:
+    array = floats(value, "angles", LARGEST)
+    if array.ndim == 0 or array.shape[-1] != 4:
+        raise ShapeError(f"angles: expected four on the last axis, θ1 to θ4, got shape {array.shape}")
+    return array
+
+
+def _pair(places: Array) -> Pair:
+    """Return (..., 2) numbers as a pair of arrays: also a single place, so that one law fits all."""
+    return Pair(np.asarray(places[..., 0]), np.asarray(places[..., 1]))
+
+
+def _arms(bar: FiveBar, links: Array) -> list[tuple[ArmAngles, float, float]]:
+    """Return of each arm the numbers of crank and rod, and their lengths."""
+    pairs = (ArmAngles(*(np.asarray(links[..., i]) for i in order)) for order in ((0, 1), (3, 2)))
+    return [(one, float(a), float(b)) for one, a, b in zip(pairs, bar.cranks, bar.rods, strict=True)]
+
+
+def _stacked(arms: list[ArmAngles]) -> Array:
+    left, right = arms
+    parts = np.broadcast_arrays(left.crank, left.rod, right.rod, right.crank)
+    return np.stack(parts, axis=-1).astype(np.float64)
+
+
+def _check_reach(bar: FiveBar, places: Array) -> None:
+    """Refuse places that an arm does not reach.
+
+    Raises:
+        InvalidValueError: there is one; the text says which, by how much and of which arm.
+    """
+    distances = np.linalg.norm(places[..., None, :] - bar.motors, axis=-1)
+    near, far = bar.reaches.T
+    out = np.maximum(distances - far, near - distances)
+    if np.any(out > _ROUNDING):
+        row = np.unravel_index(int(out.max(axis=-1).argmax()), out.shape[:-1])
+        words = [
+            f"{out[row][i] * 1e3:.4g} mm too {'far from' if distances[row][i] > far[i] else 'near to'} "
+            f"the {SIDES[i]} motor, whose arm reaches {near[i] * 1e3:g} to {far[i] * 1e3:g} mm"
+            for i in range(2)
+            if out[row][i] > _ROUNDING
+        ]
+        raise InvalidValueError(f"{_spot(places, row)} is out of reach: {'; and '.join(words)}")
+    if np.any(distances < _ROUNDING):
+        row = tuple(np.argwhere(distances.min(axis=-1) < _ROUNDING)[0])
+        side = SIDES[int(distances[row].argmin())]
+        raise InvalidValueError(f"{_spot(places, row)} is on the {side} motor: its folded arm may stand anywhere")
+
+
+def _spot(places: Array, row: tuple[Any, ...]) -> str:
+    x, y = places[row] * 1e3
+    return f"tip{_index(row)}: ({x:g}, {y:g}) mm"
+
+
+def _index(row: tuple[Any, ...]) -> str:
+    return f" {', '.join(str(int(i)) for i in row)}" if row else ""
+
+
+def _check_meeting(bar: FiveBar, places: Array) -> None:
+    """Refuse elbows between which the rods do not meet.
+
+    Raises:
+        InvalidValueError: there are some.
+    """
+    apart = np.linalg.norm(places[..., 1, :] - places[..., 0, :], axis=-1)
+    near, far = abs(float(bar.rods[0] - bar.rods[1])), float(bar.rods.sum())
+    out = np.maximum(apart - far, near - apart)
+    if np.any(out > _ROUNDING):
+        row = np.unravel_index(int(out.argmax()), out.shape)
+        word = "far" if apart[row] > far else "near"
+        raise InvalidValueError(
+            f"cranks{_index(row)}: the rods do not meet: the elbows are {apart[row] * 1e3:.6g} mm apart, "
+            f"{out[row] * 1e3:.4g} mm too {word}; the rods meet from {near * 1e3:g} to {far * 1e3:g} mm"
+        )
+    if np.any(apart < _ROUNDING):
+        row = tuple(np.argwhere(apart < _ROUNDING)[0])
+        raise InvalidValueError(f"cranks{_index(row)}: the elbows fall together: the rods may stand anywhere")
+
+
+def _check_bent(links: Array) -> None:
+    """Refuse arms that are stretched or folded.
+
+    Raises:
+        InvalidValueError: there is one.
+    """
+    turns = np.abs(np.sin(links[..., [1, 2]] - links[..., [0, 3]]))
+    if np.any(turns < _STRAIGHT):
+        *row, side = np.argwhere(turns < _STRAIGHT)[0]
+        raise InvalidValueError(
+            f"angles{_index(tuple(row))}: the {SIDES[int(side)]} arm is stretched or folded, a serial singularity: "
+            f"its tip cannot move along it"
+        )

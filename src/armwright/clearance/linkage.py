@@ -1,0 +1,353 @@
+"""What a planar linkage is: bodies, ideal joints that hang them in trees, pins with play that close the loops.
+
+Lengths are in metres, angles in radians, counter-clockwise positive. The axis of a body at angle θ points along
+(cos(θ + zero), sin(θ + zero)); with ``zero`` = -π/2 angles are measured from the downward vertical. The axis of the
+ground points along x.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import attrs
+
+from armwright.arrays import LARGEST, Array, ArrayLike, exactly, number
+from armwright.errors import InvalidValueError, UnknownNameError, one_of
+
+# The name of what stands still.
+GROUND = "ground"
+# Of the thesis [m/s²]; the standard's 9.80665 changes nothing to four digits.
+GRAVITY = (0.0, -9.81)
+
+DriveKind: TypeAlias = Literal["effort", "motion"]
+
+
+def _pair(value: ArrayLike) -> Array:
+    return exactly(value, (2,), "point", LARGEST)
+
+
+def _points(value: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    return {name: exactly(point, (2,), f"point {name}", LARGEST) for name, point in value.items()}
+
+
+def _parts(value: Iterable[Any]) -> tuple[Any, ...]:
+    return tuple(value)
+
+
+def not_negative(value: float, what: str, *, zero: bool = True) -> float:
+    """Return a number that is finite and not below 0, or above 0 where ``zero`` is not allowed.
+
+    Raises:
+        InvalidValueError: it is not.
+    """
+    found = number(value, what)
+    if not 0 <= found <= LARGEST or (found == 0 and not zero):
+        raise InvalidValueError(f"{what}: expected a number {'not below' if zero else 'above'} 0, got {found:g}")
+    return found
+
+
+class Place(NamedTuple):
+    """A point of a body, written ``body:point``."""
+
+    body: str
+    point: str
+
+    def __str__(self) -> str:
+        """Return the place as a file writes it."""
+        return f"{self.body}:{self.point}"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        name: of the body.
+        mass: [kg].
+        inertia: about its centre of mass [kg m²].
+        centre: (2,) centre of mass, along the axis of the body and across it [m].
+        points: (2,) places on it by name, in the same axes [m].
+    """
+
+    name: str
+    mass: float = 0.0
+    inertia: float = 0.0
+    centre: Array = attrs.field(converter=_pair, default=(0.0, 0.0))
+    points: Mapping[str, Array] = attrs.field(converter=_points, factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        """Check mass and inertia."""
+        not_negative(self.mass, f"body {self.name}: mass")
+        not_negative(self.inertia, f"body {self.name}: inertia")
+
+
+@attrs.frozen(kw_only=True)
+class Pin:
+    """An ideal pin: a point of a body stays at a place of another.
+
+    Attributes:
+        body: the body it hangs.
+        point: the point of that body.
+        on: where it hangs.
+    """
+
+    body: str
+    point: str
+    on: Place
+
+
+@attrs.frozen(kw_only=True)
+class Guide:
+    """An ideal guide: a body slides along a line of another, without turning on it.
+
+    Attributes:
+        body: the body that slides.
+        point: the point of it that stays on the line.
+        on: a place on the line.
+        direction: of the line, from the axis of the body that has it [rad].
+        angle: of the body's axis, from the same axis [rad].
+    """
+
+    body: str
+    point: str
+    on: Place
+    direction: float = 0.0
+    angle: float = 0.0
+
+
+@attrs.frozen(kw_only=True)
+class Play:
+    """A pin whose journal is smaller than its bearing.
+
+    Attributes:
+        name: of the pin.
+        bearing: the middle of the hole.
+        journal: the middle of what turns in it.
+        clearance: radius of the bearing minus that of the journal [m].
+        journal_radius: [m].
+    """
+
+    name: str
+    bearing: Place
+    journal: Place
+    clearance: float
+    journal_radius: float
+
+    def __attrs_post_init__(self) -> None:
+        """Check the radii."""
+        not_negative(self.clearance, f"pin {self.name}: clearance")
+        not_negative(self.journal_radius, f"pin {self.name}: journal radius", zero=False)
+
+
+@attrs.frozen(kw_only=True)
+class Drive:
+    """A motor at the ideal joint of a body.
+
+    Attributes:
+        body: what it turns or pushes against the body that carries it.
+        kind: ``effort`` when a torque or force is given, ``motion`` when the motion is.
+    """
+
+    body: str
+    kind: DriveKind = "effort"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Load:
+    """A constant force on a point.
+
+    Attributes:
+        at: the point.
+        force: (2,) in the axes of the ground [N].
+    """
+
+    at: Place
+    force: Array = attrs.field(converter=_pair)
+
+
+@attrs.frozen(kw_only=True)
+class Material:
+    """What bearings and journals are made of.
+
+    Attributes:
+        young: modulus of elasticity [Pa].
+        poisson: ratio.
+        restitution: of an impact, 0 to 1.
+        friction: coefficient of dry sliding.
+    """
+
+    young: float = 207e9
+    poisson: float = 0.3
+    restitution: float = 0.9
+    friction: float = 0.05
+
+    def __attrs_post_init__(self) -> None:
+        """Check the ranges."""
+        not_negative(self.young, "young", zero=False)
+        not_negative(self.friction, "friction")
+        if not -1 < number(self.poisson, "poisson") <= 0.5:
+            raise InvalidValueError(f"poisson: expected a ratio above -1, at most 0.5, got {self.poisson:g}")
+        if not 0 < number(self.restitution, "restitution") <= 1:
+            raise InvalidValueError(f"restitution: expected a number above 0, at most 1, got {self.restitution:g}")
+
+
+class Coordinate(NamedTuple):
+    """One number of a configuration: an ``angle``, a ``slide`` along a guide, or ``x`` and ``y`` of a centre."""
+
+    body: str
+    kind: Literal["angle", "slide", "x", "y"]
+
+    def __str__(self) -> str:
+        """Return the name under which it is shown."""
+        return f"{self.body}.{self.kind}"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Linkage:
+    """A planar linkage.
+
+    Attributes:
+        name: of the linkage.
+        bodies: all but the ground; each after the one it hangs on.
+        ground: what stands still.
+        joints: ideal ones; at most one for each body, none for a body that only pins with play hold.
+        pins: those with play.
+        drives: the motors.
+        loads: constant forces.
+        tip: the point that is to follow a path.
+        gravity: (2,) [m/s²].
+        zero: direction of a body's axis at angle 0 [rad].
+        material: of bearings and journals.
+        assembly: roughly where the bodies are, by name: angles [rad], slides along guides [m]; it says which of
+            several ways to put the linkage together is meant.
+    """
+
+    name: str
+    bodies: tuple[Body, ...] = attrs.field(converter=_parts)
+    ground: Body
+    joints: tuple[Pin | Guide, ...] = attrs.field(converter=_parts)
+    pins: tuple[Play, ...] = attrs.field(converter=_parts)
+    drives: tuple[Drive, ...] = attrs.field(converter=_parts)
+    loads: tuple[Load, ...] = attrs.field(converter=_parts, default=())
+    tip: Place
+    gravity: Array = attrs.field(converter=_pair, default=GRAVITY)
+    zero: float = 0.0
+    material: Material = attrs.field(factory=Material)
+    assembly: Mapping[str, float] = attrs.field(factory=dict)
+
+    def __attrs_post_init__(self) -> None:
+        """Check that everything named is there and that the ideal joints make trees."""
+        names = [GROUND, *(body.name for body in self.bodies)]
+        _no_twins("body", names)
+        _no_twins("pin", [pin.name for pin in self.pins])
+        _no_twins("joint of body", [joint.body for joint in self.joints])
+        _no_twins("drive of body", [drive.body for drive in self.drives])
+        known = {GROUND}
+        for body in self.bodies:
+            joint = self.joint(body.name)
+            if joint is not None and joint.on.body not in known:
+                one_of("body", joint.on.body, names)
+                raise InvalidValueError(f"body {body.name} hangs on {joint.on.body}, which must be named before it")
+            if body.mass == 0 or (body.inertia == 0 and not isinstance(joint, Guide)):
+                raise InvalidValueError(f"body {body.name}: mass and inertia must be above 0")
+            known.add(body.name)
+        for joint in self.joints:
+            self.point(Place(one_of("body", joint.body, names[1:]), joint.point))
+        places = [*(joint.on for joint in self.joints), *(load.at for load in self.loads), self.tip]
+        for place in (*places, *(pin.bearing for pin in self.pins), *(pin.journal for pin in self.pins)):
+            self.point(place)
+        for drive in self.drives:
+            if self.joint(drive.body) is None:
+                raise InvalidValueError(f"drive of {drive.body}: it hangs on no ideal joint, so nothing drives it")
+            one_of("kind of drive", drive.kind, ("effort", "motion"))
+            self._can_be_moved(drive)
+        for name in self.assembly:
+            one_of("body", name, names[1:])
+
+    def joint(self, body: str) -> Pin | Guide | None:
+        """Return the ideal joint that a body hangs on; None for a free one."""
+        return next((joint for joint in self.joints if joint.body == body), None)
+
+    def body(self, name: str) -> Body:
+        """Return a body, or the ground.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        found = {GROUND: self.ground, **{body.name: body for body in self.bodies}}
+        return found[one_of("body", name, found)]
+
+    def point(self, place: Place) -> Array:
+        """Return (2,) where a place lies on its body [m].
+
+        Raises:
+            UnknownNameError: there is no such body or no such point on it.
+        """
+        points = self.body(place.body).points
+        if place.point not in points:
+            raise UnknownNameError(f"point of {place.body}", place.point, points)
+        return points[place.point]
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """What a configuration consists of, in order."""
+        return tuple(self._coordinates())
+
+    @property
+    def driven(self) -> tuple[int, ...]:
+        """The numbers of the driven coordinates, in the order of the drives."""
+        place = {one.body: i for i, one in enumerate(self.coordinates) if one.kind in ("angle", "slide")}
+        return tuple(place[drive.body] for drive in self.drives)
+
+    @property
+    def clearances(self) -> dict[str, float]:
+        """The clearance of each pin [m]."""
+        return {pin.name: pin.clearance for pin in self.pins}
+
+    def with_clearances(self, clearances: Mapping[str, float]) -> "Linkage":
+        """Return the same linkage with other clearances at some pins [m].
+
+        Raises:
+            UnknownNameError: there is no such pin.
+            InvalidValueError: a clearance is negative.
+        """
+        for name in clearances:
+            one_of("pin", name, self.clearances)
+        pins = tuple(attrs.evolve(pin, clearance=clearances.get(pin.name, pin.clearance)) for pin in self.pins)
+        return attrs.evolve(self, pins=pins)
+
+    def _can_be_moved(self, drive: Drive) -> None:
+        """Refuse a motion that is given of what turns on a body whose own motion is not."""
+        joint = self.joint(drive.body)
+        if drive.kind != "motion" or not isinstance(joint, Pin):
+            return
+        carrier = joint.on.body
+        while isinstance(guide := self.joint(carrier), Guide):
+            carrier = guide.on.body
+        given = [one.body for one in self.drives if one.kind == "motion"]
+        if carrier != GROUND and carrier not in given:
+            raise InvalidValueError(
+                f"drive of {drive.body}: its motion can be given only if that of {carrier} is, which carries it"
+            )
+
+    def _coordinates(self) -> Iterator[Coordinate]:
+        for body in self.bodies:
+            match self.joint(body.name):
+                case Pin():
+                    yield Coordinate(body.name, "angle")
+                case Guide():
+                    yield Coordinate(body.name, "slide")
+                case _:
+                    yield from (Coordinate(body.name, "x"), Coordinate(body.name, "y"), Coordinate(body.name, "angle"))
+
+
+def _no_twins(kind: str, names: list[str]) -> None:
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            raise InvalidValueError(f"{kind} '{name}' is given twice")
+
+
+def exact(x: float) -> float:
+    """Return a sine or cosine, exactly 0 or ±1 at the multiples of a right angle."""
+    near = float(round(x))
+    return near if math.isclose(x, near, abs_tol=1e-12) else x

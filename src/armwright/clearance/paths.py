@@ -1,0 +1,265 @@
+"""Paths in the plane for a tip to follow: pieces of polynomials in time, with jumps of the acceleration between them.
+
+Source:
+    Thesis, 4.2 (24 test paths) and 5.2.2 (pick and place); spec of the clearance, 1.2.
+"""
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import attrs
+import numpy as np
+
+from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats
+from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
+
+# The thesis' test paths: where they run [m], how fast [m/s], and how long they speed up [s].
+TOP_SPEED = 1.5
+RAMP = 0.05
+_X_ROWS = (-0.7, -0.65, -0.6, -0.55, -0.5)
+_Y_COLUMNS = (-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15)
+
+
+class Moment(NamedTuple):
+    """Places, speeds and accelerations of a path.
+
+    Attributes:
+        at: (..., 2) [m].
+        velocity: (..., 2) [m/s].
+        acceleration: (..., 2) [m/s²].
+    """
+
+    at: Array
+    velocity: Array
+    acceleration: Array
+
+
+# The name of the thesis' path of section 5.2.2.
+PICK_AND_PLACE = "pick-and-place"
+
+
+def _nodes(value: ArrayLike) -> Array:
+    return exactly(value, (3, 2), "nodes", LARGEST)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Path:
+    """A path in the plane.
+
+    Attributes:
+        name: of the path.
+        knots: (m + 1,) times at which its pieces begin and end, the first 0 [s].
+        pieces: (m, a, k) of each piece and axis the coefficients, of 1, t, t² ... with t from the start of the piece.
+        targets: times at which the tip is to be at its goals [s].
+        of: what moves along it: the ``tip`` in the plane, or the ``drives``, one axis for each.
+    """
+
+    name: str
+    knots: Array
+    pieces: Array
+    targets: tuple[float, ...] = ()
+    of: Literal["tip", "drives"] = "tip"
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return float(self.knots[-1])
+
+    def at(self, t: ArrayLike, piece: ArrayLike | None = None) -> Moment:
+        """Return places, speeds and accelerations.
+
+        Args:
+            t: times [s], any shape; before the start and after the end the path stands still.
+            piece: the number of the piece to take at each; by the time, at a knot the later one, when left out.
+        """
+        times = np.clip(floats(t, "t"), 0.0, self.duration)
+        number = np.searchsorted(self.knots, times, side="right") - 1 if piece is None else np.asarray(piece)
+        number = np.clip(number, 0, len(self.pieces) - 1)
+        u = (times - self.knots[number])[..., None]
+        found = []
+        coefficients = self.pieces[number]
+        for _ in range(3):
+            value = np.zeros((*times.shape, self.pieces.shape[1]))
+            for i in range(coefficients.shape[-1] - 1, -1, -1):
+                value = value * u + coefficients[..., i]
+            found.append(value)
+            coefficients = coefficients[..., 1:] * np.arange(1, coefficients.shape[-1])
+        return Moment(*found)
+
+    def halves(self, steps: int) -> tuple[Moment, Moment]:
+        """Return the path at the ends and middles of equal steps.
+
+        Where the acceleration jumps there are two: so an integrator sees no jump inside a step.
+
+        Args:
+            steps: how many there are.
+
+        Returns:
+            The path at 2 steps + 1 times, as it goes on from there, and as it came there.
+        """
+        times = np.linspace(0.0, self.duration, 2 * steps + 1)
+        rounding = 1e-9 * self.duration / steps
+        after = np.searchsorted(self.knots, times + rounding, side="right") - 1
+        before = np.searchsorted(self.knots, times - rounding, side="right") - 1
+        return self.at(times, after), self.at(times, before)
+
+
+def turning(name: str, start: float, speed: float, duration: float) -> Path:
+    """Return the path of one drive that turns, or pushes, at constant speed.
+
+    Args:
+        name: of the path.
+        start: [rad] or [m].
+        speed: [rad/s] or [m/s].
+        duration: [s].
+    """
+    if not duration > 0:
+        raise InvalidValueError(f"path {name}: expected a duration above 0, got {duration:g} s")
+    pieces = np.array([[[start, speed]]])
+    return Path(name=name, knots=np.array([0.0, duration]), pieces=pieces, of="drives")
+
+
+def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP_SPEED, ramp: float = RAMP) -> Path:
+    """Return a straight path with a trapezoid of speed.
+
+    Args:
+        name: of the path.
+        start: (2,) [m].
+        goal: (2,) [m].
+        speed: its top [m/s].
+        ramp: how long it speeds up, and slows down [s].
+
+    Raises:
+        InvalidValueError: it is too short for that speed, or has no length.
+    """
+    a, b = _place(start, "start"), _place(goal, "goal")
+    length = float(np.linalg.norm(b - a))
+    if not (speed > 0 and ramp > 0):
+        raise InvalidValueError(f"path {name}: speed and ramp must be above 0, got {speed:g} m/s and {ramp:g} s")
+    cruise = length / speed - ramp
+    if length == 0 or cruise < -1e-12:
+        raise InvalidValueError(
+            f"path {name}: {length * 1e3:g} mm are too short to reach {speed:g} m/s in {ramp:g} s; "
+            f"at least {speed * ramp * 1e3:g} mm are needed"
+        )
+    direction, pull = (b - a) / length, speed / ramp
+    s = [(0.0, 0.0, pull / 2), (speed * ramp / 2, speed, 0.0), (length - speed * ramp / 2, speed, -pull / 2)]
+    knots = np.array([0.0, ramp, ramp + max(cruise, 0.0), 2 * ramp + max(cruise, 0.0)])
+    keep = np.diff(knots) > 0
+    pieces = np.array([direction[:, None] * np.array(one) for one in s])
+    pieces[..., 0] += a
+    return Path(name=name, knots=np.append(knots[:-1][keep], knots[-1]), pieces=pieces[keep], targets=(knots[-1],))
+
+
+def hermite(
+    name: str, times: Sequence[float], places: ArrayLike, velocities: ArrayLike, targets: Sequence[int]
+) -> Path:
+    """Return a path of cubic pieces through places with given velocities.
+
+    Args:
+        name: of the path.
+        times: (m + 1) at the places, the first 0, increasing [s].
+        places: (m + 1, 2) [m].
+        velocities: (m + 1, 2) [m/s].
+        targets: numbers of the places that are goals.
+
+    Raises:
+        ShapeError: the arrays do not fit together.
+        InvalidValueError: the times do not increase from 0.
+    """
+    t, p, v = floats(times, "times"), floats(places, "places"), floats(velocities, "velocities")
+    if t.ndim != 1 or len(t) < 2 or p.shape != (len(t), 2) or v.shape != p.shape:
+        raise ShapeError(
+            f"path {name}: expected (m + 1) times and (m + 1, 2) places and velocities, "
+            f"got {t.shape}, {p.shape} and {v.shape}"
+        )
+    if t[0] != 0 or np.any(np.diff(t) <= 0):
+        raise InvalidValueError(f"path {name}: times must increase from 0, got {t.tolist()}")
+    T = np.diff(t)[:, None]
+    step = p[1:] - p[:-1]
+    square = (3 * step / T - 2 * v[:-1] - v[1:]) / T
+    cube = (v[:-1] + v[1:] - 2 * step / T) / T**2
+    return Path(
+        name=name,
+        knots=t,
+        pieces=np.stack([p[:-1], v[:-1], square, cube], axis=-1),
+        targets=tuple(t[list(targets)].tolist()),
+    )
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class PickAndPlace:
+    """A pick-and-place path: up, over, down; its goals are where it picks, passes, and places.
+
+    Between its five nodes it is cubic. It leaves the first and comes to the last vertically, ``lift`` above them within
+    ``lift_time``.
+
+    Attributes:
+        nodes: (3, 2) first, middle and last node [m].
+        rise_time: from above the first to the middle [s].
+        fall_time: from the middle to above the last [s].
+        lift_time: over the first and the last [s].
+        lift_speed: vertical, there [m/s].
+        speed: horizontal, in the middle [m/s].
+
+    Source:
+        Thesis table 5.9. It leaves the way between nodes, and how the last is come to, open: here the end mirrors the
+        start (spec of the clearance, 1.2).
+    """
+
+    nodes: Array = attrs.field(converter=_nodes, default=((-0.18, -0.6), (0.0, -0.575), (0.18, -0.6)))
+    rise_time: float = 0.2
+    fall_time: float = 0.2
+    lift_time: float = 0.05
+    lift_speed: float = 0.3
+    speed: float = 1.5
+
+    def path(self) -> Path:
+        """Return it as a path with three targets."""
+        first, middle, last = self.nodes
+        lift = np.array([0.0, self.lift_speed * self.lift_time / 2])
+        places = [first, first + lift, middle, last + lift, last]
+        velocities = [(0, 0), (0, self.lift_speed), (self.speed, 0), (0, -self.lift_speed), (0, 0)]
+        times: list[float] = np.cumsum([0.0, self.lift_time, self.rise_time, self.fall_time, self.lift_time]).tolist()
+        return hermite("pick and place", times, places, velocities, (0, 2, 4))
+
+
+def thesis_path(name: str) -> Path:
+    """Return one of the thesis' 24 test paths, ``x1`` to ``x10`` or ``y1`` to ``y14``.
+
+    Raises:
+        UnknownNameError: there is none of that name.
+    """
+    if name not in TEST_PATHS:
+        raise UnknownNameError("test path", name, TEST_PATHS)
+    start, goal = TEST_PATHS[name]
+    return straight(name, start, goal)
+
+
+def named_path(name: str) -> Path:
+    """Return a path by its name: one of the thesis' 24, or ``pick-and-place``.
+
+    Raises:
+        UnknownNameError: there is none of that name.
+    """
+    if name == PICK_AND_PLACE:
+        return PickAndPlace().path()
+    if name not in TEST_PATHS:
+        raise UnknownNameError("path", name, (*TEST_PATHS, PICK_AND_PLACE))
+    return thesis_path(name)
+
+
+def _test_paths() -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
+    rows = [((-0.18, y), (0.18, y)) for y in _X_ROWS] + [((0.18, y), (-0.18, y)) for y in _X_ROWS]
+    columns = [((x, -0.7), (x, -0.4)) for x in _Y_COLUMNS] + [((x, -0.4), (x, -0.7)) for x in _Y_COLUMNS]
+    return {f"x{i}": one for i, one in enumerate(rows, 1)} | {f"y{i}": one for i, one in enumerate(columns, 1)}
+
+
+TEST_PATHS = _test_paths()
+
+
+def _place(value: ArrayLike, what: str) -> Array:
+    place = floats(value, what)
+    if place.shape != (2,):
+        raise ShapeError(f"{what}: expected two numbers, got shape {place.shape}")
+    return place

@@ -1,0 +1,160 @@
+"""Linkages from files: the catalogue by name, any other by path; the format is in docs/clearance.md."""
+
+import math
+from pathlib import Path
+
+from armwright.clearance.linkage import (
+    GRAVITY,
+    GROUND,
+    Body,
+    Drive,
+    Guide,
+    Linkage,
+    Load,
+    Material,
+    Pin,
+    Place,
+    Play,
+)
+from armwright.errors import ArmwrightError, UnknownNameError
+from armwright.files.document import Document, Table
+
+_CATALOGUE = Path(__file__).parent / "catalogue"
+
+
+def linkage_names() -> list[str]:
+    """Return the names of the catalogue, sorted."""
+    return sorted(path.stem for path in _CATALOGUE.glob("*.toml"))
+
+
+def load_linkage(source: str | Path) -> Linkage:
+    """Return a linkage by its name in the catalogue, or from a TOML file.
+
+    Args:
+        source: a name such as ``five-bar``, or a path.
+
+    Raises:
+        UnknownNameError: the catalogue has no such linkage; the nearest is named.
+        FileFormatError: the file is missing or broken, or says what cannot be; the text has file, line and key.
+    """
+    text = str(source)
+    if isinstance(source, str) and not ("/" in text or "." in text or Path(text).is_file()):
+        if text not in linkage_names():
+            raise UnknownNameError("linkage", text, linkage_names())
+        return read_linkage(_CATALOGUE / f"{text}.toml")
+    return read_linkage(Path(source))
+
+
+def read_linkage(path: Path) -> Linkage:
+    """Read a linkage from a TOML file.
+
+    Raises:
+        FileFormatError: it is missing or broken, or says what cannot be.
+    """
+    top = Document.read(path).root
+    ground = Body(name=GROUND, points=_points(top.table("ground", required=True)))
+    bodies = tuple(_body(table) for table in top.tables("body"))
+    joints = tuple(_joint(table) for table in top.tables("joint"))
+    pins = tuple(_play(table) for table in top.tables("play"))
+    drives = tuple(_drive(table) for table in top.tables("drive"))
+    loads = tuple(_load(table) for table in (top.tables("load") if "load" in top else ()))
+    material = _material(top.table("material"))
+    name = top.text("name", default=path.stem)
+    zero = math.radians(top.number("zero_deg", default=0.0))
+    assembly = _assembly(top.table("assembly"))
+    gravity, tip = top.vector("gravity", 2, default=GRAVITY), _place(top, "tip")
+    top.finish()
+    try:
+        return Linkage(
+            name=name,
+            bodies=bodies,
+            ground=ground,
+            joints=joints,
+            pins=pins,
+            drives=drives,
+            loads=loads,
+            tip=tip,
+            gravity=gravity,
+            zero=zero,
+            material=material,
+            assembly=assembly,
+        )
+    except ArmwrightError as error:
+        raise top.error(None, str(error)) from error
+
+
+def _place(table: Table, key: str) -> Place:
+    text = table.text(key)
+    body, colon, point = text.partition(":")
+    if not (body and colon and point):
+        raise table.error(key, f"expected a place such as 'link1:J2', got {text!r}")
+    return Place(body, point)
+
+
+def _points(table: Table) -> dict[str, list[float]]:
+    points = table.table("points")
+    found = {key: [float(x) for x in points.vector(key, 2)] for key in points.free_keys()}
+    table.finish()
+    return found
+
+
+def _body(table: Table) -> Body:
+    name, mass = table.text("name"), table.positive("mass")
+    inertia = table.number("inertia", default=0.0, lower=0.0)
+    centre = table.vector("centre", 2, default=(0.0, 0.0))
+    return Body(name=name, mass=mass, inertia=inertia, centre=centre, points=_points(table))
+
+
+def _joint(table: Table) -> Pin | Guide:
+    kind = table.choice("kind", ("pin", "guide"))
+    body, point, on = table.text("body"), table.text("point"), _place(table, "on")
+    joint: Pin | Guide = Pin(body=body, point=point, on=on)
+    if kind == "guide":
+        direction, angle = (math.radians(table.number(key, default=0.0)) for key in ("direction_deg", "angle_deg"))
+        joint = Guide(body=body, point=point, on=on, direction=direction, angle=angle)
+    table.finish()
+    return joint
+
+
+def _play(table: Table) -> Play:
+    name, bearing, journal = table.text("name"), _place(table, "bearing"), _place(table, "journal")
+    clearance = table.number("clearance_mm", lower=0.0) * 1e-3
+    radius = table.positive("journal_radius_mm") * 1e-3
+    table.finish()
+    return Play(name=name, bearing=bearing, journal=journal, clearance=clearance, journal_radius=radius)
+
+
+def _drive(table: Table) -> Drive:
+    body, kind = table.text("body"), table.choice("kind", ("effort", "motion"), default="effort")
+    table.finish()
+    return Drive(body=body, kind="motion" if kind == "motion" else "effort")
+
+
+def _load(table: Table) -> Load:
+    load = Load(at=_place(table, "at"), force=table.vector("force", 2))
+    table.finish()
+    return load
+
+
+def _assembly(table: Table) -> dict[str, float]:
+    """Return where the bodies are: ``link1_deg = -70``, and ``slider_mm = 170`` of what slides."""
+    found = {}
+    for key in table.free_keys():
+        body, _, unit = key.rpartition("_")
+        if not body or unit not in ("deg", "mm"):
+            raise table.error(key, "expected the name of a body with its unit, such as link1_deg or slider_mm")
+        found[body] = math.radians(table.number(key)) if unit == "deg" else table.number(key) * 1e-3
+    table.finish()
+    return found
+
+
+def _material(table: Table) -> Material:
+    usual = Material()
+    material = Material(
+        young=table.number("young", default=usual.young, lower=1.0),
+        poisson=table.number("poisson", default=usual.poisson, lower=-0.99, upper=0.5),
+        restitution=table.number("restitution", default=usual.restitution, lower=1e-3, upper=1.0),
+        friction=table.number("friction", default=usual.friction, lower=0.0),
+    )
+    table.finish()
+    return material

@@ -1,0 +1,118 @@
+"""How a linkage with play is simulated, and whether the step can be right for its contacts."""
+
+from typing import Literal, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.clearance.contact import FRICTION_LAWS, IMPACT_LAWS, ImpactLaw, deepest, stiffness
+from armwright.clearance.equations import SLIP_SPEEDS, Rubbing
+from armwright.clearance.kernel import CONTROLS, INTEGRATORS, Control, Integrator
+from armwright.clearance.linkage import Linkage, not_negative
+from armwright.errors import InvalidValueError, one_of
+
+Start: TypeAlias = Literal["rest", "rigid", "centred"]
+STARTS: tuple[Start, ...] = ("rest", "rigid", "centred")
+
+# The force at which a resting contact is judged [N], and what a step may be of the time in which it swings.
+_USUAL_FORCE, _LARGEST_PART = 20.0, 0.7
+# A path of more steps is a slip of units.
+_MOST_STEPS = 20_000_000
+
+
+@attrs.frozen(kw_only=True)
+class Settings:
+    """How a linkage with play is simulated.
+
+    Attributes:
+        step: of the integrator [s].
+        integrator: ``rk4`` or ``semi-implicit``.
+        control: ``effort``, the drives give what the ideal linkage needs; ``pd+ff``, a controller helps.
+        gains: of the controller, stiffness [N m/rad] and damping [N m s/rad].
+        impact: law of the loss in an impact.
+        friction: how friction is worked out.
+        threshold: sliding speed below which friction fades [m/s].
+        start: lying at ``rest`` on elastic walls, at rest on ``rigid`` ones, or with ``centred`` journals.
+        sample: time between samples [s]; rounded to whole steps.
+        located: whether a step in which a journal comes to its wall is made in two parts, so that the speed of the
+            impact is taken where it comes and not up to a step later.
+    """
+
+    step: float = 1e-5
+    integrator: Integrator = "rk4"
+    control: Control = "effort"
+    gains: tuple[float, float] = (200.0, 10.0)
+    impact: ImpactLaw = "lankarani-nikravesh"
+    friction: Rubbing = attrs.field(factory=Rubbing)
+    threshold: float = 1e-3
+    start: Start = "rest"
+    sample: float = 1e-4
+    located: bool = False
+
+    def __attrs_post_init__(self) -> None:
+        """Check names and ranges."""
+        for what in ("step", "threshold", "sample"):
+            not_negative(getattr(self, what), what, zero=False)
+        for gain in self.gains:
+            not_negative(gain, "gains")
+        one_of("integrator", self.integrator, INTEGRATORS)
+        one_of("control", self.control, CONTROLS)
+        one_of("law of impact", self.impact, IMPACT_LAWS)
+        one_of("law of friction", self.friction.law, FRICTION_LAWS)
+        one_of("sliding speed", self.friction.velocity, SLIP_SPEEDS)
+        one_of("start", self.start, STARTS)
+
+    def steps(self, duration: float) -> int:
+        """Return how many equal steps a duration [s] takes.
+
+        Raises:
+            InvalidValueError: more than anybody means.
+        """
+        steps = max(1, int(np.ceil(duration / self.step - 1e-9)))
+        if steps > _MOST_STEPS:
+            raise InvalidValueError(
+                f"{duration:g} s would take {steps:.3g} steps of {self.step:g} s; at most {_MOST_STEPS:,} are made"
+            )
+        return steps
+
+
+def contact_stiffness(linkage: Linkage, clearances: Array) -> Array:
+    """Return K of each pin [N/m^1.5] for clearances (..., p) [m].
+
+    Raises:
+        InvalidValueError: a clearance is not above 0.
+    """
+    material = linkage.material
+    K = np.zeros_like(clearances)
+    for i, pin in enumerate(linkage.pins):
+        K[..., i] = stiffness(clearances[..., i], pin.journal_radius, material.young, material.poisson)
+    return K
+
+
+def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
+    """Refuse a step that cannot follow what the contacts do.
+
+    A contact under load swings with ω² = k / m, where k is the slope of the Hertz force at that load and m the lighter
+    side. Runge-Kutta and the semi-implicit rule hold while ω h stays below 2 to 2.8; a third of that is followed well.
+
+    Args:
+        linkage: with p pins.
+        settings: with the step.
+        K: (..., p) stiffness of the contacts [N/m^1.5].
+
+    Raises:
+        InvalidValueError: the step is too long.
+    """
+    if not linkage.pins:
+        return
+    lightest = min(body.mass for body in linkage.bodies) / 2
+    slope = 1.5 * float(K.max()) ** (2 / 3) * _USUAL_FORCE ** (1 / 3)
+    longest = _LARGEST_PART / np.sqrt(slope / lightest)
+    if settings.step > longest:
+        depth = deepest(lightest, float(K.max()), 1.0, 0.0)
+        raise InvalidValueError(
+            f"step: {settings.step:g} s is too long for contacts of {K.max():.3g} N/m^1.5, which swing in "
+            f"{2 * np.pi * np.sqrt(lightest / slope):.2g} s and stop a blow of 1 m/s within {depth * 1e6:.0f} µm; "
+            f"expected at most {longest:.1g} s"
+        )

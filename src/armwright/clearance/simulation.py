@@ -1,0 +1,258 @@
+"""Simulating linkages with play: one run, or many with other clearances side by side.
+
+The drives give what a linkage without play would need for the path; what the tip then does differently is the error.
+"""
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from enum import IntEnum
+from functools import cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arrays import Array, ArrayLike, floats
+from armwright.clearance.contact import damping
+from armwright.clearance.equations import WORKS, Rubbing
+from armwright.clearance.ideal import gaps_of, tip_of
+from armwright.clearance.kernel import Control, Integrator, Layout, emit_simulation
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.preparing import Task
+from armwright.clearance.rest import at_rest
+from armwright.clearance.settings import check_step, contact_stiffness
+from armwright.errors import InvalidValueError, ShapeError
+from armwright.tracing.cache import compiled_module
+from armwright.tracing.emit import LANES
+
+# A tip that is farther off than this has left its path for good [m].
+_LOST = 1.0
+
+
+class Status(IntEnum):
+    """How a run ended."""
+
+    FINISHED = 0
+    DIVERGED = 1
+    """A number became infinite, or the tip left its path by more than a metre."""
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Simulation:
+    """What a linkage with play did; the leading axes are those of the clearances.
+
+    Attributes:
+        task: what it was to do.
+        clearances: (..., p) [m].
+        frictions: (...) coefficients of friction.
+        time: (s,) of the samples [s].
+        q: (..., s, n) coordinates [rad, m].
+        qd: (..., s, n) their speeds.
+        tip: (..., s, 2) where the tip was [m].
+        error: (..., s, 2) by how much it was off [m].
+        forces: (..., s, p) with which journals and bearings pressed on one another [N].
+        works: by name (..., s) what drives gave and what impacts and friction took [J].
+        impacts: (..., p) how often each journal came down on its wall.
+        peaks: (..., p) the largest force in each pin [N].
+        status: (...) how each run ended.
+    """
+
+    task: Task
+    clearances: Array
+    frictions: Array
+    time: Array
+    q: Array
+    qd: Array
+    tip: Array
+    error: Array
+    forces: Array
+    works: Mapping[str, Array]
+    impacts: npt.NDArray[np.int64]
+    peaks: Array
+    status: npt.NDArray[np.int64]
+
+    @property
+    def distance(self) -> Array:
+        """(..., s) how far the tip was off [m]."""
+        return np.asarray(np.linalg.norm(self.error, axis=-1), dtype=np.float64)
+
+    @property
+    def gaps(self) -> Array:
+        """(..., s, p, 2) from the middle of each bearing to that of its journal [m]."""
+        return gaps_of(self.task.linkage, self.q)
+
+    @property
+    def depths(self) -> Array:
+        """(..., s, p) how deep each journal is in the wall; below 0 where it flies [m]."""
+        size = np.linalg.norm(self.gaps, axis=-1)
+        return np.asarray(size - self.clearances[..., None, :], dtype=np.float64)
+
+
+class Record(NamedTuple):
+    """What the compiled simulation fills; one row per run."""
+
+    samples: Array
+    impacts: npt.NDArray[np.int64]
+    peaks: Array
+    ends: Array
+
+
+def simulate(
+    task: Task, clearances: ArrayLike | None = None, *, frictions: ArrayLike | None = None, threads: int | None = None
+) -> Simulation:
+    """Let a linkage with play do what one without would need for its path.
+
+    Args:
+        task: the path, made ready; see ``prepare``.
+        clearances: (..., p) of the pins [m]; those of the linkage when left out.
+        frictions: (...) coefficients of friction; that of the material when left out.
+        threads: how many cores to use; all when left out. The bits do not depend on it.
+
+    Raises:
+        InvalidValueError: a clearance is not above 0, or the step is too long for the contacts.
+        ShapeError: the clearances are not one per pin, or the leading axes do not fit.
+    """
+    linkage, settings = task.linkage, task.settings
+    c, mu = _parameters(linkage, clearances, frictions)
+    lead = mu.shape
+    K = contact_stiffness(linkage, c)
+    check_step(linkage, settings, K)
+    layout = Layout(linkage=linkage, rubbing=settings.friction, control=settings.control, located=settings.located)
+    start = np.zeros((*lead, layout.states))
+    start[..., : layout.n] = started(task, c, K)
+    start[..., layout.n : 2 * layout.n] = task.ideal.qd[0]
+    chi = damping(settings.impact, linkage.material.restitution)
+    parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
+    contacts = np.stack(parts, axis=-1).reshape(*lead, -1)
+    record = _run(task, layout, start.reshape(mu.size, -1), contacts.reshape(mu.size, -1), threads)
+    return _told(task, layout, c, mu, record)
+
+
+def started(task: Task, clearances: Array, K: Array) -> Array:
+    """Return (..., n) the coordinates from which runs start.
+
+    Args:
+        task: what is to be done.
+        clearances: (..., p) [m].
+        K: (..., p) stiffness of the contacts [N/m^1.5].
+    """
+    ideal = task.ideal.q[0]
+    if task.settings.start == "centred":
+        return np.broadcast_to(ideal, (*clearances.shape[:-1], len(ideal)))
+    elastic = None if task.settings.start == "rigid" else K
+    return at_rest(task.linkage, ideal, clearances, elastic).q
+
+
+def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: ArrayLike | None) -> tuple[Array, Array]:
+    """Return clearances (..., p) and frictions (...), broadcast together."""
+    own = list(linkage.clearances.values())
+    c = floats(own if clearances is None else clearances, "clearances")
+    if c.ndim == 0 or c.shape[-1] != len(own):
+        names = ", ".join(linkage.clearances)
+        raise ShapeError(f"clearances: expected {len(own)} on the last axis ({names}), got shape {c.shape}")
+    if not np.all(c > 0):
+        raise InvalidValueError(f"clearances: contact needs them above 0, got {c.min() * 1e3:g} mm")
+    mu = floats(linkage.material.friction if frictions is None else frictions, "frictions")
+    if np.any(mu < 0):
+        raise InvalidValueError(f"frictions: expected none below 0, got {mu.min():g}")
+    try:
+        lead = np.broadcast_shapes(c.shape[:-1], mu.shape)
+    except ValueError as error:
+        raise ShapeError(f"leading axes must fit together, got {c.shape[:-1]} and {mu.shape}") from error
+    return np.broadcast_to(c, (*lead, len(own))), np.broadcast_to(mu, lead)
+
+
+def _run(task: Task, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
+    """Run the compiled simulation, blocks of lanes on several cores."""
+    runs, pins, stride = len(start), layout.pins, task.stride
+    seen = np.arange(len(layout.seen))
+    record = Record(
+        samples=np.full((runs, task.steps // stride + 1, len(seen)), np.nan),
+        impacts=np.zeros((runs, pins), dtype=np.int64),
+        peaks=np.zeros((runs, pins)),
+        ends=np.zeros((runs, layout.states)),
+    )
+    gains = np.tile(task.settings.gains, (runs, len(task.linkage.drives) if layout.gains else 0))
+    tables, which = task.table[None], np.zeros(runs, dtype=np.int64)
+    rows = _simulator(layout, task.settings.integrator)
+    blocks = -(-runs // LANES)
+    workers = max(1, min(threads or _cores(), blocks))
+    cuts = [min(round(blocks * i / workers) * LANES, runs) for i in range(workers + 1)]
+
+    def part(ends: tuple[int, int]) -> None:
+        rows(*ends, start, contacts, gains, tables, which, task.h, stride, seen, *record)
+
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(part, pairwise(cuts)))
+    return record
+
+
+def _simulator(layout: Layout, integrator: Integrator) -> Any:
+    """Return the compiled simulation of a linkage: its numbers alone count, not its clearances or its material."""
+    linkage = layout.linkage
+    return _compiled(_Shape(linkage), layout.rubbing, layout.control, layout.located, integrator)
+
+
+class _Shape:
+    """A linkage as a key: two are equal if their compiled simulations are."""
+
+    def __init__(self, linkage: Linkage) -> None:
+        self.linkage = linkage
+        bodies = [
+            (b.name, b.mass, b.inertia, *b.centre, *((name, *p) for name, p in b.points.items()))
+            for b in linkage.bodies
+        ]
+        ground = tuple((name, *p) for name, p in linkage.ground.points.items())
+        pins = [(pin.bearing, pin.journal, pin.journal_radius) for pin in linkage.pins]
+        loads = [(load.at, *load.force) for load in linkage.loads]
+        rest = (linkage.joints, linkage.drives, linkage.tip, *linkage.gravity, linkage.zero)
+        self._key = (tuple(bodies), ground, tuple(pins), tuple(loads), rest)
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Shape) and self._key == other._key
+
+
+@cache
+def _compiled(shape: _Shape, rubbing: Rubbing, control: Control, located: bool, integrator: Integrator) -> Any:  # noqa: FBT001 - a part of the key
+    layout = Layout(linkage=shape.linkage, rubbing=rubbing, control=control, located=located)
+    source = emit_simulation(layout, integrator)
+    return compiled_module(source, f"the simulation of {shape.linkage.name}").simulate
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _told(task: Task, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
+    """Return a record in the terms of the linkage."""
+    n, lead, linkage = layout.n, mu.shape, task.linkage
+    samples = record.samples.reshape(*lead, *record.samples.shape[1:])
+    q = samples[..., :n]
+    tip = tip_of(linkage, q)
+    number = np.arange(samples.shape[-2]) * task.stride
+    error = tip - tip_of(linkage, task.ideal.q[number])
+    with np.errstate(invalid="ignore"):
+        lost = ~np.all(np.abs(error) < _LOST, axis=(-1, -2))
+    first = 2 * n + layout.bends
+    ends = first + len(WORKS)
+    return Simulation(
+        task=task,
+        clearances=c,
+        frictions=mu,
+        time=np.asarray(number * task.h, dtype=np.float64),
+        q=q,
+        qd=samples[..., n : 2 * n],
+        tip=tip,
+        error=error,
+        forces=samples[..., ends + 2 : ends + 3 * layout.pins : 3],
+        works={name: samples[..., first + i] for i, name in enumerate(WORKS)},
+        impacts=record.impacts.reshape(*lead, -1),
+        peaks=record.peaks.reshape(*lead, -1),
+        status=np.where(lost, Status.DIVERGED, Status.FINISHED),
+    )
