@@ -26,8 +26,9 @@ ALL = (
     "motion_knots",
     "motion_online",
     "language",
+    "play",
 )
-PEERS = ("pin", "roboticstoolbox-python", "eaik", "ruckig", "toppra", "lark", "numpy", "numba", "scipy")
+PEERS = ("pin", "roboticstoolbox-python", "eaik", "ruckig", "toppra", "lark", "exudyn", "numpy", "numba", "scipy")
 
 
 def main() -> None:

@@ -11,6 +11,13 @@ from matplotlib.figure import Figure
 from armwright import inverse, link_poses, load_arm, simulate
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.clearance.ideal import point_of, tip_of
+from armwright.clearance.linkage import Place
+from armwright.clearance.paths import thesis_path
+from armwright.clearance.preparing import prepare
+from armwright.clearance.reader import load_linkage
+from armwright.clearance.simulation import Simulation as Rattling
+from armwright.clearance.simulation import simulate as simulate_play
 from armwright.dynamics.integrators import Adaptive
 from armwright.dynamics.simulation import Event, JointState, Simulation
 from armwright.kinematics.inverse.solution import Branch
@@ -284,12 +291,70 @@ def two_moves() -> Figure:
     return figure
 
 
+# A linkage with play.
+
+MAGNIFIED = 50
+JOURNALS = ("J2", "J3", "J4")
+
+
+def draw_linkage(axes: Axes, run: Rattling) -> None:
+    """Draw the five-bar at the start, its path, and the path taken with the error magnified."""
+    linkage, q = run.task.linkage, run.task.ideal.q
+    corners = [Place("ground", "J1"), Place("link1", "J2"), Place("link2", "J3")]
+    others = [Place("ground", "J5"), Place("link4", "J4"), Place("link3", "J3")]
+    for way in (corners, others):
+        ends = np.array([point_of(linkage, place, q[0]) for place in way]) * 1e3
+        axes.plot(*ends.T, color="#c3cad2", linewidth=7, solid_capstyle="round", zorder=1)
+        axes.plot(*ends.T, "o", color="white", markeredgecolor=FAINT, markersize=5, zorder=2)
+    path = tip_of(linkage, q)[:: run.task.stride] * 1e3
+    axes.plot(*path.T, color=INK, linewidth=1.2, linestyle=(0, (4, 3)), label="without play", zorder=3)
+    taken = path + MAGNIFIED * run.error * 1e3
+    axes.plot(*taken.T, color=BY_HAND, linewidth=1.6, label=f"with play, error × {MAGNIFIED}", zorder=4)
+    axes.set_aspect("equal")
+    axes.set(xlabel="x, mm", ylabel="y, mm", xlim=(-430, 400))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.16), frameon=False, fontsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def draw_bearing(axes: Axes, run: Rattling, number: int) -> None:
+    """Draw where a journal's middle goes in its bearing: dark while it speeds up and cruises, then red."""
+    gap, wall = run.gaps[:, number] * 1e3, run.clearances[number] * 1e3
+    angle = np.linspace(0, 2 * np.pi, 200)
+    axes.plot(wall * np.cos(angle), wall * np.sin(angle), color=FAINT, linewidth=0.9)
+    slows = run.time >= run.task.path.knots[-2]
+    axes.plot(*gap[slows].T, color=ALARM, linewidth=0.7)
+    axes.plot(*gap[~slows].T, color=INK, linewidth=2.4)
+    axes.set_aspect("equal")
+    axes.set_title(JOURNALS[number], fontsize=9)
+    axes.axis("off")
+
+
+def rattling() -> Figure:
+    """Draw the five-bar with half a millimetre of play in three pins on its path y1."""
+    run = simulate_play(prepare(load_linkage("five-bar"), thesis_path("y1")))
+    figure = Figure(figsize=(7.4, 4.4), layout="constrained")
+    left, right = figure.subfigures(1, 2, width_ratios=(1, 1.1))
+    draw_linkage(left.subplots(), run)
+    above, below = right.subfigures(2, 1, height_ratios=(1, 1.15))
+    for i, axes in enumerate(above.subplots(1, 3)):
+        draw_bearing(axes, run, i)
+    axes = below.subplots()
+    axes.plot(run.time, run.distance * 1e3, color=BY_HAND, linewidth=1.5)
+    for knot in run.task.path.knots[1:-1]:
+        axes.axvline(knot, color=FAINT, linewidth=0.7, linestyle=(0, (2, 2)))
+    axes.set(xlabel="time, s", ylabel="error of the tip, mm", xlim=(0, run.time[-1]), ylim=(0, None))
+    axes.grid(color=GRID)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
 def main() -> None:
     """Draw all pictures."""
     with mpl.rc_context(STYLE):
         write(postures(), "postures.svg")
         write(released(), "released.svg")
         write(two_moves(), "two_moves.svg")
+        write(rattling(), "rattling.svg")
 
 
 if __name__ == "__main__":

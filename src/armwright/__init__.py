@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from armwright.arm.load import arm_names, load_arm
     from armwright.arm.model import Arm
     from armwright.arm.urdf.reader import load_urdf
+    from armwright.clearance.correcting import correct_nodes, correct_path
+    from armwright.clearance.estimating.static import estimate_at_rest
+    from armwright.clearance.reader import load_linkage
     from armwright.dynamics.compiled import compile_arm
     from armwright.dynamics.forward_dynamics import forward_dynamics
     from armwright.dynamics.mass_matrix import mass_matrix
@@ -72,11 +75,14 @@ _HOME = {
     "compile_arm": "dynamics.compiled",
     "continuity": "motion.continuity",
     "corner_deviations": "accuracy.corner",
+    "correct_nodes": "clearance.correcting",
+    "correct_path": "clearance.correcting",
     "cubic": "motion.cubic",
     "cubic_through": "motion.cubic",
     "distance_accuracy": "accuracy.distance",
     "distance_repeatability": "accuracy.distance",
     "effort_peaks": "motion.efforts",
+    "estimate_at_rest": "clearance.estimating.static",
     "exchangeability": "accuracy.variation",
     "forward": "kinematics.forward",
     "forward_dynamics": "dynamics.forward_dynamics",
@@ -91,6 +97,7 @@ _HOME = {
     "line_or_detour": "motion.detour",
     "link_poses": "kinematics.forward",
     "load_arm": "arm.load",
+    "load_linkage": "clearance.reader",
     "load_urdf": "arm.urdf.reader",
     "mass_matrix": "dynamics.mass_matrix",
     "multidirectional_variation": "accuracy.variation",
@@ -140,11 +147,14 @@ __all__ = [
     "compile_arm",
     "continuity",
     "corner_deviations",
+    "correct_nodes",
+    "correct_path",
     "cubic",
     "cubic_through",
     "distance_accuracy",
     "distance_repeatability",
     "effort_peaks",
+    "estimate_at_rest",
     "exchangeability",
     "forward",
     "forward_dynamics",
@@ -159,6 +169,7 @@ __all__ = [
     "line_or_detour",
     "link_poses",
     "load_arm",
+    "load_linkage",
     "load_urdf",
     "mass_matrix",
     "multidirectional_variation",

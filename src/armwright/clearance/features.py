@@ -64,10 +64,12 @@ def features_of(time: Array, error: Array, window: tuple[float, float] = WINDOW)
             f"window: expected two samples or more from {window[0]:g} to {window[1]:g} s, got "
             f"{np.count_nonzero(inside)} of {len(time)} up to {time[-1]:g} s"
         )
-    size = np.linalg.norm(error, axis=-1)
-    t = time[inside] - time[inside].mean()
-    slope = (size[..., inside] @ t) / (t @ t)
-    intercept = size[..., inside].mean(axis=-1) - slope * time[inside].mean()
+    size = np.ascontiguousarray(np.linalg.norm(error, axis=-1))
+    first, last = np.flatnonzero(inside)[[0, -1]]
+    straight, t = size[..., first : last + 1], time[inside] - time[inside].mean()
+    # Sums of rows, not products of matrices: these would round otherwise where other curves stand beside.
+    slope = (straight * t).sum(axis=-1) / (t @ t)
+    intercept = straight.mean(axis=-1) - slope * time[inside].mean()
     waves = spectrum(size)
     return Features(slope, intercept, waves[..., 0], waves[..., 1:].max(axis=-1), error[..., 0, 0], error[..., 0, 1])
 

@@ -19,7 +19,7 @@ from armwright.errors import InvalidValueError, ShapeError
 CurveKind: TypeAlias = Literal["serial", "parallel"]
 
 # Points of a curve of singular places.
-_POINTS = 720
+_POINTS = 1440
 # A place so near to a circle lies on it [m].
 _ON = 1e-9
 # Rods so little bent are in one line: the sine of their angle.
@@ -65,8 +65,8 @@ class Curve(NamedTuple):
     Attributes:
         kind: ``serial`` or ``parallel``.
         places: (k, 2) [m].
-        modes: (k,) the assembly mode in which each is singular; empty where it is a border of the workspace, which two
-            modes share.
+        modes: (k,) the assembly mode in which each is singular; the last may be of the next curve. Empty where it is a
+            border of the workspace, which two modes share.
     """
 
     kind: CurveKind
@@ -313,13 +313,20 @@ def _in_line(bar: FiveBar, turn: Array, apart: float, branch: float) -> list[Cur
         apart: from the left elbow along the left rod to the right elbow [m]; below 0 beyond the left elbow.
         branch: -1 or 1, which of both angles of the right crank.
     """
+    # Where both branches meet, the right arm from left elbow to right motor is stretched or folded.
+    ends = [
+        place - bar.motors[0]
+        for reach in (abs(apart) + bar.cranks[1], abs(abs(apart) - bar.cranks[1]))
+        for place in _meeting(bar.motors, float(bar.cranks[0]), float(reach))
+    ]
+    turn = np.sort(np.concatenate([turn, [math.atan2(x, -y) % (2 * math.pi) for x, y in ends]]))
     left = elbows(bar, np.stack([turn, turn], axis=-1))[:, 0]
     way = bar.motors[1] - left
     distance = np.linalg.norm(way, axis=-1)
     safe = np.where(distance > 0, distance, 1.0)
     along = (apart**2 - bar.cranks[1] ** 2 + distance**2) / (2 * safe)
     square = apart**2 - along**2
-    good = (square >= 0) & (distance > 0)
+    good = (square >= -_ON) & (distance > 0)
     unit = way / safe[:, None]
     across = np.sqrt(np.maximum(square, 0.0))[:, None] * np.stack([-unit[:, 1], unit[:, 0]], axis=-1)
     right = left + along[:, None] * unit + branch * across
@@ -328,7 +335,13 @@ def _in_line(bar: FiveBar, turn: Array, apart: float, branch: float) -> list[Cur
 
 
 def _pieces(kind: CurveKind, places: Array, good: Flags, modes: npt.NDArray[np.str_]) -> list[Curve]:
-    """Cut a row of places where some are no good, or their mode changes."""
+    """Cut a row of places where some are no good, or their mode changes; there the curve goes on in the next mode."""
     cuts = np.flatnonzero((good[1:] != good[:-1]) | (modes[1:] != modes[:-1])) + 1
-    rows = [row for row in np.split(np.arange(len(places)), cuts) if good[row[0]] and len(row) > 1]
-    return [Curve(kind, places[row], modes[row]) for row in rows]
+    found = []
+    for row in np.split(np.arange(len(places)), cuts):
+        last = int(row[-1])
+        if good[last]:
+            on = np.append(row, last + 1) if last + 1 < len(places) and good[last + 1] else row
+            if len(on) > 1:
+                found.append(Curve(kind, places[on], modes[on]))
+    return found

@@ -67,9 +67,10 @@ def closed(
     """
     goal = _goal(linkage, tip=tip, drives=drives)
     given = floats(guess, "guess")
-    lead = np.broadcast_shapes(given.shape[:-1], goal.shape[:-1])
+    lead = np.broadcast_shapes(given.shape[:-1], goal.shape[:-1], np.shape(gaps)[:-2])
     q = np.array(np.broadcast_to(given, (*lead, len(linkage.coordinates))))
-    apart = np.broadcast_to(gaps, (*lead, len(linkage.pins), 2)).reshape(*lead, -1)
+    apart = np.broadcast_to(gaps, (*lead, len(linkage.pins), 2)).reshape(*lead, 2 * len(linkage.pins))
+    done = np.zeros((*lead, 1), dtype=bool)
     for _ in range(_MOST_ITERATIONS):
         placement = _placed(linkage, q)
         misses = _misses(placement, goal, by_tip=tip is not None)
@@ -78,10 +79,12 @@ def closed(
             step = _solved(_closure(placement, tip is not None), -misses)
         size = np.abs(step).max(axis=-1, keepdims=True, initial=0.0)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
-        q += step
+        q += np.where(done, 0.0, step)
         if not np.all(np.isfinite(q)):
             break
-        if size.max(initial=0.0) < _CLOSED:
+        # One that is closed stays as it is, however long others take: its bits are its own.
+        done |= size < _CLOSED
+        if np.all(done):
             return q
     worst = int(np.nan_to_num(np.abs(misses).max(axis=-1), nan=np.inf).reshape(-1).argmax())
     what = "the path" if tip is not None else "the drives"

@@ -145,10 +145,13 @@ def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP
     direction, pull = (b - a) / length, speed / ramp
     s = [(0.0, 0.0, pull / 2), (speed * ramp / 2, speed, 0.0), (length - speed * ramp / 2, speed, -pull / 2)]
     knots = np.array([0.0, ramp, ramp + max(cruise, 0.0), 2 * ramp + max(cruise, 0.0)])
-    keep = np.diff(knots) > 0
+    # Where there is just room, rounding may leave a rest of constant speed.
+    keep = np.diff(knots) > 1e-12
     pieces = np.array([direction[:, None] * np.array(one) for one in s])
     pieces[..., 0] += a
-    return Path(name=name, knots=np.append(knots[:-1][keep], knots[-1]), pieces=pieces[keep], targets=(knots[-1],))
+    return Path(
+        name=name, knots=np.append(knots[:-1][keep], knots[-1]), pieces=pieces[keep], targets=(float(knots[-1]),)
+    )
 
 
 def hermite(

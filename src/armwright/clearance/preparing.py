@@ -13,6 +13,8 @@ from armwright.errors import InvalidValueError, ShapeError
 
 # So many places of a path are solved one after the other; all between them at once, from there.
 _COARSE = 60
+# A coordinate that changes by more between two moments has jumped [rad, m].
+_JUMP = 0.05
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -133,7 +135,15 @@ def followed(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bool) -> A
     if len(picks) == 1:
         return known
     between = [np.interp(np.arange(len(goals)), picks, known[:, i]) for i in range(known.shape[1])]
-    return at(np.stack(between, axis=-1), goals)
+    q = at(np.stack(between, axis=-1), goals)
+    jumps = np.abs(np.diff(q, axis=0)).max(axis=-1)
+    # From one moment to the next a body goes hardly farther than on its way on average; to another assembly it jumps.
+    if jumps.max() > _JUMP + 50 * jumps.mean():
+        raise InvalidValueError(
+            f"{linkage.name}: at moment {int(jumps.argmax())} of {len(goals)} the path comes to a singular "
+            f"configuration, where the linkage goes over to another assembly"
+        )
+    return q
 
 
 def _told(linkage: Linkage, settings: Settings, ideal: IdealMotion) -> Array:

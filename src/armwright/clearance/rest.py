@@ -19,6 +19,8 @@ from armwright.errors import InvalidValueError, ShapeError
 _MOST_ROUNDS = 60
 # The rounds end when no coordinate moves by more [rad, m].
 _SETTLED = 1e-14
+# What rounding keeps in motion beyond that is no movement; this is [rad, m].
+_RESTLESS = 1e-9
 # A pin that carries less has no side on which its journal leans [N].
 _NO_FORCE = 1e-9
 
@@ -67,6 +69,7 @@ def at_rest(
     q = np.array(np.broadcast_to(start, (*lead, start.shape[-1])))
     held = q[..., list(linkage.driven)]
     still = np.zeros_like(q)
+    settled = np.zeros((*lead, 1), dtype=bool)
     for _ in range(_MOST_ROUNDS):
         _, reactions = balance(linkage, q, still, still)
         size = np.linalg.norm(reactions, axis=-1)
@@ -77,8 +80,15 @@ def at_rest(
             )
         gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
         new = closed(linkage, q, drives=held, gaps=gaps)
-        moved = np.abs(new - q).max(initial=0.0)
-        q = new
-        if moved < _SETTLED:
+        moved = np.abs(new - q).max(axis=-1, keepdims=True)
+        q = np.where(settled, q, new)
+        # One that lies stays as it is, however long others take.
+        settled |= moved < _SETTLED
+        if np.all(settled):
             break
+    if np.any(~settled & (moved > _RESTLESS)):
+        raise InvalidValueError(
+            f"{linkage.name} does not come to rest: after {_MOST_ROUNDS} rounds it still moves by {moved.max():.2g}; "
+            f"expected drives held away from singular configurations"
+        )
     return Rest(q=q, tip=tip_of(linkage, q), gaps=gaps_of(linkage, q), forces=size)

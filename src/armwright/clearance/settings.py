@@ -104,7 +104,7 @@ def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
     Raises:
         InvalidValueError: the step is too long.
     """
-    if not linkage.pins:
+    if K.size == 0:
         return
     lightest = min(body.mass for body in linkage.bodies) / 2
     slope = 1.5 * float(K.max()) ** (2 / 3) * _USUAL_FORCE ** (1 / 3)

@@ -126,8 +126,8 @@ def simulate(
     start[..., layout.n : 2 * layout.n] = task.ideal.qd[0]
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
-    contacts = np.stack(parts, axis=-1).reshape(*lead, -1)
-    record = _run(task, layout, start.reshape(mu.size, -1), contacts.reshape(mu.size, -1), threads)
+    contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
+    record = _run(task, layout, start.reshape(mu.size, layout.states), contacts, threads)
     return _told(task, layout, c, mu, record)
 
 
@@ -252,7 +252,7 @@ def _told(task: Task, layout: Layout, c: Array, mu: Array, record: Record) -> Si
         error=error,
         forces=samples[..., ends + 2 : ends + 3 * layout.pins : 3],
         works={name: samples[..., first + i] for i, name in enumerate(WORKS)},
-        impacts=record.impacts.reshape(*lead, -1),
-        peaks=record.peaks.reshape(*lead, -1),
+        impacts=record.impacts.reshape(*lead, layout.pins),
+        peaks=record.peaks.reshape(*lead, layout.pins),
         status=np.where(lost, Status.DIVERGED, Status.FINISHED),
     )

@@ -41,7 +41,7 @@ class FeatureSweep:
     """
 
     linkage: Linkage
-    paths: tuple[str, ...] = attrs.field(converter=tuple)
+    paths: tuple[str, ...]
     settings_of: Settings = attrs.field(factory=Settings)
     with_friction: bool = False
 

@@ -10,6 +10,7 @@ import typer
 
 from armwright.cli.arms import arms
 from armwright.cli.check import check
+from armwright.cli.clearance import clearance
 from armwright.cli.code import code
 from armwright.cli.convert import convert
 from armwright.cli.debug import debug
@@ -60,6 +61,7 @@ app.command()(singularity)
 app.command()(simulate)
 app.command()(move)
 app.command()(iso9283)
+app.add_typer(clearance)
 app.command()(study)
 app.command()(kernel)
 

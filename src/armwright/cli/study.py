@@ -7,11 +7,15 @@ from typing import Annotated
 import typer
 
 # By name: the module next to this one that runs, prints and draws it.
-_STUDIES = {"stanford-torque": "study_stanford_torque", "puma-moves": "study_puma_moves"}
+_STUDIES = {
+    "stanford-torque": "study_stanford_torque",
+    "puma-moves": "study_puma_moves",
+    "five-bar-clearance": "study_five_bar_clearance",
+}
 
 
 def study(
-    name: Annotated[str, typer.Argument(help="stanford-torque or puma-moves.", show_default=False)],
+    name: Annotated[str, typer.Argument(help="stanford-torque, puma-moves or five-bar-clearance.", show_default=False)],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the figures (SVG) and the tables (JSON).")
     ] = None,
@@ -24,6 +28,10 @@ def study(
 
     puma-moves: a joint move and a Cartesian move of the PUMA through three poses (figures 5 to 7, 10, 16 to 19, 22, 23,
     and 25 as a film), what each asks of the joints, and what becomes of the second one at the wrist's singularity.
+
+    five-bar-clearance: a parallel arm with play in three pins: error curves, their features over 729 linkages, the
+    clearances told from them, two arms compared, a path corrected (tables 5.3 to 5.12, figures 4.6 to 5.13). Takes a
+    minute.
 
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """

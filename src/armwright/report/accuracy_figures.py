@@ -15,7 +15,7 @@ from armwright.accuracy.settling import PosingTime, Settling, attained_place
 from armwright.accuracy.variation import PoseDrift, Variation
 from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array
-from armwright.report.figures import Drawing, svg_text
+from armwright.report.figures import Drawing, literal, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,7 +40,7 @@ def drawings(found: Assessment) -> list[Drawing]:
             what = "velocity" if isinstance(result, PathVelocity) else test.kind
             figure = Figure(figsize=(7.4, 4.2), layout="constrained")
             draw(figure, test, result)
-            figure.suptitle(_literal(f"{what}: {of}"))
+            figure.suptitle(literal(f"{what}: {of}"))
             drawn.append(Drawing(f"{len(drawn) + 1:02d}-{what}", f"{what} {of}: {caption}", svg_text(figure)))
     return drawn
 
@@ -83,7 +83,7 @@ def _clouds(figure: "Figure", test: PoseTest, result: Variation) -> None:
                 "linestyle": "",
             }
             axis.plot(places[:, i], places[:, j], **style, markersize=3.5, fillstyle="none", alpha=0.7)
-            axis.plot(middle[i], middle[j], **style, markersize=8, markeredgecolor="k", label=_literal(cloud.label))
+            axis.plot(middle[i], middle[j], **style, markersize=8, markeredgecolor="k", label=literal(cloud.label))
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
 
 
@@ -172,11 +172,6 @@ def _axes(figure: "Figure", x: str, y: str) -> Any:
     axis.grid(visible=True, alpha=0.3)
     axis.ticklabel_format(useOffset=False)
     return axis
-
-
-def _literal(text: str) -> str:
-    """Return a text in which no dollar begins a formula."""
-    return text.replace("$", r"\$")
 
 
 def _some(count: int) -> Array:

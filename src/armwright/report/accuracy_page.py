@@ -106,7 +106,7 @@ def accuracy_page(found: Assessment, drawn: Sequence[Drawing], *, title: str, co
         verdict=verdict,
         notes="".join(f'<li class="warning"><b>Note</b>{html.escape(note)}</li>' for note in notes_of(found)),
         rows="\n".join(_rows(found.measures)),
-        figures="\n".join(one.html for one in drawn),
+        figures="\n".join(one.element for one in drawn),
         generated=html.escape(f"armwright {__version__}: {command}"),
     )
 

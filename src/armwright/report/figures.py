@@ -29,7 +29,7 @@ class Drawing(NamedTuple):
     svg: str
 
     @property
-    def html(self) -> str:
+    def element(self) -> str:
         """The figure as an element of a page, which carries it."""
         data = base64.b64encode(self.svg.encode()).decode()
         caption = html.escape(self.caption)
@@ -72,3 +72,8 @@ def svg_text(figure: "Figure") -> str:
     with mpl.rc_context({"svg.hashsalt": "armwright"}):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return text.getvalue()
+
+
+def literal(text: str) -> str:
+    """Return a text in which no dollar begins a formula."""
+    return text.replace("$", r"\$")

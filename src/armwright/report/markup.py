@@ -19,7 +19,9 @@ _DECIMALS = 7
 # A row of a track that equals the one before it is written as this.
 _REPEATED = 0
 # In the order in which the browser reads them: each uses only what stands before it.
-_SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "lists.js", "run.js")
+_SCRIPTS = (
+    "basics.js", "clock.js", "scene.js", "camera.js", "solids.js", "view.js", "charts.js", "lists.js", "run.js",
+)  # fmt: skip
 
 
 def run_html(title: str, data: object) -> str:
@@ -32,10 +34,10 @@ def run_html(title: str, data: object) -> str:
     Returns:
         HTML text.
     """
-    return Template(_asset("run.html")).substitute(
+    return Template(asset("run.html")).substitute(
         title=html.escape(title),
-        style=_asset("run.css"),
-        script="\n".join(_asset(name) for name in _SCRIPTS),
+        style=asset("run.css"),
+        script="\n".join(asset(name) for name in _SCRIPTS),
         data=json_text(data),
     )
 
@@ -46,7 +48,8 @@ def json_text(data: object) -> str:
     return text.replace("<", "\\u003c")
 
 
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """Return the text of a template, a style sheet or a script."""
     return (files("armwright.report") / "assets" / name).read_text(encoding="utf-8")
 
 

@@ -7,6 +7,8 @@ Source:
 
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
 import attrs
 import numpy as np
@@ -54,8 +56,15 @@ class Process:
         apart = (a**2).sum(axis=-1)[:, None] + (b**2).sum(axis=-1) - 2 * a @ b.T
         near = self.amplitude * np.exp(-0.5 * np.maximum(apart, 0.0))
         left = self.amplitude + self.noise - ((near @ self.inverse) * near).sum(axis=-1)
-        deviation = np.sqrt(np.maximum(left, 0.0))
+        # Rounding must not make a run surer than chance lets it be.
+        deviation = np.sqrt(np.maximum(left, self.noise))
         return self.mean + self.scale * (near @ self.weights), np.asarray(self.scale * deviation, dtype=np.float64)
+
+    def slope(self, unit: Array) -> Array:
+        """Return (k,) how the mean changes about a point (k,)."""
+        apart = (self.x - unit) / self.lengths
+        near = self.amplitude * np.exp(-0.5 * (apart**2).sum(axis=-1))
+        return np.asarray(self.scale * ((near * self.weights) @ apart) / self.lengths, dtype=np.float64)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -97,6 +106,7 @@ def learn(
     features: Sequence[str],
     values: ArrayLike,
     *,
+    ranges: ArrayLike | None = None,
     seed: int = 0,
     restarts: int = 0,
     progress: Callable[[str], None] | None = None,
@@ -108,6 +118,7 @@ def learn(
         points: (m, k) at which was simulated; those that came to nothing (NaN) are left out.
         features: f names.
         values: (m, f) what came of it.
+        ranges: (k, 2) of the design; those of the points when left out, which chance leaves a little narrower.
         seed: which points are taken where there are more than ``MOST_POINTS``.
         restarts: how often the lengths are sought again from another start.
         progress: told the name of each feature before it is learnt.
@@ -115,7 +126,7 @@ def learn(
     Raises:
         MissingExtraError: scikit-learn is not installed.
         ShapeError: the tables do not fit together.
-        InvalidValueError: there are too few points, or a parameter does not vary.
+        InvalidValueError: there are too few points, one lies outside the ranges, or a parameter does not vary.
     """
     x, y = floats(points, "points"), np.asarray(values, dtype=np.float64)
     if x.ndim != 2 or y.shape != (len(x), len(features)) or x.shape[1] != len(parameters):
@@ -129,7 +140,7 @@ def learn(
         )
     if len(kept) > MOST_POINTS:
         kept = np.sort(np.random.default_rng(seed).choice(kept, MOST_POINTS, replace=False))
-    lower, upper = x[kept].min(axis=0), x[kept].max(axis=0)
+    lower, upper = _ranges(x[kept], ranges)
     for name, low, high in zip(parameters, lower, upper, strict=True):
         if not low < high:
             raise InvalidValueError(f"parameter {name} does not vary: it is {low:g} in every run")
@@ -166,13 +177,46 @@ def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | N
         mean, _ = surrogate.predict((surrogate.lower + unit * width)[None])
         return np.asarray((mean[0] - goal) / scale, dtype=np.float64)
 
+    def slopes(unit: Array) -> Array:
+        # Differences would tell the rounding of the means, which is large where chance adds next to nothing.
+        return np.stack([process.slope(unit) for process in surrogate.processes]) / scale[:, None]
+
     rng = np.random.default_rng(0)
     starts = rng.random((_STARTS * 40, len(width)))
-    means, _ = surrogate.predict(surrogate.lower + starts * width)
-    order = np.argsort((((means - goal) / scale) ** 2).sum(axis=-1))
-    found = [least_squares(missing, starts[i], bounds=(0.0, 1.0), xtol=1e-12) for i in order[:3]]
+    with one_core():
+        means, _ = surrogate.predict(surrogate.lower + starts * width)
+        order = np.argsort((((means - goal) / scale) ** 2).sum(axis=-1))
+        found = [least_squares(missing, starts[i], slopes, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:3]]
     best = min(found, key=lambda one: float(one.cost))
     return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)
+
+
+def one_core() -> AbstractContextManager[Any]:
+    """Keep the matrices of a surrogate on one core: they are so small that several only wait for one another."""
+    try:
+        from threadpoolctl import threadpool_limits  # noqa: PLC0415 - comes with scikit-learn
+    except ImportError:
+        return nullcontext()
+    limits: AbstractContextManager[Any] = threadpool_limits(1)
+    return limits
+
+
+def _ranges(x: Array, ranges: ArrayLike | None) -> tuple[Array, Array]:
+    """Return (k,) the lower and upper ends of what was simulated.
+
+    Raises:
+        ShapeError: there is not one range for each parameter.
+        InvalidValueError: a point lies outside.
+    """
+    low, high = x.min(axis=0), x.max(axis=0)
+    if ranges is None:
+        return low, high
+    ends = floats(ranges, "ranges")
+    if ends.shape != (x.shape[1], 2):
+        raise ShapeError(f"ranges: expected shape {(x.shape[1], 2)}, got {ends.shape}")
+    if np.any(low < ends[:, 0]) or np.any(high > ends[:, 1]):
+        raise InvalidValueError("ranges: a point lies outside of them")
+    return ends[:, 0], ends[:, 1]
 
 
 def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
@@ -180,7 +224,6 @@ def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
         from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
         from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
-        from threadpoolctl import threadpool_limits  # noqa: PLC0415 - comes with scikit-learn
     except ImportError as error:
         raise MissingExtraError(
             'learning from simulations needs scikit-learn: pip install "armwright[clearance]"'
@@ -189,8 +232,7 @@ def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
     # Scaled here, so that the way back is ours too.
     mean, scale = float(y.mean()), float(y.std()) or 1.0
     process = GaussianProcessRegressor(kernel, n_restarts_optimizer=restarts, random_state=seed)
-    # The matrices are so small that several cores only wait for one another.
-    with warnings.catch_warnings(), threadpool_limits(1):
+    with warnings.catch_warnings(), one_core():
         # A length at its bound is a feature that hardly depends on a parameter.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(unit, (y - mean) / scale)

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.estimating.kriging import Surrogate, solve_features
+from armwright.clearance.estimating.kriging import Surrogate, one_core, solve_features
 from armwright.errors import InvalidValueError, ShapeError
 
 _WALKERS, _STEPS, _BURN = 60, 300, 100
@@ -103,7 +103,8 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
     centre = solve_features(
         surrogate, goal, np.sqrt(np.diag(measured) + surrogate.predict((lower + upper)[None] / 2)[1][0] ** 2)
     )
-    samples = _walk(log_density, centre, lower, upper, seed)
+    with one_core():
+        samples = _walk(log_density, centre, lower, upper, seed)
     mean, deviation = surrogate.predict(centre[None])
     covariance = measured + np.diag(deviation[0] ** 2)
     missing = mean[0] - goal

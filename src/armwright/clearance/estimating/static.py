@@ -36,17 +36,17 @@ class Estimate:
 
     Attributes:
         names: of the parameters, p of them.
-        values: (p,) clearances [m].
+        values: (..., p) clearances [m].
         covariance: (p, p) [m²].
         singular_values: of the equations, largest first; how the offset grows with the best and worst told mixture.
-        residual: root mean square of what is left [m].
+        residual: (...) root mean square of what is left [m].
     """
 
     names: tuple[str, ...]
     values: Array
     covariance: Array
     singular_values: Array
-    residual: float
+    residual: Array
 
     @property
     def deviations(self) -> Array:
@@ -59,7 +59,7 @@ class Estimate:
         return np.asarray(self.covariance / np.outer(self.deviations, self.deviations), dtype=np.float64)
 
     def interval(self, level: float = 0.9) -> Array:
-        """Return (p, 2) in which each clearance lies with a probability [m]."""
+        """Return (..., p, 2) in which each clearance lies with a probability [m]."""
         if not 0 < level < 1:
             raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level:g}")
         from scipy.stats import norm  # noqa: PLC0415 - a slow import
@@ -108,7 +108,7 @@ def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noi
     Args:
         linkage: with p pins.
         poses: (k, 2) places of its tip without play [m].
-        offsets: (k, 2) by how much it was off there [m].
+        offsets: (..., k, 2) by how much it was off there [m].
         noise: standard deviation of a coordinate of an offset [m].
 
     Raises:
@@ -116,8 +116,8 @@ def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noi
         InvalidValueError: the poses do not tell all clearances.
     """
     places, seen = floats(poses, "poses"), floats(offsets, "offsets")
-    if places.ndim != 2 or places.shape[1] != 2 or seen.shape != places.shape:
-        raise ShapeError(f"expected (k, 2) poses and offsets, got shapes {places.shape} and {seen.shape}")
+    if places.ndim != 2 or places.shape[1] != 2 or seen.shape[-2:] != places.shape:
+        raise ShapeError(f"expected (k, 2) poses and as many offsets, got shapes {places.shape} and {seen.shape}")
     if not noise > 0:
         raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
     names = tuple(linkage.clearances)
@@ -127,10 +127,14 @@ def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noi
         raise InvalidValueError(
             f"{len(places)} poses do not tell {len(names)} clearances from one another; take more, or others"
         )
-    c = np.maximum(np.linalg.lstsq(B, seen.ravel(), rcond=None)[0], _SMALLEST)
+    solver = np.linalg.pinv(B)
+
+    def explained(offsets: Array) -> Array:
+        return np.asarray((offsets.reshape(*offsets.shape[:-2], 1, -1) * solver).sum(axis=-1), dtype=np.float64)
+
+    c = np.maximum(explained(seen), _SMALLEST)
     for _ in range(_MOST_ROUNDS):
-        missing = (seen - rest_offsets(linkage, places, c)).ravel()
-        new = np.maximum(c + np.linalg.lstsq(B, missing, rcond=None)[0], _SMALLEST)
+        new = np.maximum(c + explained(seen - rest_offsets(linkage, places, c)), _SMALLEST)
         done = np.abs(new - c).max() < _SETTLED
         c = new
         if done:
@@ -141,7 +145,7 @@ def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noi
         values=np.asarray(c, dtype=np.float64),
         covariance=np.asarray(noise**2 * np.linalg.inv(B.T @ B), dtype=np.float64),
         singular_values=np.asarray(singular, dtype=np.float64),
-        residual=float(np.sqrt(np.mean(missing**2))),
+        residual=np.asarray(np.sqrt(np.mean(missing**2, axis=(-2, -1))), dtype=np.float64),
     )
 
 

@@ -1,7 +1,5 @@
 // Lists that follow the time: program, what happened, stages, the tree of frames.
 
-const byId = (id) => document.getElementById(id);
-
 // Comments of a program are { ... } over any number of lines, and // to the end of one; those of a file of poses # to
 // the end of a line.
 const COMMENTS = { Program: /(\{[^}]*\}?|\/\/[^\r\n]*)/, Poses: /(#[^\r\n]*)/ };

@@ -1,6 +1,4 @@
-// The page: heading, readouts and the controls of time.
-
-const slider = byId("time");
+// The page: heading and readouts.
 
 function fillHeader() {
   byId("status").textContent = data.status;
@@ -125,65 +123,10 @@ function fillArms() {
   if (data.arms.length) chooseArm(0);
 }
 
-let clock = null;
-
-function tick(time) {
-  if (!now.playing) return;
-  seek(now.t + ((time - (clock ?? time)) / 1000) * now.rate);
-  clock = time;
-  if (now.t >= data.duration) play(false);
-  else requestAnimationFrame(tick);
-}
-
-function play(wanted) {
-  if (wanted && now.t >= data.duration) seek(0);
-  now.playing = wanted && data.duration > 0;
-  clock = null;
-  byId("play").classList.toggle("playing", now.playing);
-  byId("play").ariaLabel = now.playing ? "Pause" : "Play";
-  if (now.playing) requestAnimationFrame(tick);
-}
-
-function onKey(event) {
-  const target = event.target;
-  if (
-    event.ctrlKey ||
-    event.altKey ||
-    event.metaKey ||
-    target.matches("select") ||
-    (event.key === " " && target.matches("button"))
-  )
-    return;
-  const step = event.shiftKey ? 1 : 1 / (data.animation?.fps ?? 25);
-  const actions = {
-    " ": () => play(!now.playing),
-    ArrowLeft: () => seek(now.t - step),
-    ArrowRight: () => seek(now.t + step),
-    Home: () => seek(0),
-    End: () => seek(data.duration),
-  };
-  if (!actions[event.key]) return;
-  event.preventDefault();
-  actions[event.key]();
-}
-
 function redraw() {
   readColours();
   drawView();
   drawCharts();
-}
-
-function startControls() {
-  slider.max = data.duration;
-  slider.addEventListener("input", () => seek(slider.value));
-  byId("play").addEventListener("click", () => play(!now.playing));
-  byId("rate").addEventListener("change", (event) => {
-    now.rate = Number(event.target.value);
-  });
-  document.addEventListener("keydown", onKey);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-  const watcher = new ResizeObserver(redraw);
-  for (const element of [canvas, byId("charts")]) watcher.observe(element);
 }
 
 function start() {
@@ -197,7 +140,7 @@ function start() {
   listeners.push(showClock, showProgram, showStages, showReadout, drawView);
   if (tree.changes.length) listeners.push(showTree);
   fillArms();
-  startControls();
+  startClock({ step: 1 / (data.animation?.fps ?? 25), leap: 1, redraw, watched: [canvas, byId("charts")] });
   seek(0);
 }
 

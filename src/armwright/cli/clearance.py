@@ -1,0 +1,26 @@
+"""``armwright clearance``: linkages whose pins have play."""
+
+import typer
+
+from armwright.cli.clearance_correct import correct
+from armwright.cli.clearance_estimate import estimate
+from armwright.cli.clearance_simulate import simulate
+from armwright.cli.clearance_sweep import sweep
+
+clearance = typer.Typer(
+    name="clearance",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+)
+clearance.command("simulate")(simulate)
+clearance.command("sweep")(sweep)
+clearance.command("estimate")(estimate)
+clearance.command("correct")(correct)
+
+
+@clearance.callback()
+def group() -> None:
+    """Linkages with play in their pins: how they rattle, and what that does to the path.
+
+    **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
+    """

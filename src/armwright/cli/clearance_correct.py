@@ -1,0 +1,161 @@
+"""``armwright clearance correct``: a path told so that the tip comes to the right places in spite of play."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.arrays import Array
+    from armwright.clearance.correcting import Correction
+    from armwright.clearance.linkage import Linkage
+    from armwright.clearance.settings import Settings
+
+# So many linkages stand for what is known of one; the least play of any [m].
+_DRAWS, _SMALLEST = 32, 1e-6
+
+
+def correct(  # noqa: PLR0917 - Typer reads one parameter per option
+    linkage: Annotated[str, typer.Argument(help="Name in the catalogue, or a TOML file.", show_default=False)],
+    path: Annotated[str, typer.Option(help="pick-and-place, or a test path x1 to x10, y1 to y14.")] = "pick-and-place",
+    clearance: Annotated[
+        list[str] | None,
+        typer.Option(help="Of one pin in mm, as estimated: J2=0.34; may be repeated.", show_default=False),
+    ] = None,
+    estimate: Annotated[
+        Path | None,
+        typer.Option(help="What `clearance estimate --json` printed: then the mean error over what is known goes."),
+    ] = None,
+    knots: Annotated[int, typer.Option(help="Places at which a whole path is moved.")] = 20,
+    rounds: Annotated[int, typer.Option(help="How often the path is moved.")] = 3,
+    friction_velocity: Annotated[str, typer.Option(help="Which speed slides: surface or centre.")] = "surface",
+    threshold_mm_s: Annotated[float, typer.Option(help="Sliding speed below which friction fades.")] = 1.0,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for path.csv, summary.json and paths.svg.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Move a path against the error that play makes, until the tip comes to where it is wanted.
+
+    Of pick-and-place the three nodes are moved; of another path the whole, smoothly. Each round is one simulation.
+
+    **Example:** `armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483`
+    """
+    import json
+
+    import numpy as np
+
+    from armwright.clearance.correcting import correct_nodes, correct_path
+    from armwright.clearance.equations import Rubbing
+    from armwright.clearance.paths import PICK_AND_PLACE, PickAndPlace, named_path
+    from armwright.clearance.reader import load_linkage
+    from armwright.clearance.settings import Settings
+    from armwright.cli.clearance_simulate import with_clearances
+    from armwright.files.output import write_folder
+
+    model = with_clearances(load_linkage(linkage), None, clearance or [])
+    settings = Settings(
+        threshold=threshold_mm_s * 1e-3,
+        friction=Rubbing(velocity=friction_velocity),  # type: ignore[arg-type]
+    )
+    clearances = list(model.clearances.values()) if estimate is None else _drawn(model, estimate)
+
+    def told(mean: float) -> None:
+        if not (quiet or as_json):
+            print(f"mean error {mean * 1e3:.5f} mm")
+
+    if path == PICK_AND_PLACE:
+        found = correct_nodes(model, PickAndPlace(), clearances, settings, rounds=rounds, progress=told)
+    else:
+        found = correct_path(model, named_path(path), clearances, settings, knots=knots, rounds=rounds, progress=told)
+    summary = {
+        "linkage": model.name,
+        "path": path,
+        "clearances": model.clearances,
+        "times": list(found.path.targets),
+        "nodes": found.nodes.tolist(),
+        "before": np.atleast_2d(found.before).mean(axis=0).tolist(),
+        "after": np.atleast_2d(found.after).mean(axis=0).tolist(),
+        "mean errors": list(found.history),
+    }
+    if output is not None:
+        write_folder(output, _files(model, path, found, summary, settings))
+    if as_json:
+        print(json.dumps(summary, indent=2))
+    elif not quiet:
+        _print(summary)
+        if output is not None:
+            print(f"path: {output / 'path.csv'}")
+
+
+def _drawn(model: "Linkage", estimate: Path) -> "Array":
+    """Return (32, p) clearances drawn from an estimate.
+
+    Raises:
+        FileFormatError: the file is not what `clearance estimate --json` prints, or of another linkage.
+    """
+    import json
+
+    import numpy as np
+
+    from armwright.errors import FileFormatError
+    from armwright.files.document import read_text
+
+    try:
+        told = json.loads(read_text(estimate))
+        parameters, correlation = told["parameters"], np.array(told["correlation"], dtype=np.float64)
+        mean, deviation = (np.array([one[key] for one in parameters.values()]) for key in ("mean", "deviation"))
+        names = list(parameters)
+        picked = [names.index(name) for name in model.clearances]
+    except (KeyError, TypeError, ValueError) as error:
+        text = f"expected what `armwright clearance estimate --json` prints for {model.name}"
+        raise FileFormatError(estimate, None, "", text) from error
+    covariance = correlation * np.outer(deviation, deviation)
+    drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, _DRAWS)[:, picked]
+    # Contact needs some play.
+    return np.maximum(drawn, _SMALLEST)
+
+
+def _files(
+    model: "Linkage", name: str, found: "Correction", summary: dict[str, Any], settings: "Settings"
+) -> dict[str, str | bytes]:
+    import json
+
+    import numpy as np
+
+    from armwright.clearance.paths import named_path
+    from armwright.clearance.preparing import prepare
+    from armwright.clearance.simulation import simulate
+    from armwright.report.clearance_figures import paths
+
+    times = np.linspace(0.0, found.path.duration, 1001)
+    told, wanted = found.path.at(times), named_path(name)
+    rows = np.column_stack([times, told.at * 1e3, told.velocity * 1e3, told.acceleration * 1e3])
+    head = "t_s,x_mm,y_mm,vx_mm_per_s,vy_mm_per_s,ax_mm_per_s2,ay_mm_per_s2"
+    text = "\n".join([head, *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n"
+    panels = {
+        title: {"wanted": wanted.at(times).at * 1e3, "taken": simulate(prepare(model, path, settings)).tip * 1e3}
+        for title, path in (("path as it is", wanted), ("path corrected", found.path))
+    }
+    targets = wanted.at(np.array(wanted.targets)).at * 1e3
+    return {
+        "path.csv": text,
+        "summary.json": json.dumps(summary, indent=2) + "\n",
+        "paths.svg": paths(f"{model.name}, {name}: with play", panels, targets),
+    }
+
+
+def _print(summary: dict[str, Any]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in ("at s", "told x mm", "y mm", "error before mm", "after mm"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for t, node, before, after in zip(
+        summary["times"], summary["nodes"], summary["before"], summary["after"], strict=True
+    ):
+        table.add_row(f"{t:.4g}", *(f"{x * 1e3:.4f}" for x in node), f"{before * 1e3:.4f}", f"{after * 1e3:.5f}")
+    Console(markup=False, highlight=False).print(table)

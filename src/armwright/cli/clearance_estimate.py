@@ -1,0 +1,159 @@
+"""``armwright clearance estimate``: the clearances that measurements tell, and how well."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.clearance.estimating.measured import PathsMeasured, RestMeasured
+    from armwright.clearance.linkage import Linkage
+
+# What of an error curve is compared.
+_FEATURES = ("slope", "intercept", "amp_dc", "offset_x", "offset_y")
+_LEVEL = 0.9
+
+
+def estimate(
+    linkage: Annotated[str, typer.Argument(help="Name in the catalogue, or a TOML file.", show_default=False)],
+    measured: Annotated[
+        Path, typer.Argument(help="CSV of a resting tip, or of a tip on paths (docs/clearance.md).", show_default=False)
+    ],
+    sweep: Annotated[
+        Path | None,
+        typer.Option(help="Folder of `clearance sweep` with the same paths; for measurements on paths."),
+    ] = None,
+    noise_um: Annotated[
+        float | None,
+        typer.Option(help="Standard deviation of a measured coordinate; that of repeated readings without it."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the estimate as JSON, in SI units.")] = False,
+) -> None:
+    """Tell the clearances of a linkage from where its tip rests, or from how it follows paths.
+
+    At rest a few poses are enough and no simulation is needed. On paths a sweep of simulations tells what an error
+    curve means; the answer is a distribution: mean, 90 % interval, correlation, and which parameters the data do not
+    tell.
+
+    **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
+    """
+    import json
+
+    from armwright.clearance.estimating.measured import RestMeasured, read_measured
+    from armwright.clearance.reader import load_linkage
+
+    model, found = load_linkage(linkage), read_measured(measured)
+    noise = None if noise_um is None else noise_um * 1e-6
+    told = _at_rest(model, found, noise) if isinstance(found, RestMeasured) else _on_paths(found, sweep, noise)
+    if as_json:
+        print(json.dumps(told, indent=2))
+    else:
+        _print(told)
+
+
+def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) -> dict[str, Any]:
+    from armwright.errors import InvalidValueError
+
+    if noise is not None and not noise > 0:
+        raise InvalidValueError(f"--noise-um: expected a number above 0, got {noise * 1e6:g}")
+    found = measured.estimate(model, noise)
+    interval, told = found.interval(_LEVEL), found.identifiable(float(found.values.max()))
+    return {
+        "by": "rest",
+        "parameters": {
+            name: {
+                "mean": float(found.values[i]),
+                "deviation": float(found.deviations[i]),
+                "interval": interval[i].tolist(),
+                "identifiable": told[i],
+            }
+            for i, name in enumerate(found.names)
+        },
+        "correlation": found.correlation.tolist(),
+        "notes": [
+            f"{len(measured.names)} poses, {sum(measured.readings)} readings; {found.residual * 1e6:.3g} µm are left",
+            f"singular values of the equations: {', '.join(f'{x:.3g}' for x in found.singular_values)}",
+            *([] if noise or measured.noise else ["no pose was read twice: a noise of 1 µm was taken for granted"]),
+        ],
+    }
+
+
+def _on_paths(measured: "PathsMeasured", folder: Path | None, noise: float | None) -> dict[str, Any]:
+    import json
+
+    import numpy as np
+
+    from armwright.clearance.estimating.kriging import learn
+    from armwright.clearance.estimating.posterior import posterior
+    from armwright.errors import InvalidValueError
+    from armwright.sweep.results import load
+
+    if folder is None:
+        raise typer.BadParameter(
+            "measurements on paths need a sweep to compare with: `armwright clearance sweep`", param_hint="--sweep"
+        )
+    if noise is None or not noise > 0:
+        raise InvalidValueError("--noise-um: expected the standard deviation of a measured coordinate, above 0")
+    with load(folder) as data:
+        names = tuple(f"{path}_{feature}" for path in measured.times for feature in _FEATURES)
+        missing = sorted({name.partition("_")[0] for name in names if name not in data})
+        if missing:
+            raise InvalidValueError(
+                f"{folder}: the sweep has no path {', '.join(missing)}; sweep the paths that were measured"
+            )
+        parameters = tuple(name for name in map(str, data.coords) if name.startswith("c_") or name == "friction")
+        points = np.stack([data[name].to_numpy() for name in parameters], axis=-1)
+        table = np.stack([np.where(data["status"] == 0, data[name], np.nan) for name in names], axis=-1)
+        told = json.loads(data.attrs["design"])["ranges"]
+    # The two bounds of a design by chance, or the levels of a full factorial.
+    ranges = [(min(told[name]), max(told[name])) for name in parameters] if set(parameters) <= set(told) else None
+    surrogate = learn(parameters, points, names, table, ranges=ranges)
+    features = measured.features()
+    seen = [float(getattr(features[path], feature)) for path in measured.times for feature in _FEATURES]
+    found = posterior(surrogate, seen, measured.noise_of(names, noise))
+    interval = found.interval(_LEVEL)
+    return {
+        "by": "paths",
+        "parameters": {
+            name.removeprefix("c_"): {
+                "mean": float(found.mean[i]),
+                "deviation": float(found.deviations[i]),
+                "interval": interval[i].tolist(),
+                "identifiable": found.identifiable[name],
+            }
+            for i, name in enumerate(found.names)
+        },
+        "correlation": found.correlation.tolist(),
+        "notes": [
+            f"{len(names)} features of {len(measured.times)} paths, learnt from {len(points)} simulations",
+            f"features as far off as these come by chance in {100 * found.misfit:.3g} % of cases"
+            + ("; the model or the noise is wrong" if found.misfit < 1e-3 else ""),
+        ],
+    }
+
+
+def _print(told: Mapping[str, Any]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(markup=False, highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    names = list(told["parameters"])
+    for name in ("", "mean mm", "± mm", "90 % interval mm", "told", *(f"r {one}" for one in names)):
+        table.add_column(name, justify="right" if name else "left", no_wrap=True)
+    for i, (name, one) in enumerate(told["parameters"].items()):
+        scale = 1.0 if name == "friction" else 1e3
+        low, high = (scale * x for x in one["interval"])
+        table.add_row(
+            "friction, no unit" if name == "friction" else name,
+            f"{scale * one['mean']:.4f}",
+            f"{scale * one['deviation']:.4f}",
+            f"{low:.4f} to {high:.4f}",
+            "yes" if one["identifiable"] else "no",
+            *(f"{x:+.2f}" for x in told["correlation"][i]),
+        )
+    console.print(table)
+    for note in told["notes"]:
+        console.print(note)

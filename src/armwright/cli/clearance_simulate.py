@@ -1,0 +1,255 @@
+"""``armwright clearance simulate``: a linkage with play follows a path, and one sees its journals rattle."""
+
+import math
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.clearance.linkage import Linkage
+    from armwright.clearance.paths import Path as TipPath
+    from armwright.clearance.preparing import Task
+    from armwright.clearance.settings import Settings
+    from armwright.clearance.simulation import Simulation
+    from armwright.report.rattling import Run
+
+_CLEARANCE = re.compile(r"(?P<pin>[^=]+)=(?P<number>[^=a-z]+)(?:mm)?")
+# Samples of a run, and the time between two of them at most [s].
+_SAMPLES, _SAMPLE = 2500, 1e-4
+
+
+def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
+    linkage: Annotated[
+        str, typer.Argument(help="Name in the catalogue, or a TOML file (docs/clearance.md).", show_default=False)
+    ],
+    path: Annotated[
+        str | None, typer.Option(help="Test path of the thesis for the tip: x1 to x10, y1 to y14.", show_default=False)
+    ] = None,
+    speed_rpm: Annotated[
+        float | None, typer.Option(help="Instead: turn the one drive at so many rev/min.", show_default=False)
+    ] = None,
+    turns: Annotated[float, typer.Option(help="How many turns of the drive.")] = 3.0,
+    clearance: Annotated[
+        list[str] | None,
+        typer.Option(help="Of one pin in mm: J2=0.5; may be repeated.", show_default=False),
+    ] = None,
+    clearance_mm: Annotated[
+        float | None, typer.Option(help="Of all pins; those of the linkage without it.", show_default=False)
+    ] = None,
+    friction: Annotated[
+        float | None, typer.Option(help="Coefficient; that of the linkage without it.", show_default=False)
+    ] = None,
+    friction_law: Annotated[str, typer.Option(help="linear, tanh or lugre.")] = "linear",
+    friction_velocity: Annotated[
+        str, typer.Option(help="Which speed slides: of the surface, or of the centre as the thesis has it.")
+    ] = "surface",
+    threshold_mm_s: Annotated[float, typer.Option(help="Sliding speed below which friction fades.")] = 1.0,
+    law: Annotated[
+        str, typer.Option(help="Of impact: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...")
+    ] = "lankarani-nikravesh",
+    integrator: Annotated[str, typer.Option(help="rk4 or semi-implicit.")] = "rk4",
+    step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
+    locate: Annotated[
+        bool, typer.Option("--locate", help="Cut a step in two where a journal comes to its wall.")
+    ] = False,
+    sample: Annotated[
+        float | None, typer.Option(help="Time between samples, in s; 1e-4 or less without it.", show_default=False)
+    ] = None,
+    control: Annotated[str, typer.Option(help="effort: open loop, or pd+ff: with a controller.")] = "effort",
+    start: Annotated[str, typer.Option(help="At rest on elastic walls, on rigid ones, or centred.")] = "rest",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for report.html, samples.csv, summary.json and figures (SVG)."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Let a linkage with play follow a path: its drives do what it would need without play.
+
+    Prints what became of the path, of every pin and of the energy. With -o, report.html shows the linkage moving, its
+    journals rattling in their bearings, and error, forces and energy over time. The first run of a linkage compiles it.
+
+    **Example:** `armwright clearance simulate five-bar --path y1 --clearance J2=0.3 -o out/rattling`
+
+    **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --turns 2 --start centred --step 2e-6`
+    """
+    import json
+
+    from armwright.clearance.reader import load_linkage
+    from armwright.files.output import write_folder
+    from armwright.report.rattling import Run, summary
+
+    model = with_clearances(load_linkage(linkage), clearance_mm, clearance or [])
+    way = _path(model, path, speed_rpm, turns)
+    settings = _settings(
+        step=step,
+        sample=max(step, min(_SAMPLE, way.duration / _SAMPLES)) if sample is None else sample,
+        integrator=integrator,
+        control=control,
+        impact=law,
+        threshold=threshold_mm_s * 1e-3,
+        start=start,
+        located=locate,
+        friction=(friction_law, friction_velocity),
+    )
+    run = Run.of(_simulated(model, way, settings, friction, watched=not (quiet or as_json)))
+    told = {"command": _command(), **summary(run)}
+    text = json.dumps(told, indent=2, ensure_ascii=False)
+    if output is not None:
+        write_folder(output, _files(run, text))
+    if as_json:
+        print(text)
+    elif not quiet:
+        _print(run, told)
+        if output is not None:
+            print(f"report: {output / 'report.html'}")
+
+
+def with_clearances(model: "Linkage", clearance_mm: float | None, clearances: list[str]) -> "Linkage":
+    """Return the linkage with the clearances that are asked for."""
+    found = {}
+    if clearance_mm is not None:
+        found = dict.fromkeys(model.clearances, clearance_mm * 1e-3)
+    for text in clearances:
+        match = _CLEARANCE.fullmatch(text.replace(" ", ""))
+        try:
+            value = float(match["number"]) if match else math.nan
+        except ValueError:
+            value = math.nan
+        if match is None or math.isnan(value):
+            raise typer.BadParameter(
+                f"expected a pin and its clearance in mm, J2=0.5, got {text}", param_hint="--clearance"
+            )
+        found[match["pin"]] = value * 1e-3
+    return model.with_clearances(found)
+
+
+def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: float) -> "TipPath":
+    """Return the path of the tip, or of the one drive."""
+    from armwright.clearance.paths import thesis_path, turning
+
+    drives = len(model.drives)
+    if (path is None) == (speed_rpm is None):
+        wanted = "--path y1" if drives > 1 else "--speed-rpm 300"
+        raise typer.BadParameter(
+            f"expected either --path or --speed-rpm; {model.name} takes {wanted}", param_hint="--path"
+        )
+    if path is not None:
+        if drives != 2:
+            raise typer.BadParameter(
+                f"a path leads the tip of a linkage with two drives; {model.name} has {drives}: give --speed-rpm",
+                param_hint="--path",
+            )
+        return thesis_path(path)
+    if drives != 1:
+        raise typer.BadParameter(f"turns one drive; {model.name} has {drives}: give --path", param_hint="--speed-rpm")
+    assert speed_rpm is not None  # noqa: S101 - one of both is given
+    if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < turns < math.inf):
+        raise typer.BadParameter(
+            f"expected a speed that is not 0 and turns above 0, got {speed_rpm:g} and {turns:g}",
+            param_hint="--speed-rpm",
+        )
+    speed = speed_rpm * 2 * math.pi / 60
+    at = model.assembly.get(model.drives[0].body, 0.0)
+    name = f"{turns:g} turns at {speed_rpm:g} rev/min"
+    return turning(name, at, speed, turns * 2 * math.pi / abs(speed))
+
+
+def _settings(friction: tuple[str, str], **options: Any) -> "Settings":
+    """Return the settings; what stands for nothing is answered with the nearest name."""
+    from armwright.clearance.equations import Rubbing
+    from armwright.clearance.settings import Settings
+
+    law, velocity = friction
+    return Settings(friction=Rubbing(law=law, velocity=velocity), **options)  # type: ignore[arg-type]
+
+
+def _simulated(
+    model: "Linkage", way: "TipPath", settings: "Settings", friction: float | None, *, watched: bool
+) -> "Simulation":
+    """Run it, with a word on the screen while a person waits for the compiler."""
+    from contextlib import nullcontext
+
+    from rich.console import Console
+
+    from armwright.clearance.preparing import prepare
+    from armwright.clearance.simulation import simulate as run
+
+    console = Console(stderr=True)
+    waiting = console.status(f"{model.name}: the first run compiles it") if watched and console.is_terminal else None
+    with waiting or nullcontext():
+        task: Task = prepare(model, way, settings)
+        return run(task, frictions=friction)
+
+
+def _files(run: "Run", text: str) -> dict[str, Any]:
+    """Return the files of a run by name."""
+    from armwright.report.five_bar_figure import workspace_of
+    from armwright.report.rattling import samples_csv
+    from armwright.report.rattling_figures import rattling_figures
+    from armwright.report.rattling_page import rattling_page
+
+    task = run.simulation.task
+    drawn = rattling_figures(run)
+    space = workspace_of(task)
+    drawn += [space] if space else []
+    return {
+        "summary.json": text + "\n",
+        "samples.csv": samples_csv(run),
+        "report.html": rattling_page(run, drawn, title=f"{task.linkage.name}: {task.path.name}", command=_command()),
+        **{f"{one.name}.svg": one.svg for one in drawn},
+    }
+
+
+def _command() -> str:
+    import shlex
+
+    return shlex.join(["armwright", *sys.argv[1:]])
+
+
+def _print(run: "Run", told: dict[str, Any]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from armwright.report.rattling import newtons, notes
+
+    console = Console(markup=False, highlight=False)
+    error, energy, how = told["error"], told["energy"], told["settings"]
+    console.print(
+        f"{told['linkage']}, {told['path']}: {told['status']} after {told['sound_until']:.4g} s; {how['integrator']}, "
+        f"steps of {how['step']:.3g} s, friction {how['friction']:g}"
+    )
+    for headings, rows in (
+        (
+            ("pin", "clearance mm", "peak N", "mean N", "impacts", "in flight %"),
+            [
+                (name, f"{pin['clearance'] * 1e3:.4g}", newtons(pin["peak_force"]), f"{pin['mean_force']:.4g}",
+                 str(pin["impacts"]), f"{100 * pin['flight']:.3g}")
+                for name, pin in told["pins"].items()
+            ],
+        ),
+        (
+            ("error at", "x mm", "y mm", "distance mm"),
+            [
+                (f"{one['time']:.4g} s", *(f"{one[key] * 1e3:.4f}" for key in ("error_x", "error_y", "distance")))
+                for one in told["targets"]
+            ],
+        ),
+    ):  # fmt: skip
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+        for place, name in enumerate(headings):
+            table.add_column(name, justify="right" if place else "left", no_wrap=True)
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+    console.print(f"error: {error['largest'] * 1e3:.4g} mm at most, {error['mean'] * 1e3:.4g} mm on average")
+    console.print(
+        f"energy: {energy['driven']:.4g} J from the drives, {energy['impact_loss']:.3g} J lost in impacts, "
+        f"{energy['friction_loss']:.3g} J in friction, {energy['imbalance']:.2g} J not explained"
+    )
+    for note in notes(run):
+        console.print(f"note: {note}")

@@ -1,0 +1,88 @@
+"""``armwright clearance sweep``: the features of many linkages with other clearances, kept in a folder."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
+    linkage: Annotated[str, typer.Argument(help="Name in the catalogue, or a TOML file.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of this sweep alone.", show_default=False)],
+    paths: Annotated[str, typer.Option(help="Test paths, with commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
+    design: Annotated[str, typer.Option(help="factorial, lhs (Latin hypercube) or sobol.")] = "sobol",
+    from_mm: Annotated[float, typer.Option(help="Smallest clearance.")] = 0.1,
+    to_mm: Annotated[float, typer.Option(help="Largest clearance.")] = 0.5,
+    levels: Annotated[int, typer.Option(help="Of each clearance, for factorial: 9 are the thesis' 729 runs.")] = 9,
+    runs: Annotated[int, typer.Option("-n", "--runs", help="For lhs and sobol (a power of two).")] = 128,
+    to_friction: Annotated[
+        float | None,
+        typer.Option(help="Vary the coefficient of friction too, from 0 to this one.", show_default=False),
+    ] = None,
+    friction_velocity: Annotated[str, typer.Option(help="Which speed slides: surface or centre.")] = "surface",
+    threshold_mm_s: Annotated[float, typer.Option(help="Sliding speed below which friction fades.")] = 1.0,
+    step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
+    seed: Annotated[int, typer.Option(help="Of lhs and sobol.")] = 0,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; as many as there are cores without it.", show_default=False)
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler to use instead: tcp://10.0.0.1:8786.", show_default=False)
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+) -> None:
+    """Simulate a linkage with many clearances on several paths and keep the features of the error curves.
+
+    A sweep that was stopped goes on where it was when the same command is given again. `armwright clearance estimate`
+    learns from the folder what an error curve says of the clearances.
+
+    **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
+    """
+    import json
+
+    import numpy as np
+
+    from armwright.clearance.equations import Rubbing
+    from armwright.clearance.reader import load_linkage
+    from armwright.clearance.settings import Settings
+    from armwright.clearance.sweeping import FeatureSweep
+    from armwright.cli.progress import sweep_bar
+    from armwright.errors import one_of
+    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
+    from armwright.sweep.run import run
+
+    one_of("design", design, ("factorial", "lhs", "sobol"))
+    settings = Settings(
+        step=step,
+        threshold=threshold_mm_s * 1e-3,
+        friction=Rubbing(velocity=friction_velocity),  # type: ignore[arg-type]
+    )
+    task = FeatureSweep(
+        linkage=load_linkage(linkage),
+        paths=tuple(name.strip() for name in paths.split(",")),
+        settings_of=settings,
+        with_friction=to_friction is not None,
+    )
+    bounds = dict.fromkeys(task.parameters, (from_mm * 1e-3, to_mm * 1e-3))
+    units = dict.fromkeys(task.parameters, "m")
+    if to_friction is not None:
+        bounds["friction"], units["friction"] = (0.0, to_friction), "1"
+    if design == "factorial":
+        plan = full_factorial(
+            {name: np.linspace(*ends, levels).round(12).tolist() for name, ends in bounds.items()}, units=units
+        )
+    else:
+        plan = (latin_hypercube if design == "lhs" else sobol)(bounds, runs, seed, units=units)
+    # Whatever is wrong with a path is said now; and the simulation is compiled once, not by every worker.
+    task(plan.points[:1])
+    with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
+        found = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
+    failed = int((found["status"] != 0).sum())
+    summary = {"runs": len(plan.points), "failed": failed, "paths": list(task.paths), "folder": str(output)}
+    found.close()
+    if as_json:
+        print(json.dumps(summary, indent=2))
+    elif not quiet:
+        said = f", {failed} of them came to nothing" if failed else ""
+        print(f"{len(plan.points)} linkages on {', '.join(task.paths)}{said}: {output}")

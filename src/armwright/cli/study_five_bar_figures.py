@@ -1,0 +1,162 @@
+"""The figures of the study of the five-bar with play."""
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.clearance.features import WINDOW, spectrum
+from armwright.clearance.ideal import tip_of
+from armwright.clearance.paths import Path, PickAndPlace, named_path
+from armwright.clearance.preparing import prepare
+from armwright.clearance.simulation import Simulation, simulate
+from armwright.report.clearance_figures import lines_of_spectrum, marked_curves, paths, surface
+from armwright.report.figures import curves
+from armwright.report.rattling import Run
+from armwright.report.rattling_figures import rattling_figures
+from armwright.study import five_bar_clearance as study
+
+_TIME, _ERROR = "time, s", "error, mm"
+_SHOWN = {"slope": "slope, mm/s", "intercept": "intercept, mm", "amp_dc": "amplitude, mm"}
+
+
+def drawn(learnt: study.Learnt, estimates: list[study.EstimateRow]) -> dict[str, str | bytes]:
+    """Return all figures by the name of their file."""
+    return {**_single_run(), **_curves(), **_surfaces(learnt), **_arm_a(), **_corrected(estimates)}
+
+
+def _single_run() -> dict[str, str | bytes]:
+    """Figures 4.6 to 4.9: path y1 with half a millimetre of play in every pin."""
+    run = _half("y1")
+    files: dict[str, str | bytes] = {"figure4.06.svg": _torques("Figure 4.6: drives on path y1", named_path("y1"))}
+    wanted = {"path": "4.07", "bearings": "4.08", "error": "4.09"}
+    for one in rattling_figures(Run.of(run)):
+        if one.name in wanted:
+            files[f"figure{wanted[one.name]}.svg"] = one.svg
+    return files
+
+
+def _curves() -> dict[str, str | bytes]:
+    """Figures 4.10 to 4.13: error curves of paths along y and x, and their spectra."""
+    files: dict[str, str | bytes] = {}
+    y = {name: _half(name) for name in ("y1", "y3")}
+    files["figure4.10.svg"] = marked_curves(
+        "Figure 4.10: error curves along y, and the straight part that is fitted",
+        y["y1"].time,
+        {name: run.distance * 1e3 for name, run in y.items()},
+        labels=(_TIME, _ERROR),
+        spans=(WINDOW,),
+        fits={f"fit of {name}": _fit(run) for name, run in y.items()},
+    )
+    x = {name: _half(name) for name in ("x2", "x5")}
+    first = x["x2"]
+    files["figure4.11.svg"] = marked_curves(
+        "Figure 4.11: error curves along x",
+        first.time,
+        {name: run.distance * 1e3 for name, run in x.items()},
+        labels=(_TIME, _ERROR),
+        spans=[tuple(first.task.path.knots[1:3])],
+    )
+    spectra = {name: spectrum(run.distance) * 1e3 for name, run in x.items()}
+    frequencies = np.arange(len(spectra["x2"])) / (len(first.time) * (first.time[1] - first.time[0]))
+    for number, title, highest in (
+        ("4.12", "Figure 4.12: spectra of the error along x; the constant part counts twice", 500.0),
+        ("4.13", "Figure 4.13: spectra of the error along x, 0 to 20 Hz", 20.0),
+    ):
+        kept = frequencies <= highest
+        shown = {name: values[kept] for name, values in spectra.items()}
+        files[f"figure{number}.svg"] = lines_of_spectrum(title, frequencies[kept], shown, "mm")
+    return files
+
+
+def _surfaces(learnt: study.Learnt) -> dict[str, str | bytes]:
+    """Figures 4.14 to 4.22: each feature of path y1 over the play of J2 and J4, for three of J3."""
+    files: dict[str, str | bytes] = {}
+    levels = np.array(study.LEVELS)
+    number = 14
+    for feature, label in _SHOWN.items():
+        table = learnt.values[f"y1_{feature}"].reshape(9, 9, 9) * 1e3
+        for c3 in (0.1e-3, 0.25e-3, 0.5e-3):
+            k = int(np.abs(levels - c3).argmin())
+            files[f"figure4.{number}.svg"] = surface(
+                f"Figure 4.{number}: {label.partition(',')[0]} on path y1, play of J3 {c3 * 1e3:g} mm",
+                levels * 1e3,
+                levels * 1e3,
+                table[:, k, :],
+                ("play of J2, mm", "play of J4, mm", label),
+            )
+            number += 1
+    return files
+
+
+def _arm_a() -> dict[str, str | bytes]:
+    """Figures 5.4 to 5.6: error curves of arm A on its three paths."""
+    files: dict[str, str | bytes] = {}
+    for number, path in zip((4, 5, 6), study.PATHS, strict=True):
+        both = {
+            "speed of centres, as the thesis": study.run_of("A", path, study.SETTINGS),
+            "speed of surfaces": study.run_of("A", path, study.SURFACE),
+        }
+        files[f"figure5.{number:02d}.svg"] = marked_curves(
+            f"Figure 5.{number}: error of arm A on path {path}",
+            next(iter(both.values())).time,
+            {name: run.distance * 1e3 for name, run in both.items()},
+            labels=(_TIME, _ERROR),
+            spans=(WINDOW,),
+        )
+    return files
+
+
+def _corrected(estimates: list[study.EstimateRow]) -> dict[str, str | bytes]:
+    """Figures 5.10 to 5.13: the path as it is and corrected, what arm A makes of it, drives, speeds."""
+    both = {"path as it is": PickAndPlace().path(), "path corrected": study.corrected(estimates, "intercept").path}
+    targets = np.array(PickAndPlace().nodes) * 1e3
+    runs = {name: _simulated(path, study.ARMS["A"]) for name, path in both.items()}
+    wanted = tip_of(study.arm(), runs["path as it is"].task.ideal.q) * 1e3
+    told = {name: tip_of(study.arm(), run.task.ideal.q) * 1e3 for name, run in runs.items()}
+    files: dict[str, str | bytes] = {
+        "figure5.10.svg": paths(
+            "Figure 5.10: the path, and the path corrected",
+            {name: {"wanted": wanted, "told": told[name]} for name in both},
+            targets,
+        ),
+        "figure5.11.svg": paths(
+            "Figure 5.11: what arm A makes of them",
+            {name: {"wanted": wanted, "taken": run.tip * 1e3} for name, run in runs.items()},
+            targets,
+        ),
+    }
+    for letter, (name, path) in zip("ab", both.items(), strict=True):
+        files[f"figure5.12{letter}.svg"] = _torques(f"Figure 5.12 {letter}: drives, {name}", path)
+        times = np.linspace(0.0, path.duration, 1001)
+        moment = path.at(times)
+        lines = {
+            "speed x, m/s": moment.velocity[:, 0],
+            "speed y, m/s": moment.velocity[:, 1],
+            "acceleration x, 10 m/s²": moment.acceleration[:, 0] / 10,
+            "acceleration y, 10 m/s²": moment.acceleration[:, 1] / 10,
+        }
+        title = f"Figure 5.13 {letter}: speeds and accelerations, {name}"
+        files[f"figure5.13{letter}.svg"] = curves(title, times, lines, x_label=_TIME, y_label="m/s, 10 m/s²")
+    return files
+
+
+def _half(name: str) -> Simulation:
+    return _simulated(named_path(name), (0.5e-3,) * 3)
+
+
+def _simulated(path: Path, clearances: tuple[float, ...]) -> Simulation:
+    return simulate(prepare(study.arm(), path, study.SETTINGS), clearances)
+
+
+def _fit(run: Simulation) -> tuple[Array, Array]:
+    inside = (run.time >= WINDOW[0]) & (run.time <= WINDOW[1])
+    slope, intercept = np.polyfit(run.time[inside], run.distance[inside] * 1e3, 1)
+    ends = np.array([0.0, 0.2])
+    return ends, intercept + slope * ends
+
+
+def _torques(title: str, path: Path) -> str:
+    task = prepare(study.arm(), path, study.SETTINGS)
+    some = slice(None, None, 20)
+    times = np.asarray(np.arange(len(task.ideal.q))[some] * task.h, dtype=np.float64)
+    lines = {f"M{i + 1}": task.ideal.efforts[some, i] for i in range(2)}
+    return curves(title, times, lines, x_label=_TIME, y_label="torque, N m")

@@ -1,0 +1,119 @@
+// The bearings: every journal in its hole, the gap so large that one sees it.
+
+// The journal's radius as part of the wall's; the rest is left for the gap.
+const JOURNAL = 0.45;
+const most = Math.max(2, ...data.pins.map((pin) => pin.peak_N));
+const bearings = [];
+
+const fliesAt = ([i, j, s], pin) => data.flies[s < 0.5 ? i : j][pin] > 0;
+const forceAt = ([i, j, s], pin) => data.forces_N[s < 0.5 ? i : j][pin];
+// 0 for 1 N and less, 1 for the largest force of the run.
+const strength = (force) => Math.min(1, Math.max(0, Math.log(force) / Math.log(most)));
+
+function mixed(one, other, part) {
+  const parse = (colour) => [1, 3, 5].map((k) => Number.parseInt(colour.slice(k, k + 2), 16));
+  const [a, b] = [parse(one), parse(other)];
+  return `rgb(${a.map((value, k) => Math.round(value + part * (b[k] - value))).join(",")})`;
+}
+
+function forceColour(force) {
+  const part = strength(force) * (colours.forces.length - 1);
+  const k = Math.min(Math.floor(part), colours.forces.length - 2);
+  return mixed(colours.forces[k], colours.forces[k + 1], part - k);
+}
+
+function readForceColours() {
+  const style = getComputedStyle(document.documentElement);
+  colours.forces = [0, 1, 2, 3].map((k) => style.getPropertyValue(`--f${k}`).trim());
+}
+
+function hole(size) {
+  const wall = size / 2 - 34;
+  const journal = JOURNAL * wall;
+  return { wall, journal, room: wall - journal, middle: [size / 2, size / 2] };
+}
+
+function drawWay(pin, i, { room, middle }, last) {
+  const at = (row) => [
+    middle[0] + (room * row[2 * i]) / pin.clearance_um,
+    middle[1] - (room * row[2 * i + 1]) / pin.clearance_um,
+  ];
+  const places = data.gaps_um.map(at);
+  polyline(places, colours.quiet, 0.8, { alpha: 0.35 });
+  polyline(places.slice(0, last + 1), colours.hues[i % HUES], 1.5);
+}
+
+function drawArrow([x, y], [dx, dy], length, colour) {
+  const tip = [x + dx * length, y + dy * length];
+  polyline([[x, y], tip], colour, 3);
+  const head = [-1, 1].map((side) => [
+    tip[0] - 7 * dx + 4.5 * side * dy,
+    tip[1] - 7 * dy - 4.5 * side * dx,
+  ]);
+  pen.fillStyle = colour;
+  pen.beginPath();
+  for (const [px, py] of [[tip[0] + 3 * dx, tip[1] + 3 * dy], ...head]) pen.lineTo(px, py);
+  pen.fill();
+}
+
+function drawBearing({ pin, view }, i, place) {
+  const [ink, size] = sharpen(view);
+  if (!size) return;
+  pen = ink;
+  const shape = hole(size);
+  const { wall, journal, room, middle } = shape;
+  const gap = blend(data.gaps_um, place).slice(2 * i, 2 * i + 2);
+  const [force, flies] = [forceAt(place, i), fliesAt(place, i)];
+  disc(middle, wall + 9, colours.metal);
+  disc(middle, wall, colours.sky, colours.ink, 1.5);
+  const centre = [middle[0] + (room * gap[0]) / pin.clearance_um, middle[1] - (room * gap[1]) / pin.clearance_um];
+  pen.globalAlpha = 0.4;
+  disc(centre, journal, flies ? null : forceColour(force));
+  pen.globalAlpha = 1;
+  disc(centre, journal, null, flies ? colours.quiet : forceColour(force), 1.8);
+  pen.setLineDash([3, 3]);
+  disc(middle, room, null, colours.quiet, 1);
+  pen.setLineDash([]);
+  drawWay(pin, i, shape, place[0]);
+  disc(centre, 3.5, colours.ink);
+  const distance = Math.hypot(...gap);
+  if (!flies && force > 0 && distance > 0) {
+    const way = [gap[0] / distance, -gap[1] / distance];
+    drawArrow([middle[0] + wall * way[0], middle[1] + wall * way[1]], way, 5 + 19 * strength(force), forceColour(force));
+  }
+}
+
+function forceText(force) {
+  return force >= 1000 ? `${number(force / 1000, 2)} kN` : `${number(force, force < 10 ? 2 : 1)} N`;
+}
+
+function drawBearings() {
+  const place = locate(data.t, now.t);
+  bearings.forEach((bearing, i) => {
+    drawBearing(bearing, i, place);
+    const flies = fliesAt(place, i);
+    bearing.said.textContent = flies ? "flies" : forceText(forceAt(place, i));
+    bearing.said.classList.toggle("flies", flies);
+  });
+}
+
+function startBearings() {
+  readForceColours();
+  byId("most").textContent = forceText(most);
+  for (const pin of data.pins) {
+    const view = make("canvas");
+    view.setAttribute("role", "img");
+    view.setAttribute("aria-label", `Journal ${pin.name} in its bearing`);
+    const said = make("span");
+    const play = make("span", { className: "quiet", textContent: `${number(pin.clearance_um, 0)} µm` });
+    bearings.push({ pin, view, said });
+    byId("bearings").append(
+      make(
+        "figure",
+        { className: "bearing" },
+        view,
+        make("figcaption", {}, make("b", { textContent: pin.name }), said, play),
+      ),
+    );
+  }
+}

@@ -1,0 +1,150 @@
+"""Figures of linkages with play beyond one run: features over clearances, paths as they are and corrected."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.report.figures import svg_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> str:
+    """Draw a quantity over two others, as a surface with its points and the contours below it.
+
+    Args:
+        title: of the figure.
+        x: (a,) along the first axis.
+        y: (b,) along the second.
+        z: (a, b) over both.
+        labels: of the three axes, with units.
+
+    Returns:
+        An SVG file's text.
+    """
+    figure = _figure((6.6, 5.0))
+    axis: Any = figure.add_subplot(projection="3d")
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    axis.plot_surface(X, Y, z, cmap="viridis", alpha=0.85, linewidth=0.3, edgecolor="0.35")
+    axis.scatter(X.ravel(), Y.ravel(), z.ravel(), s=5, color="0.15", depthshade=False)
+    axis.set(title=title, xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
+    axis.locator_params(nbins=5)
+    axis.view_init(elev=24, azim=-128)
+    axis.set_box_aspect(None, zoom=0.88)
+    return svg_text(figure)
+
+
+def marked_curves(
+    title: str,
+    x: Array,
+    lines: Mapping[str, Array],
+    *,
+    labels: Sequence[str],
+    spans: Sequence[tuple[float, float]] = (),
+    fits: Mapping[str, tuple[Array, Array]] | None = None,
+) -> str:
+    """Draw curves over a common axis, with stretches that are shaded and straight lines laid through them.
+
+    Args:
+        title: of the figure.
+        x: (m,) the common axis.
+        lines: (m,) values by the name of the curve.
+        labels: of both axes, with units.
+        spans: from where to where to shade.
+        fits: by name the places (k,) and values (k,) of lines to draw over the curves.
+
+    Returns:
+        An SVG file's text.
+    """
+    figure = _figure((7.2, 4.2))
+    axis = figure.subplots()
+    for name, y in lines.items():
+        axis.plot(x, y, linewidth=1.3, label=name)
+    for name, (at, values) in (fits or {}).items():
+        axis.plot(at, values, "k--", linewidth=1.4, label=name)
+    for low, high in spans:
+        axis.axvspan(low, high, color="0.88", zorder=0)
+    axis.set(title=title, xlabel=labels[0], ylabel=labels[1], xlim=(float(x[0]), float(x[-1])))
+    axis.grid(visible=True, alpha=0.3)
+    if len(lines) + len(fits or {}) > 1:
+        axis.legend(fontsize="small")
+    return svg_text(figure)
+
+
+def lines_of_spectrum(title: str, frequencies: Array, spectra: Mapping[str, Array], unit: str) -> str:
+    """Draw amplitudes over frequency, those of several curves side by side.
+
+    Args:
+        title: of the figure.
+        frequencies: (m,) [Hz].
+        spectra: (m,) by name.
+        unit: of the amplitudes.
+
+    Returns:
+        An SVG file's text.
+    """
+    figure = _figure((7.2, 2.3 * len(spectra) + 0.8))
+    panels = figure.subplots(len(spectra), sharex=True, squeeze=False)[:, 0]
+    for axis, (name, values) in zip(panels, spectra.items(), strict=True):
+        axis.vlines(frequencies, 0, values, color="C0", linewidth=1.6)
+        axis.plot(frequencies, values, "o", color="C0", markersize=3)
+        axis.set(title=name, ylabel=f"amplitude, {unit}")
+        axis.set_ylim(bottom=0)
+        axis.grid(visible=True, alpha=0.3)
+    panels[-1].set_xlabel("frequency, Hz")
+    figure.suptitle(title)
+    return svg_text(figure)
+
+
+def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array) -> str:
+    """Draw paths in the plane, several panels side by side, and around each target what happens there.
+
+    Args:
+        title: of the figure.
+        panels: by title, (m, 2) places by the name of the path [mm].
+        targets: (k, 2) [mm].
+
+    Returns:
+        An SVG file's text.
+    """
+    figure = _figure((4.6 * len(panels) + 0.6, 6.4))
+    near = len(targets)
+    grid = figure.add_gridspec(2, len(panels) * near, height_ratios=(1.7, 1.0))
+    for i, (name, lines) in enumerate(panels.items()):
+        axis = figure.add_subplot(grid[0, i * near : (i + 1) * near])
+        _plane(axis, lines, targets)
+        axis.set(title=name, xlabel="x, mm", ylabel="y, mm")
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.legend(fontsize="small", loc="lower center")
+        for k, target in enumerate(targets):
+            close = figure.add_subplot(grid[1, i * near + k])
+            _plane(close, lines, targets)
+            close.set(
+                xlim=(target[0] - _CLOSE, target[0] + _CLOSE),
+                ylim=(target[1] - _CLOSE, target[1] + _CLOSE),
+                title=f"Q{k + 1}",
+            )
+            close.set_aspect("equal")
+            close.tick_params(labelsize="x-small")
+    figure.suptitle(title)
+    return svg_text(figure)
+
+
+# Half the width of what is shown around a target [mm].
+_CLOSE = 1.5
+
+
+def _plane(axis: Any, lines: Mapping[str, Array], targets: Array) -> None:
+    for style, (name, places) in zip(("k--", "C0-", "C1-"), lines.items(), strict=False):
+        axis.plot(*places.T, style, linewidth=1.2, label=name)
+    axis.plot(*targets.T, "r+", markersize=9, label="targets")
+    axis.grid(visible=True, alpha=0.3)
+
+
+def _figure(size: tuple[float, float]) -> "Figure":
+    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
+
+    return Figure(figsize=size, layout="constrained")

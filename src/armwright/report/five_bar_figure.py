@@ -1,0 +1,117 @@
+"""The workspace of a five-bar with its singular places, and how well its motors move the tip in it."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.clearance.five_bar import MODES, FiveBar, Mode, elbows, inverse, inverse_all
+from armwright.clearance.five_bar_parts import configuration
+from armwright.clearance.five_bar_workspace import Workspace, singular_curves, singularity, transmission, workspace
+from armwright.clearance.ideal import tip_of
+from armwright.clearance.preparing import Task
+from armwright.errors import InvalidValueError, one_of
+from armwright.report.figures import Drawing, svg_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Rods so little bent are in one line, and have no condition: the sine of their angle.
+_IN_LINE = 1e-9
+# Angles so near to one another are the same [rad], and a path is drawn with so many points.
+_SAME, _DRAWN = 1e-6, 200
+# Cells of the map along its longer side.
+_CELLS = 260
+
+
+def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = ()) -> Drawing:
+    """Return the workspace with its singular places, in one assembly mode.
+
+    Args:
+        bar: the five-bar.
+        mode: where its elbows are.
+        paths: (k, 2) places to draw into it [m], the arm at the start of the first.
+
+    Raises:
+        UnknownNameError: there is no such mode.
+        InvalidValueError: its arms never meet, or a path starts out of reach.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
+
+    one_of("assembly mode", mode, MODES)
+    figure = Figure(figsize=(7.4, 6.6), layout="constrained")
+    axis = figure.subplots()
+    space = workspace(bar, _CELLS)
+    edges = [np.append(x, 2 * x[-1] - x[-2]) - (x[1] - x[0]) / 2 for x in (space.x * 1e3, space.y * 1e3)]
+    colours = axis.pcolormesh(
+        *edges, _evenness(bar, space, mode), cmap="YlGnBu", vmin=0, vmax=1, rasterized=True, zorder=0
+    )
+    figure.colorbar(colours, ax=axis, label="smallest gain of the motors by the largest", shrink=0.8)
+    _draw_curves(axis, bar, mode)
+    for path in paths:
+        axis.plot(*(path * 1e3).T, color="C1", linewidth=2.2, zorder=4)
+    start = paths[0][0] if paths else _middle(space)
+    _draw_arm(axis, bar, inverse(bar, start, mode), start)
+    axis.set(xlabel="x, mm", ylabel="y, mm", title=f"elbows {mode}")
+    axis.set_aspect("equal")
+    axis.margins(0.03)
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    caption = (
+        f"Workspace with elbows {mode}: borders and serial singularities; parallel singularities of this mode "
+        f"and of the others; colour: how evenly the motors move the tip"
+    )
+    return Drawing("workspace", caption, svg_text(figure))
+
+
+def workspace_of(task: Task) -> Drawing | None:
+    """Return the workspace of the five-bar that does a task, with its path; None where it is no five-bar."""
+    try:
+        bar = FiveBar.of(task.linkage)
+    except InvalidValueError:
+        return None
+    tips = tip_of(task.linkage, task.ideal.q)
+    for mode, angles in inverse_all(bar, tips[0]).items():
+        if np.abs(np.sin((configuration(task.linkage, angles) - task.ideal.q[0]) / 2)).max() < _SAME:
+            return workspace_figure(bar, mode, [tips[:: max(1, len(tips) // _DRAWN)]])
+    raise AssertionError("a five-bar stands in one of four modes")
+
+
+def _evenness(bar: FiveBar, space: Workspace, mode: Mode) -> Array:
+    """Return one over the condition, (j, i); NaN out of reach."""
+    found = np.full(space.distance.shape, np.nan)
+    inside = space.distance > 0
+    places = np.stack(np.meshgrid(space.x, space.y), axis=-1)[inside]
+    angles = inverse(bar, places, mode)
+    values = np.zeros(len(places))
+    bent = np.abs(singularity(angles).parallel) > _IN_LINE
+    values[bent] = 1.0 / transmission(bar, angles[bent]).condition
+    found[inside] = values
+    return found
+
+
+def _draw_curves(axis: "Axes", bar: FiveBar, mode: Mode) -> None:
+    styles: dict[str, dict[str, Any]] = {
+        "serial singularity": {"color": "k", "linewidth": 1.6},
+        "parallel singularity": {"color": "C3", "linewidth": 1.8},
+        "in another mode": {"color": "C3", "linewidth": 0.8, "linestyle": ":"},
+    }
+    seen: set[str] = set()
+    for curve in singular_curves(bar):
+        own = "parallel singularity" if curve.modes[0] == mode else "in another mode"
+        label = "serial singularity" if curve.kind == "serial" else own
+        axis.plot(*(curve.places * 1e3).T, **styles[label], label=None if label in seen else label)
+        seen.add(label)
+
+
+def _draw_arm(axis: "Axes", bar: FiveBar, angles: Array, tip: Array) -> None:
+    left, right = elbows(bar, angles[[0, 3]]) * 1e3
+    points = np.stack([bar.motors[0] * 1e3, left, np.asarray(tip) * 1e3, right, bar.motors[1] * 1e3])
+    axis.plot(*points.T, "-", color="0.25", linewidth=3.2, solid_capstyle="round", zorder=5)
+    axis.plot(*points.T, "o", color="w", markeredgecolor="0.25", markersize=6, zorder=6)
+
+
+def _middle(space: Workspace) -> Array:
+    """Return the place farthest from the border, of those below the motors if it has some."""
+    j, i = np.unravel_index(int(space.distance[: max(1, len(space.y) // 2)].argmax()), space.distance.shape)
+    return np.array([space.x[i], space.y[j]])

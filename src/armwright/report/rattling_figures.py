@@ -1,0 +1,176 @@
+"""Figures of a linkage with play: its path, the journals in their bearings, the error and its spectrum.
+
+Source:
+    Thesis, figures 4.7, 4.8, 4.9 and 4.12.
+"""
+
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.clearance.features import spectrum
+from armwright.clearance.ideal import tip_of
+from armwright.report.figures import Drawing, literal, svg_text
+from armwright.report.rattling import Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# The largest error is drawn as this part of the size of the path, and no curve with more points than this.
+_SHOWN, _DRAWN = 0.2, 2500
+# The way of a journal is coloured by time in so many pieces.
+_PIECES = 100
+# So many places of the path without play are tied to those of the same moment with it.
+_TIES = 31
+# The spectrum is shown up to here [Hz].
+_HIGHEST = 200.0
+
+
+def rattling_figures(run: Run) -> list[Drawing]:
+    """Return the figures of a run: path, bearings, error, forces, energy, spectrum."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
+
+    drawn = []
+    times = magnification(run)
+    pins = len(run.simulation.task.linkage.pins)
+    for name, draw, size, caption in (
+        ("path", _path, (6.4, 5.2), f"The path without play and the path taken, its error magnified {times:g} times"),
+        ("bearings", _bearings, (3.1 * pins + 1.0, 3.6), "Middles of the journals in their bearings; circles: walls"),
+        ("error", _error, (7.4, 4.2), "Error of the tip over time"),
+        ("spectrum", _spectrum, (7.4, 4.2), "Amplitudes of the error: mean removed, up to 200 Hz"),
+        ("forces", _forces, (7.4, 4.2), "Forces between journals and bearings; a gap in a curve: the journal flies"),
+        ("energy", _energy, (7.4, 4.2), "What impacts and friction have taken, and what the books lack"),
+    ):
+        figure = Figure(figsize=size, layout="constrained")
+        draw(figure, run)
+        drawn.append(Drawing(name, caption, svg_text(figure)))
+    return drawn
+
+
+def magnification(run: Run) -> float:
+    """Return a round number by which errors are magnified so that one sees them beside the path."""
+    path = tip_of(run.simulation.task.linkage, run.simulation.task.ideal.q)
+    size, largest = float(np.ptp(path, axis=0).max()), float(run.distance.max())
+    return round_number(_SHOWN * size / largest) if largest > 0 else 1.0
+
+
+def round_number(x: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20 ... that is not above x; 1 for all below."""
+    if x < 1:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(x))
+    return max(digit * power for digit in (1, 2, 5) if digit * power <= x)
+
+
+def _path(figure: "Figure", run: Run) -> None:
+    simulation, times = run.simulation, magnification(run)
+    some = _some(run.rows)
+    ideal = (simulation.tip[: run.rows] - run.error)[some] * 1e3
+    taken = ideal + times * run.error[some] * 1e3
+    width, height = np.ptp(np.concatenate([ideal, taken]), axis=0)
+    figure.set_size_inches(float(np.clip(5.0 * width / max(height, 1e-9), 3.8, 8.0)), 5.4)
+    axis = figure.subplots()
+    # Of the same moment.
+    for k in np.unique(np.linspace(0, len(some) - 1, _TIES).astype(int)):
+        axis.plot(*np.stack([ideal[k], taken[k]], axis=-1), color="C7", linewidth=0.7)
+    axis.plot(*ideal.T, "k--", linewidth=1.3, label="without play")
+    axis.plot(*taken.T, color="C0", linewidth=1.3, label=f"with play, error × {times:g}")
+    for k, label in ((0, "start"), (-1, "end")):
+        axis.plot(*taken[k], "os"[k], color="C3", markersize=6, fillstyle="none", linestyle="", label=label)
+    axis.set(xlabel="x, mm", ylabel="y, mm")
+    axis.set_aspect("equal", adjustable="datalim")
+    axis.grid(visible=True, alpha=0.3)
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
+
+
+def _bearings(figure: "Figure", run: Run) -> None:
+    from matplotlib.collections import LineCollection  # noqa: PLC0415
+    from matplotlib.patches import Circle  # noqa: PLC0415
+
+    pins, some = run.simulation.task.linkage.pins, _some(run.rows)
+    panels = figure.subplots(1, len(pins), squeeze=False)[0]
+    # Each piece begins where the one before it ends.
+    cuts = np.unique(np.linspace(0, len(some) - 1, _PIECES + 1).astype(int))
+    pieces = [slice(a, b + 1) for a, b in pairwise(cuts)]
+    times = np.array([run.time[some[a]] for a in cuts[:-1]]) * 1e3
+    lines: Any = None
+    for i, (axis, pin) in enumerate(zip(panels, pins, strict=True)):
+        gaps = run.gaps[some, i] * 1e3
+        wall = float(run.simulation.clearances[i]) * 1e3
+        axis.add_patch(Circle((0, 0), wall, fill=False, color="k", linewidth=1.2))
+        lines = LineCollection([gaps[piece] for piece in pieces], array=times, cmap="viridis", linewidths=1.0)
+        axis.add_collection(lines)
+        axis.plot(*gaps[0], "o", color="C3", markersize=6, fillstyle="none", zorder=4)
+        axis.set(title=literal(f"{pin.name}, {wall:g} mm"), xlabel="x, mm", xlim=(-1.12 * wall, 1.12 * wall))
+        axis.set_ylim(-1.12 * wall, 1.12 * wall)
+        axis.set_aspect("equal")
+        axis.grid(visible=True, alpha=0.3)
+    panels[0].set_ylabel("y, mm")
+    figure.colorbar(lines, ax=panels, label="time, ms", shrink=0.8)
+
+
+def _error(figure: "Figure", run: Run) -> None:
+    axis, some = _axes(figure, "time, s", "error, mm"), _some(run.rows)
+    t = run.time[some]
+    lines = (("E", run.distance, "-", "C0"), ("x", run.error[:, 0], "--", "C1"), ("y", run.error[:, 1], "-.", "C2"))
+    for name, values, style, colour in lines:
+        axis.plot(t, values[some] * 1e3, style, color=colour, linewidth=1.3, label=name)
+    for knot in run.simulation.task.path.knots[1:-1]:
+        axis.axvline(knot, color="0.6", linewidth=0.8, linestyle=":")
+    axis.set_xlim(float(t[0]), float(t[-1]) or 1.0)
+    axis.legend(fontsize="small")
+
+
+def _spectrum(figure: "Figure", run: Run) -> None:
+    axis = _axes(figure, "frequency, Hz", "amplitude, mm")
+    waves = spectrum(run.distance) * 1e3
+    per_line = 1.0 / (len(run.time) * (run.time[1] - run.time[0])) if len(run.time) > 1 else 1.0
+    frequencies = per_line * np.arange(len(waves))
+    shown = (frequencies > 0) & (frequencies <= max(_HIGHEST, 20 * per_line))
+    axis.vlines(frequencies[shown], 0.0, waves[shown], color="C0", linewidth=1.6)
+    axis.plot(frequencies[shown], waves[shown], "o", color="C0", markersize=3.5)
+    axis.set_ylim(bottom=0.0)
+    axis.set_title(f"constant part, counted twice: {waves[0]:.4g} mm", fontsize="medium")
+
+
+def _forces(figure: "Figure", run: Run) -> None:
+    axis, some = _axes(figure, "time, s", "force, N"), _some(run.rows)
+    for i, pin in enumerate(run.simulation.task.linkage.pins):
+        forces = run.simulation.forces[: run.rows, i][some]
+        axis.plot(
+            run.time[some],
+            np.where(forces > 0, forces, np.nan),
+            linewidth=1.1,
+            color=f"C{i % 10}",
+            label=literal(pin.name),
+        )
+    if np.any(run.simulation.forces[: run.rows] > 0):
+        axis.set_yscale("log")
+    axis.legend(fontsize="small")
+
+
+def _energy(figure: "Figure", run: Run) -> None:
+    axis, some, energy = _axes(figure, "time, s", "energy, J"), _some(run.rows), run.energy
+    for name, track, style in (
+        ("lost in impacts", energy.impact_loss, "-"),
+        ("lost in friction", energy.friction_loss, "--"),
+        ("in the walls", energy.stored, "-."),
+        ("not explained", energy.imbalance, ":"),
+    ):
+        axis.plot(run.time[some], track[: run.rows][some], style, linewidth=1.4, label=name)
+    axis.legend(fontsize="small")
+
+
+def _axes(figure: "Figure", x: str, y: str) -> "Axes":
+    axis = figure.subplots()
+    axis.set(xlabel=x, ylabel=y)
+    axis.grid(visible=True, alpha=0.3)
+    return axis
+
+
+def _some(count: int) -> Array:
+    return np.unique(np.linspace(0, count - 1, _DRAWN).astype(int))

@@ -1,0 +1,256 @@
+"""The page of a linkage with play: the arm along its path, its journals rattling, and everything over time.
+
+The page is one HTML file that needs no other. Its arrays carry their unit in their name.
+"""
+
+import html
+from collections.abc import Iterator, Mapping, Sequence
+from string import Template
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.clearance.ideal import point_of
+from armwright.clearance.linkage import GROUND, Guide, Linkage, Pin, Place
+from armwright.report.figures import Drawing
+from armwright.report.markup import asset, json_text
+from armwright.report.rattling import Run, newtons, notes, summary
+from armwright.report.rattling_figures import round_number
+from armwright.version import __version__
+
+# Rows that a page carries at most, and the largest error on the screen as a part of the size of the linkage.
+_ROWS, _SHOWN = 2600, 0.09
+_SCRIPTS = ("basics.js", "clock.js", "plane.js", "bearings.js", "traces.js", "rattling.js")
+_MICRO = 1e6
+# Figures that the page has no chart of its own for.
+_PRINTED = ("path", "bearings", "spectrum", "workspace")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Film:
+    """What the scripts of the page read, at r instants.
+
+    Attributes:
+        duration: of what is shown [s].
+        t: (r,) instants [s].
+        ground_m: places on the ground, (x, y) each.
+        rails: guides on the ground: x, y [m] and direction [rad] of each.
+        bodies: of each its name and the numbers of its points.
+        motors: of each drive x, y of its joint on the ground, or the number of the point it sits at.
+        points_m: (r, 2 k) where the points of all bodies would be without play.
+        shifts_um: (r, 2 k) by how much play shifts them.
+        tip: number of the point that is the tip.
+        path_m: (r, 2) where the tip would be without play.
+        error_um: (r, 2) by how much it is off.
+        pins: of each name, clearance, the numbers of the points in the middle of bearing and journal, largest force.
+        gaps_um: (r, 2 p) from the middle of each bearing to that of its journal.
+        forces_N: (r, p) of the contacts; the largest since the row before.
+        flies: (r, p) 1 where a journal touches no wall.
+        energy_J: (r, 6) driven, kinetic, potential, impact loss, friction loss, not explained.
+        magnification: of the shifts, to begin with.
+    """
+
+    duration: float
+    t: Array
+    ground_m: Sequence[Sequence[float]]
+    rails: Sequence[Sequence[float]]
+    bodies: Sequence[Mapping[str, Any]]
+    motors: Sequence[int | Sequence[float]]
+    points_m: Array
+    shifts_um: Array
+    tip: int
+    path_m: Array
+    error_um: Array
+    pins: Sequence[Mapping[str, Any]]
+    gaps_um: Array
+    forces_N: Array
+    flies: Array
+    energy_J: Array
+    magnification: float
+
+
+def film(run: Run) -> Film:
+    """Return what the page shows of a run, with as many rows as a screen can tell apart."""
+    simulation, linkage = run.simulation, run.simulation.task.linkage
+    stride = max(1, -(-run.rows // _ROWS))
+    rows = np.arange(0, run.rows, stride)
+    rows = rows if rows[-1] == run.rows - 1 else np.append(rows, run.rows - 1)
+    places = [Place(body.name, point) for body in linkage.bodies for point in body.points]
+    q = simulation.q[rows]
+    ideal_q = simulation.task.ideal.q[rows * simulation.task.stride]
+    with_play = np.stack([point_of(linkage, place, q) for place in places], axis=1)
+    without = np.stack([point_of(linkage, place, ideal_q) for place in places], axis=1)
+    energy = run.energy
+    tracks = (energy.driven, energy.kinetic, energy.potential, energy.impact_loss, energy.friction_loss)
+    return Film(
+        duration=float(run.time[-1]),
+        t=run.time[rows],
+        ground_m=[[float(x) for x in point] for point in linkage.ground.points.values()],
+        rails=_rails(linkage),
+        bodies=[
+            {"name": body.name, "points": [i for i, place in enumerate(places) if place.body == body.name]}
+            for body in linkage.bodies
+        ],
+        motors=[_motor(linkage, drive.body, places) for drive in linkage.drives],
+        points_m=without.reshape(len(rows), -1),
+        shifts_um=(with_play - without).reshape(len(rows), -1) * _MICRO,
+        tip=places.index(linkage.tip) if linkage.tip in places else -1,
+        path_m=simulation.tip[rows] - simulation.error[rows],
+        error_um=simulation.error[rows] * _MICRO,
+        pins=_pins(run, places),
+        gaps_um=run.gaps[rows].reshape(len(rows), -1) * _MICRO,
+        # A blow between two rows is not lost.
+        forces_N=np.maximum.reduceat(simulation.forces[: run.rows], rows, axis=0),
+        flies=(run.depths[rows] < 0).astype(np.float64),
+        energy_J=np.stack([track[rows] for track in (*tracks, energy.imbalance)], axis=-1),
+        magnification=_magnification(without, np.concatenate([with_play - without, simulation.error[rows, None]], 1)),
+    )
+
+
+def rattling_page(run: Run, drawn: Sequence[Drawing], *, title: str, command: str) -> str:
+    """Return the whole text of the page.
+
+    Args:
+        run: what happened.
+        drawn: its printed figures.
+        title: heading of the page.
+        command: the command line that made it.
+
+    Returns:
+        HTML text; write it as UTF-8.
+    """
+    told = summary(run)
+    return Template(asset("rattling.html")).substitute(
+        title=html.escape(title),
+        style=asset("run.css") + asset("rattling.css"),
+        status=html.escape(told["status"]),
+        good=" good" if run.finished else "",
+        facts="".join(_fact(name, text) for name, text in _facts(told, command)),
+        notes="".join(f'<li class="warning"><b>Note</b>{html.escape(note)}</li>' for note in notes(run)),
+        pins="\n".join(_pin_rows(told)),
+        targets="\n".join(_target_rows(told)),
+        totals="".join(_pair(name, text) for name, text in _totals(told)),
+        settings="".join(_pair(name, text) for name, text in _settings(told)),
+        figures="\n".join(one.element for one in drawn if one.name in _PRINTED),
+        data=json_text(film(run)),
+        script="\n".join(asset(name) for name in _SCRIPTS),
+        generated=html.escape(f"armwright {__version__}: {command}"),
+    )
+
+
+# ---- the film ------------------------------------------------------------------------------------------------------
+
+
+def _pins(run: Run, places: Sequence[Place]) -> list[dict[str, Any]]:
+    """Return the pins; a bearing or journal on the ground has no number, but a place."""
+    linkage = run.simulation.task.linkage
+    found = []
+    for i, pin in enumerate(linkage.pins):
+        ends = {
+            name: places.index(place) if place in places else [float(x) for x in linkage.point(place)]
+            for name, place in (("bearing", pin.bearing), ("journal", pin.journal))
+        }
+        found.append(
+            {
+                "name": pin.name,
+                "clearance_um": float(run.simulation.clearances[i]) * _MICRO,
+                "peak_N": float(run.simulation.peaks[i]),
+                **ends,
+            }
+        )
+    return found
+
+
+def _rails(linkage: Linkage) -> list[list[float]]:
+    guides = [joint for joint in linkage.joints if isinstance(joint, Guide) and joint.on.body == GROUND]
+    return [[*(float(x) for x in linkage.point(guide.on)), guide.direction] for guide in guides]
+
+
+def _motor(linkage: Linkage, body: str, places: Sequence[Place]) -> int | list[float]:
+    joint = linkage.joint(body)
+    assert joint is not None  # noqa: S101 - a linkage has no drive without one
+    if isinstance(joint, Pin) and joint.on.body == GROUND:
+        return [float(x) for x in linkage.point(joint.on)]
+    return places.index(Place(joint.body, joint.point))
+
+
+def _magnification(points: Array, shifts: Array) -> float:
+    size = float(np.ptp(points.reshape(-1, 2), axis=0).max())
+    largest = float(np.linalg.norm(shifts, axis=-1).max())
+    return round_number(_SHOWN * size / largest) if largest > 0 else 1.0
+
+
+# ---- the words -----------------------------------------------------------------------------------------------------
+
+
+def _facts(told: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
+    yield "Linkage", told["linkage"]
+    yield "Path", f"{told['path']}, {told['duration']:.4g} s"
+    yield "Clearance", ", ".join(f"{name} {pin['clearance'] * 1e3:.4g} mm" for name, pin in told["pins"].items())
+    yield "Command", command
+
+
+def _pin_rows(told: Mapping[str, Any]) -> Iterator[str]:
+    for name, pin in told["pins"].items():
+        numbers = (
+            f"{pin['clearance'] * 1e3:.4g}",
+            newtons(pin["peak_force"]),
+            f"{pin['mean_force']:.4g}",
+            f"{pin['impacts']}",
+            f"{100 * pin['flight']:.3g}",
+            f"{pin['deepest'] * 1e6:.3g}",
+        )
+        yield _row(name, numbers)
+
+
+def _target_rows(told: Mapping[str, Any]) -> Iterator[str]:
+    for one in told["targets"]:
+        lengths = (one["error_x"], one["error_y"], one["distance"], one["nearest"])
+        numbers = ("" if length is None else f"{length * 1e3:.4f}" for length in lengths)
+        yield _row(f"{one['time']:.4g} s", numbers)
+
+
+def _totals(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    error, energy = told["error"], told["energy"]
+    yield "Largest error", f"{error['largest'] * 1e3:.4g} mm"
+    yield "in x", f"{error['largest_x'] * 1e3:.4g} mm"
+    yield "in y", f"{error['largest_y'] * 1e3:.4g} mm"
+    yield "Mean error", f"{error['mean'] * 1e3:.4g} mm"
+    yield "Largest wave of the error", f"{error['amp_ac'] * 1e3:.4g} mm"
+    yield "Work of the drives", f"{energy['driven']:.4g} J"
+    yield "Lost in impacts", f"{energy['impact_loss']:.4g} J"
+    yield "Lost in friction", f"{energy['friction_loss']:.4g} J"
+    yield "Not explained by the books", f"{energy['imbalance']:.2g} J"
+
+
+def _settings(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    how = told["settings"]
+    located = ", impacts located" if how["located"] else ""
+    yield "Integrator", f"{how['integrator']}, step {how['step']:.3g} s{located}, sampled every {how['sample']:.3g} s"
+    gains = f", {how['gains'][0]:g} N m/rad and {how['gains'][1]:g} N m s/rad" if "gains" in how else ""
+    yield "Control", f"{how['control']}{gains}"
+    yield "Start", how["start"]
+    asked, given = how["restitution_asked"], how["restitution_given"]
+    yield "Impact", f"{how['impact_law']}, restitution {asked:g} asked, {given:.3g} given"
+    threshold = "" if how["friction_law"] == "lugre" else f", fading below {how['friction_threshold'] * 1e3:g} mm/s"
+    yield "Friction", f"{how['friction']:g}, {how['friction_law']}, of the {how['friction_velocity']}{threshold}"
+    yield "Material", f"E {how['young'] / 1e9:g} GPa, ν {how['poisson']:g}"
+    radii = ", ".join(f"{name} {radius * 1e3:g}" for name, radius in how["journal_radius"].items())
+    yield "Radius of the journals", f"{radii} mm"
+    yield "Versions", ", ".join(f"{name} {version}" for name, version in told["versions"].items())
+
+
+def _fact(name: str, text: str) -> str:
+    code = ' class="code"' if name == "Command" else ""
+    return f"<div><dt>{name}</dt><dd{code}>{html.escape(text)}</dd></div>"
+
+
+def _pair(name: str, text: str) -> str:
+    return f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>"
+
+
+def _row(name: str, numbers: Sequence[str] | Iterator[str]) -> str:
+    cells = "".join(f'<td class="number">{html.escape(number)}</td>' for number in numbers)
+    return f"<tr><td>{html.escape(name)}</td>{cells}</tr>"

@@ -1,0 +1,111 @@
+"""Small linkages whose motion one can calculate, and what every simulated motion must obey."""
+
+from typing import Any
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from armwright.arrays import Array
+from armwright.clearance.equations import Contact, Rubbing, State, Touch, rates
+from armwright.clearance.linkage import Body, Drive, Guide, Linkage, Material, Pin, Place, Play
+from armwright.clearance.paths import Path
+from armwright.clearance.preparing import Task, prepare
+from armwright.clearance.settings import Settings, contact_stiffness
+from armwright.clearance.simulation import Simulation
+
+GRAVITY = 9.81
+ORIGIN = Body(name="ground", points={"O": (0.0, 0.0)})
+
+
+def block(
+    *,
+    clearance: float = 5e-4,
+    gravity: float = 0.0,
+    restitution: float = 0.9,
+    friction: float = 0.0,
+) -> Linkage:
+    """A block of 1 kg in a round hole, that moves up and down on a cross of 1 kg, that moves from side to side.
+
+    Up and down 1 kg moves, from side to side 2 kg; nothing turns.
+    """
+    return Linkage(
+        name="block",
+        ground=ORIGIN,
+        bodies=[Body(name="cross", mass=1.0, points={"P": (0, 0)}), Body(name="block", mass=1.0, points={"P": (0, 0)})],
+        joints=[
+            Guide(body="cross", point="P", on=Place("ground", "O")),
+            Guide(body="block", point="P", on=Place("cross", "P"), direction=np.pi / 2),
+        ],
+        pins=[
+            Play(
+                name="hole",
+                bearing=Place("ground", "O"),
+                journal=Place("block", "P"),
+                clearance=clearance,
+                journal_radius=0.01,
+            )
+        ],
+        drives=[],
+        tip=Place("block", "P"),
+        gravity=(0.0, -gravity),
+        material=Material(restitution=restitution, friction=friction),
+    )
+
+
+def pendulum() -> Linkage:
+    """1 kg at the end of a rod of 1 m without mass; a drive at its pin, and nothing has play."""
+    # Without any inertia of its own a body is refused; this one changes the period by 5e-13.
+    bar = Body(name="bar", mass=1.0, inertia=1e-12, centre=(1, 0), points={"O": (0, 0), "P": (1, 0)})
+    return Linkage(
+        name="pendulum",
+        ground=ORIGIN,
+        bodies=[bar],
+        joints=[Pin(body="bar", point="O", on=Place("ground", "O"))],
+        pins=[],
+        drives=[Drive(body="bar")],
+        tip=Place("bar", "P"),
+    )
+
+
+def still(duration: float, *drives: float) -> Path:
+    """The drives stay where they are."""
+    pieces = np.array(drives, dtype=np.float64).reshape(1, -1, 1)
+    return Path(name="still", knots=np.array([0.0, duration]), pieces=pieces, of="drives")
+
+
+def thrown(linkage: Linkage, settings: Settings, duration: float, speeds: ArrayLike) -> Task:
+    """A linkage that starts with given speeds where it stood still."""
+    task = prepare(linkage, still(duration, *([0.0] * len(linkage.drives))), settings)
+    qd = np.zeros_like(task.ideal.qd)
+    qd[0] = speeds
+    return attrs.evolve(task, ideal=attrs.evolve(task.ideal, qd=qd))
+
+
+def left_alone(task: Task) -> Task:
+    """The same with drives that give nothing."""
+    return attrs.evolve(task, table=np.zeros_like(task.table))
+
+
+def energies(found: Simulation) -> Array:
+    """(..., s) kinetic energy, that of gravity and loads, and that of indentations, all together [J]."""
+    linkage, settings = found.task.linkage, found.task.settings
+    c = np.broadcast_to(found.clearances[..., None, :], (*found.q.shape[:-1], len(linkage.pins)))
+    K = contact_stiffness(linkage, c)
+    contacts = [Contact(c[..., i], K[..., i], 0.0, 0.0, settings.threshold) for i in range(len(linkage.pins))]
+    touches = [Touch(np.zeros(found.q.shape[:-1]), 1.0) for _ in linkage.pins]
+    state = State(axes(found.q), axes(found.qd), touches)
+    return np.asarray(sum(rates(linkage, Rubbing(), state, [0.0] * len(linkage.drives), contacts).energy))
+
+
+def imbalance(found: Simulation) -> Array:
+    """(..., s) energy that has come from nowhere since the start [J]."""
+    energy = energies(found)
+    works = found.works
+    given = works["driven"] - works["impact loss"] - works["friction loss"]
+    return np.asarray(energy - energy[..., :1] - given)
+
+
+def axes(values: Array) -> list[Any]:
+    """The numbers of the last axis one by one."""
+    return [values[..., i] for i in range(values.shape[-1])]

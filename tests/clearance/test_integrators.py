@@ -1,0 +1,87 @@
+"""How fast the integrators of the compiled simulation come nearer to the truth."""
+
+from itertools import pairwise
+
+import attrs
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+from armwright.clearance.preparing import prepare
+from armwright.clearance.settings import Settings
+from armwright.clearance.simulation import simulate
+from clearance.mechanisms import GRAVITY, block, imbalance, left_alone, pendulum, still, thrown
+
+# Of benchmark A01: six digits are printed.
+PRINTED = 6e-7
+
+
+def swung(integrator: str, step: float, duration: float = 1.0) -> np.ndarray:
+    """(s, 2) where the pendulum's bob is each second, let go from the level on the left."""
+    settings = Settings(step=step, sample=1.0, integrator=integrator)  # type: ignore[arg-type]
+    return simulate(left_alone(prepare(pendulum(), still(duration, -np.pi), settings))).tip
+
+
+def bob(t: float) -> np.ndarray:
+    """Where it is, by elliptic functions: sin(φ/2) = k sn(K - ω t) with k = sin(45°), φ from straight down."""
+    k = np.sin(np.pi / 4)
+    angle = -2 * np.arcsin(k * ellipj(ellipk(k * k) - np.sqrt(GRAVITY) * t, k * k)[0])
+    return np.array((np.sin(angle), -np.cos(angle)))
+
+
+def test_simple_pendulum() -> None:
+    """Let go at (-1, 0) the bob is where elliptic functions and benchmark A01 say, after 1, 5 and 10 seconds."""
+    tip = swung("rk4", 1e-3, 10.0)
+
+    published = ((0.986292, -0.165011), (-0.942305, -0.334754), (-0.275087, -0.961419))
+    for second, place in zip((1, 5, 10), published, strict=True):
+        np.testing.assert_allclose(tip[second], bob(second), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(tip[second], place, rtol=0, atol=PRINTED)
+
+
+@pytest.mark.parametrize(("integrator", "order", "step"), [("rk4", 4, 0.02), ("semi-implicit", 1, 2e-3)])
+def test_order_in_the_air(integrator: str, order: int, step: float) -> None:
+    """Half the step leaves a sixteenth of the error of Runge and Kutta, and half of that of the semi-implicit rule."""
+    errors = [np.linalg.norm(swung(integrator, step / 2**i)[-1] - bob(1.0)) for i in range(4)]
+
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    np.testing.assert_allclose(orders, order, atol=0.25)
+
+
+def slid(integrator: str, step: float) -> tuple[np.ndarray, float]:
+    """Where the block is that slides in the hole like a pendulum, pressed to the wall by its weight; and its ledger."""
+    settings = Settings(step=step, sample=2e-4, integrator=integrator)  # type: ignore[arg-type]
+    found = simulate(thrown(block(gravity=GRAVITY, clearance=5e-3), settings, 0.002, (0.15, 0.0)))
+    assert found.depths.min() > 0
+    # Going round in the hole presses half as much again as weight does: the indentation swings.
+    assert np.ptp(found.depths) > 0.1 * found.depths[0]
+    return np.concatenate([found.q[-1], found.qd[-1]]), float(np.abs(imbalance(found)).max())
+
+
+@pytest.mark.parametrize(("integrator", "order", "step"), [("rk4", 4, 2e-5), ("semi-implicit", 1, 2e-5)])
+def test_order_on_the_wall(integrator: str, order: int, step: float) -> None:
+    """On a wall that is never left the orders are the same."""
+    ends = [slid(integrator, step / 2**i)[0] for i in range(4)]
+
+    steps = np.array([np.linalg.norm(b - a) for a, b in pairwise(ends)])
+    np.testing.assert_allclose(np.log2(steps[:-1] / steps[1:]), order, atol=0.4)
+
+
+def test_ledger_on_the_wall() -> None:
+    """On the wall no energy comes from nowhere: of 10 mJ less than a millionth of a millionth."""
+    assert slid("rk4", 2e-6)[1] < 1e-14
+
+
+def test_controller_brings_it_to_its_goal() -> None:
+    """A pendulum that is held with 200 N m/rad and 10 N m s/rad swings into its goal as a linear one does."""
+    settings = Settings(step=1e-4, sample=1e-2, control="pd+ff", gains=(200.0, 10.0))
+    task = prepare(pendulum(), still(0.3, -np.pi / 2), settings)
+    off = task.ideal.q.copy()
+    off[0] += 1e-3
+    found = simulate(attrs.evolve(task, ideal=attrs.evolve(task.ideal, q=off)))
+
+    # Near its lowest place weight is a spring of m g l; inertia is m l².
+    a, b = 10.0 / 2, np.sqrt(200.0 + GRAVITY - 25.0)
+    t = found.time
+    by_hand = 1e-3 * np.exp(-a * t) * (np.cos(b * t) + a / b * np.sin(b * t))
+    np.testing.assert_allclose(found.q[:, 0] + np.pi / 2, by_hand, rtol=0, atol=1e-9)

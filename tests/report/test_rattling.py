@@ -1,0 +1,407 @@
+"""The report of a linkage with play: its numbers, its table, its figures, and its page in a real browser."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.clearance.five_bar import FiveBar
+from armwright.clearance.ideal import tip_of
+from armwright.clearance.linkage import Pin, Place
+from armwright.clearance.paths import thesis_path, turning
+from armwright.clearance.preparing import Task, prepare
+from armwright.clearance.reader import load_linkage
+from armwright.clearance.settings import Settings
+from armwright.clearance.simulation import Simulation, Status, simulate
+from armwright.errors import ShapeError
+from armwright.report.five_bar_figure import workspace_figure, workspace_of
+from armwright.report.rattling import Run, notes, samples_csv, summary
+from armwright.report.rattling_figures import magnification, rattling_figures, round_number
+from armwright.report.rattling_page import film, rattling_page
+
+# The page writes five significant digits.
+FIVE_DIGITS = 0.5e-4
+# The books of a run in steps of 1e-5 s close to this [J], with 11 J that go through them.
+BOOKS = 2e-4
+MEGABYTE = 1e6
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return prepare(load_linkage("five-bar"), thesis_path("y1"))
+
+
+@pytest.fixture(scope="module")
+def simulation(task: Task) -> Simulation:
+    return simulate(task)
+
+
+@pytest.fixture(scope="module")
+def run(simulation: Simulation) -> Run:
+    return Run.of(simulation)
+
+
+@pytest.fixture(scope="module")
+def cranked() -> dict[str, Run]:
+    """Return runs of the linkages of which one drive turns, half a turn each."""
+    found = {}
+    for name, speed in (("slider-crank", 60.0), ("four-bar", 12.0)):
+        linkage = load_linkage(name)
+        at = linkage.assembly[linkage.drives[0].body]
+        path = turning("half a turn", at, speed, np.pi / speed)
+        found[name] = Run.of(simulate(prepare(linkage, path, Settings(start="centred"))))
+    return found
+
+
+def diverged(simulation: Simulation) -> Run:
+    """Return a run whose numbers became infinite after 500 samples."""
+    q = simulation.q.copy()
+    q[500:] = np.nan
+    error = np.where(np.isnan(q[:, :1]), np.nan, simulation.error)
+    peaks = np.array([np.inf, *simulation.peaks[1:]])
+    return Run.of(attrs.evolve(simulation, q=q, error=error, peaks=peaks, status=np.array(Status.DIVERGED)))
+
+
+def page_of(run: Run) -> str:
+    return rattling_page(run, rattling_figures(run), title="A & B", command="armwright clearance simulate <x>")
+
+
+# ---- numbers -------------------------------------------------------------------------------------------------------
+
+
+def test_summary(run: Run) -> None:
+    """The summary has the error of the thesis' start, the peaks of the run, and books that close."""
+    told = summary(run)
+
+    start = told["targets"][0]
+    # Table of the thesis: 0.2893 mm to the side; straight down by statics.
+    assert (start["error_x"] * 1e3, start["error_y"] * 1e3) == pytest.approx((0.2893, -0.9059), abs=5e-5)
+    assert told["targets"][-1]["time"] == pytest.approx(0.25)
+    assert [pin["peak_force"] for pin in told["pins"].values()] == run.simulation.peaks.tolist()
+    assert all(pin["mean_force"] < pin["peak_force"] for pin in told["pins"].values())
+    energy = told["energy"]
+    held = energy["kinetic_change"] + energy["potential_change"] + energy["stored_change"]
+    lost = energy["impact_loss"] + energy["friction_loss"]
+    assert energy["driven"] == pytest.approx(held + lost, abs=BOOKS)
+    assert energy["imbalance"] < BOOKS
+    assert told["error"]["amp_dc"] == pytest.approx(2 * told["error"]["mean"], rel=1e-9)
+    assert notes(run) == []
+
+
+def test_nearest_approach(run: Run) -> None:
+    """No target is nearer at its time than at the nearest approach."""
+    for one in summary(run)["targets"]:
+        assert one["nearest"] <= one["distance"] + 1e-12
+
+
+def test_peak_lies_in_the_wall(run: Run) -> None:
+    """Where a journal presses it is in the wall, and where it flies it presses on nothing."""
+    forces = run.simulation.forces
+
+    assert np.all(run.depths[forces > 0] > 0)
+    assert np.all(forces[run.depths < 0] == 0)
+
+
+def test_samples_table(run: Run) -> None:
+    """The table has a row per sample, and every column but none of its numbers tells its unit."""
+    rows = list(csv.reader(samples_csv(run)))
+
+    assert len(rows) == 1 + len(run.time)
+    table = {name: np.array([float(row[i]) for row in rows[1:]]) for i, name in enumerate(rows[0])}
+    assert all(name.rpartition("_")[2] in {"s", "m", "rad", "m/s", "rad/s", "N", "J"} for name in table)
+    np.testing.assert_allclose(table["error_m"], np.hypot(table["error_x_m"], table["error_y_m"]), rtol=1e-8)
+    gap = np.hypot(table["J3.gap_x_m"], table["J3.gap_y_m"])
+    np.testing.assert_allclose(gap - 0.5e-3, table["J3.depth_m"], atol=1e-12)
+    np.testing.assert_allclose(table["tip_y_m"], run.simulation.tip[:, 1], rtol=1e-9)
+
+
+def test_diverged_run(simulation: Simulation) -> None:
+    """A run that diverged is told as far as it is sound, and the reader is told so."""
+    run = diverged(simulation)
+
+    assert summary(run)["status"] == "diverged"
+    assert summary(run)["pins"]["J2"]["peak_force"] is None
+    assert len(list(samples_csv(run))) == 1 + 500
+    assert "shown until" in notes(run)[0]
+    assert "diverged" in page_of(run)
+    assert len(rattling_figures(run)) == 6
+
+
+def test_books_that_do_not_close(simulation: Simulation) -> None:
+    """Of energy that nobody can explain the reader is told, with the step that lost it."""
+    works = {
+        **simulation.works,
+        "impact loss": simulation.works["impact loss"] + np.linspace(0, 1, len(simulation.time)),
+    }
+
+    said = notes(Run.of(attrs.evolve(simulation, works=works)))
+
+    assert len(said) == 1
+    assert said[0].startswith("the books lack 1 J")
+    assert "1e-05 s" in said[0]
+
+
+def test_many_runs_are_refused(task: Task) -> None:
+    """A report is of one run: of several one is to be taken out."""
+    both = simulate(task, [[5e-4] * 3, [4e-4] * 3])
+    with pytest.raises(ShapeError, match=r"expected one run, got \(2,\)"):
+        Run.of(both)
+
+
+# ---- figures -------------------------------------------------------------------------------------------------------
+
+
+def test_figures(run: Run) -> None:
+    """Path, bearings, error, spectrum, forces and energy are drawn, the same for the same run."""
+    drawn = rattling_figures(run)
+
+    assert [one.name for one in drawn] == ["path", "bearings", "error", "spectrum", "forces", "energy"]
+    assert all(one.svg.startswith("<?xml") and len(one.caption) > 20 for one in drawn)
+    assert [one.svg for one in rattling_figures(run)] == [one.svg for one in drawn]
+
+
+def test_magnification(run: Run) -> None:
+    """The error is magnified by a round number that keeps it below a fifth of the path."""
+    times = magnification(run)
+
+    assert times == round_number(times)
+    assert times * run.distance.max() <= 0.2 * 0.3 < 2.5 * times * run.distance.max()
+
+
+@pytest.mark.parametrize(("x", "round_one"), [(0.3, 1), (1, 1), (4.99, 2), (5, 5), (99, 50), (100, 100), (730, 500)])
+def test_round_numbers(x: float, round_one: float) -> None:
+    """1, 2, 5, 10 ... are round."""
+    assert round_number(x) == round_one
+
+
+def test_workspace(task: Task, run: Run, cranked: dict[str, Run]) -> None:
+    """The workspace of a five-bar is drawn in the mode in which it stands, of no other linkage at all."""
+    assert run.simulation.task is task
+    drawn = workspace_of(task)
+
+    assert drawn is not None
+    assert "elbows out" in drawn.caption
+    assert workspace_of(cranked["four-bar"].simulation.task) is None
+    for mode in ("left", "in"):
+        assert workspace_figure(FiveBar.symmetric(0.45, 0.3, 0.4), mode).svg != drawn.svg
+
+
+# ---- the film ------------------------------------------------------------------------------------------------------
+
+
+def test_film(run: Run) -> None:
+    """The film puts every point where the linkage has it: without play on the path, with play off by the error."""
+    shown = film(run)
+
+    rows = len(shown.t)
+    tip = shown.points_m.reshape(rows, -1, 2)[:, shown.tip]
+    np.testing.assert_allclose(tip, shown.path_m, atol=1e-12)
+    shift = shown.shifts_um.reshape(rows, -1, 2)[:, shown.tip]
+    np.testing.assert_allclose(shift, shown.error_um, atol=1e-6)
+    for i, pin in enumerate(shown.pins):
+        ends = [shown.shifts_um.reshape(rows, -1, 2)[:, pin[name]] for name in ("journal", "bearing")]
+        np.testing.assert_allclose(ends[0] - ends[1], shown.gaps_um[:, 2 * i : 2 * i + 2], atol=1e-6)
+
+
+def test_long_runs_are_thinned(simulation: Simulation) -> None:
+    """A long run keeps few rows, but no blow is lost between two of them."""
+    times = 5
+    long = {
+        name: np.concatenate([getattr(simulation, name)] * times)
+        for name in ("q", "qd", "tip", "error", "forces")
+    }  # fmt: skip
+    works = {name: np.concatenate([track] * times) for name, track in simulation.works.items()}
+    time = np.linspace(0, times * 0.25, len(long["q"]))
+    ideal = attrs.evolve(simulation.task.ideal, q=np.concatenate([simulation.task.ideal.q] * (times + 1)))
+    run = Run.of(
+        attrs.evolve(simulation, **long, works=works, time=time, task=attrs.evolve(simulation.task, ideal=ideal))
+    )
+
+    shown = film(run)
+
+    assert len(shown.t) <= 2601
+    assert shown.t[-1] == time[-1]
+    assert np.array_equal(shown.forces_N.max(axis=0), simulation.forces.max(axis=0))
+
+
+def test_page_carries_all(run: Run) -> None:
+    """The page names no address, no text on it is taken for HTML, and it stays below three megabytes."""
+    page = page_of(run)
+
+    assert len(page) < 3 * MEGABYTE
+    assert "<x>" not in page
+    assert "<h1>A &amp; B</h1>" in page
+    for scheme in ("http://", "https://", "//cdn"):
+        assert scheme not in page
+    for name in run.simulation.task.linkage.clearances:
+        assert f"<td>{name}</td>" in page
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "four-bar"])
+def test_other_linkages(cranked: dict[str, Run], name: str) -> None:
+    """A slider-crank has a rail and a four-bar none; both have one motor on the ground and one bearing."""
+    run = cranked[name]
+    shown = film(run)
+
+    assert len(shown.rails) == (1 if name == "slider-crank" else 0)
+    assert shown.motors == [[0.0, 0.0]]
+    assert len(shown.pins) == 1
+    task = run.simulation.task
+    ideal = tip_of(task.linkage, task.ideal.q)[:: task.stride]
+    np.testing.assert_allclose(shown.path_m[[0, -1]], ideal[[0, -1]], atol=1e-12)
+    # Its path has no goal of the tip but the start.
+    assert [one["time"] for one in summary(run)["targets"]] == [0.0]
+
+
+def test_bearing_in_the_ground() -> None:
+    """A bearing in the ground has a place on it, and moves with no body."""
+    linkage = load_linkage("four-bar")
+    joints = [*linkage.joints[:2], Pin(body="rocker", point="B", on=Place("coupler", "B"))]
+    pin = attrs.evolve(linkage.pins[0], name="C$", bearing=Place("ground", "C"), journal=Place("rocker", "C"))
+    other = attrs.evolve(linkage, joints=joints, pins=[pin])
+    path = turning("a little", linkage.assembly["crank"], 12.0, 0.05)
+
+    run = Run.of(simulate(prepare(other, path, Settings(start="centred"))))
+
+    (shown,) = film(run).pins
+    assert shown["bearing"] == [0.3, 0.0]
+    assert isinstance(shown["journal"], int)
+    assert all(one.svg for one in rattling_figures(run))
+
+
+# ---- in a browser --------------------------------------------------------------------------------------------------
+
+
+class Opened:
+    """An opened page, and everything it complained about or asked the network for."""
+
+    def __init__(self, browser: Any, file: Path, run: Run) -> None:
+        file.write_text(page_of(run), encoding="utf-8")
+        self.said: list[str] = []
+        self.page = browser.new_page(viewport={"width": 1280, "height": 900})
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.said.append(request.url) if request.url != file.as_uri() else None)
+        self.page.goto(file.as_uri())
+
+    def state(self) -> dict[str, Any]:
+        """Ask the page where it stands."""
+        return dict(self.page.evaluate("armwright.state()"))
+
+    def seek(self, t: float) -> None:
+        """Move the slider as a hand does."""
+        self.page.evaluate(
+            "t => { const s = document.getElementById('time'); s.value = t; s.dispatchEvent(new Event('input')); }", t
+        )
+
+    def pixels(self, selector: str) -> str:
+        """Return what a canvas shows, as the text of a picture."""
+        return str(self.page.evaluate("s => document.querySelector(s).toDataURL()", selector))
+
+
+@pytest.fixture
+def opened(browser: Any, tmp_path: Path, run: Run) -> Any:
+    shown = Opened(browser, tmp_path / "report.html", run)
+    yield shown
+    shown.page.close()
+
+
+@pytest.mark.browser
+def test_opens_from_the_disk(opened: Opened) -> None:
+    """The page opens without a complaint and asks the network for nothing but pictures that it carries itself."""
+    assert [text for text in opened.said if not text.startswith("data:image/svg+xml")] == []
+    assert opened.page.locator(".bearing").count() == 3
+    assert opened.page.locator(".chart").count() == 4
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("t", [0.0, 0.1, 0.2213, 0.25])
+def test_shows_the_moment(opened: Opened, run: Run, t: float) -> None:
+    """At every moment the page shows the error, the gaps and what flies as the simulation has it."""
+    opened.seek(t)
+    seen = opened.state()
+
+    row = round(t / 1e-4)
+    assert seen["time"] == pytest.approx(t, abs=1e-6)
+    np.testing.assert_allclose(seen["error"], run.error[row], atol=FIVE_DIGITS * 1e-3)
+    np.testing.assert_allclose(seen["gaps"], run.gaps[row].ravel(), atol=FIVE_DIGITS * 1e-3)
+    assert seen["flies"] == (run.depths[row] < 0).tolist()
+    text = opened.page.locator("#now").inner_text()
+    assert f"{run.distance[row] * 1e3:.3f} mm" in text
+    assert text.count("flies") == np.count_nonzero(run.depths[row] < 0)
+
+
+@pytest.mark.browser
+def test_plays(opened: Opened) -> None:
+    """Play moves everything, slowly enough to see a quarter of a second; the space bar stops it."""
+    before = [opened.pixels("#view"), opened.pixels(".bearing canvas")]
+    assert opened.state()["rate"] < 0.1
+
+    opened.page.locator("#play").click()
+    for _ in range(500):
+        if opened.state()["time"] > 0.002:
+            break
+        opened.page.wait_for_timeout(20)
+    opened.page.locator("#play").blur()
+    opened.page.keyboard.press(" ")
+
+    assert opened.state()["playing"] is False
+    assert opened.state()["time"] > 0.002
+    assert [opened.pixels("#view"), opened.pixels(".bearing canvas")] != before
+
+
+@pytest.mark.browser
+def test_magnifies(opened: Opened) -> None:
+    """Another magnification draws the linkage otherwise, and the bearings as before."""
+    view, bearing = opened.pixels("#view"), opened.pixels(".bearing canvas")
+
+    opened.page.locator("#magnify").select_option("1")
+
+    assert opened.state()["magnification"] == 1
+    assert opened.pixels("#view") != view
+    assert opened.pixels(".bearing canvas") == bearing
+
+
+@pytest.mark.browser
+def test_charts_lead(opened: Opened) -> None:
+    """A click into the middle of a chart goes to the middle of the run, and the cursor of each chart is there."""
+    chart = opened.page.locator(".plot").nth(1)
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+
+    opened.page.mouse.click(box["x"] + (50 + box["width"] - 10) / 2, box["y"] + 40)
+
+    assert opened.state()["time"] == pytest.approx(0.125, abs=0.002)
+    places = opened.page.evaluate(
+        "[...document.querySelectorAll('.plot > .cursor:first-of-type')].map(c => c.style.left)"
+    )
+    assert len(set(places)) == 1
+    assert opened.page.locator(".tip:visible").inner_text().count(" N") == 3
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", ["slider-crank", "four-bar"])
+def test_other_pages(browser: Any, tmp_path: Path, cranked: dict[str, Run], name: str) -> None:
+    """The pages of slider-crank and four-bar open, and end where their runs end."""
+    shown = Opened(browser, tmp_path / f"{name}.html", cranked[name])
+    shown.page.keyboard.press("End")
+
+    assert shown.state()["time"] == pytest.approx(cranked[name].time[-1], rel=1e-6)
+    assert [text for text in shown.said if not text.startswith("data:image/svg+xml")] == []
+    shown.page.close()
+
+
+@pytest.mark.browser
+def test_diverged_page(browser: Any, tmp_path: Path, simulation: Simulation) -> None:
+    """The page of a run that diverged ends where it was last sound, and says so."""
+    shown = Opened(browser, tmp_path / "diverged.html", diverged(simulation))
+
+    shown.page.keyboard.press("End")
+
+    assert shown.state()["time"] == pytest.approx(0.0499, abs=1e-6)
+    assert shown.page.locator("#status").inner_text() == "diverged"
+    assert [text for text in shown.said if not text.startswith("data:image/svg+xml")] == []
+    shown.page.close()
