@@ -46,6 +46,13 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 	$(BIN)/python examples/measurements.py
 	$(BIN)/armwright iso9283 examples/measured_poses.csv examples/measured_paths.csv -o out/iso9283
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sweep,clearance]'
+	$(BIN)/python examples/five_bar.py
+	$(BIN)/armwright clearance simulate five-bar --path y1 -o out/rattling
+	$(BIN)/armwright clearance estimate five-bar examples/five_bar_rest.csv
+	$(BIN)/armwright clearance sweep five-bar --friction-velocity centre --threshold-mm-s 10 -o out/sweep
+	$(BIN)/armwright clearance estimate five-bar examples/five_bar_paths.csv --sweep out/sweep --noise-um 2
+	$(BIN)/armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483 -o out/corrected
 
 pictures: $(VENV)/core  ## Draw the pictures of the physics pages
 	$(BIN)/python docs/pictures/make.py

@@ -84,7 +84,7 @@ def test_quiet() -> None:
     ("arguments", "said"),
     [
         (["fivebar", "--path", "y1"], "no linkage 'fivebar'. Did you mean 'five-bar'?"),
-        (["five-bar", "--path", "Y2"], "no test path 'Y2'. Did you mean 'y2'?"),
+        (["five-bar", "--path", "Y2"], "no path 'Y2'. Did you mean 'y2'?"),
         (["five-bar", "--path", "y1", "--clearance", "j3=0.2"], "no pin 'j3'. Did you mean 'J3'?"),
         (["five-bar", "--path", "y1", "--law", "flors"], "no law of impact 'flors'. Did you mean 'flores'?"),
         (["five-bar", "--path", "y1", "--friction-velocity", "center"], "Did you mean 'centre'?"),

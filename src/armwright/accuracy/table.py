@@ -1,6 +1,5 @@
 """Tables of measurements: CSV whose column names tell the units, read row by row into SI units."""
 
-import csv
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -10,9 +9,8 @@ import attrs
 
 from armwright.accuracy.cycles import ASKED, Kind
 from armwright.accuracy.measured import ANGLES
-from armwright.arrays import LARGEST
 from armwright.errors import FileFormatError, closest, shown
-from armwright.files.document import read_text
+from armwright.files.rows import Cells, number_in_cell, read_rows, refuse_other_widths
 
 # SI values of the units that names of columns end in.
 _LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
@@ -94,42 +92,24 @@ def read_table(path: Path | str) -> Table:
             be; the text has file, line and column.
     """
     path = Path(path)
-    text = read_text(path)
-    reader = csv.reader(text.splitlines())
-    try:
-        lines = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise FileFormatError(path, reader.line_num + 1, "", f"not valid CSV: {error}") from error
-    if not lines:
-        raise FileFormatError(path, None, "", "the file is empty; its first line should name the columns")
-    head_line, head = lines[0]
-    columns = _columns(path, head_line, head)
-    if len(lines) == 1:
-        raise FileFormatError(path, None, "", "no rows below the names of the columns")
-    rows = tuple(_Line(path, line, cells, len(head), columns).row() for line, cells in lines[1:])
+    head, lines = read_rows(path)
+    columns = _columns(path, head)
+    refuse_other_widths(path, head, lines)
+    rows = tuple(_Line(path, one, columns).row() for one in lines)
     return Table(path=path, columns=tuple(columns), rows=rows)
 
 
-def _columns(path: Path, line: int, head: list[str]) -> dict[str, _Column]:
+def _columns(path: Path, head: Cells) -> dict[str, _Column]:
     """Return the columns by their name without the unit."""
-    if len(head) == 1:
-        for mark, name in ((";", "semicolons"), ("\t", "tabs")):
-            if mark in head[0]:
-                raise FileFormatError(
-                    path,
-                    line,
-                    "",
-                    f"columns are separated by {name}; expected commas between columns and points in numbers",
-                )
     found: dict[str, _Column] = {}
-    for place, header in enumerate(cell.strip().lower() for cell in head):
+    for place, header in enumerate(cell.lower() for cell in head.cells):
         if header.startswith(_NOTE):
             continue
-        name, scale = _named(path, line, header)
+        name, scale = _named(path, head.line, header)
         if name in found:
-            raise FileFormatError(path, line, header, f"given twice, as {found[name].header} too")
+            raise FileFormatError(path, head.line, header, f"given twice, as {found[name].header} too")
         found[name] = _Column(place, scale, header)
-    _complete(path, line, found)
+    _complete(path, head.line, found)
     return found
 
 
@@ -175,12 +155,9 @@ def _complete(path: Path, line: int, found: Mapping[str, _Column]) -> None:
 class _Line:
     """One line of a table while it is read."""
 
-    def __init__(self, path: Path, line: int, cells: list[str], width: int, columns: Mapping[str, _Column]) -> None:
-        self._path, self._line, self._columns = path, line, columns
-        self._cells = [cell.strip() for cell in cells]
-        if len(cells) != width:
-            hint = "; is there a comma in a number?" if len(cells) > width else ""
-            raise self._error("", f"expected {width} values, as there are columns, got {len(cells)}{hint}")
+    def __init__(self, path: Path, cells: Cells, columns: Mapping[str, _Column]) -> None:
+        self._path, self._columns = path, columns
+        self._line, self._cells = cells
 
     def row(self) -> Row:
         """Return what the line says, in SI units."""
@@ -235,23 +212,7 @@ class _Line:
         if not text:
             return None
         column = self._columns[name]
-        try:
-            value = float(text)
-        except ValueError:
-            said = f"expected a number, got {shown(text)}"
-            hint = "; write a decimal point" if _is_number(text.replace(",", ".")) else ""
-            raise self._error(column.header, said + hint) from None
-        if not abs(value) <= LARGEST:
-            raise self._error(column.header, f"every number must be finite and no larger than {LARGEST:g}, got {text}")
-        return value * column.scale
+        return number_in_cell(self._path, self._line, column.header, text) * column.scale
 
     def _error(self, key: str, message: str) -> FileFormatError:
         return FileFormatError(self._path, self._line, key, message)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -205,9 +205,13 @@ def _corrected(  # noqa: PLR0917 - what both kinds of corrections have in common
     rounds: int,
     progress: Callable[[float], None] | None,
 ) -> Correction:
+    if rounds < 0:
+        raise InvalidValueError(f"rounds: expected 0 or more, got {rounds}")
     c = floats(clearances, "clearances")
     if c.ndim not in (1, 2):
         raise ShapeError(f"clearances: expected one row or several, got shape {c.shape}")
+    if rounds < 0:
+        raise InvalidValueError(f"rounds: expected 0 or more, got {rounds}")
     history: list[float] = []
     before = after = np.zeros(0)
     for turn in range(rounds + 1):
@@ -249,7 +253,7 @@ def tip_at(simulation: Simulation, times: Array) -> Array:
     step = t[1] - t[0]
     number = np.clip((times / step).astype(int), 0, len(t) - 2)
     u = ((times - t[number]) / step)[:, None]
-    speed = np.gradient(tip, step, axis=-2, edge_order=2) * step
+    speed = np.gradient(tip, step, axis=-2, edge_order=2 if len(t) > 2 else 1) * step
     a, b = tip[..., number, :], tip[..., number + 1, :]
     va, vb = speed[..., number, :], speed[..., number + 1, :]
     return np.asarray(a + u * (va + u * (3 * (b - a) - 2 * va - vb + u * (2 * (a - b) + va + vb))), dtype=np.float64)

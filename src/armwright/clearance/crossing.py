@@ -18,28 +18,28 @@ def rates(x, y):
 
 
 @njit(error_model="numpy")
-def tell(x, tables, table, step, k, moment):
+def tell(x, table, step, k, moment):
     for i in range({columns}):
-        a, b, c = tables[table, step, 0, i], tables[table, step, 1, i], tables[table, step, 2, i]
+        a, b, c = table[step, 0, i], table[step, 1, i], table[step, 2, i]
         bent = 2.0 * (a - 2.0 * b + c)
         x[({first_drive} + i) * {lanes} + k] = a + moment * (c - a - bent + moment * bent)
 
 
 @njit(error_model="numpy")
-def look(x, y, state, tables, table, step, moment):
+def look(x, y, state, table, step, moment):
     for k in range({lanes}):
-        tell(x, tables, table[k], step, k, moment[k])
+        tell(x, table, step, k, moment[k])
     for j in range({states} * {lanes}):
         x[j] = state[j]
     rates(x, y)
 
 
 @njit(error_model="numpy")
-def go(x, y, state, change, tables, table, step, h, done, part):
+def go(x, y, state, change, table, step, h, done, part):
     for stage in range({stages}):
         at = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         for k in range({lanes}):
-            tell(x, tables, table[k], step, k, done[k] + at * part[k])
+            tell(x, table, step, k, done[k] + at * part[k])
         for i in range({states}):
             for k in range({lanes}):
                 j = i * {lanes} + k
@@ -81,15 +81,15 @@ def find(x, y, state, was, done, part, hit, h):
 
 
 @njit(error_model="numpy")
-def locate(x, y, state, before, after, change, was, done, part, hit, tables, table, step, h):
+def locate(x, y, state, before, after, change, was, done, part, hit, table, step, h):
     after[:] = state
     moment = np.zeros({lanes})
     for correction in range(2):
         state[:] = before
-        go(x, y, state, change, tables, table, step, h, done, part)
+        go(x, y, state, change, table, step, h, done, part)
         for k in range({lanes}):
             moment[k] = done[k] + part[k]
-        look(x, y, state, tables, table, step, moment)
+        look(x, y, state, table, step, moment)
         for k in range({lanes}):
             if correction == 0 and hit[k] >= 0:
                 j = ({first_depth} + 2 * hit[k]) * {lanes} + k
@@ -107,7 +107,7 @@ def locate(x, y, state, before, after, change, was, done, part, hit, tables, tab
                 was[i * {lanes} + k] = y[({first_depth} + i) * {lanes} + k]
             for i in range({states}):
                 before[i * {lanes} + k] = state[i * {lanes} + k]
-    go(x, y, state, change, tables, table, step, h, done, part)
+    go(x, y, state, change, table, step, h, done, part)
     for k in range({lanes}):
         if hit[k] < 0:
             for i in range({states}):
@@ -132,12 +132,12 @@ AGAIN = """
                     for again in range({pins}):
                         if find(x, y, state, was, done, part, hit, h) == 0:
                             break
-                        locate(x, y, state, before, after, change, was, done, part, hit, tables, table, step - 1, h)
+                        locate(x, y, state, before, after, change, was, done, part, hit, table, step - 1, h)
                         for k in range({lanes}):
                             if hit[k] >= 0 and begin + k < last:
                                 counts[row[k], hit[k]] += 1
                             ending[k] = 1.0 if step == steps else 0.0
-                        look(x, y, state, tables, table, now, ending)
+                        look(x, y, state, table, now, ending)
                 if stage == 0:
                     before[:] = state
                     for j in range(2 * {pins} * {lanes}):

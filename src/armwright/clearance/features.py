@@ -25,8 +25,8 @@ class Features(NamedTuple):
         amp_dc: twice the mean error, which is what the thesis calls the largest amplitude: its spectrum is one-sided
             and counts the constant part, and that is the largest [m].
         amp_ac: the largest amplitude of a wave [m].
-        offset_x: error at the start, across gravity [m].
-        offset_y: error at the start, along gravity [m].
+        offset_x: error at the start, along x [m].
+        offset_y: error at the start, along y [m].
     """
 
     slope: Array
@@ -37,7 +37,7 @@ class Features(NamedTuple):
     offset_y: Array
 
 
-# Which features are lengths in metres, and which are not.
+# In what each feature is told.
 UNITS = {"slope": "m/s", "intercept": "m", "amp_dc": "m", "amp_ac": "m", "offset_x": "m", "offset_y": "m"}
 
 
@@ -75,5 +75,12 @@ def features_of(time: Array, error: Array, window: tuple[float, float] = WINDOW)
 
 
 def spectrum(curve: Array) -> Array:
-    """Return the one-sided amplitudes 2 |X| / N of curves (..., s), the constant part first and counted twice."""
-    return np.asarray(2.0 * np.abs(np.fft.rfft(curve, axis=-1)) / curve.shape[-1], dtype=np.float64)
+    """Return the one-sided amplitudes 2 |X| / N of curves (..., s), the constant part first and counted twice.
+
+    The fastest wave that an even number of samples tells, up and down from one to the next, has no twin either: it is
+    counted once.
+    """
+    amplitudes = np.asarray(2.0 * np.abs(np.fft.rfft(curve, axis=-1)) / curve.shape[-1], dtype=np.float64)
+    if curve.shape[-1] % 2 == 0:
+        amplitudes[..., -1] /= 2
+    return amplitudes

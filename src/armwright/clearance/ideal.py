@@ -193,13 +193,17 @@ def sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
     Returns:
         (..., 2, p, 2): shift of the tip by the gap of each pin.
 
+    Raises:
+        InvalidValueError: a configuration is singular, or the freedoms are not as many as the drives.
+
     Source:
         Spec of the clearance, 4.3.
     """
     q = floats(q, "q")
     lead, p = q.shape[:-1], len(linkage.pins)
     placement = _placed(linkage, q)
-    inverse = np.linalg.solve(_closure(placement, by_tip=False), np.eye(q.shape[-1]))[..., :, : 2 * p]
+    A = _closure(placement, by_tip=False)
+    inverse = _divided(A, np.eye(q.shape[-1])[:, : 2 * p])
     tip = _jacobian(lead, [placement.point(linkage.tip)], q.shape[-1])
     return (tip @ inverse).reshape(*lead, 2, p, 2)
 
@@ -262,9 +266,11 @@ def _closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of 
         rows.append(picked)
     A = np.concatenate(rows, axis=-2)
     if A.shape[-2] != n:
-        kind = "numbers of the tip" if by_tip else "drives"
+        freedoms = n - 2 * len(linkage.pins)
+        what = "a place of the tip tells 2" if by_tip else f"its drives tell {len(linkage.drives)}"
         raise InvalidValueError(
-            f"{linkage.name}: {n} coordinates need as many equations, got {A.shape[-2]} of pins and {kind}"
+            f"{linkage.name}: with its pins closed it has {freedoms} freedom{'s' if freedoms != 1 else ''}, "
+            f"and {what}; expected as many"
         )
     return A
 
@@ -285,12 +291,17 @@ def _stacked(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
 
 
 def _solved(A: Array, right: Array) -> Array:
-    """Return A⁻¹ b of many systems.
+    """Return A⁻¹ b of many systems; errors as of ``_divided``."""
+    return np.asarray(_divided(A, right[..., None])[..., 0], dtype=np.float64)
+
+
+def _divided(A: Array, columns: Array) -> Array:
+    """Return A⁻¹ B of many systems.
 
     Raises:
         InvalidValueError: one of them is singular.
     """
     try:
-        return np.asarray(np.linalg.solve(A, right[..., None])[..., 0], dtype=np.float64)
+        return np.asarray(np.linalg.solve(A, columns), dtype=np.float64)
     except np.linalg.LinAlgError as error:
         raise InvalidValueError("the linkage is in a singular configuration") from error

@@ -23,28 +23,24 @@ CONTROLS: tuple[Control, ...] = ("effort", "pd+ff")
 _SOURCE = """{head}{helpers}
 {functions}
 @njit(
-    int64(
-        int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 4, "C", readonly=True), {indices}, float64,
-        int64, {indices}, types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
-        types.Array(float64, 2, "C"),
+    types.void(
+        int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True), float64, int64,
+        types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
     ),
     error_model="numpy", nogil=True, cache=True,
 )
-def simulate(first, last, start, contacts, gains, tables, which, h, stride, seen, samples, counts, peaks, ends):
-    steps = tables.shape[1]
+def simulate(first, last, start, contacts, gains, table, h, stride, samples, counts, peaks):
+    steps = table.shape[0]
     x = np.zeros({inputs} * {lanes})
     y = np.zeros({outputs} * {lanes})
     state = np.zeros({states} * {lanes})
     change = np.zeros({states} * {lanes})
-    table = np.zeros({lanes}, dtype=np.int64)
     row = np.zeros({lanes}, dtype=np.int64)
 {arrays}
-    lost = 0
     for begin in range(first, last, {lanes}):
         # Lanes that are left over run the last run once more.
         for k in range({lanes}):
             row[k] = min(begin + k, last - 1)
-            table[k] = which[row[k]]
             for i in range({states}):
                 state[i * {lanes} + k] = start[row[k], i]
             for i in range({parameters}):
@@ -64,7 +60,7 @@ def simulate(first, last, start, contacts, gains, tables, which, h, stride, seen
                 ahead = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
                 for k in range({lanes}):
                     for i in range({columns}):
-                        x[({first_drive} + i) * {lanes} + k] = tables[table[k], now, moment, i]
+                        x[({first_drive} + i) * {lanes} + k] = table[now, moment, i]
                 for j in range({states} * {lanes}):
                     x[j] = state[j] + ahead * y[j]
 {body}
@@ -82,26 +78,14 @@ def simulate(first, last, start, contacts, gains, tables, which, h, stride, seen
                             if normal > peaks[row[k], i]:
                                 peaks[row[k], i] = normal
                     if step % stride == 0:
-                        for i in range(len(seen)):
-                            source = seen[i]
-                            for k in range({lanes}):
-                                if begin + k >= last:
-                                    break
-                                if source < {states}:
-                                    samples[row[k], step // stride, i] = state[source * {lanes} + k]
-                                else:
-                                    samples[row[k], step // stride, i] = y[source * {lanes} + k]
+                        for k in range(min({lanes}, last - begin)):
+                            for i in range({states}):
+                                samples[row[k], step // stride, i] = state[i * {lanes} + k]
+                            for i in range({pins}):
+                                samples[row[k], step // stride, {states} + i] = y[({states} + 3 * i + 2) * {lanes} + k]
                     if step == steps:
                         break
 {advance}
-        for k in range({lanes}):
-            if begin + k < last:
-                sound = 0.0
-                for i in range({states}):
-                    ends[row[k], i] = state[i * {lanes} + k]
-                    sound += state[i * {lanes} + k]
-                lost += 0 if sound - sound == 0.0 else 1
-    return lost
 """
 
 _RK4 = """
@@ -175,13 +159,9 @@ class Layout:
         return 2 * len(self.linkage.drives) if self.control == "pd+ff" else 0
 
     @property
-    def seen(self) -> list[str]:
-        """What can be kept of a moment: the state, and of each pin contact, speed of the impact, and force."""
-        coordinates = [str(one) for one in self.linkage.coordinates]
-        names = [*coordinates, *(f"{one}'" for one in coordinates)]
-        names += [f"{pin.name}.bend" for pin in self.linkage.pins][: self.bends]
-        pins = [f"{pin.name}.{what}" for pin in self.linkage.pins for what in ("touching", "speed", "force")]
-        return [*names, *WORKS, *pins]
+    def sampled(self) -> int:
+        """Numbers of a sample: the state, and of each pin the force."""
+        return self.states + self.pins
 
     def unpack(self, x: Sequence[Scalar]) -> tuple[State, list[Scalar], list[Contact]]:
         """Return state, drives and contacts of a row of numbers."""
@@ -241,7 +221,6 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
         outputs=body.outputs,
         advance=_filled(_RK4 if integrator == "rk4" else _SEMI_IMPLICIT, sizes),
         matrix='types.Array(float64, 2, "C", readonly=True)',
-        indices='types.Array(int64, 1, "C", readonly=True)',
         **parts,
         **sizes,
     )

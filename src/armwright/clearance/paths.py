@@ -69,7 +69,7 @@ class Path:
         """Return places, speeds and accelerations.
 
         Args:
-            t: times [s], any shape; before the start and after the end the path stands still.
+            t: times [s], any shape; one before the start or after the end counts as that.
             piece: the number of the piece to take at each; by the time, at a knot the later one, when left out.
         """
         times = np.clip(floats(t, "t"), 0.0, self.duration)
@@ -89,7 +89,8 @@ class Path:
     def halves(self, steps: int) -> tuple[Moment, Moment]:
         """Return the path at the ends and middles of equal steps.
 
-        Where the acceleration jumps there are two: so an integrator sees no jump inside a step.
+        Where the acceleration jumps at one of these times there are two: an integrator sees no jump that falls on a
+        step, only one within.
 
         Args:
             steps: how many there are.

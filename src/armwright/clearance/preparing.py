@@ -27,6 +27,7 @@ class Task:
         settings: how.
         steps: how many there are.
         h: how long each is [s].
+        stride: how many of them lie between two samples; the last sample is at the end.
         table: (steps, 3, columns) what the drives are told at the start, the middle and the end of each step.
         ideal: the motion without play at the start of each step and at the end of the last.
     """
@@ -36,13 +37,9 @@ class Task:
     settings: Settings
     steps: int
     h: float
+    stride: int
     table: Array
     ideal: IdealMotion
-
-    @property
-    def stride(self) -> int:
-        """How many steps lie between two samples."""
-        return max(1, round(self.settings.sample / self.h))
 
 
 def prepare(linkage: Linkage, path: Path, settings: Settings | None = None, *, guess: ArrayLike | None = None) -> Task:
@@ -63,6 +60,9 @@ def prepare(linkage: Linkage, path: Path, settings: Settings | None = None, *, g
     if path.pieces.shape[1] != axes:
         raise ShapeError(f"path {path.name}: expected {axes} axes for the {path.of}, got {path.pieces.shape[1]}")
     steps = settings.steps(path.duration)
+    stride = min(steps, max(1, round(settings.sample * steps / path.duration)))
+    # A few more, where that is needed for the last sample to be at the end.
+    steps = -(-steps // stride) * stride
     after, before = path.halves(steps)
     by_tip = path.of == "tip"
     q = followed(linkage, after.at, assembled(linkage) if guess is None else floats(guess, "guess"), by_tip=by_tip)
@@ -81,6 +81,7 @@ def prepare(linkage: Linkage, path: Path, settings: Settings | None = None, *, g
         settings=settings,
         steps=steps,
         h=path.duration / steps,
+        stride=stride,
         table=np.ascontiguousarray(table),
         ideal=IdealMotion(**{one.name: getattr(ideal, one.name)[::2] for one in attrs.fields(IdealMotion)}),
     )

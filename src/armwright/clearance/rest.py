@@ -72,12 +72,7 @@ def at_rest(
     settled = np.zeros((*lead, 1), dtype=bool)
     for _ in range(_MOST_ROUNDS):
         _, reactions = balance(linkage, q, still, still)
-        size = np.linalg.norm(reactions, axis=-1)
-        if not np.all(size > _NO_FORCE):
-            pin = linkage.pins[int(np.argwhere(~(size > _NO_FORCE))[0][-1])].name
-            raise InvalidValueError(
-                f"pin {pin} of {linkage.name} carries no force at rest: its journal may lie anywhere"
-            )
+        size = forces_of(linkage, reactions)
         gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
         new = closed(linkage, q, drives=held, gaps=gaps)
         moved = np.abs(new - q).max(axis=-1, keepdims=True)
@@ -92,3 +87,16 @@ def at_rest(
             f"expected drives held away from singular configurations"
         )
     return Rest(q=q, tip=tip_of(linkage, q), gaps=gaps_of(linkage, q), forces=size)
+
+
+def forces_of(linkage: Linkage, reactions: Array) -> Array:
+    """Return (..., p) how large the reactions (..., p, 2) of the pins at rest are [N].
+
+    Raises:
+        InvalidValueError: a pin carries no force, so that its journal has no side to lean on.
+    """
+    size = np.asarray(np.linalg.norm(reactions, axis=-1), dtype=np.float64)
+    if not np.all(size > _NO_FORCE):
+        pin = linkage.pins[int(np.argwhere(~(size > _NO_FORCE))[0][-1])].name
+        raise InvalidValueError(f"pin {pin} of {linkage.name} carries no force at rest: its journal may lie anywhere")
+    return size

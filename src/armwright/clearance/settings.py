@@ -29,7 +29,8 @@ class Settings:
         step: of the integrator [s].
         integrator: ``rk4`` or ``semi-implicit``.
         control: ``effort``, the drives give what the ideal linkage needs; ``pd+ff``, a controller helps.
-        gains: of the controller, stiffness [N m/rad] and damping [N m s/rad].
+        gains: of the controller, stiffness [N m/rad] and damping [N m s/rad]; of a drive whose motion is given they add
+            to its acceleration [1/s², 1/s].
         impact: law of the loss in an impact.
         friction: how friction is worked out.
         threshold: sliding speed below which friction fades [m/s].
@@ -54,6 +55,8 @@ class Settings:
         """Check names and ranges."""
         for what in ("step", "threshold", "sample"):
             not_negative(getattr(self, what), what, zero=False)
+        if len(self.gains) != 2:
+            raise InvalidValueError(f"gains: expected stiffness and damping, got {len(self.gains)} numbers")
         for gain in self.gains:
             not_negative(gain, "gains")
         one_of("integrator", self.integrator, INTEGRATORS)
@@ -114,5 +117,11 @@ def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
         raise InvalidValueError(
             f"step: {settings.step:g} s is too long for contacts of {K.max():.3g} N/m^1.5, which swing in "
             f"{2 * np.pi * np.sqrt(lightest / slope):.2g} s and stop a blow of 1 m/s within {depth * 1e6:.0f} µm; "
-            f"expected at most {longest:.1g} s"
+            f"expected at most {_shorter(float(longest)):g} s"
         )
+
+
+def _shorter(seconds: float) -> float:
+    """Return a time with two digits that is not longer than another."""
+    unit = 10.0 ** (np.floor(np.log10(seconds)) - 1)
+    return float(np.floor(seconds / unit) * unit)

@@ -42,7 +42,7 @@ class Status(IntEnum):
 
 @attrs.frozen(kw_only=True, eq=False)
 class Simulation:
-    """What a linkage with play did; the leading axes are those of the clearances.
+    """What a linkage with play did; the leading axes are those of clearances and frictions together.
 
     Attributes:
         task: what it was to do.
@@ -97,7 +97,6 @@ class Record(NamedTuple):
     samples: Array
     impacts: npt.NDArray[np.int64]
     peaks: Array
-    ends: Array
 
 
 def simulate(
@@ -168,22 +167,19 @@ def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: Array
 def _run(task: Task, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
     """Run the compiled simulation, blocks of lanes on several cores."""
     runs, pins, stride = len(start), layout.pins, task.stride
-    seen = np.arange(len(layout.seen))
     record = Record(
-        samples=np.full((runs, task.steps // stride + 1, len(seen)), np.nan),
+        samples=np.full((runs, task.steps // stride + 1, layout.sampled), np.nan),
         impacts=np.zeros((runs, pins), dtype=np.int64),
         peaks=np.zeros((runs, pins)),
-        ends=np.zeros((runs, layout.states)),
     )
     gains = np.tile(task.settings.gains, (runs, len(task.linkage.drives) if layout.gains else 0))
-    tables, which = task.table[None], np.zeros(runs, dtype=np.int64)
     rows = _simulator(layout, task.settings.integrator)
     blocks = -(-runs // LANES)
     workers = max(1, min(threads or _cores(), blocks))
     cuts = [min(round(blocks * i / workers) * LANES, runs) for i in range(workers + 1)]
 
     def part(ends: tuple[int, int]) -> None:
-        rows(*ends, start, contacts, gains, tables, which, task.h, stride, seen, *record)
+        rows(*ends, start, contacts, gains, task.table, task.h, stride, *record)
 
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(part, pairwise(cuts)))
@@ -234,13 +230,13 @@ def _told(task: Task, layout: Layout, c: Array, mu: Array, record: Record) -> Si
     n, lead, linkage = layout.n, mu.shape, task.linkage
     samples = record.samples.reshape(*lead, *record.samples.shape[1:])
     q = samples[..., :n]
-    tip = tip_of(linkage, q)
     number = np.arange(samples.shape[-2]) * task.stride
-    error = tip - tip_of(linkage, task.ideal.q[number])
-    with np.errstate(invalid="ignore"):
+    # What became infinite has no sine.
+    with np.errstate(invalid="ignore", over="ignore"):
+        tip = tip_of(linkage, q)
+        error = tip - tip_of(linkage, task.ideal.q[number])
         lost = ~np.all(np.abs(error) < _LOST, axis=(-1, -2))
     first = 2 * n + layout.bends
-    ends = first + len(WORKS)
     return Simulation(
         task=task,
         clearances=c,
@@ -250,7 +246,7 @@ def _told(task: Task, layout: Layout, c: Array, mu: Array, record: Record) -> Si
         qd=samples[..., n : 2 * n],
         tip=tip,
         error=error,
-        forces=samples[..., ends + 2 : ends + 3 * layout.pins : 3],
+        forces=samples[..., layout.states :],
         works={name: samples[..., first + i] for i, name in enumerate(WORKS)},
         impacts=record.impacts.reshape(*lead, layout.pins),
         peaks=record.peaks.reshape(*lead, layout.pins),

@@ -10,10 +10,11 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.features import UNITS, Features, features
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.paths import named_path
+from armwright.clearance.paths import TEST_PATHS, thesis_path
 from armwright.clearance.preparing import Task, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
+from armwright.errors import InvalidValueError, one_of
 from armwright.sweep.task import FAILURE, Axis, Output
 
 _MEANING = {
@@ -35,7 +36,7 @@ class FeatureSweep:
 
     Attributes:
         linkage: what moves.
-        paths: names of paths; see ``named_path``.
+        paths: names of test paths, each once; the features look at the straight part that these have.
         settings_of: how it is simulated.
         with_friction: whether a point has a coefficient of friction too.
     """
@@ -44,6 +45,15 @@ class FeatureSweep:
     paths: tuple[str, ...]
     settings_of: Settings = attrs.field(factory=Settings)
     with_friction: bool = False
+
+    def __attrs_post_init__(self) -> None:
+        """Refuse paths that there are not, or that stand there twice."""
+        for path in self.paths:
+            one_of("test path", path, TEST_PATHS)
+            if self.paths.count(path) > 1:
+                raise InvalidValueError(f"paths: '{path}' stands there twice")
+        if not self.paths:
+            raise InvalidValueError("paths: expected one or more, got none")
 
     @property
     def name(self) -> str:
@@ -60,7 +70,7 @@ class FeatureSweep:
     def settings(self) -> Mapping[str, Any]:
         """All else that the results depend on."""
         return {
-            "linkage": _plain(attrs.asdict(self.linkage)),
+            "linkage": _told(self.linkage),
             "paths": list(self.paths),
             "simulation": attrs.asdict(self.settings_of),
             "with_friction": self.with_friction,
@@ -86,7 +96,7 @@ class FeatureSweep:
     @cached_property
     def tasks(self) -> tuple[Task, ...]:
         """The paths made ready, when they are first needed."""
-        return tuple(prepare(self.linkage, named_path(path), self.settings_of) for path in self.paths)
+        return tuple(prepare(self.linkage, thesis_path(path), self.settings_of) for path in self.paths)
 
     def __call__(self, points: Array) -> dict[str, Any]:
         """Return the outputs at (m, k) points; a run that diverged says so."""
@@ -122,6 +132,20 @@ def feature_vector(values: Mapping[str, Array], paths: Sequence[str], names: Seq
         names: of the features.
     """
     return np.stack([np.asarray(values[f"{path}_{name}"]) for path in paths for name in names], axis=-1)
+
+
+def is_sweep_of(settings: Mapping[str, Any], linkage: Linkage) -> bool:
+    """Whether the settings of a sweep are those of a linkage, whatever its own clearances: each run had others."""
+    both = [dict(one) for one in (settings.get("linkage", {}), _told(linkage))]
+    for one in both:
+        one["pins"] = [{key: value for key, value in pin.items() if key != "clearance"} for pin in one.get("pins", [])]
+    return both[0] == both[1]
+
+
+def _told(linkage: Linkage) -> dict[str, Any]:
+    """Return a linkage as plain data."""
+    plain: dict[str, Any] = _plain(attrs.asdict(linkage))
+    return plain
 
 
 def _plain(value: Any) -> Any:

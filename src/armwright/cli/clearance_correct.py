@@ -59,7 +59,10 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
         threshold=threshold_mm_s * 1e-3,
         friction=Rubbing(velocity=friction_velocity),  # type: ignore[arg-type]
     )
-    clearances = list(model.clearances.values()) if estimate is None else _drawn(model, estimate)
+    if estimate is not None and clearance:
+        raise typer.BadParameter("the clearances are either given or those of --estimate", param_hint="--clearance")
+    clearances = np.array(list(model.clearances.values())) if estimate is None else _drawn(model, estimate)
+    usual = np.atleast_2d(clearances).mean(axis=0)
 
     def told(mean: float) -> None:
         if not (quiet or as_json):
@@ -72,7 +75,7 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     summary = {
         "linkage": model.name,
         "path": path,
-        "clearances": model.clearances,
+        "clearances": dict(zip(model.clearances, usual.tolist(), strict=True)),
         "times": list(found.path.targets),
         "nodes": found.nodes.tolist(),
         "before": np.atleast_2d(found.before).mean(axis=0).tolist(),
@@ -102,17 +105,18 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
     from armwright.errors import FileFormatError
     from armwright.files.document import read_text
 
+    text = read_text(estimate)
     try:
-        told = json.loads(read_text(estimate))
+        told = json.loads(text)
         parameters, correlation = told["parameters"], np.array(told["correlation"], dtype=np.float64)
         mean, deviation = (np.array([one[key] for one in parameters.values()]) for key in ("mean", "deviation"))
         names = list(parameters)
         picked = [names.index(name) for name in model.clearances]
-    except (KeyError, TypeError, ValueError) as error:
+        covariance = correlation * np.outer(deviation, deviation)
+        drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, _DRAWS, check_valid="raise")[:, picked]
+    except (AttributeError, KeyError, TypeError, ValueError, np.linalg.LinAlgError) as error:
         text = f"expected what `armwright clearance estimate --json` prints for {model.name}"
         raise FileFormatError(estimate, None, "", text) from error
-    covariance = correlation * np.outer(deviation, deviation)
-    drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, _DRAWS)[:, picked]
     # Contact needs some play.
     return np.maximum(drawn, _SMALLEST)
 
@@ -129,13 +133,14 @@ def _files(
     from armwright.clearance.simulation import simulate
     from armwright.report.clearance_figures import paths
 
+    usual = list(summary["clearances"].values())
     times = np.linspace(0.0, found.path.duration, 1001)
     told, wanted = found.path.at(times), named_path(name)
     rows = np.column_stack([times, told.at * 1e3, told.velocity * 1e3, told.acceleration * 1e3])
     head = "t_s,x_mm,y_mm,vx_mm_per_s,vy_mm_per_s,ax_mm_per_s2,ay_mm_per_s2"
     text = "\n".join([head, *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n"
     panels = {
-        title: {"wanted": wanted.at(times).at * 1e3, "taken": simulate(prepare(model, path, settings)).tip * 1e3}
+        title: {"wanted": wanted.at(times).at * 1e3, "taken": simulate(prepare(model, path, settings), usual).tip * 1e3}
         for title, path in (("path as it is", wanted), ("path corrected", found.path))
     }
     targets = wanted.at(np.array(wanted.targets)).at * 1e3

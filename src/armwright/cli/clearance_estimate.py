@@ -1,5 +1,6 @@
 """``armwright clearance estimate``: the clearances that measurements tell, and how well."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -45,7 +46,7 @@ def estimate(
 
     model, found = load_linkage(linkage), read_measured(measured)
     noise = None if noise_um is None else noise_um * 1e-6
-    told = _at_rest(model, found, noise) if isinstance(found, RestMeasured) else _on_paths(found, sweep, noise)
+    told = _at_rest(model, found, noise) if isinstance(found, RestMeasured) else _on_paths(model, found, sweep, noise)
     if as_json:
         print(json.dumps(told, indent=2))
     else:
@@ -55,7 +56,7 @@ def estimate(
 def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) -> dict[str, Any]:
     from armwright.errors import InvalidValueError
 
-    if noise is not None and not noise > 0:
+    if noise is not None and not 0 < noise < math.inf:
         raise InvalidValueError(f"--noise-um: expected a number above 0, got {noise * 1e6:g}")
     found = measured.estimate(model, noise)
     interval, told = found.interval(_LEVEL), found.identifiable(float(found.values.max()))
@@ -74,18 +75,23 @@ def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) ->
         "notes": [
             f"{len(measured.names)} poses, {sum(measured.readings)} readings; {found.residual * 1e6:.3g} µm are left",
             f"singular values of the equations: {', '.join(f'{x:.3g}' for x in found.singular_values)}",
-            *([] if noise or measured.noise else ["no pose was read twice: a noise of 1 µm was taken for granted"]),
+            *(
+                []
+                if noise or measured.noise
+                else ["no readings of a pose differ: a noise of 1 µm was taken for granted"]
+            ),
         ],
     }
 
 
-def _on_paths(measured: "PathsMeasured", folder: Path | None, noise: float | None) -> dict[str, Any]:
+def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, noise: float | None) -> dict[str, Any]:
     import json
 
     import numpy as np
 
     from armwright.clearance.estimating.kriging import learn
     from armwright.clearance.estimating.posterior import posterior
+    from armwright.clearance.sweeping import is_sweep_of
     from armwright.errors import InvalidValueError
     from armwright.sweep.results import load
 
@@ -93,9 +99,11 @@ def _on_paths(measured: "PathsMeasured", folder: Path | None, noise: float | Non
         raise typer.BadParameter(
             "measurements on paths need a sweep to compare with: `armwright clearance sweep`", param_hint="--sweep"
         )
-    if noise is None or not noise > 0:
+    if noise is None or not 0 < noise < math.inf:
         raise InvalidValueError("--noise-um: expected the standard deviation of a measured coordinate, above 0")
     with load(folder) as data:
+        if not is_sweep_of(json.loads(data.attrs["settings"]), model):
+            raise InvalidValueError(f"{folder}: the sweep is of another linkage than {model.name}; sweep this one")
         names = tuple(f"{path}_{feature}" for path in measured.times for feature in _FEATURES)
         missing = sorted({name.partition("_")[0] for name in names if name not in data})
         if missing:
@@ -128,7 +136,7 @@ def _on_paths(measured: "PathsMeasured", folder: Path | None, noise: float | Non
         "notes": [
             f"{len(names)} features of {len(measured.times)} paths, learnt from {len(points)} simulations",
             f"features as far off as these come by chance in {100 * found.misfit:.3g} % of cases"
-            + ("; the model or the noise is wrong" if found.misfit < 1e-3 else ""),
+            + ("; the model or the noise is wrong" if found.misfit < 1e-4 else ""),
         ],
     }
 

@@ -26,7 +26,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         str, typer.Argument(help="Name in the catalogue, or a TOML file (docs/clearance.md).", show_default=False)
     ],
     path: Annotated[
-        str | None, typer.Option(help="Test path of the thesis for the tip: x1 to x10, y1 to y14.", show_default=False)
+        str | None, typer.Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", show_default=False)
     ] = None,
     speed_rpm: Annotated[
         float | None, typer.Option(help="Instead: turn the one drive at so many rev/min.", show_default=False)
@@ -129,7 +129,7 @@ def with_clearances(model: "Linkage", clearance_mm: float | None, clearances: li
 
 def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: float) -> "TipPath":
     """Return the path of the tip, or of the one drive."""
-    from armwright.clearance.paths import thesis_path, turning
+    from armwright.clearance.paths import named_path, turning
 
     drives = len(model.drives)
     if (path is None) == (speed_rpm is None):
@@ -140,12 +140,14 @@ def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: fl
     if path is not None:
         if drives != 2:
             raise typer.BadParameter(
-                f"a path leads the tip of a linkage with two drives; {model.name} has {drives}: give --speed-rpm",
+                f"a path leads the tip of a linkage with two drives; {model.name} has {drives}{_instead(drives, 1)}",
                 param_hint="--path",
             )
-        return thesis_path(path)
+        return named_path(path)
     if drives != 1:
-        raise typer.BadParameter(f"turns one drive; {model.name} has {drives}: give --path", param_hint="--speed-rpm")
+        raise typer.BadParameter(
+            f"turns one drive; {model.name} has {drives}{_instead(drives, 2)}", param_hint="--speed-rpm"
+        )
     assert speed_rpm is not None  # noqa: S101 - one of both is given
     if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < turns < math.inf):
         raise typer.BadParameter(
@@ -156,6 +158,13 @@ def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: fl
     at = model.assembly.get(model.drives[0].body, 0.0)
     name = f"{turns:g} turns at {speed_rpm:g} rev/min"
     return turning(name, at, speed, turns * 2 * math.pi / abs(speed))
+
+
+def _instead(drives: int, wanted: int) -> str:
+    """Return what to give instead, if so many drives can be led at all."""
+    if drives != wanted:
+        return ""
+    return ": give --path" if wanted == 2 else ": give --speed-rpm"
 
 
 def _settings(friction: tuple[str, str], **options: Any) -> "Settings":

@@ -49,10 +49,11 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.clearance.sweeping import FeatureSweep
     from armwright.cli.progress import sweep_bar
     from armwright.errors import one_of
-    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
+    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol, whole
     from armwright.sweep.run import run
 
     one_of("design", design, ("factorial", "lhs", "sobol"))
+    whole(levels, "levels", least=2)
     settings = Settings(
         step=step,
         threshold=threshold_mm_s * 1e-3,
@@ -60,7 +61,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     )
     task = FeatureSweep(
         linkage=load_linkage(linkage),
-        paths=tuple(name.strip() for name in paths.split(",")),
+        paths=tuple(dict.fromkeys(name.strip() for name in paths.split(","))),
         settings_of=settings,
         with_friction=to_friction is not None,
     )
@@ -74,8 +75,9 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         )
     else:
         plan = (latin_hypercube if design == "lhs" else sobol)(bounds, runs, seed, units=units)
-    # Whatever is wrong with a path is said now; and the simulation is compiled once, not by every worker.
-    task(plan.points[:1])
+    # Whatever is wrong with a path is said now, and a step too long for the least play; and the simulation is compiled
+    # once, not by every worker.
+    task(plan.points.min(axis=0, keepdims=True))
     with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
         found = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
     failed = int((found["status"] != 0).sum())

@@ -3,7 +3,7 @@
 import base64
 import html
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from armwright.arrays import Array
@@ -60,6 +60,36 @@ def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_
     axes.grid(visible=True, alpha=0.3)
     if len(lines) > 1:
         axes.legend()
+    return svg_text(figure)
+
+
+def bars(
+    title: str, names: Sequence[str], values: Mapping[str, Sequence[float]], *, y_label: str, logarithmic: bool = False
+) -> str:
+    """Draw groups of bars side by side.
+
+    Args:
+        title: of the figure.
+        names: of the groups.
+        values: one per group, by the name of the kind.
+        y_label: what they are, with their unit.
+        logarithmic: whether the axis is.
+
+    Returns:
+        An SVG file's text.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(7.6, 4.2), layout="constrained")
+    axes = figure.subplots()
+    width = 0.8 / len(values)
+    for i, (name, heights) in enumerate(values.items()):
+        axes.bar([k + (i + 0.5) * width - 0.4 for k in range(len(names))], heights, width, label=name)
+    axes.set(title=title, ylabel=y_label, xticks=range(len(names)), xticklabels=names)
+    if logarithmic:
+        axes.set_yscale("log")
+    axes.grid(visible=True, axis="y", alpha=0.3)
+    figure.legend(fontsize="small", loc="outside lower center", ncols=len(values))
     return svg_text(figure)
 
 

@@ -48,10 +48,12 @@ class Run:
         """
         if simulation.error.ndim != 2:
             raise ShapeError(f"expected one run, got {simulation.error.shape[:-2]} of them: take one out")
-        sound = np.isfinite(np.concatenate([simulation.q, simulation.qd], axis=-1)).all(axis=-1)
-        rows = len(simulation.time) if sound.all() else max(1, int(np.argmin(sound)))
         with np.errstate(invalid="ignore", over="ignore"):
             energy, gaps, depths = ledger(simulation), simulation.gaps, simulation.depths
+            told = [simulation.q, simulation.qd, simulation.forces, energy.imbalance[:, None]]
+        # Forces and energies become infinite before places do.
+        sound = np.isfinite(np.concatenate(told, axis=-1)).all(axis=-1)
+        rows = len(simulation.time) if sound.all() else max(1, int(np.argmin(sound)))
         return cls(simulation=simulation, rows=rows, energy=energy, gaps=gaps, depths=depths)
 
     @property
@@ -137,8 +139,8 @@ def targets(run: Run) -> list[dict[str, Any]]:
     task, path = run.simulation.task, run.simulation.task.path
     found = []
     for t in sorted({0.0, *path.targets}):
-        # The last sample stands for an end that lies between two.
-        if t >= run.time[-1] + task.stride * task.h:
+        # Of a run that diverged there is no more; the end of another is told but for rounding.
+        if t > run.time[-1] + 0.5 * task.h:
             continue
         x, y = (float(np.interp(t, run.time, run.error[:, i])) for i in range(2))
         one = {"time": float(t), "error_x": x, "error_y": y, "distance": float(np.hypot(x, y)), "nearest": None}

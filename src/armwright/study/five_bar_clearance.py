@@ -8,8 +8,8 @@ Friction goes by the speed of the joints' centres, with the threshold that bring
 clearance, 0.2); that of the surfaces, which is physically right, stands beside it where it matters.
 """
 
-from collections.abc import Callable, Mapping
-from functools import cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache, lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ from armwright.clearance.estimating.static import estimate_at_rest, rest_offsets
 from armwright.clearance.features import Features, features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, named_path
-from armwright.clearance.preparing import prepare
+from armwright.clearance.preparing import Task, prepare
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import Settings, contact_stiffness
@@ -121,8 +121,8 @@ class Learnt:
     """The sweep of 729 linkages on three paths, and what was learnt from it.
 
     Attributes:
-        points: (729, 3) clearances [m].
-        values: by ``path_feature``, (729,) SI.
+        points: (m, 3) clearances [m].
+        values: by ``path_feature``, (m,) SI.
         surrogate: of the nine features.
     """
 
@@ -142,18 +142,21 @@ def feature_sweep() -> FeatureSweep:
     return FeatureSweep(linkage=arm(), paths=PATHS, settings_of=SETTINGS)
 
 
-def learnt(progress: Callable[[str, float], None] | None = None) -> Learnt:
+def learnt(progress: Callable[[str, float], None] | None = None, *, levels: Sequence[float] = LEVELS) -> Learnt:
     """Simulate the 729 linkages on three paths and learn the nine features.
 
     Args:
         progress: told what is done, and how much of it.
+        levels: of each clearance; the thesis has nine [m].
     """
-    points = np.array(list(product(LEVELS, repeat=3)))
+    points = np.array(list(product(levels, repeat=3)))
     task, block, parts = feature_sweep(), 96, []
     for first in range(0, len(points), block):
         parts.append(task(points[first : first + block]))
         if progress is not None:
-            progress("simulating 729 linkages on 3 paths", min(1.0, (first + block) / len(points)))
+            progress(
+                f"simulating {len(points)} linkages on {len(PATHS)} paths", min(1.0, (first + block) / len(points))
+            )
     values = {name: np.concatenate([part[name] for part in parts]) for name in task.outputs}
     names = [f"{path}_{feature}" for path in PATHS for feature in FEATURES]
     done: list[str] = []
@@ -205,11 +208,11 @@ def target_table(rows: list[EstimateRow]) -> list[TargetRow]:
         rows: of ``estimate_table``.
     """
     estimated = {row.arm: row.ours for row in rows if row.way == "intercept"}
-    table = []
+    table, path = [], PickAndPlace().path()
     for name, given in ARMS.items():
         for case, clearances in (("given", given), ("estimated", tuple(c * 1e-3 for c in estimated[name]))):
             printed = PRINTED_TARGETS[name, case]
-            table.append(TargetRow(name, case, printed, target_errors(PickAndPlace().path(), clearances)))
+            table.append(TargetRow(name, case, printed, target_errors(path, clearances)))
     return table
 
 
@@ -259,9 +262,15 @@ def run_of(name: str, path: str, settings: Settings = SETTINGS) -> Simulation:
 
 def target_errors(path: Path, clearances: tuple[float, ...] | Array) -> tuple[float, ...]:
     """Return how far the tip is from the three targets when it is told to follow a path [mm]."""
-    run = simulate(prepare(arm(), path, SETTINGS), clearances)
+    run = simulate(_ready(path), clearances)
     goals = np.array(PickAndPlace().nodes)
     return tuple(float(one) * 1e3 for one in np.linalg.norm(misses(run, goals), axis=-1))
+
+
+@lru_cache(maxsize=8)
+def _ready(path: Path) -> Task:
+    """Return a path made ready; several arms follow the same."""
+    return prepare(arm(), path, SETTINGS)
 
 
 def _cycles(clearances: Array, rng: np.random.Generator) -> Array:

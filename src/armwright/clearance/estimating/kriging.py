@@ -12,7 +12,7 @@ from typing import Any
 
 import attrs
 import numpy as np
-from scipy.linalg import cho_solve
+from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from armwright.arrays import Array, ArrayLike, floats
@@ -20,10 +20,13 @@ from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
 
 # Lengths over which a feature may change, as part of the range of a parameter.
 _LENGTHS = (0.1, 30.0)
-_NOISE = (1e-12, 1e-1)
+# What chance adds, as part of the variance of a feature: less than the smallest is lost in rounding.
+_NOISE = (1e-8, 1e-1)
+_AMPLITUDE = (1e-2, 1e4)
 # From so many points the surface of a feature is learnt; more cost time with their cube.
 MOST_POINTS = 300
-_STARTS = 12
+# Features are compared at so many points first, and matched from the best of them: fewer starts end in a wrong valley.
+_TRIED, _STARTS = 480, 6
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -36,7 +39,7 @@ class Process:
         amplitude: variance of the smooth part.
         noise: variance of what chance adds.
         weights: (m,) of the points.
-        inverse: (m, m) of their covariance.
+        whitener: (m, m) W with Wᵀ W the inverse of their covariance; the inverse itself would round far worse.
         mean: of what was learnt.
         scale: its deviation, by which all the above is divided.
     """
@@ -46,7 +49,7 @@ class Process:
     amplitude: float
     noise: float
     weights: Array
-    inverse: Array
+    whitener: Array
     mean: float
     scale: float
 
@@ -55,7 +58,7 @@ class Process:
         a, b = unit / self.lengths, self.x / self.lengths
         apart = (a**2).sum(axis=-1)[:, None] + (b**2).sum(axis=-1) - 2 * a @ b.T
         near = self.amplitude * np.exp(-0.5 * np.maximum(apart, 0.0))
-        left = self.amplitude + self.noise - ((near @ self.inverse) * near).sum(axis=-1)
+        left = self.amplitude + self.noise - ((near @ self.whitener.T) ** 2).sum(axis=-1)
         # Rounding must not make a run surer than chance lets it be.
         deviation = np.sqrt(np.maximum(left, self.noise))
         return self.mean + self.scale * (near @ self.weights), np.asarray(self.scale * deviation, dtype=np.float64)
@@ -182,11 +185,11 @@ def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | N
         return np.stack([process.slope(unit) for process in surrogate.processes]) / scale[:, None]
 
     rng = np.random.default_rng(0)
-    starts = rng.random((_STARTS * 40, len(width)))
+    starts = rng.random((_TRIED, len(width)))
     with one_core():
         means, _ = surrogate.predict(surrogate.lower + starts * width)
         order = np.argsort((((means - goal) / scale) ** 2).sum(axis=-1))
-        found = [least_squares(missing, starts[i], slopes, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:3]]
+        found = [least_squares(missing, starts[i], slopes, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:_STARTS]]
     best = min(found, key=lambda one: float(one.cost))
     return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)
 
@@ -228,7 +231,7 @@ def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
         raise MissingExtraError(
             'learning from simulations needs scikit-learn: pip install "armwright[clearance]"'
         ) from error
-    kernel = ConstantKernel(10.0, (1e-2, 1e5)) * RBF([1.0] * unit.shape[1], _LENGTHS) + WhiteKernel(1e-5, _NOISE)
+    kernel = ConstantKernel(10.0, _AMPLITUDE) * RBF([1.0] * unit.shape[1], _LENGTHS) + WhiteKernel(1e-5, _NOISE)
     # Scaled here, so that the way back is ours too.
     mean, scale = float(y.mean()), float(y.std()) or 1.0
     process = GaussianProcessRegressor(kernel, n_restarts_optimizer=restarts, random_state=seed)
@@ -243,7 +246,7 @@ def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
         amplitude=float(smooth.k1.constant_value),
         noise=float(chance.noise_level),
         weights=np.array(process.alpha_, dtype=np.float64),
-        inverse=np.asarray(cho_solve((process.L_, True), np.eye(len(unit))), dtype=np.float64),
+        whitener=np.asarray(solve_triangular(process.L_, np.eye(len(unit)), lower=True), dtype=np.float64),
         mean=mean,
         scale=scale,
     )

@@ -1,7 +1,8 @@
 """What was measured of a linkage with play: where its tip rests, or how it follows paths; as CSV.
 
 At rest, one row for each reading: ``pose, commanded_x_mm, commanded_y_mm, x_mm, y_mm``. On paths, one row for each
-sample: ``path, t_s, x_mm, y_mm``. Lengths may be in m, mm or um, all of a file in the same unit; time in s or ms.
+sample: ``path, t_s, x_mm, y_mm``; those after the end of the path are left out. Lengths may be in m, mm or um, all of a
+file in the same unit; time in s or ms.
 """
 
 import csv
@@ -26,8 +27,8 @@ _AT_REST = ("pose", "commanded_x", "commanded_y", "x", "y")
 _ON_PATHS = ("path", "t", "x", "y")
 # An error beyond this is no play but another unit, or another arm [m].
 _LARGEST = 0.02
-# Samples of a measured path, at least.
-_FEWEST = 20
+# Samples of a measured path, at least, and how much of the path they must tell.
+_FEWEST, _WHOLE = 20, 0.99
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -39,7 +40,8 @@ class RestMeasured:
         poses: (k, 2) where the tip was told to be [m].
         offsets: (k, 2) by how much it was off, mean of the readings [m].
         readings: (k,) how many there are of each.
-        noise: standard deviation of one coordinate of a mean; None where no pose was read twice [m].
+        noise: standard deviation of one coordinate of the mean of the fewest readings, from how all readings of a pose
+            differ; None where none was read twice, or no readings differ [m].
     """
 
     names: tuple[str, ...]
@@ -101,9 +103,11 @@ def read_measured(path: Path | str) -> RestMeasured | PathsMeasured:
             farther off than any play lets it be. The text has file and line.
     """
     path = Path(path)
-    rows = [
-        (i, row) for i, row in enumerate(csv.reader(read_text(path).splitlines()), 1) if row and "".join(row).strip()
-    ]
+    try:
+        table = list(enumerate(csv.reader(read_text(path).splitlines()), 1))
+    except csv.Error as error:
+        raise FileFormatError(path, None, "", f"not a table: {error}") from error
+    rows = [(i, row) for i, row in table if row and "".join(row).strip()]
     if not rows:
         raise FileFormatError(path, None, "", "there is nothing in it; expected a line of column names")
     line, head = rows[0]
@@ -113,13 +117,16 @@ def read_measured(path: Path | str) -> RestMeasured | PathsMeasured:
     if len(rows) == 1:
         raise FileFormatError(path, line, "", "there is no row below the column names")
     wanted = _AT_REST if "pose" in columns else _ON_PATHS
-    table: dict[str, list[tuple[int, list[float]]]] = {}
+    found: dict[str, list[tuple[int, list[float]]]] = {}
     for number, row in rows[1:]:
         if len(row) != len(head):
             raise FileFormatError(path, number, "", f"expected {len(head)} columns, got {len(row)}")
         values = [_number(path, number, name, row[columns[name]]) * scales[name] for name in wanted[1:]]
-        table.setdefault(row[columns[wanted[0]]].strip(), []).append((number, values))
-    return _at_rest(path, table) if "pose" in columns else _on_paths(path, table)
+        name = row[columns[wanted[0]]].strip()
+        if not name:
+            raise FileFormatError(path, number, wanted[0], "expected a name, got nothing")
+        found.setdefault(name, []).append((number, values))
+    return _at_rest(path, found) if "pose" in columns else _on_paths(path, found)
 
 
 def _columns(path: Path, line: int, head: list[str]) -> tuple[dict[str, int], dict[str, float]]:
@@ -137,7 +144,8 @@ def _columns(path: Path, line: int, head: list[str]) -> tuple[dict[str, int], di
         if name in ("pose", "path"):
             base = name
         elif base not in wanted or unit not in (units := _TIMES if base == "t" else _LENGTHS):
-            near = closest(name, [f"{one}_mm" for one in wanted[1:] if one != "t"] + ["t_s", "pose", "path"])
+            usual = [wanted[0], *(f"{one}_s" if one == "t" else f"{one}_mm" for one in wanted[1:])]
+            near = next((one for one in usual if one.rpartition("_")[0] == base), None) or closest(name, usual)
             hint = f"; did you mean {near}?" if near else ""
             raise FileFormatError(path, line, name, f"unknown column{hint}; expected {_expected(wanted)}")
         else:
@@ -183,13 +191,15 @@ def _at_rest(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) -> 
         offsets.append(off.mean(axis=0))
         counts.append(len(rows))
         if len(rows) > 1:
-            spread.append(off.var(axis=0, ddof=1).mean() / len(rows))
+            spread.append(((off - off.mean(axis=0)) ** 2).sum(axis=0).mean())
+    again = sum(counts) - len(counts)
+    variance = sum(spread) / again if again else 0.0
     return RestMeasured(
         names=tuple(table),
         poses=np.array(poses),
         offsets=np.array(offsets),
         readings=tuple(counts),
-        noise=float(np.sqrt(np.mean(spread))) if spread and np.mean(spread) > 0 else None,
+        noise=math.sqrt(variance / min(counts)) if variance > 0 else None,
     )
 
 
@@ -209,10 +219,13 @@ def _on_paths(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) ->
         if np.any(steps <= 0) or np.ptp(steps) > 0.01 * steps.mean():
             late = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
             raise FileFormatError(path, rows[late][0], "t", "samples must be equally spaced in time")
-        if abs(t[0]) > 1.5 * steps.mean() or t[-1] < 0.9 * wanted.duration:
+        if abs(t[0]) > 1.5 * steps.mean() or t[-1] < _WHOLE * wanted.duration - 1.5 * steps.mean():
             raise FileFormatError(
                 path, rows[0][0], "t", f"path {name} takes {wanted.duration:g} s; got {t[0]:g} to {t[-1]:g} s"
             )
+        # While the tip rests after the path its error says something else than on the way: a mean must not count it.
+        on_the_way = t <= wanted.duration + 0.5 * steps.mean()
+        t, values = t[on_the_way], values[on_the_way]
         off = values[:, 1:] - wanted.at(t).at
         _refuse_far(path, rows[0][0], name, off)
         times[name], errors[name] = t, off
@@ -221,7 +234,7 @@ def _on_paths(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) ->
 
 def _refuse_far(path: Path, line: int, name: str, off: Array) -> None:
     """Refuse what no play explains."""
-    worst = float(np.linalg.norm(off, axis=-1).max())
+    worst = float(np.hypot(off[:, 0], off[:, 1]).max())
     if worst > _LARGEST:
         raise FileFormatError(
             path,

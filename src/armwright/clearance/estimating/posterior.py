@@ -104,8 +104,8 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
         surrogate, goal, np.sqrt(np.diag(measured) + surrogate.predict((lower + upper)[None] / 2)[1][0] ** 2)
     )
     with one_core():
-        samples = _walk(log_density, centre, lower, upper, seed)
-    mean, deviation = surrogate.predict(centre[None])
+        samples, best = _walk(log_density, centre, lower, upper, seed)
+    mean, deviation = surrogate.predict(best[None])
     covariance = measured + np.diag(deviation[0] ** 2)
     missing = mean[0] - goal
     freedom = max(1, count - len(lower))
@@ -113,15 +113,17 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
     return Posterior(names=surrogate.parameters, samples=samples, lower=lower, upper=upper, misfit=misfit)
 
 
-def _walk(log_density: Callable[[Array], Array], centre: Array, lower: Array, upper: Array, seed: int) -> Array:
-    """Return samples of walkers that stretch towards and away from one another."""
+def _walk(
+    log_density: Callable[[Array], Array], centre: Array, lower: Array, upper: Array, seed: int
+) -> tuple[Array, Array]:
+    """Return samples of walkers that stretch towards and away from one another, and the likeliest place they saw."""
     rng = np.random.default_rng(seed)
     k = len(centre)
     spread = 0.02 * (upper - lower)
     places = np.clip(centre + spread * rng.standard_normal((_WALKERS, k)), lower + 1e-3 * spread, upper - 1e-3 * spread)
     density = log_density(places)
     half = _WALKERS // 2
-    kept = []
+    kept, heights = [], []
     for step in range(_STEPS):
         for own, others in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
             z = ((_STRETCH - 1) * rng.random(half) + 1) ** 2 / _STRETCH
@@ -133,4 +135,6 @@ def _walk(log_density: Callable[[Array], Array], centre: Array, lower: Array, up
             density[own] = np.where(taken, found, density[own])
         if step >= _BURN:
             kept.append(places.copy())
-    return np.concatenate(kept)
+            heights.append(density.copy())
+    samples = np.concatenate(kept)
+    return samples, samples[np.concatenate(heights).argmax()]

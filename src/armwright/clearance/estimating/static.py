@@ -17,7 +17,7 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.ideal import closed, ideal_motion, sensitivity, tip_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.preparing import assembled
-from armwright.clearance.rest import at_rest
+from armwright.clearance.rest import at_rest, forces_of
 from armwright.clearance.settings import contact_stiffness
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -81,11 +81,14 @@ def rest_matrix(linkage: Linkage, poses: ArrayLike) -> Array:
 
     Returns:
         (k, 2, p) shift by clearance.
+
+    Raises:
+        InvalidValueError: a pose cannot be reached, or a pin carries no force there.
     """
     q = _posed(linkage, poses)
     still = np.zeros((len(q), 2))
     reactions = ideal_motion(linkage, q, still, still, by_tip=True).reactions
-    direction = reactions / np.linalg.norm(reactions, axis=-1, keepdims=True)
+    direction = reactions / forces_of(linkage, reactions)[..., None]
     return np.asarray(np.einsum("kapb,kpb->kap", sensitivity(linkage, q), direction), dtype=np.float64)
 
 
@@ -118,7 +121,7 @@ def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noi
     places, seen = floats(poses, "poses"), floats(offsets, "offsets")
     if places.ndim != 2 or places.shape[1] != 2 or seen.shape[-2:] != places.shape:
         raise ShapeError(f"expected (k, 2) poses and as many offsets, got shapes {places.shape} and {seen.shape}")
-    if not noise > 0:
+    if not 0 < noise < np.inf:
         raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
     names = tuple(linkage.clearances)
     B = rest_matrix(linkage, places).reshape(-1, len(names))

@@ -1,0 +1,20 @@
+"""The thesis' two arms, and how their simulations are set so that its numbers come back."""
+
+import numpy as np
+
+from armwright.arrays import Array, ArrayLike
+from armwright.clearance.equations import Rubbing
+from armwright.clearance.settings import Settings
+
+# Clearances of J2, J3 and J4 [m].
+ARM_A, ARM_B = np.array((0.328, 0.171, 0.483)) * 1e-3, np.array((0.460, 0.480, 0.460)) * 1e-3
+CENTRE = Settings(friction=Rubbing(velocity="centre"), threshold=1e-2)
+PATHS = ("y1", "y3", "y7")
+# Where these paths start [m].
+STARTS = np.array(((-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7)))
+
+
+def accuracy(found: ArrayLike, true: ArrayLike) -> Array:
+    """Mean accuracy of clearances (..., 3) as the thesis counts it [%]."""
+    found, true = np.asarray(found), np.asarray(true)
+    return np.asarray(100 * (1 - np.abs(found / true - 1)).mean(axis=-1))

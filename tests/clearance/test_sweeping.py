@@ -1,0 +1,192 @@
+"""Sweeps over clearances: the features of single simulations, the same bits whoever makes them, rows that fail."""
+
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.clearance.features import Features, features
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.paths import named_path
+from armwright.clearance.preparing import prepare
+from armwright.clearance.simulation import simulate
+from armwright.clearance.sweeping import FeatureSweep, feature_vector
+from armwright.errors import InvalidValueError, UnknownNameError
+from armwright.sweep.designs import Design, latin_hypercube
+from armwright.sweep.errors import SweepError
+from armwright.sweep.progress import Progress
+from armwright.sweep.run import run
+from armwright.sweep.task import Status, check_task, evaluate
+from clearance.arms import ARM_A, ARM_B, CENTRE
+
+RANGE = (0.1e-3, 0.5e-3)
+# So much friction in a pin no step can follow.
+STUCK = 1e4
+
+
+@pytest.fixture(scope="module")
+def task(five_bar: Linkage) -> FeatureSweep:
+    return FeatureSweep(linkage=five_bar, paths=("y1",), settings_of=CENTRE)
+
+
+@pytest.fixture(scope="module")
+def design(task: FeatureSweep) -> Design:
+    return latin_hypercube(dict.fromkeys(task.parameters, RANGE), 24, 7, units=dict.fromkeys(task.parameters, "m"))
+
+
+def bits(results: Any) -> dict[str, bytes]:
+    """All numbers and texts of some results."""
+    return {name: pickle.dumps(results[name].values.tolist()) for name in (*results.coords, *results.data_vars)}
+
+
+def test_features_of_the_simulation(five_bar: Linkage, task: FeatureSweep) -> None:
+    """A row of a sweep has the features of the simulation with those clearances, bit for bit, and its largest force."""
+    rows = task(np.array([ARM_B, ARM_A]))
+
+    alone = simulate(prepare(five_bar, named_path("y1"), CENTRE), ARM_A)
+    for name, value in features(alone)._asdict().items():
+        assert rows[f"y1_{name}"][1] == value, name
+    assert rows["y1_peak"][1] == alone.peaks.max()
+    assert rows["failure"] == ["", ""]
+
+
+def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:
+    """With friction as a parameter, its usual value gives the usual row, and another one another row."""
+    with_friction = attrs.evolve(task, with_friction=True)
+    usual = five_bar.material.friction
+
+    rows = with_friction(np.array([[*ARM_A, usual], [*ARM_A, 0.0]]))
+
+    assert with_friction.parameters == ("c_J2", "c_J3", "c_J4", "friction")
+    assert rows["y1_intercept"][0] == task(ARM_A[None])["y1_intercept"][0]
+    # By 0.07 to 0.10 mm between 0.05 and none (spec of the clearance, 4.4).
+    assert 0.02e-3 < abs(rows["y1_intercept"][1] - rows["y1_intercept"][0]) < 0.15e-3
+
+
+def test_said_beforehand(task: FeatureSweep) -> None:
+    """What a task returns is what it says it will, with units, and its settings are plain enough for JSON."""
+    both = attrs.evolve(task, paths=("y1", "x2"))
+    rows = evaluate(both, ARM_A[None])
+
+    check_task(both, both.parameters)
+    assert set(rows.values) == {f"{path}_{name}" for path in ("y1", "x2") for name in (*Features._fields, "peak")}
+    assert {name: one.units for name, one in both.outputs.items()}["x2_slope"] == "m/s"
+    told = json.loads(json.dumps(dict(both.settings)))
+    assert told["simulation"]["friction"]["velocity"] == "centre"
+    assert told["linkage"]["bodies"][0]["mass"] == 2.5
+
+
+def test_feature_vector(task: FeatureSweep) -> None:
+    """Chosen features stand path by path, in the order asked for."""
+    rows = task(np.array([ARM_A, ARM_B]))
+
+    table = feature_vector(rows, ["y1"], ["intercept", "slope"])
+
+    np.testing.assert_array_equal(table, np.stack([rows["y1_intercept"], rows["y1_slope"]], axis=-1))
+
+
+def test_workers_make_their_own_tables(task: FeatureSweep) -> None:
+    """A task that has run is sent without its tables of drives, and does the same where it arrives."""
+    here = task(ARM_A[None])
+    sent = pickle.dumps(task)
+
+    there = pickle.loads(sent)(ARM_A[None])
+
+    assert len(sent) < 10_000
+    assert bits_of(there) == bits_of(here)
+
+
+def bits_of(rows: dict[str, Any]) -> dict[str, bytes]:
+    return {name: pickle.dumps(np.asarray(values).tolist()) for name, values in rows.items()}
+
+
+def test_same_bits(task: FeatureSweep, design: Design, tmp_path: Path) -> None:
+    """One process, two, a Dask cluster, and blocks of other lengths make the same bits."""
+    pytest.importorskip("xarray")
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as cluster:
+        ways: list[dict[str, Any]] = [
+            {"workers": 1},
+            {"workers": 1, "block": 5},
+            {"workers": 2, "block": 12},
+            {"scheduler": cluster.scheduler_address, "block": 8},
+        ]
+        found = [bits(run(task, design, tmp_path / str(i), **way)) for i, way in enumerate(ways)]
+
+    assert all(one == found[0] for one in found[1:])
+
+
+def test_diverging_run(task: FeatureSweep, tmp_path: Path) -> None:
+    """A run that diverges is a row that says so; those beside it keep their bits, and the sweep goes on."""
+    pytest.importorskip("xarray")
+    with_friction = attrs.evolve(task, with_friction=True)
+    well = np.array([[*ARM_A, 0.05], [*ARM_B, 0.05], [*ARM_A, 0.0]])
+    points = np.insert(well, 1, [*ARM_B, STUCK], axis=0)
+
+    found = run(with_friction, Design(names=with_friction.parameters, points=points), tmp_path / "out", workers=1)
+
+    assert found.status.values.tolist() == [Status.DONE, Status.FAILED, Status.DONE, Status.DONE]
+    assert found.message.values[1] == "the simulation diverged"
+    assert np.isnan(found.y1_slope[1])
+    alone = with_friction(well)
+    np.testing.assert_array_equal(found.y1_amp_dc.values[[0, 2, 3]], alone["y1_amp_dc"])
+
+
+def test_impossible_rows(task: FeatureSweep, tmp_path: Path) -> None:
+    """A clearance of nothing, and one of two metres, are rows with a message; the others are simulated."""
+    pytest.importorskip("xarray")
+    points = np.array([ARM_A, (0.0, 1e-4, 1e-4), (2.0, 2.0, 2.0), ARM_B])
+
+    found = run(task, Design(names=task.parameters, points=points), tmp_path / "out", workers=1)
+
+    assert found.status.values.tolist() == [Status.DONE, Status.FAILED, Status.FAILED, Status.DONE]
+    assert "clearances: contact needs them above 0, got 0 mm" in str(found.message.values[1])
+    assert "the loops do not close" in str(found.message.values[2])
+
+
+def test_stopped_and_begun_again(task: FeatureSweep, design: Design, tmp_path: Path) -> None:
+    """A sweep that was stopped goes on where it was, and ends with the bits of one that was not."""
+    pytest.importorskip("xarray")
+    seen: list[Progress] = []
+
+    def stop(now: Progress) -> None:
+        if now.done == 16:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        run(task, design, tmp_path / "out", block=8, workers=1, progress=stop)
+    again = run(task, design, tmp_path / "out", block=8, workers=1, progress=seen.append)
+
+    assert (seen[0].found, seen[-1].done) == (16, 24)
+    assert bits(again) == bits(run(task, design, tmp_path / "whole", workers=1))
+
+
+def test_folder_of_other_settings(task: FeatureSweep, design: Design, tmp_path: Path) -> None:
+    """A folder of sweeps with the other friction is refused, and what differs is told."""
+    pytest.importorskip("xarray")
+    few = attrs.evolve(design, points=design.points[:2])
+    run(task, few, tmp_path / "out", workers=1)
+    other = attrs.evolve(task, settings_of=attrs.evolve(CENTRE, threshold=2e-2))
+
+    with pytest.raises(SweepError, match=r"settings\.simulation"):
+        run(other, few, tmp_path / "out", workers=1)
+
+
+def test_unknown_path(five_bar: Linkage) -> None:
+    """A path that there is not is answered with what there is; none is swept twice, and one is needed.
+
+    Pick and place has no straight part to look at.
+    """
+    for name in ("y15", "pick-and-place"):
+        with pytest.raises(UnknownNameError, match=f"no test path '{name}'"):
+            FeatureSweep(linkage=five_bar, paths=("y1", name))
+    with pytest.raises(InvalidValueError, match="paths: 'y1' stands there twice"):
+        FeatureSweep(linkage=five_bar, paths=("y1", "y3", "y1"))
+    with pytest.raises(InvalidValueError, match="paths: expected one or more, got none"):
+        FeatureSweep(linkage=five_bar, paths=())

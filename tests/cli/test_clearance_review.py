@@ -1,0 +1,103 @@
+"""What a stranger tried with the commands of linkages with play: options that clash, files of something else."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.clearance.paths import thesis_path
+from cli_calls import armwright
+
+ESTIMATE = {
+    "parameters": {
+        "J2": {"mean": 3e-4, "deviation": 1e-6},
+        "J3": {"mean": 2e-4, "deviation": 1e-6},
+        "J4": {"mean": 4e-4, "deviation": 1e-6},
+    },
+    "correlation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+}
+# Thirty-two draws with a deviation of a micrometre lie so near to their mean [m].
+DRAWN = 1e-6
+
+
+@pytest.fixture
+def estimate(tmp_path: Path) -> Path:
+    """A file as ``clearance estimate --json`` prints it."""
+    file = tmp_path / "estimate.json"
+    file.write_text(json.dumps(ESTIMATE))
+    return file
+
+
+def test_corrected_for_the_estimate(estimate: Path, tmp_path: Path) -> None:
+    """A path is corrected for the play that was estimated, and the summary names this, not that of the catalogue."""
+    folder = tmp_path / "out"
+    done = armwright(
+        "clearance", "correct", "five-bar", "--estimate", estimate, "--rounds", "1", "--json", "-o", folder
+    )
+
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    means = {name: one["mean"] for name, one in ESTIMATE["parameters"].items()}  # type: ignore[attr-defined]
+    assert told["clearances"] == pytest.approx(means, abs=DRAWN)
+    assert {file.name for file in folder.iterdir()} == {"path.csv", "summary.json", "paths.svg"}
+
+
+def test_given_twice(estimate: Path) -> None:
+    """Clearances are given, or those of an estimate; both at once is a slip."""
+    done = armwright("clearance", "correct", "five-bar", "--estimate", estimate, "--clearance", "J2=0.1")
+
+    assert done.returncode == 2
+    assert "given or those of" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["correct", "five-bar", "--rounds", "-1"], "rounds: expected 0 or more, got -1"),
+        (["correct", "five-bar", "--estimate", "nowhere.json"], "nowhere.json: no such file"),
+        (["correct", "four-bar"], "with its pins closed it has 1 freedom, and a place of the tip tells 2"),
+        (["sweep", "five-bar", "--paths", "y1", "--step", "4.6e-5", "-o", "{out}"], "is too long for contacts"),
+    ],
+)
+def test_refused(options: list[str], text: str, tmp_path: Path) -> None:
+    """What cannot be is refused before a simulation, in one line; a step is held against the least play of a sweep."""
+    done = armwright("clearance", *(one.format(out=tmp_path / "out") for one in options))
+
+    assert done.returncode == 1
+    assert text in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_matrix_that_does_not_fit(estimate: Path) -> None:
+    """A correlation of two pins is none of three."""
+    estimate.write_text(json.dumps(ESTIMATE | {"correlation": [[1, 0], [0, 1]]}))
+    done = armwright("clearance", "correct", "five-bar", "--estimate", estimate)
+
+    assert done.returncode == 1
+    assert "expected what `armwright clearance estimate --json` prints for five-bar" in done.stderr
+
+
+def test_sweep_of_another_linkage(tmp_path: Path) -> None:
+    """Clearances of a linkage cannot be told by a sweep of another; a path that is named twice is swept once."""
+    pytest.importorskip("xarray")
+    folder, measured = tmp_path / "sweep", tmp_path / "measured.csv"
+    swept = armwright(
+        "clearance", "sweep", "five-bar", "--paths", "y1,y1", "-n", "2", "--workers", "1", "--json", "-o", folder
+    )
+    way = thesis_path("y1")
+    places = ((t, *way.at(t).at * 1e3) for t in np.linspace(0.0, way.duration, 51))
+    rows = [f"y1,{t:.6f},{x:.6f},{y:.6f}" for t, x, y in places]
+    measured.write_text("\n".join(["path,t_s,x_mm,y_mm", *rows]))
+    done = armwright("clearance", "estimate", "slider-crank", measured, "--sweep", folder, "--noise-um", "2")
+
+    assert json.loads(swept.stdout)["paths"] == ["y1"]
+    assert done.returncode == 1
+    assert "the sweep is of another linkage than slider-crank" in done.stderr
+
+
+def test_pick_and_place() -> None:
+    """The path that is corrected can be simulated too, with its three targets."""
+    done = armwright("clearance", "simulate", "five-bar", "--path", "pick-and-place", "--json")
+
+    assert [one["time"] for one in json.loads(done.stdout)["targets"]] == pytest.approx([0.0, 0.25, 0.5])
