@@ -10,6 +10,10 @@ import pytest
 import armwright
 from armwright.arm.load import read_arm, read_load
 from armwright.cell.reader import read_cell
+from armwright.clearance.estimating.measured import RestMeasured, read_measured
+from armwright.clearance.ideal import closed, tip_of
+from armwright.clearance.preparing import assembled
+from armwright.clearance.reader import read_linkage
 from armwright.dynamics.integrators import Adaptive
 from armwright.dynamics.simulation import JointState, Status
 from armwright.errors import FileFormatError
@@ -19,6 +23,7 @@ from armwright.study.stanford_torque import joint_table, torques
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
+PLAY = (DOCS / "clearance.md").read_text(encoding="utf-8")
 CELLS, ARMS = (DOCS / "cells.md").read_text(encoding="utf-8"), (DOCS / "arms.md").read_text(encoding="utf-8")
 
 
@@ -88,6 +93,64 @@ def test_mistakes_in_an_arm(slip: int, tmp_path: Path) -> None:
     text = example(ARMS).replace(*ARM_SLIPS[slip])
 
     assert f"    armwright: {said(tmp_path / 'lift.toml', text, read_arm)}\n" in ARMS
+
+
+LINKAGE_SLIPS = [
+    ("clearance_mm", "clearance"),
+    ('on = "ground:O"\ndirection', 'on = "ground"\ndirection'),
+    ("restitution", "restitutoin"),
+]
+
+
+@pytest.mark.parametrize("slip", range(len(LINKAGE_SLIPS)))
+def test_mistakes_in_a_linkage(slip: int, tmp_path: Path) -> None:
+    """The messages on the page are what these slips in its example are answered with."""
+    text = example(PLAY).replace(*LINKAGE_SLIPS[slip], 1)
+
+    assert f"    armwright: {said(tmp_path / 'press.toml', text, read_linkage)}\n" in PLAY
+
+
+def test_linkage_of_the_page(tmp_path: Path) -> None:
+    """The press on the page is read and put together: its ram hangs below the crank, 0.05 mm loose at the wrist."""
+    (tmp_path / "press.toml").write_text(example(PLAY), encoding="utf-8")
+
+    press = read_linkage(tmp_path / "press.toml")
+
+    guess = assembled(press)
+    q = closed(press, guess, drives=guess[list(press.driven)])
+    # Crank and rod of 40 and 200 mm: 40 sin 60° + √(200² - (40 cos 60°)²) below, and the face 50 mm below that.
+    height = -(0.04 * np.sin(np.pi / 3) + np.sqrt(0.2**2 - 0.02**2)) - 0.05
+    np.testing.assert_allclose(tip_of(press, q), (0.0, height), atol=1e-12)
+    assert press.clearances == {"wrist": pytest.approx(5e-5)}
+    assert press.drives[0].kind == "motion"
+
+
+@pytest.mark.parametrize("table", ["", "body", "joint", "play", "drive", "load", "material"])
+def test_every_key_of_a_linkage_is_explained(table: str, tmp_path: Path) -> None:
+    """What the reader of linkages knows in a table, the page explains outside of its example."""
+    header = {"": "", "material": "[material]\n"}.get(table, f"[[{table}]]\n")
+    start = example(PLAY) if table == "" else example(PLAY).partition(header)[2]
+    text = example(PLAY).replace(start, f"qqqqqqqq = 1\n{start}", 1)
+
+    for key in known_keys(said(tmp_path / "press.toml", text, read_linkage)):
+        assert f"`{key}`" in PLAY.replace(example(PLAY), ""), key
+
+
+@pytest.mark.parametrize("name", ["pose", "path"])
+def test_measurements_of_the_page(name: str, tmp_path: Path) -> None:
+    """The columns of both files on the page are those that are read, and the mistake is told as it says."""
+    rows = [line.strip() for line in PLAY.partition(f"    {name},")[2].partition("\n\n")[0].split("\n")]
+    head = f"{name},{rows[0]}"
+    if name == "pose":
+        (tmp_path / "today.csv").write_text("\n".join([head, *rows[1:]]), encoding="utf-8")
+        found = read_measured(tmp_path / "today.csv")
+        assert isinstance(found, RestMeasured)
+        assert found.readings == (2, 1)
+        mixed = "\n".join([head.replace(",x_mm,y_mm", ",x_m,y_m"), *rows[1:]])
+        assert f"    armwright: {said(tmp_path / 'today.csv', mixed, read_measured)}\n" in PLAY
+    else:
+        few = "\n".join([head, *rows[1:]])
+        assert "expected 20 samples or more, got 2" in said(tmp_path / "today.csv", few, read_measured)
 
 
 def known_keys(message: str) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from armwright.cli.arms import arms
+from armwright.cli.calibrate import calibrate
 from armwright.cli.check import check
 from armwright.cli.clearance import clearance
 from armwright.cli.code import code
@@ -23,6 +24,7 @@ from armwright.cli.iso9283 import iso9283
 from armwright.cli.kernel import kernel
 from armwright.cli.lsp import lsp
 from armwright.cli.move import move
+from armwright.cli.plan_poses import plan_poses
 from armwright.cli.repl import repl
 from armwright.cli.run import run
 from armwright.cli.show import show
@@ -61,6 +63,8 @@ app.command()(singularity)
 app.command()(simulate)
 app.command()(move)
 app.command()(iso9283)
+app.command()(calibrate)
+app.command("plan-poses")(plan_poses)
 app.add_typer(clearance)
 app.command()(study)
 app.command()(kernel)

@@ -11,11 +11,15 @@ _STUDIES = {
     "stanford-torque": "study_stanford_torque",
     "puma-moves": "study_puma_moves",
     "five-bar-clearance": "study_five_bar_clearance",
+    "dh-calibration": "study_dh_calibration",
 }
 
 
 def study(
-    name: Annotated[str, typer.Argument(help="stanford-torque, puma-moves or five-bar-clearance.", show_default=False)],
+    name: Annotated[
+        str,
+        typer.Argument(help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.", show_default=False),
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the figures (SVG) and the tables (JSON).")
     ] = None,
@@ -32,6 +36,9 @@ def study(
     five-bar-clearance: a parallel arm with play in three pins: error curves, their features over 729 linkages, the
     clearances told from them, two arms compared, a path corrected (tables 5.3 to 5.12, figures 4.6 to 5.13). Takes a
     minute.
+
+    dh-calibration: a three-joint arm touches a board of 33 points in three attitudes; the thesis' fit of its table, and
+    a complete model, held against six points (table 2.4).
 
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """

@@ -1,0 +1,1 @@
+"""A better arm from measured points: which of its parameters a measurement tells, what they are, and how well."""

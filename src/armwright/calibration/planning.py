@@ -1,0 +1,175 @@
+"""Which poses to measure: those that tell most of an arm's errors.
+
+Source:
+    Borm & Menq (1991); Driels & Pathre (1990); Nahvi, Hollerbach, Hayward (1994); Nahvi & Hollerbach (1996).
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.identifying import identify
+from armwright.errors import InvalidValueError, one_of
+
+Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
+INDICES: tuple[Index, ...] = ("O1", "O2", "O3", "O4", "O5")
+
+# Joints without limits are tried within a turn [rad], slides within a metre.
+_FREE = np.pi
+_CANDIDATES = 400
+# Poses are exchanged for better ones so often at most.
+_MOST_EXCHANGES = 200
+# Noise at which one asks what can be told at all [m].
+_USUAL_NOISE = 1e-4
+
+
+class Observability(NamedTuple):
+    """How well poses tell errors that are counted in metres and radians; the larger the better.
+
+    Attributes:
+        O1: geometric mean of the singular values, by the root of the number of poses.
+        O2: smallest by largest: the inverse of the condition number.
+        O3: the smallest.
+        O4: the smallest, squared, by the largest: how little noise is amplified.
+        O5: the inverse of the sum of their inverses.
+    """
+
+    O1: float
+    O2: float
+    O3: float
+    O4: float
+    O5: float
+
+
+class Plan(NamedTuple):
+    """Poses to measure.
+
+    Attributes:
+        q: (m, n) joint positions [rad] or [m].
+        observability: of these poses.
+        by_chance: that of as many poses taken by chance, the median of some tries.
+        names: of the errors that they tell.
+    """
+
+    q: Array
+    observability: Observability
+    by_chance: Observability
+    names: tuple[str, ...]
+
+
+def observability(chain: Chain, q: Array, kept: list[int]) -> Observability:
+    """Return how well poses (m, n) tell the errors with these numbers."""
+    return _indices(chain.reach(q).by_position[:, :, kept].reshape(-1, len(kept)), len(q))
+
+
+def plan_poses(
+    arm: Arm,
+    count: int,
+    *,
+    index: Index = "O1",
+    seed: int = 0,
+    candidates: int = _CANDIDATES,
+    progress: Callable[[int], None] | None = None,
+) -> Plan:
+    """Return poses inside the limits that tell an arm's errors well.
+
+    Poses are taken one by one from candidates drawn by chance, each the one that adds most to what is told of all
+    errors together (the determinant); then single ones are exchanged as long as the index asked for gets better.
+
+    Args:
+        arm: with n joints.
+        count: how many poses.
+        index: O1 to O5; see ``Observability``.
+        seed: of the candidates.
+        candidates: how many there are.
+        progress: told how many poses are chosen.
+
+    Raises:
+        InvalidValueError: so few poses do not tell the errors of the arm, or there are fewer candidates.
+        UnknownNameError: there is no such index.
+    """
+    one_of("index", index, INDICES)
+    chain = chain_of(arm)
+    rng = np.random.default_rng(seed)
+    if candidates < count:
+        raise InvalidValueError(f"candidates: expected {count} or more, got {candidates}")
+    lower, upper = _limits(arm)
+    q = lower + (upper - lower) * rng.random((candidates, arm.n))
+    slopes = chain.reach(q).by_position
+    told = identify(chain.names, slopes.reshape(-1, len(chain.names)), chain.is_length, _USUAL_NOISE)
+    kept = list(told.kept)
+    if 3 * count < len(kept):
+        raise InvalidValueError(
+            f"count: {arm.name} has {len(kept)} errors that points can tell; "
+            f"expected {-(-len(kept) // 3)} poses or more, got {count}"
+        )
+    rows = slopes[:, :, kept]
+    taken = _greedy(rows, count, progress)
+    taken = _exchanged(rows, taken, INDICES.index(index))
+    chance = [_indices(_stacked(rows, rng.choice(candidates, count, replace=False).tolist()), count) for _ in range(15)]
+    return Plan(
+        q=q[taken],
+        observability=_indices(_stacked(rows, taken), count),
+        by_chance=Observability(*(float(np.median([one[i] for one in chance])) for i in range(len(INDICES)))),
+        names=tuple(chain.names[i] for i in kept),
+    )
+
+
+def _limits(arm: Arm) -> tuple[Array, Array]:
+    free = [_FREE if joint.revolute else 1.0 for joint in arm.joints]
+    lower = [max(joint.limits.lower, -most) for joint, most in zip(arm.joints, free, strict=True)]
+    upper = [min(joint.limits.upper, most) for joint, most in zip(arm.joints, free, strict=True)]
+    return np.array(lower), np.array(upper)
+
+
+def _stacked(rows: Array, taken: Sequence[int]) -> Array:
+    return np.asarray(rows[list(taken)].reshape(-1, rows.shape[-1]), dtype=np.float64)
+
+
+def _indices(A: Array, poses: int) -> Observability:
+    s = np.linalg.svd(A, compute_uv=False)
+    if len(s) < A.shape[1] or s[-1] <= 1e-12 * s[0]:
+        return Observability(0.0, 0.0, 0.0, 0.0, 0.0)
+    return Observability(
+        O1=float(np.exp(np.log(s).mean()) / np.sqrt(poses)),
+        O2=float(s[-1] / s[0]),
+        O3=float(s[-1]),
+        O4=float(s[-1] ** 2 / s[0]),
+        O5=float(1.0 / (1.0 / s).sum()),
+    )
+
+
+def _greedy(rows: Array, count: int, progress: Callable[[int], None] | None) -> list[int]:
+    """Return the poses that add most to the determinant, one after the other."""
+    information = 1e-6 * np.eye(rows.shape[-1])
+    taken: list[int] = []
+    for _ in range(count):
+        inverse = np.linalg.inv(information)
+        # det(I + A C Aᵀ) of the three rows of each candidate.
+        gains = np.linalg.det(np.eye(3) + rows @ inverse @ np.swapaxes(rows, 1, 2))
+        gains[taken] = -np.inf
+        best = int(np.argmax(gains))
+        taken.append(best)
+        information = information + rows[best].T @ rows[best]
+        if progress is not None:
+            progress(len(taken))
+    return taken
+
+
+def _exchanged(rows: Array, taken: list[int], index: int) -> list[int]:
+    """Exchange single poses for others as long as the index gets better."""
+    rng = np.random.default_rng(0)
+    best = _indices(_stacked(rows, taken), len(taken))[index]
+    others = [i for i in range(len(rows)) if i not in taken]
+    for _ in range(min(_MOST_EXCHANGES, len(others) * len(taken))):
+        place, other = int(rng.integers(len(taken))), int(rng.integers(len(others)))
+        tried = taken.copy()
+        tried[place] = others[other]
+        value = _indices(_stacked(rows, tried), len(tried))[index]
+        if value > best:
+            others[other], taken, best = taken[place], tried, value
+    return taken

@@ -1,0 +1,85 @@
+"""``armwright plan-poses``: the poses at which an arm should be measured."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from armwright.arm.model import Arm
+    from armwright.calibration.planning import Plan
+
+
+def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
+    arm: Annotated[str, typer.Argument(help="Name in the catalogue, an arm file or a URDF.", show_default=False)],
+    count: Annotated[int, typer.Option("-n", "--count", help="How many poses.")] = 30,
+    index: Annotated[str, typer.Option(help="What is to be large: O1 to O5 (docs/calibration.md).")] = "O1",
+    seed: Annotated[int, typer.Option(help="Of the candidates.")] = 0,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="CSV of the poses, to be measured and given to calibrate.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON, in SI units.")] = False,
+) -> None:
+    """Propose poses inside the limits whose measured points tell most of an arm's errors.
+
+    The CSV has a column for every joint; add `x_mm, y_mm, z_mm`, where the tool was measured, and calibrate.
+
+    **Example:** `armwright plan-poses puma560 -n 30 -o out/poses.csv`
+    """
+    import json
+
+    from armwright.arm.load import load_arm
+    from armwright.calibration.planning import plan_poses as planned
+    from armwright.files.output import write_file
+
+    model = load_arm(arm)
+    plan = planned(model, count, index=index, seed=seed)  # type: ignore[arg-type]
+    if output is not None:
+        write_file(output, _csv(model, plan))
+    if as_json:
+        print(json.dumps(_as_data(plan), indent=2))
+    else:
+        _print(model, plan)
+        if output is not None:
+            print(f"poses: {output}")
+
+
+def _as_data(plan: "Plan") -> dict[str, Any]:
+    return {
+        "q": plan.q.tolist(),
+        "tells": list(plan.names),
+        "observability": plan.observability._asdict(),
+        "by chance": plan.by_chance._asdict(),
+    }
+
+
+def _columns(model: "Arm") -> list[tuple[str, float]]:
+    """Return the names of the columns and how many of their units are one in SI."""
+    import math
+
+    return [
+        (f"joint_{i}_deg", 180 / math.pi) if joint.revolute else (f"joint_{i}_mm", 1e3)
+        for i, joint in enumerate(model.joints, 1)
+    ]
+
+
+def _csv(model: "Arm", plan: "Plan") -> str:
+    columns = _columns(model)
+    rows = [",".join(f"{x * scale:.4f}" for x, (_, scale) in zip(q, columns, strict=True)) for q in plan.q]
+    return "\n".join([",".join(name for name, _ in columns), *rows]) + "\n"
+
+
+def _print(model: "Arm", plan: "Plan") -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(markup=False, highlight=False)
+    console.print(f"{len(plan.q)} poses of {model.name} tell {len(plan.names)} errors:")
+    console.print(", ".join(plan.names))
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in ("index", "these poses", "by chance"):
+        table.add_column(name, justify="left" if name == "index" else "right", no_wrap=True)
+    for name, ours, chance in zip(plan.observability._fields, plan.observability, plan.by_chance, strict=True):
+        table.add_row(name, f"{ours:.4g}", f"{chance:.4g}")
+    console.print(table)

@@ -1,0 +1,327 @@
+"""Files of measurements, good ones and those that people send."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm, Joint, Limits
+from armwright.calibration.measurements import read_measurements
+from armwright.errors import FileFormatError, UnknownNameError
+
+Write = Callable[[str], Path]
+HEAD = "joint_1_deg,joint_2_deg,x_mm,y_mm,z_mm"
+ROWS = ("10,-20,300.5,10,5", "20,30,-310,20.25,5", "-40,55,100,-200,6")
+
+
+@pytest.fixture
+def arm() -> Arm:
+    """Return an elbow of two joints."""
+    return Arm(name="elbow", joints=[Joint(kind="revolute", a=0.2), Joint(kind="revolute", a=0.15)])
+
+
+@pytest.fixture
+def sliding() -> Arm:
+    """Return a turning joint with a slide of 0.1 to 0.5 m."""
+    return Arm(
+        name="slider",
+        joints=[Joint(kind="revolute"), Joint(kind="prismatic", alpha=1.5, limits=Limits(lower=0.1, upper=0.5))],
+    )
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def written(text: str) -> Path:
+        path = tmp_path / "points.csv"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written
+
+
+def table(head: str, rows: Sequence[str] = ROWS) -> str:
+    return "\n".join([head, *rows]) + "\n"
+
+
+def refused(path: Path, arm: Arm, units: tuple[str, str] | None = None) -> str:
+    """Return what is said of a file, without the folder it lies in."""
+    with pytest.raises(FileFormatError) as caught:
+        read_measurements(path, arm, units=units)
+    return str(caught.value).replace(str(path), path.name)
+
+
+# ---- good files ----------------------------------------------------------------------------------------------------
+
+
+def test_units(arm: Arm, write: Write) -> None:
+    """Numbers become radians and metres by the units in the names of their columns."""
+    measured = read_measurements(write(table(HEAD)), arm)
+
+    np.testing.assert_allclose(measured.q, np.radians([[10, -20], [20, 30], [-40, 55]]), rtol=1e-15)
+    np.testing.assert_allclose(
+        measured.points, [[0.3005, 0.01, 0.005], [-0.31, 0.02025, 0.005], [0.1, -0.2, 0.006]], rtol=1e-15
+    )
+    assert measured.names == ("2", "3", "4")
+    assert not measured.check.any()
+    assert measured.warnings == ()
+
+
+def test_any_order_and_notes(arm: Arm, write: Write) -> None:
+    """Columns may stand in any order and case; those that begin with note are for people; empty lines are nothing."""
+    text = "z_m,Note,Joint_2_rad,x_m,y_m,joint_1_rad\n\n0.3,anything,0.2,0.1,0.2,-0.1\n,,,,,\n0.3,,0.3,0.1,0.2,0.1\n"
+
+    measured = read_measurements(write(text), arm)
+
+    np.testing.assert_allclose(measured.q, [[-0.1, 0.2], [0.1, 0.3]])
+    np.testing.assert_allclose(measured.points[0], (0.1, 0.2, 0.3))
+    assert measured.names == ("3", "5")
+
+
+def test_targets_and_differences(arm: Arm, write: Write) -> None:
+    """Where a file has targets and what was off, the tool was at their sum; units may be stated for all columns."""
+    head = "step_order,x_t,y_t,z_t,x_dif,y_dif,z_dif,joint_1,joint_2"
+
+    measured = read_measurements(write(table(head, ["7,300,10,5,-0.5,0.25,1,10,20"])), arm, units=("mm", "deg"))
+
+    np.testing.assert_allclose(measured.points, [[0.2995, 0.01025, 0.006]])
+    np.testing.assert_allclose(measured.q, np.radians([[10, 20]]))
+    assert measured.names == ("7",)
+
+
+def test_units_in_the_names_come_first(arm: Arm, write: Write) -> None:
+    """Stated units are for those columns whose names tell none."""
+    head = "joint_1,joint_2,x_m,y_m,z_m"
+
+    measured = read_measurements(write(table(head, ["10,20,0.3,0.1,0"])), arm, units=("mm", "deg"))
+
+    np.testing.assert_allclose(measured.points, [[0.3, 0.1, 0.0]])
+
+
+def test_kept_to_check(arm: Arm, write: Write) -> None:
+    """Rows of the set check are kept to check with; a column name names the rows."""
+    rows = [f"{row},{word},{name}" for row, word, name in zip(ROWS, ("fit", "Check", "fit"), "abc", strict=True)]
+
+    measured = read_measurements(write(table(f"{HEAD},set,name", rows)), arm)
+
+    assert measured.check.tolist() == [False, True, False]
+    assert measured.names == ("a", "b", "c")
+
+
+def test_slide(sliding: Arm, write: Write) -> None:
+    """The position of a slide is a length."""
+    measured = read_measurements(write(table("joint_1_deg,joint_2_mm,x_mm,y_mm,z_mm", ["10,250,1,2,3"])), sliding)
+
+    assert measured.q[0, 1] == pytest.approx(0.25)
+
+
+def test_read_only(arm: Arm, write: Write) -> None:
+    """What was measured cannot be changed by mistake."""
+    measured = read_measurements(write(table(HEAD)), arm)
+
+    with pytest.raises(ValueError, match="read-only"):
+        measured.points[0, 0] = 0.0
+
+
+# ---- odd, but it may be so -----------------------------------------------------------------------------------------
+
+
+def test_joint_that_never_moved(arm: Arm, write: Write) -> None:
+    """A joint that stands still in all rows is named."""
+    measured = read_measurements(write(table(HEAD, ["10,20,300,10,5", "30,20,310,20,5"])), arm)
+
+    assert measured.warnings == (
+        (
+            "joint 2 never moved: it stands at 20 deg in all 2 rows. What it and its neighbours are off by cannot be "
+            "told apart"
+        ),
+    )
+
+
+def test_copies(arm: Arm, write: Write) -> None:
+    """Rows that repeat others to the last digit are named; a posture that is measured again is none of them."""
+    again = "10,-20,300.6,10,5"
+
+    measured = read_measurements(write(table(HEAD, [*ROWS, again, ROWS[1]])), arm)
+
+    assert measured.warnings == (
+        "line 6 says to the last digit what line 3 said: a copy counts twice and tells nothing",
+    )
+
+
+def test_beyond_limits(sliding: Arm, write: Write) -> None:
+    """Positions beyond a joint's limits are named with their lines."""
+    head = "joint_1_deg,joint_2_mm,x_mm,y_mm,z_mm"
+
+    measured = read_measurements(write(table(head, ["10,250,1,2,3", "20,50,1,2,3", "30,501,2,2,3"])), sliding)
+
+    assert measured.warnings == ("joint 2 is beyond its limits of 100 to 500 mm in lines 3, 4",)
+
+
+def test_radians_for_degrees(arm: Arm, write: Write) -> None:
+    """Degrees that are all within two pi are asked about."""
+    measured = read_measurements(write(table(HEAD, ["1.2,-0.5,300,10,5", "0.2,2.1,310,20,5"])), arm)
+
+    assert measured.warnings == ("no joint is farther than 2.1 degrees from 0; are these radians?",)
+
+
+# ---- bad files -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        ("joint_1_deg,joint_2_deg,x_mm,y_mm", "points.csv:1: z_mm: no such column; there are joint_1_deg, joint_2_deg"),
+        (
+            "joint_2_deg,x_mm,y_mm,z_mm",
+            "points.csv:1: joint_1_deg: no such column; elbow has 2 joints, and the file has 1: joint_2_deg, x_mm",
+        ),
+        (f"{HEAD},joint_3_deg", "points.csv:1: joint_3_deg: elbow has 2 joints; is this a measurement of another arm?"),
+        (
+            f"{HEAD},speed",
+            "points.csv:1: speed: no such column. Known: joint_1_deg, joint_2_deg, x_mm, y_mm, z_mm, x_t",
+        ),
+        ("jiont_1_deg,joint_2_deg,x_mm,y_mm,z_mm", "jiont_1_deg: no such column. Did you mean 'joint_1_deg'? Known: "),
+        (f"{HEAD},", "points.csv:1: '': no such column."),
+        (f"{HEAD},X_mm", "points.csv:1: x_mm: given twice, as x_mm too"),
+        (f"{HEAD},joint_1_rad", "points.csv:1: joint_1_rad: given twice, as joint_1_deg too"),
+        (
+            "joint_1,joint_2_deg,x_mm,y_mm,z_mm",
+            "joint_1: the name tells no unit: write joint_1_rad or joint_1_mrad or joint_1_deg, or state the units",
+        ),
+        ("joint_1_deg,joint_2_deg,x,y,z", "x: the name tells no unit: write x_m or x_cm or x_mm or x_um or x_in, or"),
+        ("joint_1_deg,joint_2_deg,x_foot,y_mm,z_mm", "x_foot: unknown unit 'foot': expected x_m or x_cm or x_mm or"),
+        ("joint_1_mm,joint_2_deg,x_mm,y_mm,z_mm", "joint_1_mm: joint 1 of elbow turns: expected joint_1_rad or"),
+        ("joint_1_deg,joint_2_deg,x_mm,y_m,z_mm", "y_m: coordinates have one unit in a file, and x_mm has another"),
+        (f"{HEAD},x_t_mm", "points.csv:1: x: give the points, or targets and what was off, not both: joint_1_deg"),
+        (
+            "joint_1_deg,joint_2_deg,x_t_mm,y_t_mm,z_t_mm",
+            "points.csv:1: x_dif_mm: no such column; there are joint_1_deg",
+        ),
+        (
+            "joint_1_deg,joint_2_deg,x_t_mm,y_t_mm,z_t_mm,x_dif_um,y_dif_um,z_dif_um",
+            "x_dif_um: targets and what was off have one unit in a file, and x_t_mm has another",
+        ),
+        (f"{HEAD},name,pose", "points.csv:1: pose: rows have one name, and name tells it"),
+    ],
+)
+def test_columns(head: str, message: str, arm: Arm, write: Write) -> None:
+    """Columns that are missing, unknown, given twice, or in no or the wrong unit are named with what was expected."""
+    row = ",".join(["1"] * len(head.split(",")))
+
+    assert message in refused(write(table(head, [row])), arm)
+
+
+def test_unit_of_a_slide(sliding: Arm, write: Write) -> None:
+    """A slide has no position in degrees."""
+    said = refused(write(table(HEAD)), sliding)
+
+    assert said.startswith("points.csv:1: joint_2_deg: joint 2 of slider slides: expected joint_2_m or joint_2_cm or")
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("10,twenty,1,2,3", "points.csv:2: joint_2_deg: expected a number, got 'twenty'"),
+        ("10,20,,2,3", "points.csv:2: x_mm: empty; expected a number"),
+        ("10,20,nan,2,3", "points.csv:2: x_mm: every number must be finite and no larger than 1e+100, got nan"),
+        ("10,20,1,2,-inf", "points.csv:2: z_mm: every number must be finite and no larger than 1e+100, got -inf"),
+        ('10,20,"1,5",2,3', "points.csv:2: x_mm: expected a number, got '1,5'; write a decimal point"),
+        (
+            "10,20,1,5,2,3",
+            "points.csv:2: expected 5 values, as there are columns, got 6; is there a comma in a number?",
+        ),
+        ("10,20,1,5", "points.csv:2: expected 5 values, as there are columns, got 4"),
+    ],
+)
+def test_values(row: str, message: str, arm: Arm, write: Write) -> None:
+    """What is no number is named with line and column."""
+    assert refused(write(table(HEAD, [row])), arm) == message
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "points.csv: the file is empty; its first line should name the columns"),
+        ("\n \n", "points.csv: the file is empty; its first line should name the columns"),
+        (HEAD, "points.csv: no rows below the names of the columns"),
+        (HEAD.replace(",", ";"), "points.csv:1: columns are separated by semicolons; expected commas between columns"),
+        (HEAD.replace(",", "\t"), "points.csv:1: columns are separated by tabs; expected commas between columns"),
+        (f"{HEAD}\n{'1' * 200_000},2,3,4,5", "points.csv:2: not valid CSV: field larger than field limit (131072)"),
+    ],
+    ids=["empty", "blank", "no rows", "semicolons", "tabs", "endless"],
+)
+def test_no_table(text: str, message: str, arm: Arm, write: Write) -> None:
+    """A file that is no table of numbers between commas says so."""
+    assert message in refused(write(text), arm)
+
+
+def test_missing_file(arm: Arm, write: Write) -> None:
+    """A file that is not there is refused with the nearest name in its folder."""
+    path = write(table(HEAD))
+
+    with pytest.raises(FileFormatError, match=r"points\.csv"):
+        read_measurements(path.with_name("point.csv"), arm)
+
+
+def test_degrees_for_radians(arm: Arm, write: Write) -> None:
+    """Radians that are many turns are asked about, with line and joint."""
+    said = refused(write(table(HEAD.replace("deg", "rad"))), arm)
+
+    assert said.startswith("points.csv:4: joint_1_rad: joint 1 of 'elbow' stands at -40 rad, 6.4 turns. If degrees are")
+    assert said.endswith("are the units right?")
+
+
+def test_turns_that_limits_allow(arm: Arm, write: Write) -> None:
+    """A joint whose limits say that it turns so far may be there."""
+    far = [attrs.evolve(joint, limits=Limits(lower=-20 * math.pi, upper=20 * math.pi)) for joint in arm.joints]
+    measured = read_measurements(write(table(HEAD.replace("deg", "rad"))), attrs.evolve(arm, joints=far))
+
+    assert measured.q[2, 1] == 55.0
+
+
+def test_millimetres_of_a_slide(sliding: Arm, write: Write) -> None:
+    """Millimetres of a slide that are read as metres are far beyond its way."""
+    said = refused(write(table("joint_1_deg,joint_2_m,x_mm,y_mm,z_mm", ["10,250,1,2,3"])), sliding)
+
+    assert said == (
+        "points.csv:2: joint_2_m: joint 2 of slider stands at 250 m, and its limits are 0.1 to 0.5 m; are the units "
+        "right?"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("fit", "chek", "fit"), "points.csv:3: set: expected fit or check, got 'chek'; did you mean check?"),
+        (("fit", "", "fit"), "points.csv:3: set: expected fit or check, got ''"),
+        (("check", "check", "check"), "points.csv: set: every row is kept to check with; none is left to fit"),
+    ],
+)
+def test_sets(words: tuple[str, ...], message: str, arm: Arm, write: Write) -> None:
+    """A row is there to fit or to check with, and one at least to fit."""
+    rows = [f"{row},{word}" for row, word in zip(ROWS, words, strict=True)]
+
+    assert refused(write(table(f"{HEAD},set", rows)), arm) == message
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [(("mn", "deg"), "no unit of length 'mn'"), (("mm", "grad"), r"no unit of angle 'grad'\. Did you mean 'mrad'")],
+)
+def test_stated_units(units: tuple[str, str], message: str, arm: Arm, write: Write) -> None:
+    """Units that there are not are refused with the nearest."""
+    with pytest.raises(UnknownNameError, match=message):
+        read_measurements(write(table(HEAD)), arm, units=units)
+
+
+def test_six_joints_for_seven(write: Write) -> None:
+    """A file of seven joints is none of a UR5."""
+    head = ",".join([*(f"joint_{i}_deg" for i in range(1, 8)), "x_mm", "y_mm", "z_mm"])
+
+    said = refused(write(table(head, ["1,2,3,4,5,6,7,8,9,10"])), load_arm("ur5"))
+
+    assert said == "points.csv:1: joint_7_deg: ur5 has 6 joints; is this a measurement of another arm?"
