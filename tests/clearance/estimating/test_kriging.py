@@ -74,6 +74,19 @@ def test_noise_is_told_from_the_surface(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(mean, smooth(np.array([[3e-4, 0.1]])), rtol=0, atol=0.03)
 
 
+def test_what_surfaces_miss_together(rng: np.random.Generator) -> None:
+    """Where one number comes out too large by chance as another comes out too small, a surrogate knows it."""
+    points = design(64)
+    chance = 0.02 * rng.standard_normal(len(points))
+    values = smooth(points) + np.stack([chance, -chance], axis=-1)
+
+    found = learn(NAMES, points, ("f", "g"), values)
+
+    assert found.correlation[0, 1] < -0.8
+    np.testing.assert_allclose(np.diag(found.correlation), 1.0)
+    assert found.chosen(("g",)).correlation.shape == (1, 1)
+
+
 def test_inverse(known: Surrogate, rng: np.random.Generator) -> None:
     """Features of a known function tell the parameters that they are of."""
     true = rng.uniform(*np.array(list(BOUNDS.values())).T, (20, 2))

@@ -12,6 +12,7 @@ from armwright.clearance.estimating.static import rest_offsets
 from armwright.clearance.features import features_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
+from armwright.clearance.reader import load_linkage
 from armwright.errors import FileFormatError
 from clearance.arms import ARM_A, STARTS, accuracy
 
@@ -225,3 +226,20 @@ def test_spreadsheets(tmp_path: Path) -> None:
 
     assert isinstance(found, RestMeasured)
     np.testing.assert_allclose(found.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
+
+
+def test_few_readings_make_intervals_wider() -> None:
+    """The noise of six readings is itself uncertain: Student's t of six numbers reaches 1.94 deviations, not 1.64."""
+    readings = RestMeasured(
+        names=("P1", "P2", "P3"),
+        poses=np.array([(-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7)]),
+        offsets=np.full((3, 2), 1e-4),
+        readings=(2, 2, 2),
+        noise=1e-6,
+    )
+    linkage = load_linkage("five-bar")
+
+    few, known = readings.estimate(linkage), readings.estimate(linkage, noise=np.sqrt(2) * 1e-6)
+
+    np.testing.assert_allclose(np.ptp(few.interval(0.9), axis=-1) / few.deviations / 2, 1.943, atol=1e-3)
+    np.testing.assert_allclose(np.ptp(known.interval(0.9), axis=-1) / known.deviations / 2, 1.645, atol=1e-3)

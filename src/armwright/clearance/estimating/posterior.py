@@ -93,7 +93,7 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
 
     def log_density(points: Array) -> Array:
         mean, deviation = surrogate.predict(np.clip(points, lower, upper))
-        covariance = measured + np.eye(count) * (deviation**2)[..., None, :]
+        covariance = measured + surrogate.correlation * deviation[..., :, None] * deviation[..., None, :]
         missing = mean - goal
         solved = np.linalg.solve(covariance, missing[..., None])[..., 0]
         density = -0.5 * (missing * solved).sum(axis=-1) - 0.5 * np.linalg.slogdet(covariance)[1]
@@ -106,7 +106,7 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
     with one_core():
         samples, best = _walk(log_density, centre, lower, upper, seed)
     mean, deviation = surrogate.predict(best[None])
-    covariance = measured + np.diag(deviation[0] ** 2)
+    covariance = measured + surrogate.correlation * np.outer(deviation[0], deviation[0])
     missing = mean[0] - goal
     freedom = max(1, count - len(lower))
     misfit = float(chi2.sf(missing @ np.linalg.solve(covariance, missing), freedom))

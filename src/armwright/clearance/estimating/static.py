@@ -40,6 +40,7 @@ class Estimate:
         covariance: (p, p) [m²].
         singular_values: of the equations, largest first; how the offset grows with the best and worst told mixture.
         residual: (...) root mean square of what is left [m].
+        freedom: of how many numbers the noise was estimated; infinite where it was known. Few make intervals wider.
     """
 
     names: tuple[str, ...]
@@ -47,6 +48,7 @@ class Estimate:
     covariance: Array
     singular_values: Array
     residual: Array
+    freedom: float = np.inf
 
     @property
     def deviations(self) -> Array:
@@ -62,9 +64,10 @@ class Estimate:
         """Return (..., p, 2) in which each clearance lies with a probability [m]."""
         if not 0 < level < 1:
             raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level:g}")
-        from scipy.stats import norm  # noqa: PLC0415 - a slow import
+        from scipy.stats import norm, t  # noqa: PLC0415 - a slow import
 
-        half = norm.ppf(0.5 + level / 2) * self.deviations
+        reach = norm.ppf(0.5 + level / 2) if np.isinf(self.freedom) else t.ppf(0.5 + level / 2, self.freedom)
+        half = reach * self.deviations
         return np.stack([self.values - half, self.values + half], axis=-1)
 
     def identifiable(self, width: float) -> tuple[bool, ...]:
