@@ -53,6 +53,8 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright clearance sweep five-bar --friction-velocity centre --threshold-mm-s 10 -o out/sweep
 	$(BIN)/armwright clearance estimate five-bar examples/five_bar_paths.csv --sweep out/sweep --noise-um 2
 	$(BIN)/armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483 -o out/corrected
+	$(BIN)/armwright plan-poses puma560 -n 30 -o out/poses.csv
+	$(BIN)/armwright study dh-calibration -o out/dh
 
 pictures: $(VENV)/core  ## Draw the pictures of the physics pages
 	$(BIN)/python docs/pictures/make.py

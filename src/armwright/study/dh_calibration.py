@@ -32,7 +32,7 @@ PRINTED: Mapping[str, tuple[float, ...]] = {
 }
 ATTITUDES: Mapping[str, tuple[float, float]] = {"flat": (0.0, 0.0), "roll": (11.7, 0.0), "pitch": (0.0, 11.8)}  # deg
 CENTRE = (0.355, -0.275, 0.05)
-RADIUS, LINE = 0.14, 0.14  # of the board's circle, half its lines [m]
+RADIUS, LINE = 0.14, 0.12  # of the board's circle, half its lines [m]
 # What the thesis found on the flat board (table 2.3), taken for the truth; and where the arm stands [m, rad].
 TRUE_LINKS: Mapping[str, float] = {
     "joint1.d": -0.5e-3, "joint1.theta": np.radians(-0.6036), "joint1.a": 0.3e-3, "joint1.alpha": np.radians(0.0783),

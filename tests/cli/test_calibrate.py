@@ -1,0 +1,93 @@
+"""``armwright calibrate`` and ``armwright plan-poses`` as a user calls them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.calibration.chain import chain_of
+from armwright.kinematics.forward import forward
+from cli_calls import armwright
+
+ARM = "puma560"
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Poses as ``plan-poses`` writes them."""
+    path = tmp_path_factory.mktemp("plan") / "poses.csv"
+    done = armwright("plan-poses", ARM, "-n", "40", "-o", path)
+    assert done.returncode == 0, done.stderr
+    assert "40 poses of puma560 tell 21 errors" in done.stdout
+    return path
+
+
+@pytest.fixture(scope="module")
+def measured(planned: Path) -> Path:
+    """The poses with the points that an arm with errors has there."""
+    rng = np.random.default_rng(3)
+    chain = chain_of(load_arm(ARM))
+    head, *rows = planned.read_text(encoding="utf-8").splitlines()
+    q = np.radians([[float(x) for x in row.split(",")] for row in rows])
+    errors = np.where(chain.is_length, 5e-4, 2e-3) * rng.standard_normal(len(chain.names))
+    # Which a table cannot hold.
+    errors[["beta" in name for name in chain.names]] = 0.0
+    points = chain.reach(q, errors).position + 5e-5 * rng.standard_normal((len(q), 3))
+    lines = [f"{row},{','.join(f'{x * 1e3:.5f}' for x in point)}" for row, point in zip(rows, points, strict=True)]
+    path = planned.with_name("measured.csv")
+    path.write_text("\n".join([f"{head},x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_calibrate(measured: Path, tmp_path: Path) -> None:
+    """Errors and what cannot be told are printed; the arm that is written has its tool where it was measured."""
+    done = armwright("calibrate", ARM, measured, "-o", tmp_path / "out", columns=120)
+
+    assert done.returncode == 0, done.stderr
+    assert "it does just what base.rz does" in done.stdout
+    files = {path.name for path in (tmp_path / "out").iterdir()}
+    assert files == {"arm.toml", "arm.urdf", "errors.json", "report.html", "residuals.svg", "distances.svg"}
+    rows = np.loadtxt(measured, delimiter=",", skiprows=1)
+    better = load_arm(tmp_path / "out" / "arm.toml")
+    off = np.linalg.norm(forward(better, np.radians(rows[:, :6]))[:, :3, 3] * 1e3 - rows[:, 6:], axis=1)
+    said = np.linalg.norm(forward(load_arm(ARM), np.radians(rows[:, :6]))[:, :3, 3] * 1e3 - rows[:, 6:], axis=1)
+    assert off.mean() < 0.2
+    assert said.mean() > 1.0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert page.count("<img ") == 2
+    assert "http" not in page
+
+
+def test_json(measured: Path) -> None:
+    """The same as data: every error with its deviation, the covariance, why the others are held."""
+    told = json.loads(armwright("calibrate", ARM, measured, "--json").stdout)
+
+    assert set(told["errors"]) | set(told["held"]) == set(chain_of(load_arm(ARM)).names)
+    deviations = [one["deviation"] for one in told["errors"].values()]
+    np.testing.assert_allclose(np.sqrt(np.diag(told["covariance"])), deviations, rtol=1e-9)
+    assert told["distances"]["calibrated, points held out"]["mean"] < 3e-4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "says"),
+    [
+        (("calibrate", "pumma560", "MEASURED"), 1, "Did you mean 'puma560'?"),
+        (("calibrate", "ur5", "MEASURED"), 1, "are these its joints"),
+        (("calibrate", "ntu-3r", "MEASURED"), 1, "joint_4_deg"),
+        (("calibrate", ARM, "nowhere.csv"), 1, "nowhere.csv"),
+        (("calibrate", ARM, "MEASURED", "--tool-mm", "0,0"), 2, "expected three numbers such as 0,0,31"),
+        (("calibrate", ARM, "MEASURED", "--units", "mm"), 2, "such as mm,deg"),
+        (("calibrate", ARM, "MEASURED", "--folds", "1"), 1, "folds: expected 2 to 40"),
+        (("plan-poses", ARM, "-n", "4"), 1, "poses or more, got 4"),
+        (("plan-poses", ARM, "--index", "O7"), 1, "no index 'O7'"),
+    ],
+)
+def test_mistakes(measured: Path, arguments: tuple[str, ...], status: int, says: str) -> None:
+    """A mistake is told in a line, without a traceback."""
+    done = armwright(*(str(measured) if one == "MEASURED" else one for one in arguments), columns=200)
+
+    assert done.returncode == status
+    assert says in done.stderr
+    assert "Traceback" not in done.stderr
