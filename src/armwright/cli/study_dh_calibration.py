@@ -43,7 +43,7 @@ def printed(found: Mapping[str, Any]) -> "Iterator[Table]":
     """Give the tables as a terminal shows them."""
     yield study_table(
         f"Table 2.4: errors at six verification points [mm]; ours simulated, cameras with {study.NOISE * 1e3:g} mm",
-        ("model", "fitted to", "", *(f"P{i}" for i in range(1, 7)), "mean", "better by"),
+        ("fit", "", *(f"P{i}" for i in range(1, 7)), "mean", "better"),
         (line for row in found["2.4"] for line in _lines(row, found["2.4"][0])),
     )
     yield study_table(
@@ -61,11 +61,10 @@ def _lines(row: Mapping[str, Any], first: Mapping[str, Any]) -> Iterator[tuple[s
         top = label == "printed" or row["printed"] is None
         better = 100 * (1 - mean / (sum(before) / len(before)))
         yield (
-            row["model"] if top else "",
-            row["points"] if top else "",
+            (row["model"] if row is first else f"{row['model']}, {row['points']}") if top else "",
             label,
-            *(f"{x:.2f}" for x in values),
-            f"{mean:.2f}",
+            *(f"{x:.3g}" for x in values),
+            f"{mean:.3g}",
             f"{better:.1f} %" if row is not first else "",
         )
 
