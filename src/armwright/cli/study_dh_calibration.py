@@ -65,7 +65,7 @@ def _lines(row: Mapping[str, Any], first: Mapping[str, Any]) -> Iterator[tuple[s
             label,
             *(f"{x:.3g}" for x in values),
             f"{mean:.3g}",
-            f"{better:.1f} %" if row is not first else "",
+            f"{better:.0f} %" if row is not first else "",
         )
 
 
