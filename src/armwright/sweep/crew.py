@@ -5,6 +5,7 @@ died is done again, alone, so that the blame for a second death is its own.
 """
 
 import concurrent.futures
+import gc
 import multiprocessing
 import os
 import pickle
@@ -241,10 +242,17 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
         SweepError: nobody answers at the address.
     """
     distributed = extra("distributed")
+    # A client that nobody answered is closed when it is collected; while another one starts, both would wait for ever.
+    gc.collect()
+    collecting = gc.isenabled()
+    gc.disable()
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SweepError(f"no Dask scheduler answers at '{address}': {shown(error)}") from error
+    finally:
+        if collecting:
+            gc.enable()
     # Where the workers are threads of this process, its threads are theirs.
     with client, extra("threadpoolctl").threadpool_limits(1):
         yield Cluster(client, address, task)
