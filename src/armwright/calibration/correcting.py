@@ -8,6 +8,8 @@ from armwright.arrays import Array
 from armwright.calibration.chain import Chain, Element
 from armwright.calibration.fitting import Calibration
 from armwright.errors import InvalidValueError
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector
 
 # The numbers of a link in the Denavit-Hartenberg convention.
 _NUMBERS = ("theta", "d", "a", "alpha")
@@ -52,12 +54,5 @@ def _pose_of(chain: Chain, by_name: dict[str, float], part: str) -> Array:
 
 
 def _moved(element: Element, by: float) -> Array:
-    X = np.eye(4)
-    if element.kind == "shift":
-        X[element.axis, 3] = by
-        return X
-    u, v = (element.axis + 1) % 3, (element.axis + 2) % 3
-    c, s = np.cos(by), np.sin(by)
-    X[u, u] = X[v, v] = c
-    X[u, v], X[v, u] = -s, s
-    return X
+    along = by * np.eye(3)[element.axis]
+    return pose(np.eye(3), along) if element.kind == "shift" else pose(rotation_from_vector(along), np.zeros(3))

@@ -16,6 +16,7 @@ from armwright.calibration.chain import Chain, chain_of
 from armwright.calibration.identifying import Held, Identified, identify
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 from armwright.spatial.poses import pose
+from armwright.spatial.rotations import nearest_rotation
 
 # Points that are off by more times their usual deviation count less.
 _USUAL = 3.0
@@ -157,9 +158,7 @@ def registered(chain: Chain, q: Array, points: Array) -> Array:
     """
     own = chain.reach(q).position
     a, b = own - own.mean(axis=0), points - points.mean(axis=0)
-    U, _, Vt = np.linalg.svd(a.T @ b)
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T)) or 1.0])
-    R = Vt.T @ flip @ U.T
+    R = nearest_rotation(b.T @ a)
     return pose(R, points.mean(axis=0) - R @ own.mean(axis=0))
 
 

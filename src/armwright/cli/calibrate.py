@@ -1,7 +1,6 @@
 """``armwright calibrate``: a better arm from measured points."""
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -65,15 +64,15 @@ def _with_tool(model: Any, text: str) -> Any:
     import attrs
     import numpy as np
 
+    from armwright.spatial.poses import pose
+
     try:
         place = [float(x) * 1e-3 for x in text.split(",")]
     except ValueError:
         place = []
     if len(place) != 3 or not all(map(math.isfinite, place)):
         raise typer.BadParameter(f"expected three numbers such as 0,0,31, got {text}", param_hint="--tool-mm")
-    tool = np.eye(4)
-    tool[:3, 3] = place
-    return attrs.evolve(model, tool=tool)
+    return attrs.evolve(model, tool=pose(np.eye(3), place))
 
 
 def _units(text: str | None) -> tuple[str, str] | None:
@@ -104,20 +103,15 @@ def _print(found: "Calibrated") -> None:
     from rich.console import Console
 
     from armwright.cli.study_tables import study_table
-    from armwright.report.calibrated import distances
+    from armwright.report.calibrated import distances, shown_errors
 
     console = Console(markup=False, highlight=False)
-    console.print(study_table(f"{found.arm.name}: errors found", ("error", "value", "±", "unit"), _errors(found)))
+    console.print(
+        study_table(f"{found.arm.name}: errors found", ("error", "value", "±", "unit"), shown_errors(found.full))
+    )
     held = ((one.name, one.why) for one in found.full.held)
     console.print(study_table("Not fitted", ("error", "why"), held))
     rows = ((name, f"{x.mean() * 1e3:.4f}", f"{x.max() * 1e3:.4f}") for name, x in distances(found).items())
     console.print(study_table("Distance of the points", ("", "mean mm", "largest mm"), rows))
     for note in found.notes:
         console.print(note)
-
-
-def _errors(found: "Calibrated") -> Iterator[tuple[str, str, str, str]]:
-    for name, value, deviation in zip(found.full.names, found.full.values, found.full.deviations, strict=True):
-        is_length = found.full.chain.is_length[found.full.chain.names.index(name)]
-        scale, unit = (1e3, "mm") if is_length else (180 / math.pi, "deg")
-        yield name, f"{value * scale:+.4f}", f"{deviation * scale:.4f}", unit

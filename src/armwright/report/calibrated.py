@@ -40,7 +40,6 @@ class Calibrated:
         measurements: what was measured.
         full: with all errors that can be told.
         table: without turns about y, for arm files.
-        corrected: the arm of ``table``.
         raw: (m,) distances of the points from the arm as said, in its own frame [m].
         held_out: (m,) distances from arms calibrated without the point, all errors [m].
         held_out_table: (m,) likewise, without turns about y [m].
@@ -52,7 +51,6 @@ class Calibrated:
     measurements: Measurements
     full: Calibration
     table: Calibration
-    corrected: Arm
     raw: Array
     held_out: Array
     held_out_table: Array
@@ -88,20 +86,19 @@ def calibrated(
     table = (
         full if not any(name.endswith(".beta") for name in full.names) else calibrate(arm, q, points, without=_TILTS)
     )
-    off = []
-    for what, without in (("all errors", ()), ("for the arm file", _TILTS)):
-        told(f"holding points out: {what}")
-        off.append(cross_validated(arm, q, points, folds=folds, seed=seed, without=without))
-    corrected = corrected_arm(table)
+    told("holding points out: all errors")
+    held_out = held_out_table = cross_validated(arm, q, points, folds=folds, seed=seed)
+    if any(name.endswith(_TILTS) for name in full.chain.names):
+        told("holding points out: for the arm file")
+        held_out_table = cross_validated(arm, q, points, folds=folds, seed=seed, without=_TILTS)
     return Calibrated(
         arm=arm,
         measurements=measurements,
         full=full,
         table=table,
-        corrected=corrected,
         raw=np.asarray(np.linalg.norm(forward(arm, q)[:, :3, 3] - points, axis=1), dtype=np.float64),
-        held_out=off[0],
-        held_out_table=off[1],
+        held_out=held_out,
+        held_out_table=held_out_table,
         checked=np.asarray(
             np.linalg.norm(full.predict(measurements.q[~fit]) - measurements.points[~fit], axis=1)
             if np.any(~fit)
@@ -134,6 +131,14 @@ def distances(found: Calibrated) -> dict[str, Array]:
         "calibrated, points kept to check": found.checked,
     }
     return {name: x for name, x in kinds.items() if len(x)}
+
+
+def shown_errors(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
+    """Give the errors that were found as people read them: name, value, deviation, unit."""
+    lengths = dict(zip(calibration.chain.names, calibration.chain.is_length, strict=True))
+    for name, value, deviation in zip(calibration.names, calibration.values, calibration.deviations, strict=True):
+        scale, unit = (1e3, "mm") if lengths[name] else (180 / math.pi, "deg")
+        yield name, f"{value * scale:+.4f}", f"{deviation * scale:.4f}", unit
 
 
 def as_data(found: Calibrated) -> dict[str, Any]:
@@ -177,9 +182,10 @@ def calibrated_files(found: Calibrated, *, title: str) -> dict[str, str]:
     ]
     text = json.dumps(as_data(found), indent=2)
     head = f"# {found.arm.name} as calibrated with {len(found.raw)} points; covariance in errors.json\n"
+    corrected = corrected_arm(found.table)
     return {
-        "arm.toml": head + toml_text(found.corrected) + "\n",
-        "arm.urdf": urdf_text(found.corrected),
+        "arm.toml": head + toml_text(corrected) + "\n",
+        "arm.urdf": urdf_text(corrected),
         "errors.json": text + "\n",
         "report.html": _page(found, drawn, title),
         **{f"{one.name}.svg": one.svg for one in drawn},
@@ -197,12 +203,9 @@ def _page(found: Calibrated, drawn: list[Drawing], title: str) -> str:
     page.writelines(f"<p>{html.escape(note)}</p>" for note in found.notes)
     page.writelines(one.element for one in drawn)
     page.write("<h2>Errors found</h2><table><tr><th>error</th><th>value</th><th>&#177;</th><th>unit</th></tr>")
-    full = found.full
-    for name, value, deviation in zip(full.names, full.values, full.deviations, strict=True):
-        scale, unit = (1e3, "mm") if full.chain.is_length[full.chain.names.index(name)] else (180 / math.pi, "deg")
-        page.write(_row(name, f"{value * scale:+.4f}", f"{deviation * scale:.4f}", unit))
+    page.writelines(_row(*cells) for cells in shown_errors(found.full))
     page.write("</table><h2>Not fitted</h2><table><tr><th>error</th><th>why</th></tr>")
-    page.writelines(f"<tr><td>{one.name}</td><td>{html.escape(one.why)}</td></tr>" for one in full.held)
+    page.writelines(f"<tr><td>{one.name}</td><td>{html.escape(one.why)}</td></tr>" for one in found.full.held)
     page.write("</table></html>\n")
     return page.getvalue()
 
