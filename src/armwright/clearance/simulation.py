@@ -3,12 +3,9 @@
 The drives give what a linkage without play would need for the path; what the tip then does differently is the error.
 """
 
-import os
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from enum import IntEnum
 from functools import cache
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import attrs
@@ -26,7 +23,7 @@ from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import check_step, contact_stiffness
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled_module
-from armwright.tracing.emit import LANES
+from armwright.tracing.kernel import on_cores
 
 # A tip that is farther off than this has left its path for good [m].
 _LOST = 1.0
@@ -174,15 +171,11 @@ def _run(task: Task, layout: Layout, start: Array, contacts: Array, threads: int
     )
     gains = np.tile(task.settings.gains, (runs, len(task.linkage.drives) if layout.gains else 0))
     rows = _simulator(layout, task.settings.integrator)
-    blocks = -(-runs // LANES)
-    workers = max(1, min(threads or _cores(), blocks))
-    cuts = [min(round(blocks * i / workers) * LANES, runs) for i in range(workers + 1)]
-
-    def part(ends: tuple[int, int]) -> None:
-        rows(*ends, start, contacts, gains, task.table, task.h, stride, *record)
-
-    with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(part, pairwise(cuts)))
+    on_cores(
+        lambda first, last: rows(first, last, start, contacts, gains, task.table, task.h, stride, *record),
+        runs,
+        threads,
+    )
     return record
 
 
@@ -219,10 +212,6 @@ def _compiled(shape: _Shape, rubbing: Rubbing, control: Control, located: bool, 
     layout = Layout(linkage=shape.linkage, rubbing=rubbing, control=control, located=located)
     source = emit_simulation(layout, integrator)
     return compiled_module(source, f"the simulation of {shape.linkage.name}").simulate
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _told(task: Task, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:

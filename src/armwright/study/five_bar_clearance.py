@@ -23,9 +23,10 @@ from armwright.clearance.equations import Rubbing
 from armwright.clearance.estimating.kriging import Surrogate, learn, solve_features
 from armwright.clearance.estimating.static import estimate_at_rest, rest_offsets
 from armwright.clearance.features import Features, features
+from armwright.clearance.ideal import closed, tip_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, named_path
-from armwright.clearance.preparing import Task, prepare
+from armwright.clearance.preparing import Task, assembled, prepare
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import Settings, contact_stiffness
@@ -275,9 +276,6 @@ def _ready(path: Path) -> Task:
 
 def _cycles(clearances: Array, rng: np.random.Generator) -> Array:
     """Return (30, 2) places at which an arm comes to rest at the first target [m]."""
-    from armwright.clearance.ideal import closed, tip_of  # noqa: PLC0415 - small parts of one test
-    from armwright.clearance.preparing import assembled  # noqa: PLC0415
-
     linkage = arm()
     ideal = closed(linkage, assembled(linkage), tip=PickAndPlace().nodes[0])
     rest = at_rest(linkage, ideal, clearances, contact_stiffness(linkage, clearances))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache, cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -15,6 +15,8 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled_module
 from armwright.tracing.emit import LANES, Emitted, Shape
+
+T = TypeVar("T")
 
 # Below this many rows a second thread costs more than it saves.
 _ROWS_PER_THREAD = 4096
@@ -168,13 +170,8 @@ class Kernel:
         shapes = self.emitted.inputs.values()
         flat = [_rows(x, lead, shape) for x, shape in zip(arrays, shapes, strict=True)]
         flat += results if len(lead) == 1 else [x.reshape(rows, *x.shape[len(lead) :]) for x in results]
-        threads = min(_cores() if threads is None else threads, max(rows // _ROWS_PER_THREAD, 1))
-        if threads <= 1:
-            return self.rows(0, rows, *flat)
-        blocks = -(-rows // LANES)
-        cuts = [min(round(blocks * i / threads) * LANES, rows) for i in range(threads + 1)]
-        jobs = [_pool().submit(self.rows, a, b, *flat) for a, b in pairwise(cuts)]
-        return sum(job.result() for job in jobs)
+        most = max(rows // _ROWS_PER_THREAD, 1)
+        return sum(on_cores(lambda a, b: self.rows(a, b, *flat), rows, threads, most=most))
 
 
 def _input(value: ArrayLike, shape: Shape, name: str) -> Array:
@@ -192,6 +189,24 @@ def _rows(array: Array, lead: Shape, shape: Shape) -> Array:
     if len(lead) > 1:
         array = array.reshape(-1, *shape)
     return array if array.flags.c_contiguous else np.ascontiguousarray(array)
+
+
+def on_cores(work: Callable[[int, int], T], rows: int, threads: int | None, *, most: int | None = None) -> list[T]:
+    """Return what ``work(first, last)`` gives for parts of many rows, cut between blocks of lanes.
+
+    Args:
+        work: does rows ``first`` to ``last`` without holding the interpreter.
+        rows: how many there are.
+        threads: how many cores to use; all when None.
+        most: no more than this are worth it; as many as there are blocks when left out.
+    """
+    blocks = -(-rows // LANES)
+    count = min(_cores() if threads is None else threads, blocks if most is None else most)
+    if count <= 1:
+        return [work(0, rows)]
+    cuts = [min(round(blocks * i / count) * LANES, rows) for i in range(count + 1)]
+    jobs = [_pool().submit(work, a, b) for a, b in pairwise(cuts)]
+    return [job.result() for job in jobs]
 
 
 def _cores() -> int:
