@@ -1,8 +1,8 @@
-"""The progress bar of sweeps."""
+"""What a person sees who waits."""
 
 import pytest
 
-from armwright.cli.progress import progress_text, sweep_bar
+from armwright.cli.progress import counting, parts, progress_text, sweep_bar, waiting
 from armwright.sweep.progress import Counter, Progress
 
 
@@ -52,6 +52,38 @@ def test_person_watches(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     assert "129/729" in shown
     assert "3 failed" in shown
     assert "slider-crank" not in shown
+
+
+def test_nobody_waits(capfd: pytest.CaptureFixture[str]) -> None:
+    """Where nobody watches, no word and no bar is shown."""
+    with waiting("compiling") as words, counting("drawing") as count, parts() as pieces:
+        assert (words, count, pieces) == (None, None, None)
+
+    assert capfd.readouterr() == ("", "")
+
+
+def test_person_waits(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """On a terminal a person sees what is going on, and how much of it is done, on the error output."""
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    with waiting("compiling"):
+        pass
+    with waiting("line 1") as words:
+        assert words is not None
+        words("line 7")
+    with counting("drawing the film") as count:
+        assert count is not None
+        count(30, 90)
+    with parts() as pieces:
+        assert pieces is not None
+        pieces("simulating", 0.25)
+        pieces("learning", 0.0)
+
+    out, shown = capsys.readouterr()
+    assert out == ""
+    for text in ("compiling", "line 7", "drawing the film", "30/90", "simulating", "25%", "learning"):
+        assert text in shown
 
 
 def test_counter() -> None:

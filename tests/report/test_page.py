@@ -194,7 +194,7 @@ def test_chart_seeks(visit, bench) -> None:
     plot = opened.page.locator(".plot").first
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
-    middle = (46 + box["width"] - 8) / 2
+    middle = (50 + box["width"] - 10) / 2
     plot.click(position={"x": middle, "y": box["height"] / 2})
 
     assert opened.state()["time"] == pytest.approx(4.5, abs=9.0 / box["width"])
@@ -371,7 +371,7 @@ def test_names_are_text(visit, bench) -> None:
     assert opened.complaints == []
     assert opened.page.evaluate("window.bitten") is None
     assert opened.page.title() == nasty
-    for selector in ("#title", "#status", "#program li:first-child .text", "#trace li:first-child .text"):
+    for selector in ("h1", "#status", "#program li:first-child .text", "#trace li:first-child .text"):
         assert opened.page.locator(selector).text_content() == nasty
     assert opened.page.locator("b", has_text="it's").count() == 0
 

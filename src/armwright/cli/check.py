@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.printing import print_json
 from armwright.cli.programs import ProgramFile, Std, Strict
 from armwright.program.text.words import Standard
 
@@ -50,18 +51,16 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code`
     """
-    import json
+    from armwright.cli.programs import given_cell, in_its_cell, print_diagnostics
 
-    from armwright.cli.programs import in_its_cell, print_diagnostics
-
-    compiled, _ = in_its_cell(program, _cell(cell), strict=strict, std=std)
+    compiled, _ = in_its_cell(program, given_cell(cell), strict=strict, std=std)
     if as_json or output_format is Format.JSON:
-        print(json.dumps(_as_data(compiled, emit), indent=2, ensure_ascii=False))
+        print_json(_as_data(compiled, emit))
     elif output_format is Format.SARIF:
         from armwright.program.messages.sarif import to_sarif
 
         log = to_sarif(compiled.diagnostics, compiled.source, program.as_posix())
-        print(json.dumps(log, indent=2, ensure_ascii=False))
+        print_json(log)
     else:
         for line in _emitted(compiled, emit) if emit else ():
             print(line)
@@ -69,14 +68,6 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
             print_diagnostics(compiled.diagnostics, compiled.source, to_errors=emit is not None)
     if compiled.code is None:
         raise typer.Exit(1)
-
-
-def _cell(path: Path | None) -> "Any":
-    if path is None:
-        return None
-    from armwright.cell.reader import read_cell
-
-    return read_cell(path)
 
 
 def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:

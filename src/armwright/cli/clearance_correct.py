@@ -5,6 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
+from armwright.cli.options import JsonSummary, Quiet
+from armwright.cli.printing import json_text, plain_console, print_json, table
+
 if TYPE_CHECKING:
     from armwright.arrays import Array
     from armwright.clearance.correcting import Correction
@@ -16,7 +20,7 @@ _DRAWS, _SMALLEST = 32, 1e-6
 
 
 def correct(  # noqa: PLR0917 - Typer reads one parameter per option
-    linkage: Annotated[str, typer.Argument(help="Name in the catalogue, or a TOML file.", show_default=False)],
+    linkage: LinkageName,
     path: Annotated[str, typer.Option(help="pick-and-place, or a test path x1 to x10, y1 to y14.")] = "pick-and-place",
     clearance: Annotated[
         list[str] | None,
@@ -28,13 +32,13 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     knots: Annotated[int, typer.Option(help="Places at which a whole path is moved.")] = 20,
     rounds: Annotated[int, typer.Option(help="How often the path is moved.")] = 3,
-    friction_velocity: Annotated[str, typer.Option(help="Which speed slides: surface or centre.")] = "surface",
-    threshold_mm_s: Annotated[float, typer.Option(help="Sliding speed below which friction fades.")] = 1.0,
+    friction_velocity: FrictionVelocity = "surface",
+    threshold_mm_s: Threshold = 1.0,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for path.csv, summary.json and paths.svg.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    as_json: JsonSummary = False,
+    quiet: Quiet = False,
 ) -> None:
     """Move a path against the error that play makes, until the tip comes to where it is wanted.
 
@@ -42,27 +46,18 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483`
     """
-    import json
-
     import numpy as np
 
     from armwright.clearance.correcting import correct_nodes, correct_path
-    from armwright.clearance.equations import Rubbing
     from armwright.clearance.paths import PICK_AND_PLACE, PickAndPlace, named_path
     from armwright.clearance.reader import load_linkage
-    from armwright.clearance.settings import Settings
-    from armwright.cli.clearance_simulate import with_clearances
     from armwright.files.output import write_folder
 
-    model = with_clearances(load_linkage(linkage), None, clearance or [])
-    settings = Settings(
-        threshold=threshold_mm_s * 1e-3,
-        friction=Rubbing(velocity=friction_velocity),  # type: ignore[arg-type]
-    )
+    model = with_clearances(load_linkage(linkage), clearance or [])
+    settings = settings_of(friction_velocity, threshold_mm_s)
     if estimate is not None and clearance:
         raise typer.BadParameter("the clearances are either given or those of --estimate", param_hint="--clearance")
     clearances = np.array(list(model.clearances.values())) if estimate is None else _drawn(model, estimate)
-    usual = np.atleast_2d(clearances).mean(axis=0)
 
     def told(mean: float) -> None:
         if not (quiet or as_json):
@@ -72,7 +67,22 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
         found = correct_nodes(model, PickAndPlace(), clearances, settings, rounds=rounds, progress=told)
     else:
         found = correct_path(model, named_path(path), clearances, settings, knots=knots, rounds=rounds, progress=told)
-    summary = {
+    summary = _summary(model, path, found, clearances)
+    if output is not None:
+        write_folder(output, _files(model, path, found, summary, settings))
+    if as_json:
+        print_json(summary)
+    elif not quiet:
+        _print(summary)
+        if output is not None:
+            print(f"path: {output / 'path.csv'}")
+
+
+def _summary(model: "Linkage", path: str, found: "Correction", clearances: "Array") -> dict[str, Any]:
+    import numpy as np
+
+    usual = np.atleast_2d(clearances).mean(axis=0)
+    return {
         "linkage": model.name,
         "path": path,
         "clearances": dict(zip(model.clearances, usual.tolist(), strict=True)),
@@ -82,14 +92,6 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
         "after": np.atleast_2d(found.after).mean(axis=0).tolist(),
         "mean errors": list(found.history),
     }
-    if output is not None:
-        write_folder(output, _files(model, path, found, summary, settings))
-    if as_json:
-        print(json.dumps(summary, indent=2))
-    elif not quiet:
-        _print(summary)
-        if output is not None:
-            print(f"path: {output / 'path.csv'}")
 
 
 def _drawn(model: "Linkage", estimate: Path) -> "Array":
@@ -124,8 +126,6 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
 def _files(
     model: "Linkage", name: str, found: "Correction", summary: dict[str, Any], settings: "Settings"
 ) -> dict[str, str | bytes]:
-    import json
-
     import numpy as np
 
     from armwright.clearance.paths import named_path
@@ -146,21 +146,15 @@ def _files(
     targets = wanted.at(np.array(wanted.targets)).at * 1e3
     return {
         "path.csv": text,
-        "summary.json": json.dumps(summary, indent=2) + "\n",
+        "summary.json": json_text(summary) + "\n",
         "paths.svg": paths(f"{model.name}, {name}: with play", panels, targets),
     }
 
 
 def _print(summary: dict[str, Any]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("at s", "told x mm", "y mm", "error before mm", "after mm"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for t, node, before, after in zip(
-        summary["times"], summary["nodes"], summary["before"], summary["after"], strict=True
-    ):
-        table.add_row(f"{t:.4g}", *(f"{x * 1e3:.4f}" for x in node), f"{before * 1e3:.4f}", f"{after * 1e3:.5f}")
-    Console(markup=False, highlight=False).print(table)
+    nodes = zip(summary["times"], summary["nodes"], summary["before"], summary["after"], strict=True)
+    rows = (
+        (f"{t:.4g}", *(f"{x * 1e3:.4f}" for x in node), f"{before * 1e3:.4f}", f"{after * 1e3:.5f}")
+        for t, node, before, after in nodes
+    )
+    plain_console().print(table(("at s", "told x mm", "y mm", "error before mm", "after mm"), rows, words=()))

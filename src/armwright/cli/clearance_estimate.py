@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.linkages import LinkageName
+from armwright.cli.printing import plain_console, print_json, table
+
 if TYPE_CHECKING:
     from armwright.clearance.estimating.measured import PathsMeasured, RestMeasured
     from armwright.clearance.linkage import Linkage
@@ -17,7 +20,7 @@ _LEVEL = 0.9
 
 
 def estimate(
-    linkage: Annotated[str, typer.Argument(help="Name in the catalogue, or a TOML file.", show_default=False)],
+    linkage: LinkageName,
     measured: Annotated[
         Path, typer.Argument(help="CSV of a resting tip, or of a tip on paths (docs/clearance.md).", show_default=False)
     ],
@@ -39,8 +42,6 @@ def estimate(
 
     **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
     """
-    import json
-
     from armwright.clearance.estimating.measured import RestMeasured, read_measured
     from armwright.clearance.reader import load_linkage
 
@@ -48,7 +49,7 @@ def estimate(
     noise = None if noise_um is None else noise_um * 1e-6
     told = _at_rest(model, found, noise) if isinstance(found, RestMeasured) else _on_paths(model, found, sweep, noise)
     if as_json:
-        print(json.dumps(told, indent=2))
+        print_json(told)
     else:
         _print(told)
 
@@ -112,11 +113,11 @@ def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, 
             )
         parameters = tuple(name for name in map(str, data.coords) if name.startswith("c_") or name == "friction")
         points = np.stack([data[name].to_numpy() for name in parameters], axis=-1)
-        table = np.stack([np.where(data["status"] == 0, data[name], np.nan) for name in names], axis=-1)
+        values = np.stack([np.where(data["status"] == 0, data[name], np.nan) for name in names], axis=-1)
         told = json.loads(data.attrs["design"])["ranges"]
     # The two bounds of a design by chance, or the levels of a full factorial.
     ranges = [(min(told[name]), max(told[name])) for name in parameters] if set(parameters) <= set(told) else None
-    surrogate = learn(parameters, points, names, table, ranges=ranges)
+    surrogate = learn(parameters, points, names, values, ranges=ranges)
     features = measured.features()
     seen = [float(getattr(features[path], feature)) for path in measured.times for feature in _FEATURES]
     found = posterior(surrogate, seen, measured.noise_of(names, noise))
@@ -142,26 +143,22 @@ def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, 
 
 
 def _print(told: Mapping[str, Any]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(markup=False, highlight=False)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     names = list(told["parameters"])
-    for name in ("", "mean mm", "± mm", "90 % interval mm", "told", *(f"r {one}" for one in names)):
-        table.add_column(name, justify="right" if name else "left", no_wrap=True)
+    rows = []
     for i, (name, one) in enumerate(told["parameters"].items()):
         scale = 1.0 if name == "friction" else 1e3
         low, high = (scale * x for x in one["interval"])
-        table.add_row(
-            "friction, no unit" if name == "friction" else name,
-            f"{scale * one['mean']:.4f}",
-            f"{scale * one['deviation']:.4f}",
-            f"{low:.4f} to {high:.4f}",
-            "yes" if one["identifiable"] else "no",
-            *(f"{x:+.2f}" for x in told["correlation"][i]),
+        rows.append(
+            (
+                "friction, no unit" if name == "friction" else name,
+                f"{scale * one['mean']:.4f}",
+                f"{scale * one['deviation']:.4f}",
+                f"{low:.4f} to {high:.4f}",
+                "yes" if one["identifiable"] else "no",
+                *(f"{x:+.2f}" for x in told["correlation"][i]),
+            )
         )
-    console.print(table)
+    console = plain_console()
+    console.print(table(("", "mean mm", "± mm", "90 % interval mm", "told", *(f"r {one}" for one in names)), rows))
     for note in told["notes"]:
         console.print(note)

@@ -1,12 +1,15 @@
 """``armwright clearance simulate``: a linkage with play follows a path, and one sees its journals rattle."""
 
 import math
-import re
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
+from armwright.cli.options import JsonSummary, Quiet
+from armwright.cli.printing import command_line, json_text, plain_console, print_json, table
+from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
@@ -16,15 +19,12 @@ if TYPE_CHECKING:
     from armwright.clearance.simulation import Simulation
     from armwright.report.rattling import Run
 
-_CLEARANCE = re.compile(r"(?P<pin>[^=]+)=(?P<number>[^=a-z]+)(?:mm)?")
 # Samples of a run, and the time between two of them at most [s].
 _SAMPLES, _SAMPLE = 2500, 1e-4
 
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
-    linkage: Annotated[
-        str, typer.Argument(help="Name in the catalogue, or a TOML file (docs/clearance.md).", show_default=False)
-    ],
+    linkage: LinkageName,
     path: Annotated[
         str | None, typer.Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", show_default=False)
     ] = None,
@@ -43,10 +43,8 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         float | None, typer.Option(help="Coefficient; that of the linkage without it.", show_default=False)
     ] = None,
     friction_law: Annotated[str, typer.Option(help="linear, tanh or lugre.")] = "linear",
-    friction_velocity: Annotated[
-        str, typer.Option(help="Which speed slides: of the surface, or of the centre as the thesis has it.")
-    ] = "surface",
-    threshold_mm_s: Annotated[float, typer.Option(help="Sliding speed below which friction fades.")] = 1.0,
+    friction_velocity: FrictionVelocity = "surface",
+    threshold_mm_s: Threshold = 1.0,
     law: Annotated[
         str, typer.Option(help="Of impact: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...")
     ] = "lankarani-nikravesh",
@@ -64,8 +62,8 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         Path | None,
         typer.Option("-o", "--output", help="Folder for report.html, samples.csv, summary.json and figures (SVG)."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    as_json: JsonSummary = False,
+    quiet: Quiet = False,
 ) -> None:
     """Let a linkage with play follow a path: its drives do what it would need without play.
 
@@ -76,55 +74,35 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --turns 2 --start centred --step 2e-6`
     """
-    import json
-
     from armwright.clearance.reader import load_linkage
     from armwright.files.output import write_folder
     from armwright.report.rattling import Run, summary
 
-    model = with_clearances(load_linkage(linkage), clearance_mm, clearance or [])
+    model = with_clearances(load_linkage(linkage), clearance or [], clearance_mm)
     way = _path(model, path, speed_rpm, turns)
-    settings = _settings(
+    settings = settings_of(
+        friction_velocity,
+        threshold_mm_s,
+        law=friction_law,
         step=step,
         sample=max(step, min(_SAMPLE, way.duration / _SAMPLES)) if sample is None else sample,
         integrator=integrator,
         control=control,
         impact=law,
-        threshold=threshold_mm_s * 1e-3,
         start=start,
         located=locate,
-        friction=(friction_law, friction_velocity),
     )
     run = Run.of(_simulated(model, way, settings, friction, watched=not (quiet or as_json)))
-    told = {"command": _command(), **summary(run)}
-    text = json.dumps(told, indent=2, ensure_ascii=False)
+    told = {"command": command_line(), **summary(run)}
+    text = json_text(told)
     if output is not None:
         write_folder(output, _files(run, text))
     if as_json:
-        print(text)
+        print_json(told)
     elif not quiet:
         _print(run, told)
         if output is not None:
             print(f"report: {output / 'report.html'}")
-
-
-def with_clearances(model: "Linkage", clearance_mm: float | None, clearances: list[str]) -> "Linkage":
-    """Return the linkage with the clearances that are asked for."""
-    found = {}
-    if clearance_mm is not None:
-        found = dict.fromkeys(model.clearances, clearance_mm * 1e-3)
-    for text in clearances:
-        match = _CLEARANCE.fullmatch(text.replace(" ", ""))
-        try:
-            value = float(match["number"]) if match else math.nan
-        except ValueError:
-            value = math.nan
-        if match is None or math.isnan(value):
-            raise typer.BadParameter(
-                f"expected a pin and its clearance in mm, J2=0.5, got {text}", param_hint="--clearance"
-            )
-        found[match["pin"]] = value * 1e-3
-    return model.with_clearances(found)
 
 
 def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: float) -> "TipPath":
@@ -167,29 +145,14 @@ def _instead(drives: int, wanted: int) -> str:
     return ": give --path" if wanted == 2 else ": give --speed-rpm"
 
 
-def _settings(friction: tuple[str, str], **options: Any) -> "Settings":
-    """Return the settings; what stands for nothing is answered with the nearest name."""
-    from armwright.clearance.equations import Rubbing
-    from armwright.clearance.settings import Settings
-
-    law, velocity = friction
-    return Settings(friction=Rubbing(law=law, velocity=velocity), **options)  # type: ignore[arg-type]
-
-
 def _simulated(
     model: "Linkage", way: "TipPath", settings: "Settings", friction: float | None, *, watched: bool
 ) -> "Simulation":
     """Run it, with a word on the screen while a person waits for the compiler."""
-    from contextlib import nullcontext
-
-    from rich.console import Console
-
     from armwright.clearance.preparing import prepare
     from armwright.clearance.simulation import simulate as run
 
-    console = Console(stderr=True)
-    waiting = console.status(f"{model.name}: the first run compiles it") if watched and console.is_terminal else None
-    with waiting or nullcontext():
+    with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
         task: Task = prepare(model, way, settings)
         return run(task, frictions=friction)
 
@@ -202,59 +165,37 @@ def _files(run: "Run", text: str) -> dict[str, Any]:
     from armwright.report.rattling_page import rattling_page
 
     task = run.simulation.task
-    drawn = rattling_figures(run)
+    drawn, title = rattling_figures(run), f"{task.linkage.name}: {task.path.name}"
     space = workspace_of(task)
     drawn += [space] if space else []
     return {
         "summary.json": text + "\n",
         "samples.csv": samples_csv(run),
-        "report.html": rattling_page(run, drawn, title=f"{task.linkage.name}: {task.path.name}", command=_command()),
+        "report.html": rattling_page(run, drawn, title=title, command=command_line()),
         **{f"{one.name}.svg": one.svg for one in drawn},
     }
 
 
-def _command() -> str:
-    import shlex
-
-    return shlex.join(["armwright", *sys.argv[1:]])
-
-
 def _print(run: "Run", told: dict[str, Any]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from armwright.report.rattling import newtons, notes
 
-    console = Console(markup=False, highlight=False)
+    console = plain_console()
     error, energy, how = told["error"], told["energy"], told["settings"]
     console.print(
         f"{told['linkage']}, {told['path']}: {told['status']} after {told['sound_until']:.4g} s; {how['integrator']}, "
         f"steps of {how['step']:.3g} s, friction {how['friction']:g}"
     )
-    for headings, rows in (
-        (
-            ("pin", "clearance mm", "peak N", "mean N", "impacts", "in flight %"),
-            [
-                (name, f"{pin['clearance'] * 1e3:.4g}", newtons(pin["peak_force"]), f"{pin['mean_force']:.4g}",
-                 str(pin["impacts"]), f"{100 * pin['flight']:.3g}")
-                for name, pin in told["pins"].items()
-            ],
-        ),
-        (
-            ("error at", "x mm", "y mm", "distance mm"),
-            [
-                (f"{one['time']:.4g} s", *(f"{one[key] * 1e3:.4f}" for key in ("error_x", "error_y", "distance")))
-                for one in told["targets"]
-            ],
-        ),
-    ):  # fmt: skip
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-        for place, name in enumerate(headings):
-            table.add_column(name, justify="right" if place else "left", no_wrap=True)
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
+    pins = (
+        (name, f"{pin['clearance'] * 1e3:.4g}", newtons(pin["peak_force"]), f"{pin['mean_force']:.4g}",
+         str(pin["impacts"]), f"{100 * pin['flight']:.3g}")
+        for name, pin in told["pins"].items()
+    )  # fmt: skip
+    console.print(table(("pin", "clearance mm", "peak N", "mean N", "impacts", "in flight %"), pins))
+    targets = (
+        (f"{one['time']:.4g} s", *(f"{one[key] * 1e3:.4f}" for key in ("error_x", "error_y", "distance")))
+        for one in told["targets"]
+    )
+    console.print(table(("error at", "x mm", "y mm", "distance mm"), targets))
     console.print(f"error: {error['largest'] * 1e3:.4g} mm at most, {error['mean'] * 1e3:.4g} mm on average")
     console.print(
         f"energy: {energy['driven']:.4g} J from the drives, {energy['impact_loss']:.3g} J lost in impacts, "

@@ -1,13 +1,22 @@
 """``armwright clearance sweep``: the features of many linkages with other clearances, kept in a folder."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
+from armwright.cli.options import Quiet
+from armwright.cli.printing import print_json
+from armwright.cli.progress import sweep_bar
+
+if TYPE_CHECKING:
+    from armwright.clearance.sweeping import FeatureSweep
+    from armwright.sweep.designs import Design
+
 
 def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
-    linkage: Annotated[str, typer.Argument(help="Name in the catalogue, or a TOML file.", show_default=False)],
+    linkage: LinkageName,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of this sweep alone.", show_default=False)],
     paths: Annotated[str, typer.Option(help="Test paths, with commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
     design: Annotated[str, typer.Option(help="factorial, lhs (Latin hypercube) or sobol.")] = "sobol",
@@ -19,8 +28,8 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         float | None,
         typer.Option(help="Vary the coefficient of friction too, from 0 to this one.", show_default=False),
     ] = None,
-    friction_velocity: Annotated[str, typer.Option(help="Which speed slides: surface or centre.")] = "surface",
-    threshold_mm_s: Annotated[float, typer.Option(help="Sliding speed below which friction fades.")] = 1.0,
+    friction_velocity: FrictionVelocity = "surface",
+    threshold_mm_s: Threshold = 1.0,
     step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
     seed: Annotated[int, typer.Option(help="Of lhs and sobol.")] = 0,
     workers: Annotated[
@@ -30,7 +39,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None, typer.Option(help="Dask scheduler to use instead: tcp://10.0.0.1:8786.", show_default=False)
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Simulate a linkage with many clearances on several paths and keep the features of the error curves.
 
@@ -39,52 +48,55 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
     """
-    import json
-
-    import numpy as np
-
-    from armwright.clearance.equations import Rubbing
     from armwright.clearance.reader import load_linkage
-    from armwright.clearance.settings import Settings
     from armwright.clearance.sweeping import FeatureSweep
-    from armwright.cli.progress import sweep_bar
-    from armwright.errors import one_of
-    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol, whole
     from armwright.sweep.run import run
 
-    one_of("design", design, ("factorial", "lhs", "sobol"))
-    whole(levels, "levels", least=2)
-    settings = Settings(
-        step=step,
-        threshold=threshold_mm_s * 1e-3,
-        friction=Rubbing(velocity=friction_velocity),  # type: ignore[arg-type]
-    )
     task = FeatureSweep(
         linkage=load_linkage(linkage),
         paths=tuple(dict.fromkeys(name.strip() for name in paths.split(","))),
-        settings_of=settings,
+        settings_of=settings_of(friction_velocity, threshold_mm_s, step=step),
         with_friction=to_friction is not None,
     )
-    bounds = dict.fromkeys(task.parameters, (from_mm * 1e-3, to_mm * 1e-3))
-    units = dict.fromkeys(task.parameters, "m")
-    if to_friction is not None:
-        bounds["friction"], units["friction"] = (0.0, to_friction), "1"
-    if design == "factorial":
-        plan = full_factorial(
-            {name: np.linspace(*ends, levels).round(12).tolist() for name, ends in bounds.items()}, units=units
-        )
-    else:
-        plan = (latin_hypercube if design == "lhs" else sobol)(bounds, runs, seed, units=units)
+    plan = _plan(task, design, (from_mm * 1e-3, to_mm * 1e-3), to_friction, levels=levels, runs=runs, seed=seed)
     # Whatever is wrong with a path is said now, and a step too long for the least play; and the simulation is compiled
     # once, not by every worker.
     task(plan.points.min(axis=0, keepdims=True))
     with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
         found = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
     failed = int((found["status"] != 0).sum())
-    summary = {"runs": len(plan.points), "failed": failed, "paths": list(task.paths), "folder": str(output)}
     found.close()
     if as_json:
-        print(json.dumps(summary, indent=2))
+        summary = {"runs": len(plan.points), "failed": failed, "paths": list(task.paths), "folder": str(output)}
+        print_json(summary)
     elif not quiet:
         said = f", {failed} of them came to nothing" if failed else ""
         print(f"{len(plan.points)} linkages on {', '.join(task.paths)}{said}: {output}")
+
+
+def _plan(
+    task: "FeatureSweep",
+    design: str,
+    clearances: tuple[float, float],
+    to_friction: float | None,
+    *,
+    levels: int,
+    runs: int,
+    seed: int,
+) -> "Design":
+    """Return which clearances [m] are simulated, and with which coefficients of friction."""
+    import numpy as np
+
+    from armwright.errors import one_of
+    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol, whole
+
+    one_of("design", design, ("factorial", "lhs", "sobol"))
+    whole(levels, "levels", least=2)
+    bounds = dict.fromkeys(task.parameters, clearances)
+    units = dict.fromkeys(task.parameters, "m")
+    if to_friction is not None:
+        bounds["friction"], units["friction"] = (0.0, to_friction), "1"
+    if design == "factorial":
+        values = {name: np.linspace(*ends, levels).round(12).tolist() for name, ends in bounds.items()}
+        return full_factorial(values, units=units)
+    return (latin_hypercube if design == "lhs" else sobol)(bounds, runs, seed, units=units)

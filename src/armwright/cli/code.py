@@ -49,14 +49,13 @@ def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> 
         FileFormatError: the file cannot be read, or its code makes no sense.
         typer.Exit: the program has errors.
     """
-    from armwright.cell.reader import read_cell
-    from armwright.cli.programs import in_its_cell, print_diagnostics
+    from armwright.cli.programs import given_cell, in_its_cell, print_diagnostics
     from armwright.files.document import read_text
     from armwright.program.intermediate.assembly import assemble
 
     if path.suffix == CODE_SUFFIX:
         return assemble(read_text(path), str(path))
-    compiled, _ = in_its_cell(path, read_cell(cell) if cell else None, strict=strict, std=std)
+    compiled, _ = in_its_cell(path, given_cell(cell), strict=strict, std=std)
     if compiled.diagnostics:
         print_diagnostics(compiled.diagnostics, compiled.source, to_errors=True)
     if compiled.code is None:

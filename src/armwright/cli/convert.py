@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.forward import ArmName
+from armwright.cli.options import ArmName
+from armwright.cli.printing import print_json
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -32,8 +33,6 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright convert puma560 -o puma560.urdf`
     """
-    import json
-
     from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
     from armwright.arm.write import toml_text
     from armwright.files.output import write_file
@@ -48,7 +47,7 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     write_file(output, urdf_text(model) if kind == ".urdf" else toml_text(model))
     if as_json:
         said = {"written": str(output), "name": model.name, "joints": model.n, "notes": notes, "lost": lost}
-        print(json.dumps(said, indent=2, ensure_ascii=False))
+        print_json(said)
         return
     print(f"{model.name}: {model.n} joint{'s' if model.n > 1 else ''} written to {output}")
     for sentence in (*notes, *lost):

@@ -66,15 +66,14 @@ def load(launch: "Launch") -> "Loaded":
         LoadError: it has errors, or no cell to run in.
         FileFormatError: a file cannot be read.
     """
-    from armwright.cell.reader import read_cell
-    from armwright.cli.programs import imported_files, in_its_cell
+    from armwright.cli.programs import given_cell, imported_files, in_its_cell
     from armwright.files.document import read_text
     from armwright.program.debugging.editor import Loaded, LoadError
     from armwright.program.intermediate.assembly import assemble
     from armwright.program.messages.diagnostics import count_line
     from armwright.program.messages.rendering import render
 
-    given = None if launch.cell is None else read_cell(launch.cell)
+    given = given_cell(launch.cell)
     if launch.program.suffix == CODE_SUFFIX:
         if given is None:
             message = f"{launch.program.name} needs a cell to run in"

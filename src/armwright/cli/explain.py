@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.printing import print_json
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
@@ -56,8 +58,6 @@ def explain(
 
 def _list(*, as_json: bool) -> None:
     """Print all codes with their titles."""
-    import json
-
     from armwright.program.explanations.explaining import explanation, ranges
 
     if as_json:
@@ -66,7 +66,7 @@ def _list(*, as_json: bool) -> None:
             for name, codes in ranges().items()
             for code in codes
         ]
-        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        print_json(rows)
         return
     for number, (name, codes) in enumerate(ranges().items()):
         print(f"{chr(10) if number else ''}{name}")
@@ -75,14 +75,12 @@ def _list(*, as_json: bool) -> None:
 
 
 def _print_json(page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> None:
-    import json
-
     import attrs
 
     from armwright.program.messages.diagnostics import to_json
 
     data: dict[str, Any] = {**attrs.asdict(page), "diagnostics": [to_json(one, source) for one in said]}
-    print(json.dumps(data, indent=2, ensure_ascii=False))
+    print_json(data)
 
 
 def _plain(page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:

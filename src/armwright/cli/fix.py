@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
 from armwright.program.text.words import Standard
 
@@ -32,14 +33,12 @@ def fix(
 
     **Example:** `armwright fix examples/bench.rlo --diff`
     """
-    import json
-
-    from armwright.cell.reader import read_cell
+    from armwright.cli.programs import given_cell
     from armwright.cli.rewriting import print_difference, read_program, write_back
     from armwright.errors import ArmwrightError
     from armwright.program.editing.fixing import fixed
 
-    acted_on = read_cell(cell) if cell else None
+    acted_on = given_cell(cell)
     rows: list[dict[str, Any]] = []
     for path in programs:
         try:
@@ -58,7 +57,7 @@ def fix(
                 print_difference(source, result.text)
             _print(result, done="could be cured" if diff else "cured")
     if as_json:
-        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        print_json(rows)
     if any(row["errors"] for row in rows):
         raise typer.Exit(1)
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
 from armwright.program.text.words import Standard
 
@@ -35,8 +36,6 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright fmt examples/*.rlo --check`
     """
-    import json
-
     from armwright.cli.rewriting import INPUT, print_difference, read_program, write_back
     from armwright.errors import ArmwrightError
     from armwright.program.editing.formatting import formatted
@@ -65,7 +64,7 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
         else:
             print(_said(source, changed=row["changed"], check=check))
     if as_json:
-        print(json.dumps(rows, indent=2, ensure_ascii=False))
+        print_json(rows)
     if any("error" in row or (check and row["changed"]) for row in rows):
         raise typer.Exit(1)
 

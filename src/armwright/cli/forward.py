@@ -5,18 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armwright.cli.options import ArmName, Json, Posture, Rows
+
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.arrays import Array
-
-ArmName = Annotated[str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)]
-Posture = Annotated[
-    str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
-]
-Rows = Annotated[
-    Path | None, typer.Option("--csv", help="Rows of q1 ... qn in SI units, such as motion.csv.", show_default=False)
-]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
 
 
 def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Json = False) -> None:

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.forward import ArmName, Json
+from armwright.cli.options import ArmName, Json
+from armwright.cli.printing import print_json
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -32,8 +33,6 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright inverse puma560 --xyz 500,100,300 --rpy 0,90,0`
     """
-    import json
-
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
     from armwright.kinematics.inverse.closed_form import inverse as postures
@@ -54,7 +53,7 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
             }
             for branch in solution
         ]
-        print(json.dumps({"answer": solution.answer, "distance": solution.distance, "branches": branches}, indent=2))
+        print_json({"answer": solution.answer, "distance": solution.distance, "branches": branches})
     else:
         _print(model, solution)
     if not solution.allowed:
@@ -64,7 +63,7 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
 def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
     import numpy as np
 
-    from armwright.cli.joints import numbers
+    from armwright.cli.numbers import numbers
     from armwright.spatial.poses import from_noap, pose
     from armwright.spatial.rotations import rotation_from_vector
 

@@ -1,17 +1,17 @@
 """``armwright iso9283``: what measured poses and paths say of a robot, by the definitions of ISO 9283."""
 
-import re
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.numbers import Named, named_number
+from armwright.cli.options import Json, Quiet
+from armwright.cli.printing import command_line, json_text, plain_console, print_json
+
 if TYPE_CHECKING:
     from armwright.accuracy.assess import Assessment
     from armwright.accuracy.measures import Measure
-
-_LIMIT = re.compile(r"(?P<symbol>\w+)=(?P<number>[^a-z%/]+)(?P<unit>[a-zA-Z%/]*)")
 
 
 def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -33,8 +33,8 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
         list[str] | None,
         typer.Option(help="What a measure should keep: RP=0.05mm; may be repeated.", show_default=False),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Print the measures of ISO 9283 that measured poses and paths allow, with the cycles of each.
 
@@ -44,16 +44,14 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
-    import json
-
     from armwright.files.output import write_folder
 
     found = _assessed(files, few=few, band_mm=band_mm, corners_mm=corners_mm, limits=limit or [])
-    text = json.dumps(_plain(found), indent=2, ensure_ascii=False)
+    plain = _plain(found)
     if output is not None:
-        write_folder(output, _files(found, files, text))
+        write_folder(output, _files(found, files, plain))
     if as_json:
-        print(text)
+        print_json(plain)
     elif not quiet:
         _print(found)
         if output is not None:
@@ -74,27 +72,22 @@ def _assessed(
     ):
         if not valid:
             raise typer.BadParameter(f"expected a number above 0, got {value:g}", param_hint=name)
-    bounds = dict(map(_bound, limits))
+    bounds = {bound.name: bound for bound in map(_bound, limits)}
     tests = read_measurements(files)
     try:
         found = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)
-        return found.within({symbol: _in_si(found, symbol, *bound) for symbol, bound in bounds.items()})
+        return found.within({symbol: _in_si(found, *bound) for symbol, bound in bounds.items()})
     except TooFewError as error:
         raise TooFewError(str(error).replace("few=True takes", "--few takes")) from error
 
 
-def _bound(text: str) -> tuple[str, tuple[float, str]]:
+def _bound(text: str) -> Named:
     """Read a limit such as ``RP=0.05mm``."""
-    match = _LIMIT.fullmatch(text.replace(" ", ""))
-    try:
-        value = float(match["number"]) if match else -1.0
-    except ValueError:
-        value = -1.0
-    if match is None or not 0 <= value < float("inf"):
-        raise typer.BadParameter(
-            f"expected a symbol and a number with its unit, RP=0.05mm, got {text}", param_hint="--limit"
-        )
-    return match["symbol"], (value, match["unit"])
+    expected = "a symbol and a number with its unit, RP=0.05mm"
+    bound = named_number(text, None, expected, "--limit")
+    if not 0 <= bound.value < float("inf"):
+        raise typer.BadParameter(f"expected {expected}, got {text}", param_hint="--limit")
+    return bound
 
 
 def _in_si(found: "Assessment", symbol: str, value: float, unit: str) -> float:
@@ -126,19 +119,16 @@ def _plain(found: "Assessment") -> dict[str, Any]:
     return {"standard": "ISO 9283:1998", "planar": found.planar, "notes": notes_of(found), "measures": measures}
 
 
-def _files(found: "Assessment", files: list[Path], text: str) -> dict[str, str]:
+def _files(found: "Assessment", files: list[Path], plain: dict[str, Any]) -> dict[str, str]:
     """Return the files of an assessment by name."""
-    import shlex
-
     from armwright.report.accuracy_figures import drawings
     from armwright.report.accuracy_page import accuracy_page
 
     drawn = drawings(found)
     title = f"ISO 9283: {', '.join(path.name for path in files)}"
-    command = shlex.join(["armwright", *sys.argv[1:]])
     return {
-        "measures.json": text + "\n",
-        "report.html": accuracy_page(found, drawn, title=title, command=command),
+        "measures.json": json_text(plain) + "\n",
+        "report.html": accuracy_page(found, drawn, title=title, command=command_line()),
         **{f"{one.name}.svg": one.svg for one in drawn},
     }
 
@@ -147,12 +137,11 @@ def _print(found: "Assessment") -> None:
     from itertools import groupby
 
     from rich import box
-    from rich.console import Console
     from rich.table import Table
 
     from armwright.report.accuracy_page import notes_of
 
-    console = Console(markup=False, highlight=False)
+    console = plain_console()
     bounded = any(one.limit is not None for one in found.measures)
     for (test, name, condition), measures in groupby(found.measures, lambda one: (one.test, one.name, one.condition)):
         title = f"{test} {name}{f', {condition}' if condition else ''}"

@@ -1,39 +1,15 @@
-"""Joint values and poses on the command line: degrees and millimetres in, rows of SI files too."""
+"""Joint values on the command line: degrees and millimetres in, rows of SI files too."""
 
 import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
+from armwright.cli.numbers import numbers
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.arrays import Array
-
-
-def numbers(text: str, count: int, option: str) -> list[float]:
-    """Read numbers apart by commas or blanks.
-
-    Raises:
-        BadParameter: it is not ``count`` finite numbers, or one is larger than any of a robot.
-    """
-    from armwright.arrays import LARGEST
-
-    words = text.replace(",", " ").split()
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        wrong = next(word for word in words if not _is_number(word))
-        raise typer.BadParameter(f"expected {count} numbers, got '{wrong}'", param_hint=option) from None
-    if len(values) != count:
-        raise typer.BadParameter(f"expected {count} finite numbers, got {len(values)}: {text}", param_hint=option)
-    for value, word in zip(values, words, strict=True):
-        if not abs(value) <= LARGEST:  # what is NaN compares with nothing
-            raise typer.BadParameter(
-                f"every number must be finite and no larger than {LARGEST:g}, got {word}", param_hint=option
-            )
-    return values
 
 
 def joint_values(arm: "Arm", text: str, option: str) -> "Array":
@@ -110,11 +86,3 @@ def _ask_for_degrees(arm: "Arm", path: Path, q: "Array") -> None:
     found = degrees_by_mistake(arm, q)
     if found:
         print(f"armwright: warning: {path}: {found}; the columns of a file are in SI units", file=sys.stderr)
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

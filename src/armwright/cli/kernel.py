@@ -4,9 +4,12 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.options import ArmName
+from armwright.cli.printing import print_json
+
 
 def kernel(
-    arm: Annotated[str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)],
+    arm: ArmName,
     quantity: Annotated[
         str,
         typer.Argument(
@@ -21,8 +24,6 @@ def kernel(
 
     **Example:** `armwright kernel stanford-jpl inverse_dynamics --count`
     """
-    import json
-
     from armwright.arm.load import load_arm
     from armwright.dynamics.compiled import emit_quantity
 
@@ -31,7 +32,7 @@ def kernel(
     source = emitted.one if one else emitted.rows
     if as_json:
         counts = {"operations": emitted.operations, "total": total, "joined": emitted.joined}
-        print(json.dumps({**counts, "source": source}, indent=2))
+        print_json({**counts, "source": source})
         return
     if not count:
         print(source)

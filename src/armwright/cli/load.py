@@ -26,7 +26,7 @@ def load_in_hand(text: str) -> "Link":
     """
     from armwright.arm.load import is_path, read_load
     from armwright.arm.model import Link
-    from armwright.cli.joints import numbers
+    from armwright.cli.numbers import numbers
 
     if is_path(text):
         return read_load(text)

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.forward import ArmName, Json
+from armwright.cli.numbers import within
+from armwright.cli.options import ArmName, Json, QuietButWarnings
+from armwright.cli.printing import command_line, json_text, plain_console, print_json, table
+from armwright.cli.progress import counting
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -78,7 +81,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     servo_ms: Annotated[float, typer.Option(help="Servo period of motion.csv.")] = 2.0,
     film: Annotated[bool, typer.Option(help="Draw move.gif, and move.mp4 where ffmpeg is installed.")] = True,
     as_json: Json = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")] = False,
+    quiet: QuietButWarnings = False,
 ) -> None:
     """Move an arm through the poses of a file.
 
@@ -89,8 +92,6 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright move joint puma560 examples/puma_poses.toml -o out/joint`
     """
-    import json
-
     from armwright.files.output import write_folder
     from armwright.motion.limit_use import limit_use, slowing_for_limits
 
@@ -110,7 +111,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None:
         write_folder(output, _files(_moved(planned, file, poses, servo_ms * 1e-3, notes), uses, film=film, quiet=quiet))
     if as_json:
-        print(json.dumps(_summary(planned, file, uses), indent=2, ensure_ascii=False))
+        print_json(_summary(planned, file, uses))
     elif not quiet:
         _print(planned, file, uses)
         if output is not None:
@@ -126,12 +127,11 @@ def _check_options(
             raise typer.BadParameter("only a cartesian move has one", param_hint=name)
     if orientation is not None and around is not None:
         raise typer.BadParameter("lines with stops turn about one axis; leave it out", param_hint="--orientation")
-    for name, value, (lower, upper) in (
+    for name, value, bounds in (
         ("--servo-ms", servo_ms, _PERIOD_MS),
         ("--deviation-mm", _DEVIATION_MM[0] if deviation_mm is None else deviation_mm, _DEVIATION_MM),
     ):
-        if not lower <= value <= upper:
-            raise typer.BadParameter(f"expected {lower:g} to {upper:g}, got {value:g}", param_hint=name)
+        within(value, bounds, name)
 
 
 def _planned(
@@ -170,8 +170,6 @@ def _planned(
 
 
 def _moved(planned: "Move", file: "PosesFile", poses: Path, period: float, notes: "Iterable[str]") -> "Moved":
-    import shlex
-
     from armwright.dynamics.newton_euler import inverse_dynamics
     from armwright.report.moved import Moved
     from armwright.report.page import Message
@@ -183,19 +181,18 @@ def _moved(planned: "Move", file: "PosesFile", poses: Path, period: float, notes
         name=poses.name,
         samples=samples,
         tau=inverse_dynamics(planned.arm, samples.q, samples.qd, samples.qdd),
-        command=shlex.join(["armwright", *sys.argv[1:]]),
+        command=command_line(),
         notes=tuple(Message(severity="note", text=note) for note in notes),
     )
 
 
 def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: bool) -> dict[str, Any]:
     """Return the files of a move by name."""
-    import json
-
     from armwright.kinematics.forward import forward
     from armwright.report import move_figures
     from armwright.report.motion_table import motion_csv
     from armwright.report.moved import move_page
+    from armwright.report.movie import films
     from armwright.report.page import run_page
 
     planned, samples = moved.move, moved.samples
@@ -207,30 +204,16 @@ def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: b
     hand = move_figures.hand_panels(samples.times, X)
     files: dict[str, Any] = {
         "motion.csv": motion_csv(samples.times, samples.q, samples.qd, samples.qdd, moved.tau),
-        "move.json": json.dumps(_summary(planned, moved.file, uses), indent=2, ensure_ascii=False) + "\n",
+        "move.json": json_text(_summary(planned, moved.file, uses)) + "\n",
         "joints.svg": move_figures.panels(f"{title}: joints", samples.times, joints, marks=moments),
         "hand.svg": move_figures.panels(f"{title}: hand", samples.times, hand, marks=moments, columns=2),
         "path.svg": move_figures.path_in_space(f"{title}: path of the hand, approach vectors", X, places),
         "report.html": run_page(move_page(moved)),
     }
-    return {**files, **_films(planned, quiet=quiet)} if film else files
-
-
-def _films(planned: "Move", *, quiet: bool) -> dict[str, bytes]:
-    """Draw the films, with a progress bar when a person watches."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    from armwright.report.movie import films
-
-    console = Console(stderr=True)
-    if quiet or not console.is_terminal:
-        return films(planned)
-    with Progress(
-        TextColumn("drawing the film"), BarColumn(), MofNCompleteColumn(), console=console, transient=True
-    ) as bar:
-        task = bar.add_task("")
-        return films(planned, lambda done, total: bar.update(task, completed=done, total=total))
+    if not film:
+        return files
+    with counting("drawing the film", quiet=quiet) as told:
+        return {**files, **films(planned, told)}
 
 
 def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> dict[str, Any]:
@@ -274,29 +257,23 @@ def _certificate(found: "Certificate") -> dict[str, Any]:
 
 
 def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
     from armwright.cli.joints import units
 
-    console = Console(markup=False, highlight=False)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("pose", overflow="fold")
+    console = plain_console()
     revolute = [joint.revolute for joint in planned.arm.joints]
     names = [f"j{i + 1} {'deg' if turns else 'mm'}" for i, turns in enumerate(revolute)]
-    for name in ("s", *names, *(["missed mm"] if planned.hand else [])):
-        table.add_column(name, justify="right")
+    shown = table(("pose", "s", *names, *(["missed mm"] if planned.hand else [])))
     scale = units(planned.arm)
     for i, pose in enumerate(file.names):
-        shown = [f"{q:.1f}" for q in planned.postures[i] / scale]
+        postures = [f"{q:.1f}" for q in planned.postures[i] / scale]
         missed = [f"{planned.misses[i] * 1e3:.1f}"] if planned.hand else []
-        table.add_row(pose, f"{planned.times[i]:.3f}", *shown, *missed, end_section=i == len(file.names) - 1)
+        shown.add_row(pose, f"{planned.times[i]:.3f}", *postures, *missed, end_section=i == len(file.names) - 1)
     for limit, use in uses.items():
         parts = [Text(f"{part:.0%}", style="bold red" if part > 1 + _ROUNDING else "") for part in use]
-        table.add_row(limit, "", *parts)
-    console.print(table)
+        shown.add_row(limit, "", *parts)
+    console.print(shown)
     console.print("speed, acceleration and effort in parts of their limits")
     console.print(f"{planned.arm.name}: {planned.trajectory.duration:.3f} s, {planned.label}")
     if planned.certificate:

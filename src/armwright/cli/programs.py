@@ -51,6 +51,17 @@ def translate_file(
     return translate(source, known, strict=strict, std=std, read_import=import_reader(path.parent))
 
 
+def given_cell(path: Path | None) -> "Cell | None":
+    """Return the cell of the option ``--cell``, if it is given.
+
+    Raises:
+        FileFormatError: it cannot be read, or says what cannot be.
+    """
+    from armwright.cell.reader import read_cell
+
+    return None if path is None else read_cell(path)
+
+
 def import_reader(folder: Path) -> "ReadImport":
     """Return what reads the files that a program of this folder IMPORTs."""
     from armwright.program.meaning.known import Imported

@@ -38,12 +38,12 @@ def repl(
 
     **Example:** `armwright repl --cell examples/stanford_cell.toml`
     """
-    from armwright.cli.programs import import_reader
+    from armwright.cli.programs import given_cell, import_reader
     from armwright.cli.repl_commands import COMMANDS, Commands
     from armwright.cli.repl_lines import Script, Terminal, editing
     from armwright.program.interactive.session import Session
 
-    session = Session(_read(cell), std, import_reader(Path()))
+    session = Session(given_cell(cell), std, import_reader(Path()))
     commands = Commands(session, cell)
     watched = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
     talk = _Json(session) if as_json else _Talk()
@@ -60,14 +60,6 @@ def repl(
     _greet(session)
     with _interruptible(), editing(session, COMMANDS):
         _converse(session, commands, Terminal(colour=_colour()), talk)
-
-
-def _read(path: Path | None) -> "Any":
-    if path is None:
-        return None
-    from armwright.cell.reader import read_cell
-
-    return read_cell(path)
 
 
 @contextlib.contextmanager

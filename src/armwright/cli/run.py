@@ -1,13 +1,16 @@
 """``armwright run``: a program moves an arm, and the user sees what happened."""
 
 import enum
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict
+from armwright.cli.numbers import within
+from armwright.cli.options import JsonSummary, QuietButWarnings
+from armwright.cli.printing import command_line, plain_console, print_json, table
+from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, given_cell
+from armwright.cli.progress import waiting
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -61,8 +64,8 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         float, typer.Option(min=0.0, help="End a program that runs so long on the cell's clock, in s.")
     ] = 3600.0,
     seed: Annotated[int, typer.Option(help="Recorded in run.json; this simulator draws no random numbers.")] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")] = False,
+    as_json: JsonSummary = False,
+    quiet: QuietButWarnings = False,
 ) -> None:
     """Run an RLO program in a simulated cell.
 
@@ -73,15 +76,13 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
-    import json
-
     from armwright.cli.programs import print_diagnostics
     from armwright.errors import FileFormatError
     from armwright.files.output import write_folder
     from armwright.program.running.interpret import Limits, RunError, warnings
     from armwright.report.files import Origin, result_files, summary
 
-    given = None if cell is None else _read(cell)
+    given = given_cell(cell)
     code, place, said, imports = _translated(program, given, strict=strict, std=std, as_json=as_json)
     place = _adjusted(place, servo_ms, deviation_mm, around)
     limits = Limits(steps=max_steps, time=max_time)
@@ -103,21 +104,15 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
             "std": std.value,
             "strict": strict,
         }
-        origin = Origin(program=program, cell=cell, imports=imports, command=_command(), seed=seed, options=options)
+        origin = Origin(program=program, cell=cell, imports=imports, command=command_line(), seed=seed, options=options)
         write_folder(output, result_files(recording, code, diagnostics, origin))
     if diagnostics and not as_json:
         print_diagnostics(diagnostics, code.source)
     if as_json:
         where = {"output": str(output)} if output else {}
-        print(json.dumps({**summary(recording, code, diagnostics), **where}, indent=2, ensure_ascii=False))
+        print_json({**summary(recording, code, diagnostics), **where})
     elif not quiet:
         _print_summary(recording, code, output)
-
-
-def _read(path: Path) -> "Cell":
-    from armwright.cell.reader import read_cell
-
-    return read_cell(path)
 
 
 def _translated(
@@ -150,38 +145,28 @@ def _adjusted(place: "Cell", servo_ms: float | None, deviation_mm: float | None,
 
     from armwright.cell.reader import DEVIATION_MM, SERVO_MS, WAYS_ROUND
 
-    period = place.period if servo_ms is None else _option("--servo-ms", servo_ms, SERVO_MS)
-    deviation = place.deviation if deviation_mm is None else _option("--deviation-mm", deviation_mm, DEVIATION_MM)
+    period = place.period if servo_ms is None else within(servo_ms, SERVO_MS, "--servo-ms") * 1e-3
+    deviation = place.deviation
+    if deviation_mm is not None:
+        deviation = within(deviation_mm, DEVIATION_MM, "--deviation-mm") * 1e-3
     way_round = place.around if around is None else WAYS_ROUND[around.value]
     return attrs.evolve(place, period=period, deviation=deviation, around=way_round)
 
 
-def _option(name: str, value: float, bounds: tuple[float, float]) -> float:
-    lower, upper = bounds
-    if not lower <= value <= upper:
-        raise typer.BadParameter(f"expected {lower:g} to {upper:g}, got {value:g}", param_hint=name)
-    return value * 1e-3
-
-
 def _interpret(code: "Code", place: "Cell", limits: "Limits", *, watched: bool) -> "Recording":
     """Run in the simulator, with the present statement on the screen when a person watches."""
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn
-
     from armwright.cell.simulator import Simulator
     from armwright.program.running.interpret import interpret
 
     simulator = Simulator(place)
-    console = Console(stderr=True)
-    if not (watched and console.is_terminal):
-        return interpret(code, place, simulator, limits=limits)
-    with Progress(SpinnerColumn(), TextColumn("{task.description}"), console=console, transient=True) as bar:
-        task = bar.add_task("", total=None)
+    with waiting("", quiet=not watched) as told:
+        if told is None:
+            return interpret(code, place, simulator, limits=limits)
 
         def show(now: float, line: int) -> None:
             # Source lines may hold what looks like markup.
             words = code.source.line_text(line).strip()[:60].replace("[", "\\[")
-            bar.update(task, description=f"{now:9.3f} s  line {line:<5} {words}")
+            told(f"{now:9.3f} s  line {line:<5} {words}")
 
         return interpret(code, place, simulator, show, limits=limits)
 
@@ -195,15 +180,13 @@ def _fail(
     as_json: bool,
 ) -> NoReturn:
     """Say why a program did not run, or did not run to its end, and stop with status 1."""
-    import json
-
     from armwright.cli.programs import print_diagnostics
     from armwright.program.messages.diagnostics import to_json
 
     if as_json:
         data = {"program": source.name, "diagnostics": [to_json(one, source) for one in diagnostics]}
         moment = {"time": error.time, "frames": _places(error)} if error else {}
-        print(json.dumps({**data, **moment}, indent=2, ensure_ascii=False))
+        print_json({**data, **moment})
     else:
         print_diagnostics(diagnostics, source)
         if error and code:
@@ -217,16 +200,8 @@ def _places(error: "RunError") -> dict[str, list[float] | None]:
     return {name: tree.world(name)[:3, 3].tolist() if tree.has_value(name) else None for name in tree}
 
 
-def _command() -> str:
-    import shlex
-
-    return shlex.join(["armwright", *sys.argv[1:]])
-
-
 def _print_summary(recording: "Recording", code: "Code", output: Path | None) -> None:
-    from rich.console import Console
-
-    console = Console(markup=False, highlight=False)
+    console = plain_console()
     console.print(_trace_table(recording, code))
     if recording.stages:
         console.print(_stage_table(recording, code))
@@ -245,37 +220,22 @@ def _print_summary(recording: "Recording", code: "Code", output: Path | None) ->
 
 
 def _trace_table(recording: "Recording", code: "Code") -> "Table":
-    from rich import box
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("line", justify="right", style="dim")
-    table.add_column("s", justify="right")
-    table.add_column("what happened", overflow="fold")
-    for effect in recording.effects:
-        if effect.kind != "PLACE":
-            table.add_row(str(code.source.line(effect.span.start)), f"{effect.t0:.3f}", effect.text)
-    return table
+    shown = (effect for effect in recording.effects if effect.kind != "PLACE")
+    rows = ((Text(str(code.source.line(one.span.start)), style="dim"), f"{one.t0:.3f}", one.text) for one in shown)
+    return table(("line", "s", "what happened"), rows, words=(2,))
 
 
 def _stage_table(recording: "Recording", code: "Code") -> "Table":
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("line", "stage", "s", "mm", "off mm", "peak speed", "peak effort"):
-        table.add_column(name, justify="left" if name == "stage" else "right", overflow="fold")
+    rows: list[tuple[str | Text, ...]] = []
     for stage in recording.stages:
         off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
-        table.add_row(
-            str(code.source.line(stage.span.start)),
-            f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}",
-            f"{stage.stage.trajectory.duration:.3f}",
-            f"{stage.stage.length * 1e3:.0f}",
-            off,
-            *_peaks(stage, recording),
-        )
-    return table
+        line = str(code.source.line(stage.span.start))
+        what = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}"
+        duration, length = f"{stage.stage.trajectory.duration:.3f}", f"{stage.stage.length * 1e3:.0f}"
+        rows.append((line, what, duration, length, off, *_peaks(stage, recording)))
+    return table(("line", "stage", "s", "mm", "off mm", "peak speed", "peak effort"), rows, words=(1,))
 
 
 def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
@@ -294,16 +254,11 @@ def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
 
 def _print_moment(error: "RunError", code: "Code") -> None:
     """Show where every frame was when a program could not go on."""
-    from rich import box
     from rich.console import Console
-    from rich.table import Table
 
     from armwright.cell.frames import WORLD
 
-    table = Table(title=f"frames at {error.time:.3f} s", box=box.SIMPLE_HEAD, pad_edge=False, title_justify="left")
-    table.add_column("frame")
-    table.add_column("hangs on")
-    table.add_column("x, y, z in the world, mm", justify="right")
+    rows = []
     for name in error.tree:
         if name == WORLD or name.endswith(".BASE"):
             continue
@@ -311,5 +266,7 @@ def _print_moment(error: "RunError", code: "Code") -> None:
         place = "no value yet"
         if error.tree.has_value(name):
             place = ", ".join(f"{x * 1e3:.1f}" for x in error.tree.world(name)[:3, 3])
-        table.add_row(code.spelled(name), "its base" if parent == name else code.spelled(parent), place)
-    Console(stderr=True, markup=False).print(table)
+        rows.append((code.spelled(name), "its base" if parent == name else code.spelled(parent), place))
+    columns = ("frame", "hangs on", "x, y, z in the world, mm")
+    shown = table(columns, rows, title=f"frames at {error.time:.3f} s", words=(0, 1))
+    Console(stderr=True, markup=False).print(shown)

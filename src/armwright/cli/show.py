@@ -5,6 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.options import ArmName
+from armwright.cli.printing import print_json
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
@@ -19,7 +22,7 @@ _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
 
 
 def show(
-    arm: Annotated[str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)],
+    arm: ArmName,
     as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON, in SI units.")] = False,
 ) -> None:
     """Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.
@@ -28,15 +31,13 @@ def show(
 
     **Example:** `armwright show puma560`
     """
-    import json
-
     from rich.console import Console
 
     from armwright.arm.load import load_arm
 
     model = load_arm(arm)
     if as_json:
-        print(json.dumps(_as_data(model), indent=2, ensure_ascii=False))
+        print_json(_as_data(model))
         return
     console = Console(highlight=False, markup=False, emoji=False)
     console.print(f"{model.name}: {model.title}", style="bold")

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.forward import ArmName, Json
 from armwright.cli.load import Load
+from armwright.cli.numbers import within
+from armwright.cli.options import ArmName, Json
+from armwright.cli.printing import print_json
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -48,8 +50,6 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright simulate puma560 -q 0,0,90,0,0,0 --duration 2`
     """
-    import json
-
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
     from armwright.cli.load import load_in_hand
@@ -64,8 +64,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     if load is not None:
         held = load_in_hand(load)
         model = payload(model, held.mass, held.com, held.inertia)
-    if not 0.001 <= step_ms <= 1000:
-        raise typer.BadParameter(f"expected 0.001 to 1000, got {step_ms:g}", param_hint="--step-ms")
+    within(step_ms, (0.001, 1000), "--step-ms")
     found = run(
         model,
         joint_values(model, posture, "-q"),
@@ -78,7 +77,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None:
         write_folder(output, {"motion.csv": motion_csv(found.t, found.q, found.qd, found.qdd, found.tau)})
     if as_json:
-        print(json.dumps({"status": found.status.name.lower(), "t": float(found.t[-1]), **_account(found)}, indent=2))
+        print_json({"status": found.status.name.lower(), "t": float(found.t[-1]), **_account(found)})
     else:
         _print(model, found)
 

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.forward import ArmName, Json
+from armwright.cli.options import ArmName, Json
+from armwright.cli.printing import print_json
 
 if TYPE_CHECKING:
     from armwright.arrays import Array
@@ -21,8 +22,6 @@ def singularity(
 
     **Example:** `armwright singularity puma560 -q 10,20,30,40,0,50`
     """
-    import json
-
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
     from armwright.kinematics.singularities import singularities
@@ -32,7 +31,7 @@ def singularity(
     if as_json:
         factors = {one.name: {"value": one.value, "scale": one.scale, "near": one.near} for one in found.factors}
         lists = {"singular_values": found.singular_values, "lost": found.lost, "idle": found.idle}
-        print(json.dumps({"factors": factors, **{name: values.tolist() for name, values in lists.items()}}, indent=2))
+        print_json({"factors": factors, **{name: values.tolist() for name, values in lists.items()}})
         return
     print(f"singular: {', '.join(found.near)}" if found.singular else "not singular")
     for one in found.factors:

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.printing import json_text, plain_console, print_json
+
 # By name: the module next to this one that runs, prints and draws it.
 _STUDIES = {
     "stanford-torque": "study_stanford_torque",
@@ -42,10 +44,6 @@ def study(
 
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """
-    import json
-
-    from rich.console import Console
-
     from armwright.errors import UnknownNameError
     from armwright.files.output import write_folder
 
@@ -53,13 +51,12 @@ def study(
         raise UnknownNameError("study", name, _STUDIES)
     chosen = importlib.import_module(f"armwright.cli.{_STUDIES[name]}")
     tables = chosen.tables()
-    text = json.dumps(tables, indent=2, ensure_ascii=False)
     if output is not None:
-        write_folder(output, {"tables.json": text + "\n", **chosen.figures()})
+        write_folder(output, {"tables.json": json_text(tables) + "\n", **chosen.figures()})
     if as_json:
-        print(text)
+        print_json(tables)
         return
-    console = Console(highlight=False, markup=False)
+    console = plain_console()
     for table in chosen.printed(tables):
         console.print(table)
     if output is not None:

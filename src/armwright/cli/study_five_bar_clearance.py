@@ -1,10 +1,10 @@
 """The study of the five-bar with play as ``armwright study`` shows it."""
 
-import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from armwright.cli.progress import parts
 from armwright.cli.study_tables import study_table
 from armwright.study import five_bar_clearance as study
 
@@ -15,19 +15,7 @@ if TYPE_CHECKING:
 @cache
 def _learnt() -> study.Learnt:
     """Simulate and learn, with a bar when a person watches."""
-    if not sys.stderr.isatty():
-        return study.learnt()
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        tasks: dict[str, Any] = {}
-
-        def told(what: str, part: float) -> None:
-            if what not in tasks:
-                tasks[what] = bar.add_task(what, total=1.0)
-            bar.update(tasks[what], completed=part)
-
+    with parts() as told:
         return study.learnt(told)
 
 

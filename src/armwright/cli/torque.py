@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.forward import ArmName, Json
 from armwright.cli.load import Load
+from armwright.cli.options import ArmName, Json
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -45,8 +45,8 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
 
     from armwright.arm.load import load_arm
     from armwright.arm.model import Link
-    from armwright.cli.joints import numbers
     from armwright.cli.load import load_in_hand
+    from armwright.cli.numbers import numbers
     from armwright.dynamics.terms import terms
 
     model = load_arm(arm)

@@ -124,7 +124,7 @@ def inertia_coefficients(derivatives: Derivatives) -> Matrix:
 
 
 def speed_coefficients(derivatives: Derivatives) -> Tensor:
-    """Return h, n x n x n, over abstract scalars: h[i][j][k] qd_j qd_k is a part of effort i.
+    """Return h, n x n x n, over abstract scalars: ``h[i][j][k] qd_j qd_k`` is a part of effort i.
 
     Source:
         TR-83-008 eq. (15); subroutine CALCOR.

@@ -127,13 +127,7 @@ def straight_line(
     spline, found, times = _refined(solver, line, q, deviation, turn)
     trajectory = Trajectory(times=times, coefficients=spline.joints)
     _check_positions(solver.arm, line, trajectory)
-    factor, because = _slowing(solver.arm, line, trajectory, found)
-    efforts = _efforts(solver, spline, found.looks, factor)
-    if (efforts > solver.arm.limit("effort")).any():
-        slower = slowing_for_efforts(arm, trajectory.slowed(factor))
-        factor, because = factor * slower.factor, because if slower.joint is None else ("effort", slower.joint)
-        efforts = effort_peaks(arm, trajectory.slowed(factor)).peaks
-    trajectory = trajectory.slowed(factor)
+    trajectory, slower = _kept_to_limits(arm, line, spline, found, trajectory)
     if period is not None:
         trajectory = whole_ticks(trajectory, period)
     stretch = trajectory.duration / times[-1]
@@ -154,12 +148,34 @@ def straight_line(
         peaks={
             "speed": found.speed.max(axis=0) / stretch,
             "acceleration": found.acceleration.max(axis=0) / stretch**2,
-            "effort": efforts,
+            "effort": slower.efforts,
         },
-        factor=factor,
-        because=because,
+        factor=slower.factor,
+        because=slower.because,
     )
     return CertifiedLine(trajectory=trajectory, certificate=certificate)
+
+
+class _Slower(NamedTuple):
+    """How many times slower a motion is run, for which limit of which joint, and the (n,) efforts that it takes."""
+
+    factor: float
+    because: tuple[LimitName, int] | None
+    efforts: Array
+
+
+def _kept_to_limits(
+    arm: AnyArm, line: Line, spline: Spline, found: Deviation, trajectory: Trajectory
+) -> tuple[Trajectory, _Slower]:
+    """Run a line slower until the joints keep their limits of speed, acceleration and effort."""
+    solver = solver_of(arm)
+    factor, because = _slowing(solver.arm, line, trajectory, found)
+    efforts = _efforts(solver, spline, found.looks, factor)
+    if (efforts > solver.arm.limit("effort")).any():
+        slower = slowing_for_efforts(arm, trajectory.slowed(factor))
+        factor, because = factor * slower.factor, because if slower.joint is None else ("effort", slower.joint)
+        efforts = effort_peaks(arm, trajectory.slowed(factor)).peaks
+    return trajectory.slowed(factor), _Slower(factor, because, efforts)
 
 
 def _slowing(

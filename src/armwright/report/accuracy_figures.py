@@ -15,7 +15,7 @@ from armwright.accuracy.settling import PosingTime, Settling, attained_place
 from armwright.accuracy.variation import PoseDrift, Variation
 from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array
-from armwright.report.figures import Drawing, literal, svg_text
+from armwright.report.figures import Drawing, empty_figure, literal, plain_axes, spread, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,8 +28,6 @@ _MARKS = "osD^v"
 
 def drawings(found: Assessment) -> list[Drawing]:
     """Return the figures of an assessment, in the order of its tests."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
-
     drawn: list[Drawing] = []
     for test, results in zip(found.tests, found.results, strict=True):
         of = f"{test.name}{f', {test.condition}' if test.condition else ''}"
@@ -38,7 +36,7 @@ def drawings(found: Assessment) -> list[Drawing]:
                 continue
             draw, caption = _DRAW[type(result)]
             what = "velocity" if isinstance(result, PathVelocity) else test.kind
-            figure = Figure(figsize=(7.4, 4.2), layout="constrained")
+            figure = empty_figure((7.4, 4.2))
             draw(figure, test, result)
             figure.suptitle(literal(f"{what}: {of}"))
             drawn.append(Drawing(f"{len(drawn) + 1:02d}-{what}", f"{what} {of}: {caption}", svg_text(figure)))
@@ -99,7 +97,7 @@ def _settling(figure: "Figure", test: PathTest, result: Settling | PosingTime) -
     axis = _axes(figure, "time, s", "distance from the attained place, mm")
     for j, run in enumerate(test.runs):
         t = run.timed("settling")
-        some = _some(len(t))
+        some = spread(len(t), _DRAWN)
         distances = np.linalg.norm(run.places - attained_place(run), axis=1)[some] * 1e3
         axis.plot(t[some], np.maximum(distances, result.band * 1e1), linewidth=1.1, label=f"cycle {j + 1}")
         if isinstance(result, Settling):
@@ -163,19 +161,13 @@ def _compliance(figure: "Figure", _test: PoseTest, result: StaticCompliance) -> 
 
 def _lines(axis: "Axes", runs: Sequence[Array]) -> None:
     for number, run in enumerate(runs):
-        axis.plot(*run[_some(len(run))].T, linewidth=1.0, color=f"C{number % 10}")
+        axis.plot(*run[spread(len(run), _DRAWN)].T, linewidth=1.0, color=f"C{number % 10}")
 
 
-def _axes(figure: "Figure", x: str, y: str) -> Any:
-    axis = figure.subplots()
-    axis.set(xlabel=x, ylabel=y)
-    axis.grid(visible=True, alpha=0.3)
+def _axes(figure: "Figure", x: str, y: str) -> "Axes":
+    axis = plain_axes(figure, x, y)
     axis.ticklabel_format(useOffset=False)
     return axis
-
-
-def _some(count: int) -> Array:
-    return np.unique(np.linspace(0, count - 1, _DRAWN).astype(int))
 
 
 # How each result is drawn, and what the figure shows.

@@ -1,9 +1,6 @@
 """The page of an assessment by ISO 9283: all measures in a table, what was reduced, and the figures."""
 
-import html
-from collections.abc import Iterator, Sequence
-from importlib.resources import files
-from string import Template
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +8,7 @@ import numpy as np
 from armwright.accuracy.assess import Assessment
 from armwright.accuracy.measures import Measure
 from armwright.report.figures import Drawing
-from armwright.version import __version__
+from armwright.report.plain_page import Table, plain_page
 
 # Units in which people read what is in SI units: name and how many of it are one.
 _SHOWN = {
@@ -22,8 +19,6 @@ _SHOWN = {
     "m/N": ("mm/N", 1e3),
     "": ("%", 100.0),
 }
-# Columns of the table that hold numbers.
-_NUMBERS = {4, 6, 7}
 # How many tests a note names.
 _NAMED = 4
 
@@ -93,33 +88,28 @@ def accuracy_page(found: Assessment, drawn: Sequence[Drawing], *, title: str, co
     Returns:
         HTML text; write it as UTF-8.
     """
-    assets = files("armwright.report") / "assets"
     bounded = [one.holds for one in found.measures if one.holds is not None]
-    verdict = ""
-    if bounded:
-        kept = all(bounded)
-        said = "all limits hold" if kept else "limit exceeded"
-        verdict = f'<span class="badge{" good" if kept else ""}">{said}</span>'
-    return Template((assets / "accuracy.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title),
-        style=(assets / "run.css").read_text(encoding="utf-8"),
-        verdict=verdict,
-        notes="".join(f'<li class="warning"><b>Note</b>{html.escape(note)}</li>' for note in notes_of(found)),
-        rows="\n".join(_rows(found.measures)),
-        figures="\n".join(one.element for one in drawn),
-        generated=html.escape(f"armwright {__version__}: {command}"),
+    kept = all(bounded)
+    seen = [shown_measure(one) for one in found.measures]
+    measures = Table(
+        title="Measures",
+        remark="n: cycles measured, of those that ISO 9283 asks for",
+        heads=("Test", "Of", "Symbol", "Measure", "Value", "Unit", "n", "Limit", "Note"),
+        rows=map(_row, found.measures, seen),
+        numbers=(4, 6, 7),
+        marks=[{"exceeds": "over"}.get(one.verdict, one.verdict) for one in seen],
+    )
+    return plain_page(
+        title=title,
+        command=command,
+        tables=[measures],
+        drawn=drawn,
+        notes=notes_of(found),
+        verdict=("all limits hold" if kept else "limit exceeded", kept) if bounded else None,
     )
 
 
-def _rows(measures: Sequence[Measure]) -> Iterator[str]:
-    for one in measures:
-        seen = shown_measure(one)
-        of = f"{one.name}, {one.condition}" if one.condition else one.name
-        mark = {"exceeds": ' class="over"', "holds": ' class="holds"'}.get(seen.verdict, "")
-        note = " ".join(filter(None, (seen.verdict, one.note)))
-        texts = (one.test, of, one.symbol, one.what, seen.value, seen.unit, seen.cycles, seen.limit, note)
-        cells = (
-            f'<td class="number">{html.escape(text)}</td>' if place in _NUMBERS else f"<td>{html.escape(text)}</td>"
-            for place, text in enumerate(texts)
-        )
-        yield f"<tr{mark}>{''.join(cells)}</tr>"
+def _row(one: Measure, seen: Shown) -> tuple[str, ...]:
+    of = f"{one.name}, {one.condition}" if one.condition else one.name
+    note = " ".join(filter(None, (seen.verdict, one.note)))
+    return one.test, of, one.symbol, one.what, seen.value, seen.unit, seen.cycles, seen.limit, note

@@ -1,15 +1,12 @@
 """Figures of linkages with play beyond one run: features over clearances, paths as they are and corrected."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.report.figures import svg_text
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from armwright.report.figures import empty_figure, svg_text
 
 
 def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> str:
@@ -25,7 +22,7 @@ def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> 
     Returns:
         An SVG file's text.
     """
-    figure = _figure((6.6, 5.0))
+    figure = empty_figure((6.6, 5.0))
     axis: Any = figure.add_subplot(projection="3d")
     X, Y = np.meshgrid(x, y, indexing="ij")
     axis.plot_surface(X, Y, z, cmap="viridis", alpha=0.85, linewidth=0.3, edgecolor="0.35")
@@ -59,7 +56,7 @@ def marked_curves(
     Returns:
         An SVG file's text.
     """
-    figure = _figure((7.2, 4.2))
+    figure = empty_figure((7.2, 4.2))
     axis = figure.subplots()
     for name, y in lines.items():
         axis.plot(x, y, linewidth=1.3, label=name)
@@ -86,7 +83,7 @@ def lines_of_spectrum(title: str, frequencies: Array, spectra: Mapping[str, Arra
     Returns:
         An SVG file's text.
     """
-    figure = _figure((7.2, 2.3 * len(spectra) + 0.8))
+    figure = empty_figure((7.2, 2.3 * len(spectra) + 0.8))
     panels = figure.subplots(len(spectra), sharex=True, squeeze=False)[:, 0]
     for axis, (name, values) in zip(panels, spectra.items(), strict=True):
         axis.vlines(frequencies, 0, values, color="C0", linewidth=1.6)
@@ -110,7 +107,7 @@ def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array)
     Returns:
         An SVG file's text.
     """
-    figure = _figure((4.6 * len(panels) + 0.6, 6.4))
+    figure = empty_figure((4.6 * len(panels) + 0.6, 6.4))
     near = len(targets)
     grid = figure.add_gridspec(2, len(panels) * near, height_ratios=(1.7, 1.0))
     for i, (name, lines) in enumerate(panels.items()):
@@ -142,9 +139,3 @@ def _plane(axis: Any, lines: Mapping[str, Array], targets: Array) -> None:
         axis.plot(*places.T, style, linewidth=1.2, label=name)
     axis.plot(*targets.T, "r+", markersize=9, label="targets")
     axis.grid(visible=True, alpha=0.3)
-
-
-def _figure(size: tuple[float, float]) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
-
-    return Figure(figsize=size, layout="constrained")

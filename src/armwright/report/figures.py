@@ -4,11 +4,14 @@ import base64
 import html
 import io
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from armwright.arrays import Array
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Line styles in the order of the curves: the first is the reference, the others are told apart without colour too.
@@ -50,9 +53,7 @@ def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_
     Returns:
         An SVG file's text.
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
-
-    figure = Figure(figsize=(7, 4.2), layout="constrained")
+    figure = empty_figure((7, 4.2))
     axes = figure.subplots()
     for i, (name, y) in enumerate(lines.items()):
         axes.plot(x, y, _STYLES[i % len(_STYLES)], label=name, linewidth=1.6)
@@ -78,9 +79,7 @@ def bars(
     Returns:
         An SVG file's text.
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
-    figure = Figure(figsize=(7.6, 4.2), layout="constrained")
+    figure = empty_figure((7.6, 4.2))
     axes = figure.subplots()
     width = 0.8 / len(values)
     for i, (name, heights) in enumerate(values.items()):
@@ -91,6 +90,45 @@ def bars(
     axes.grid(visible=True, axis="y", alpha=0.3)
     figure.legend(fontsize="small", loc="outside lower center", ncols=len(values))
     return svg_text(figure)
+
+
+def empty_figure(size: tuple[float, float]) -> "Figure":
+    """Return a figure of this width and height [inch], whose parts keep out of each other's way."""
+    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
+
+    return Figure(figsize=size, layout="constrained")
+
+
+def plain_axes(figure: "Figure", x: str, y: str) -> "Axes":
+    """Return the one pair of axes of a figure, with their names and units, and a grid."""
+    axes = figure.subplots()
+    axes.set(xlabel=x, ylabel=y)
+    axes.grid(visible=True, alpha=0.3)
+    return axes
+
+
+def equal_scales(axes: Any, low: Array, high: Array, *, least: float = 0.0) -> float:
+    """Show the same length along x, y and z, so that right angles look like right angles.
+
+    Args:
+        axes: in space.
+        low: (3,) smallest places.
+        high: (3,) largest places.
+        least: half of the length that is shown at least.
+
+    Returns:
+        Half of the length that is shown.
+    """
+    middle, half = (low + high) / 2, max(float((high - low).max()) / 2, least)
+    for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
+        set_limits(centre - half, centre + half)
+    axes.set_box_aspect((1, 1, 1))
+    return half
+
+
+def spread(count: int, most: int) -> Array:
+    """Return the numbers of so many rows at most, evenly spread over all, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, most).astype(int))
 
 
 def svg_text(figure: "Figure") -> str:

@@ -12,7 +12,7 @@ from armwright.clearance.five_bar_workspace import Workspace, singular_curves, s
 from armwright.clearance.ideal import tip_of
 from armwright.clearance.preparing import Task
 from armwright.errors import InvalidValueError, one_of
-from armwright.report.figures import Drawing, svg_text
+from armwright.report.figures import Drawing, empty_figure, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,10 +37,8 @@ def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = 
         UnknownNameError: there is no such mode.
         InvalidValueError: its arms never meet, or a path starts out of reach.
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
-
     one_of("assembly mode", mode, MODES)
-    figure = Figure(figsize=(7.4, 6.6), layout="constrained")
+    figure = empty_figure((7.4, 6.6))
     axis = figure.subplots()
     space = workspace(bar, _CELLS)
     edges = [np.append(x, 2 * x[-1] - x[-2]) - (x[1] - x[0]) / 2 for x in (space.x * 1e3, space.y * 1e3)]

@@ -3,7 +3,7 @@
 import html
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from string import Template
 
@@ -18,27 +18,56 @@ _DIGITS, _DIGITS_OF_SCALARS = 5, 8
 _DECIMALS = 7
 # A row of a track that equals the one before it is written as this.
 _REPEATED = 0
-# In the order in which the browser reads them: each uses only what stands before it.
-_SCRIPTS = (
-    "basics.js", "clock.js", "scene.js", "camera.js", "solids.js", "view.js", "charts.js", "lists.js", "run.js",
-)  # fmt: skip
+_NO_SCRIPTS = (
+    '<noscript><p class="empty">This page draws with a script of its own; please allow scripts for it.</p></noscript>'
+)
 
 
-def run_html(title: str, data: object) -> str:
-    """Return the page of a run, with title, style, scripts and data put in.
+def page_html(
+    *,
+    title: str,
+    main: str,
+    generated: str,
+    badge: str = "",
+    facts: str = "",
+    notes: str = "",
+    styles: Sequence[str] = (),
+    scripts: Sequence[str] = (),
+    data: object = None,
+) -> str:
+    """Return a whole page: one head and one heading for all, and below them what each has of its own.
 
     Args:
         title: plain text.
+        main: HTML text of the page's own parts.
+        generated: plain text, what made it.
+        badge: HTML text beside the heading, and so are the facts and notes below it.
+        facts: names and texts.
+        notes: items of a list.
+        styles: names of style sheets beyond the common one.
+        scripts: names of the page's scripts, in the order in which the browser reads them: each uses only what stands
+            before it. A page with scripts has a clock.
         data: what the scripts read: attrs objects, mappings, sequences, arrays, strings, numbers, None.
 
     Returns:
         HTML text.
     """
-    return Template(asset("run.html")).substitute(
+    film = ""
+    if scripts:
+        script = "\n".join(asset(name) for name in ("basics.js", "clock.js", *scripts))
+        film = Template(asset("film.html")).substitute(data=json_text(data), script=script)
+        styles = ("film.css", *styles)
+    return Template(asset("page.html")).substitute(
         title=html.escape(title),
-        style=asset("run.css"),
-        script="\n".join(asset(name) for name in _SCRIPTS),
-        data=json_text(data),
+        script_policy="script-src 'unsafe-inline'; " if scripts else "",
+        style="\n".join(asset(name) for name in ("page.css", *styles)),
+        badge=badge,
+        facts=facts,
+        notes=notes,
+        before=_NO_SCRIPTS if scripts else "",
+        main=main,
+        generated=html.escape(generated),
+        after=film,
     )
 
 

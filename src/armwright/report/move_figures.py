@@ -1,6 +1,5 @@
 """Printed figures of a move: joints and hand over time, and the path of the hand in space with its approach vectors."""
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,10 +8,10 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.motion.hand_path import zyz_angles
 from armwright.motion.trajectory import Samples
+from armwright.report.figures import empty_figure, equal_scales, spread, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
 # Approach vectors along a path, and their length as a part of its extent.
@@ -49,7 +48,7 @@ def panels(
         An SVG file's text.
     """
     rows = -(-len(shown) // columns)
-    figure = _figure((6.8 * columns, 1.1 + 2.1 * rows))
+    figure = empty_figure((6.8 * columns, 1.1 + 2.1 * rows))
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axis, panel in zip(grid.T.flat, shown, strict=False):
         draw_curves(axis, t, panel)
@@ -63,7 +62,7 @@ def panels(
     for axis in grid[-1]:
         axis.set_xlabel("time, s")
     figure.suptitle(title)
-    return _svg(figure)
+    return svg_text(figure)
 
 
 def path_in_space(title: str, X: Array, marks: Mapping[str, Array]) -> str:
@@ -77,10 +76,10 @@ def path_in_space(title: str, X: Array, marks: Mapping[str, Array]) -> str:
     Returns:
         An SVG file's text.
     """
-    figure = _figure((6.4, 5.6))
+    figure = empty_figure((6.4, 5.6))
     draw_path(figure.add_subplot(projection="3d"), X, marks)
     figure.suptitle(title)
-    return _svg(figure)
+    return svg_text(figure)
 
 
 def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapping[str, Array]) -> str:
@@ -96,14 +95,14 @@ def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapp
     Returns:
         An SVG file's text.
     """
-    figure = _figure((10.4, 7.6))
+    figure = empty_figure((10.4, 7.6))
     for place, panel in enumerate(three):
         axis = figure.add_subplot(2, 2, place + 1)
         draw_curves(axis, t, panel)
         axis.set_xlabel("time, s")
     draw_path(figure.add_subplot(2, 2, 4, projection="3d"), X, marks)
     figure.suptitle(title)
-    return _svg(figure)
+    return svg_text(figure)
 
 
 def joint_panels(samples: Samples, revolute: Sequence[bool]) -> list[Panel]:
@@ -155,7 +154,7 @@ def draw_curves(axis: "Axes", t: Array, panel: Panel) -> None:
 def draw_path(axis: Any, X: Array, marks: Mapping[str, Array]) -> None:
     """Draw a path in space with its approach vectors."""
     p = X[:, :3, 3] * 100
-    some = np.unique(np.linspace(0, len(X) - 1, _ARROWS).astype(int))
+    some = spread(len(X), _ARROWS)
     extent = float(np.ptp(p, axis=0).max()) or 1.0
     a = X[some, :3, 2] * _ARROW_LENGTH * extent
     axis.plot(*p.T, linewidth=2.0, color="C0")
@@ -166,25 +165,5 @@ def draw_path(axis: Any, X: Array, marks: Mapping[str, Array]) -> None:
         axis.text(x, y, z, f"  {name}", color="C3")
     tips = p[some] + a
     low, high = np.minimum(p.min(axis=0), tips.min(axis=0)), np.maximum(p.max(axis=0), tips.max(axis=0))
-    middle, half = (low + high) / 2, max(float((high - low).max()) / 2, 1e-3)
-    # Equal scales, so that right angles look like right angles.
-    for set_limits, centre in zip((axis.set_xlim, axis.set_ylim, axis.set_zlim), middle, strict=True):
-        set_limits(centre - half, centre + half)
-    axis.set_box_aspect((1, 1, 1))
+    equal_scales(axis, low, high, least=1e-3)
     axis.set(xlabel="x, cm", ylabel="y, cm", zlabel="z, cm")
-
-
-def _figure(size: tuple[float, float]) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
-
-    return Figure(figsize=size, layout="constrained")
-
-
-def _svg(figure: "Figure") -> str:
-    import matplotlib as mpl  # noqa: PLC0415
-
-    text = io.StringIO()
-    # Without a date and with fixed names of its parts, a figure changes only when its numbers do.
-    with mpl.rc_context({"svg.hashsalt": "armwright"}):
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()

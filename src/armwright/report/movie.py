@@ -11,6 +11,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.kinematics.forward import link_poses
 from armwright.motion.moves import Move
+from armwright.report.figures import equal_scales
 from armwright.report.sticks import skeleton_of
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ _SIZE, _DPI = (4.8, 4.4), 100
 _APPROACH = 0.25
 
 
-def films(move: Move, watch: Callable[[int, int], None] = lambda _done, _of: None) -> dict[str, bytes]:
+def films(move: Move, watch: Callable[[int, int], None] | None = None) -> dict[str, bytes]:
     """Return films of a move by the name of their file: a GIF, and an MP4 where ffmpeg is installed.
 
     Args:
@@ -47,7 +48,8 @@ def films(move: Move, watch: Callable[[int, int], None] = lambda _done, _of: Non
             show(i)
             for writer in writers.values():
                 writer.grab_frame()
-            watch(i + 1, count)
+            if watch is not None:
+                watch(i + 1, count)
         for writer in writers.values():
             writer.finish()
         return {name: (Path(folder) / name).read_bytes() for name in writers}
@@ -69,10 +71,7 @@ def _stage(points: Array, hand: Array, move: Move) -> "tuple[Figure, Callable[[i
     axis: Any = figure.add_axes((0, 0, 1, 1), projection="3d")
     cm = points * 100
     low, high = cm.min(axis=(0, 1)), cm.max(axis=(0, 1))
-    middle, half = (low + high) / 2, float((high - low).max()) / 2
-    for set_limits, centre in zip((axis.set_xlim, axis.set_ylim, axis.set_zlim), middle, strict=True):
-        set_limits(centre - half, centre + half)
-    axis.set_box_aspect((1, 1, 1))
+    half = equal_scales(axis, low, high)
     axis.tick_params(labelsize=7)
     axis.plot(*(move.poses[:, :3, 3] * 100).T, "o", color="C3", markersize=5)
     (trail,) = axis.plot([], [], [], color="C1", linewidth=1.6)

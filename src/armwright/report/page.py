@@ -5,7 +5,7 @@ style, its script and its numbers, and asks nothing of any network.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal, TypeAlias
 
 import attrs
@@ -13,7 +13,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
-from armwright.report.markup import run_html
+from armwright.report.elements import badge, facts
+from armwright.report.markup import asset, page_html
 from armwright.report.tracks import axes, check_rows, instants, numbers, path, per_joint, poses, rotations, skeleton
 
 Severity: TypeAlias = Literal["error", "warning", "note"]
@@ -21,6 +22,7 @@ StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"
 TextKind: TypeAlias = Literal["Program", "Poses"]
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
 
+_SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "joint_charts.js", "lists.js", "run.js")
 _SAME = attrs.cmp_using(eq=np.array_equal)
 
 
@@ -307,4 +309,23 @@ def run_page(data: RunPage) -> str:
     Returns:
         HTML text; write it as UTF-8.
     """
-    return run_html(data.title, data)
+    return page_html(
+        title=data.title,
+        badge=badge(data.status, good=data.status == "finished"),
+        facts=facts(_facts(data)),
+        main=asset("run.html"),
+        styles=("run.css",),
+        scripts=_SCRIPTS,
+        data=data,
+        generated=f"Made by {data.generated_by}",
+    )
+
+
+def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
+    yield "Duration", f"{data.duration:.2f} s"
+    if data.arms:
+        yield "Arms", ", ".join(f"{arm.name} ({arm.model})" for arm in data.arms)
+    if data.cell_name:
+        yield "Cell", data.cell_name
+    yield data.text_kind, data.program_name
+    yield "Command", data.command

@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armwright.arrays import Array
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_of
-from armwright.report.figures import Drawing, literal, svg_text
+from armwright.report.figures import Drawing, empty_figure, literal, plain_axes, spread, svg_text
 from armwright.report.rattling import Run
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # The largest error is drawn as this part of the size of the path, and no curve with more points than this.
@@ -32,8 +30,6 @@ _HIGHEST = 200.0
 
 def rattling_figures(run: Run) -> list[Drawing]:
     """Return the figures of a run: path, bearings, error, forces, energy, spectrum."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
-
     drawn = []
     times = magnification(run)
     pins = len(run.simulation.task.linkage.pins)
@@ -45,7 +41,7 @@ def rattling_figures(run: Run) -> list[Drawing]:
         ("forces", _forces, (7.4, 4.2), "Forces between journals and bearings; a gap in a curve: the journal flies"),
         ("energy", _energy, (7.4, 4.2), "What impacts and friction have taken, and what the books lack"),
     ):
-        figure = Figure(figsize=size, layout="constrained")
+        figure = empty_figure(size)
         draw(figure, run)
         drawn.append(Drawing(name, caption, svg_text(figure)))
     return drawn
@@ -68,7 +64,7 @@ def round_number(x: float) -> float:
 
 def _path(figure: "Figure", run: Run) -> None:
     simulation, times = run.simulation, magnification(run)
-    some = _some(run.rows)
+    some = spread(run.rows, _DRAWN)
     ideal = (simulation.tip[: run.rows] - run.error)[some] * 1e3
     taken = ideal + times * run.error[some] * 1e3
     width, height = np.ptp(np.concatenate([ideal, taken]), axis=0)
@@ -91,7 +87,7 @@ def _bearings(figure: "Figure", run: Run) -> None:
     from matplotlib.collections import LineCollection  # noqa: PLC0415
     from matplotlib.patches import Circle  # noqa: PLC0415
 
-    pins, some = run.simulation.task.linkage.pins, _some(run.rows)
+    pins, some = run.simulation.task.linkage.pins, spread(run.rows, _DRAWN)
     panels = figure.subplots(1, len(pins), squeeze=False)[0]
     # Each piece begins where the one before it ends.
     cuts = np.unique(np.linspace(0, len(some) - 1, _PIECES + 1).astype(int))
@@ -114,7 +110,7 @@ def _bearings(figure: "Figure", run: Run) -> None:
 
 
 def _error(figure: "Figure", run: Run) -> None:
-    axis, some = _axes(figure, "time, s", "error, mm"), _some(run.rows)
+    axis, some = plain_axes(figure, "time, s", "error, mm"), spread(run.rows, _DRAWN)
     t = run.time[some]
     lines = (("E", run.distance, "-", "C0"), ("x", run.error[:, 0], "--", "C1"), ("y", run.error[:, 1], "-.", "C2"))
     for name, values, style, colour in lines:
@@ -126,7 +122,7 @@ def _error(figure: "Figure", run: Run) -> None:
 
 
 def _spectrum(figure: "Figure", run: Run) -> None:
-    axis = _axes(figure, "frequency, Hz", "amplitude, mm")
+    axis = plain_axes(figure, "frequency, Hz", "amplitude, mm")
     waves = spectrum(run.distance) * 1e3
     per_line = 1.0 / (len(run.time) * (run.time[1] - run.time[0])) if len(run.time) > 1 else 1.0
     frequencies = per_line * np.arange(len(waves))
@@ -138,7 +134,7 @@ def _spectrum(figure: "Figure", run: Run) -> None:
 
 
 def _forces(figure: "Figure", run: Run) -> None:
-    axis, some = _axes(figure, "time, s", "force, N"), _some(run.rows)
+    axis, some = plain_axes(figure, "time, s", "force, N"), spread(run.rows, _DRAWN)
     for i, pin in enumerate(run.simulation.task.linkage.pins):
         forces = run.simulation.forces[: run.rows, i][some]
         axis.plot(
@@ -154,7 +150,7 @@ def _forces(figure: "Figure", run: Run) -> None:
 
 
 def _energy(figure: "Figure", run: Run) -> None:
-    axis, some, energy = _axes(figure, "time, s", "energy, J"), _some(run.rows), run.energy
+    axis, some, energy = plain_axes(figure, "time, s", "energy, J"), spread(run.rows, _DRAWN), run.energy
     for name, track, style in (
         ("lost in impacts", energy.impact_loss, "-"),
         ("lost in friction", energy.friction_loss, "--"),
@@ -163,14 +159,3 @@ def _energy(figure: "Figure", run: Run) -> None:
     ):
         axis.plot(run.time[some], track[: run.rows][some], style, linewidth=1.4, label=name)
     axis.legend(fontsize="small")
-
-
-def _axes(figure: "Figure", x: str, y: str) -> "Axes":
-    axis = figure.subplots()
-    axis.set(xlabel=x, ylabel=y)
-    axis.grid(visible=True, alpha=0.3)
-    return axis
-
-
-def _some(count: int) -> Array:
-    return np.unique(np.linspace(0, count - 1, _DRAWN).astype(int))

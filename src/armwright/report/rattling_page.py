@@ -3,7 +3,6 @@
 The page is one HTML file that needs no other. Its arrays carry their unit in their name.
 """
 
-import html
 from collections.abc import Iterator, Mapping, Sequence
 from string import Template
 from typing import Any
@@ -14,18 +13,22 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.ideal import point_of
 from armwright.clearance.linkage import GROUND, Guide, Linkage, Pin, Place
+from armwright.report.elements import badge, facts, figures, pairs, table
+from armwright.report.elements import notes as shown_notes
 from armwright.report.figures import Drawing
-from armwright.report.markup import asset, json_text
+from armwright.report.markup import asset, page_html
 from armwright.report.rattling import Run, newtons, notes, summary
 from armwright.report.rattling_figures import round_number
 from armwright.version import __version__
 
 # Rows that a page carries at most, and the largest error on the screen as a part of the size of the linkage.
 _ROWS, _SHOWN = 2600, 0.09
-_SCRIPTS = ("basics.js", "clock.js", "plane.js", "bearings.js", "traces.js", "rattling.js")
+_SCRIPTS = ("plane.js", "bearings.js", "charts.js", "rattling_charts.js", "rattling.js")
 _MICRO = 1e6
 # Figures that the page has no chart of its own for.
 _PRINTED = ("path", "bearings", "spectrum", "workspace")
+_PIN_HEADS = ("Pin", "Clearance mm", "Peak N", "Mean N", "Impacts", "In flight %", "Deepest µm")
+_TARGET_HEADS = ("Error at", "x mm", "y mm", "Distance mm", "Nearest approach mm")
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -122,21 +125,22 @@ def rattling_page(run: Run, drawn: Sequence[Drawing], *, title: str, command: st
         HTML text; write it as UTF-8.
     """
     told = summary(run)
-    return Template(asset("rattling.html")).substitute(
-        title=html.escape(title),
-        style=asset("run.css") + asset("rattling.css"),
-        status=html.escape(told["status"]),
-        good=" good" if run.finished else "",
-        facts="".join(_fact(name, text) for name, text in _facts(told, command)),
-        notes="".join(f'<li class="warning"><b>Note</b>{html.escape(note)}</li>' for note in notes(run)),
-        pins="\n".join(_pin_rows(told)),
-        targets="\n".join(_target_rows(told)),
-        totals="".join(_pair(name, text) for name, text in _totals(told)),
-        settings="".join(_pair(name, text) for name, text in _settings(told)),
-        figures="\n".join(one.element for one in drawn if one.name in _PRINTED),
-        data=json_text(film(run)),
-        script="\n".join(asset(name) for name in _SCRIPTS),
-        generated=html.escape(f"armwright {__version__}: {command}"),
+    return page_html(
+        title=title,
+        badge=badge(told["status"], good=run.finished),
+        facts=facts(_facts(told, command)),
+        notes=shown_notes(notes(run)),
+        main=Template(asset("rattling.html")).substitute(
+            pins=table(_PIN_HEADS, _pin_rows(told), numbers=range(1, 7)),
+            targets=table(_TARGET_HEADS, _target_rows(told), numbers=range(1, 5)),
+            totals=pairs(_totals(told)),
+            settings=pairs(_settings(told)),
+            figures=figures(one for one in drawn if one.name in _PRINTED),
+        ),
+        styles=("rattling.css",),
+        scripts=_SCRIPTS,
+        data=film(run),
+        generated=f"armwright {__version__}: {command}",
     )
 
 
@@ -192,9 +196,10 @@ def _facts(told: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
     yield "Command", command
 
 
-def _pin_rows(told: Mapping[str, Any]) -> Iterator[str]:
+def _pin_rows(told: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     for name, pin in told["pins"].items():
-        numbers = (
+        yield (
+            name,
             f"{pin['clearance'] * 1e3:.4g}",
             newtons(pin["peak_force"]),
             f"{pin['mean_force']:.4g}",
@@ -202,14 +207,12 @@ def _pin_rows(told: Mapping[str, Any]) -> Iterator[str]:
             f"{100 * pin['flight']:.3g}",
             f"{pin['deepest'] * 1e6:.3g}",
         )
-        yield _row(name, numbers)
 
 
-def _target_rows(told: Mapping[str, Any]) -> Iterator[str]:
+def _target_rows(told: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     for one in told["targets"]:
         lengths = (one["error_x"], one["error_y"], one["distance"], one["nearest"])
-        numbers = ("" if length is None else f"{length * 1e3:.4f}" for length in lengths)
-        yield _row(f"{one['time']:.4g} s", numbers)
+        yield f"{one['time']:.4g} s", *("" if length is None else f"{length * 1e3:.4f}" for length in lengths)
 
 
 def _totals(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -240,17 +243,3 @@ def _settings(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     radii = ", ".join(f"{name} {radius * 1e3:g}" for name, radius in how["journal_radius"].items())
     yield "Radius of the journals", f"{radii} mm"
     yield "Versions", ", ".join(f"{name} {version}" for name, version in told["versions"].items())
-
-
-def _fact(name: str, text: str) -> str:
-    code = ' class="code"' if name == "Command" else ""
-    return f"<div><dt>{name}</dt><dd{code}>{html.escape(text)}</dd></div>"
-
-
-def _pair(name: str, text: str) -> str:
-    return f"<dt>{html.escape(name)}</dt><dd>{html.escape(text)}</dd>"
-
-
-def _row(name: str, numbers: Sequence[str] | Iterator[str]) -> str:
-    cells = "".join(f'<td class="number">{html.escape(number)}</td>' for number in numbers)
-    return f"<tr><td>{html.escape(name)}</td>{cells}</tr>"

@@ -1,74 +1,35 @@
-// Charts: four quantities of one arm over time, either all joints in % of their limits or one joint in its units.
+// Charts over time: scales, curves, a cursor at the present instant, and a tip under the pointer. What a chart shows is
+// the page's own:
+//   label, heading: for those who hear the page, and what stands above the chart
+//   span(), powers: lowest and highest value, and whether they are on a scale of powers of ten
+//   unitOfTime: SECONDS or MILLISECONDS
+//   lines(): the curves: times, values, colour and dash of each
+//   paint(ink, axes), below: what lies under the curves, and the room it takes below them [pixels]
+//   tipAt(t): what is said of an instant; nothing where there is nothing to say
 
-const MARGIN = { left: 46, right: 8, top: 8, bottom: 20 };
-const hidden = new Set();
-let scale = "all"; // or the index of a joint
+const MARGIN = { left: 50, right: 10, top: 8, bottom: 20 };
+// Units of the axis of time: how many of it are a second, its name, the room for a number, and whether it has rules.
+const SECONDS = { many: 1, name: "s", room: 55, rules: false };
+const MILLISECONDS = { many: 1000, name: "ms", room: 70, rules: true };
 let charts = [];
 
-const chosenArm = () => data.arms[now.arm];
-
-function largest(rows, j) {
-  return rows.reduce((most, row) => Math.max(most, Math.abs(row[j])), 0);
-}
-
-// What is drawn of one joint: its curve and its limits in the scale of the chart.
-function curveOf(quantity, arm, j) {
-  const [joint, rows] = [arm.joints[j], arm[quantity.key]];
-  if (scale !== "all") {
-    const factor = unitFactor(quantity, joint);
-    return {
-      j,
-      values: rows.map((row) => row[j] * factor),
-      limits: limitsOf(quantity, joint)
-        .filter((v) => v !== null)
-        .map((v) => v * factor),
-    };
-  }
-  if (share(quantity, joint, 0) !== null)
-    return { j, values: rows.map((row) => 100 * share(quantity, joint, row[j])), limits: [-100, 100] };
-  const most = largest(rows, j) || 1;
-  return { j, values: rows.map((row) => (100 * row[j]) / most), limits: [], free: true };
-}
-
-function spanOf(curves) {
-  const values = curves.flatMap((curve) => curve.values);
-  let [low, high] = values.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [0, 0]);
-  if (scale === "all") return [Math.min(low, -100) * 1.08, Math.max(high, 100) * 1.22];
-  // A limit far away would press the curve flat; it is named above the chart instead.
-  const reach = Math.max(-low, high) || 1;
-  for (const limit of curves.flatMap((curve) => curve.limits)) {
-    if (Math.abs(limit) < 2.5 * reach) [low, high] = [Math.min(low, limit), Math.max(high, limit)];
-  }
-  const pad = 0.08 * (high - low || 1);
-  return [low - pad, high + 2 * pad];
-}
-
-function curvesOf(quantity) {
-  const arm = chosenArm();
-  return arm.joints
-    .map((_, j) => j)
-    .filter((j) => (scale === "all" ? !hidden.has(j) : j === scale))
-    .map((j) => curveOf(quantity, arm, j));
-}
-
-function axesOf(chart, width, height) {
-  const [low, high] = spanOf(chart.curves);
-  const [x0, y0, w, h] = [
-    MARGIN.left,
-    MARGIN.top,
-    width - MARGIN.left - MARGIN.right,
-    height - MARGIN.top - MARGIN.bottom,
-  ];
+function axesOf({ span, powers = false, below = 0 }, width, height) {
+  const [low, high] = span();
+  const [x0, y0] = [MARGIN.left, MARGIN.top];
+  const [w, h] = [width - x0 - MARGIN.right, height - y0 - MARGIN.bottom - below];
   const lasts = data.duration || 1;
+  const part = powers ? (v) => Math.log(high / v) / Math.log(high / low) : (v) => (high - v) / (high - low);
   return {
     low,
     high,
+    powers,
     x0,
     y0,
     w,
     h,
+    foot: y0 + h + below,
     x: (t) => x0 + (t / lasts) * w,
-    y: (v) => y0 + ((high - v) / (high - low)) * h,
+    y: (v) => y0 + Math.min(1.05, part(v)) * h,
     t: (x) => ((x - x0) / w) * lasts,
   };
 }
@@ -84,94 +45,86 @@ function rule(ink, x0, y0, x1, y1, colour, dash = []) {
   ink.setLineDash([]);
 }
 
-function drawScales(ink, axes) {
-  const { low, high, x0, y0, w, h } = axes;
+const decimalsOf = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+
+// Values to write at an axis: [value, text, whether it is 0].
+function marksOf({ low, high, powers }) {
+  const marks = [];
+  if (powers) {
+    for (let k = Math.ceil(Math.log10(low)); k <= Math.log10(high); k++)
+      marks.push([10 ** k, String(Number((10 ** k).toPrecision(3))), false]);
+    return marks;
+  }
+  const step = roundStep(high - low, 5);
+  for (let v = Math.ceil(low / step) * step; v <= high; v += step)
+    marks.push([v, number(v, decimalsOf(step)), Math.abs(v) < step / 2]);
+  return marks;
+}
+
+function drawScales(ink, axes, unit) {
+  const { x0, y0, w, foot } = axes;
   ink.font = "11px system-ui, sans-serif";
   ink.fillStyle = colours.quiet;
-  const step = roundStep(high - low, 5);
-  const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   ink.textAlign = "right";
-  for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
+  for (const [v, text, isZero] of marksOf(axes)) {
     const y = Math.round(axes.y(v)) + 0.5;
-    rule(ink, x0, y, x0 + w, y, Math.abs(v) < step / 2 ? colours.line : colours.faint);
-    ink.fillText(number(v, decimals), x0 - 6, y + 4);
+    rule(ink, x0, y, x0 + w, y, isZero ? colours.line : colours.faint);
+    ink.fillText(text, x0 - 6, y + 4);
   }
-  const lasts = data.duration || 1;
-  const second = roundStep(lasts, Math.max(2, w / 55));
+  const lasts = (data.duration || 1) * unit.many;
+  const step = roundStep(lasts, Math.max(2, w / unit.room));
   ink.textAlign = "center";
-  for (let t = 0; t <= lasts * 1.0001; t += second) {
-    const text = number(t, second < 1 ? (second < 0.1 ? 2 : 1) : 0);
-    ink.fillText(t ? text : "0 s", Math.min(axes.x(t), x0 + w - 8), y0 + h + 15);
+  for (let t = 0; t <= lasts * 1.0001; t += step) {
+    const x = axes.x(t / unit.many);
+    if (unit.rules) rule(ink, x, y0, x, foot, colours.faint);
+    ink.fillText(t ? number(t, decimalsOf(step)) : `0 ${unit.name}`, Math.min(x, x0 + w - 8), foot + 15);
   }
 }
 
-function drawBorders(ink, axes) {
-  const stages = data.stages.filter((stage) => stage.arm === chosenArm().name);
-  for (const t of new Set(stages.flatMap((stage) => [stage.t0, stage.t1]))) {
-    const x = Math.round(axes.x(t)) + 0.5;
-    rule(ink, x, axes.y0, x, axes.y0 + axes.h, colours.line);
-  }
-  ink.fillStyle = colours.quiet;
-  ink.textAlign = "center";
-  data.stages.forEach((stage, i) => {
-    const [from, to] = [axes.x(stage.t0), axes.x(stage.t1)];
-    if (stage.arm === chosenArm().name && to - from > 16) ink.fillText(String(i + 1), (from + to) / 2, axes.y0 + 10);
-  });
-}
-
-function drawLimits(ink, axes, curves) {
-  for (const limit of new Set(curves.flatMap((curve) => curve.limits))) {
-    if (limit < axes.low || limit > axes.high) continue;
-    rule(ink, axes.x0, axes.y(limit), axes.x0 + axes.w, axes.y(limit), colours.bad, [5, 4]);
-  }
-}
-
-function drawCurve(ink, axes, curve) {
-  const times = chosenArm().t;
-  ink.setLineDash(curve.free ? [2, 3] : []);
-  ink.strokeStyle = colours.hues[curve.j % HUES];
-  ink.lineWidth = 1.6;
+// A line with gaps where there is nothing; on a scale of powers it comes from the foot and goes back there, so that a
+// single value is seen.
+function drawLine(ink, axes, { times, values, colour, dash = [] }) {
+  const foot = axes.y0 + axes.h;
+  ink.setLineDash(dash);
+  ink.strokeStyle = colour;
+  ink.lineWidth = axes.powers ? 1.2 : 1.5;
   ink.lineJoin = "round";
   ink.beginPath();
-  curve.values.forEach((value, i) => ink.lineTo(axes.x(times[i]), axes.y(value)));
+  let last = null;
+  values.forEach((value, i) => {
+    if (value === null) {
+      if (last !== null && axes.powers) ink.lineTo(last, foot);
+      last = null;
+      return;
+    }
+    const [x, y] = [axes.x(times[i]), axes.y(value)];
+    if (last === null && axes.powers && i) ink.moveTo(x, foot);
+    if (last === null && !(axes.powers && i)) ink.moveTo(x, y);
+    else ink.lineTo(x, y);
+    last = x;
+  });
   ink.stroke();
   ink.setLineDash([]);
 }
 
 function drawChart(chart) {
   const [ink, width, height] = sharpen(chart.canvas);
-  if (!width || !chosenArm()[chart.quantity.key]) return;
-  chart.curves = curvesOf(chart.quantity);
+  if (!width) return;
   const axes = (chart.axes = axesOf(chart, width, height));
-  drawScales(ink, axes);
-  drawBorders(ink, axes);
-  drawLimits(ink, axes, chart.curves);
+  drawScales(ink, axes, chart.unitOfTime);
+  chart.paint?.(ink, axes);
   ink.save();
   ink.beginPath();
   ink.rect(axes.x0, axes.y0, axes.w, axes.h);
   ink.clip();
-  chart.curves.forEach((curve) => drawCurve(ink, axes, curve));
+  for (const line of chart.lines()) drawLine(ink, axes, line);
   ink.restore();
-  Object.assign(chart.cursor.style, { top: `${axes.y0}px`, height: `${axes.h}px` });
-  Object.assign(chart.ghost.style, { top: `${axes.y0}px`, height: `${axes.h}px` });
-  chart.head.textContent = headOf(chart.quantity);
-}
-
-function headOf(quantity) {
-  if (scale === "all") return "% of limit";
-  const joint = chosenArm().joints[scale];
-  const limits = limitsOf(quantity, joint).map((limit) =>
-    limit === null ? "none" : quantityText(quantity, joint, limit),
-  );
-  const said = quantity.key === "q" ? `${limits[0]} to ${limits[1]}` : limits[1] === "none" ? "none" : `±${limits[1]}`;
-  return `${quantity.units[joint.kind]} · limit ${said}`;
+  for (const mark of [chart.cursor, chart.ghost])
+    Object.assign(mark.style, { top: `${axes.y0}px`, height: `${axes.foot - axes.y0}px` });
 }
 
 function drawCharts() {
-  for (const chart of charts) {
-    chart.card.hidden = !chosenArm()[chart.quantity.key];
-    drawChart(chart);
-  }
+  charts.forEach(drawChart);
   moveCursors();
 }
 
@@ -179,53 +132,40 @@ function moveCursors() {
   for (const { axes, cursor } of charts) if (axes) cursor.style.left = `${axes.x(now.t)}px`;
 }
 
-function tipLine(quantity, j, place) {
-  const [arm, joint] = [chosenArm(), chosenArm().joints[j]];
-  const value = blend(arm[quantity.key], place)[j];
-  const part = share(quantity, joint, value);
-  const swatch = make("span", { className: "swatch" });
-  swatch.style.setProperty("--hue", `var(${hue(j)})`);
-  return make(
-    "div",
-    {},
-    swatch,
-    joint.name,
-    make("em", { textContent: quantityText(quantity, joint, value) }),
-    make("small", { textContent: part === null ? "no limit" : `${number(100 * part, 0)} %` }),
-  );
+function swatch(i) {
+  const element = make("span", { className: "swatch" });
+  element.style.setProperty("--hue", `var(${hue(i)})`);
+  return element;
 }
 
 function hover(chart, x) {
-  for (const other of charts) other.ghost.hidden = chart === null;
-  charts.forEach((other) => {
+  for (const other of charts) {
+    other.ghost.hidden = chart === null;
     if (other !== chart) other.tip.hidden = true;
-  });
-  if (!chart || !chart.axes || !chosenArm().t.length) return;
+  }
+  if (!chart?.axes) return;
   const t = Math.min(Math.max(chart.axes.t(x), 0), data.duration);
-  const place = locate(chosenArm().t, t);
+  const said = chart.tipAt(t);
+  if (!said.length) return;
   for (const other of charts) if (other.axes) other.ghost.style.left = `${other.axes.x(t)}px`;
-  chart.tip.replaceChildren(
-    make("b", { textContent: `${number(t, 2)} s` }),
-    ...chart.curves.map((curve) => tipLine(chart.quantity, curve.j, place)),
-  );
+  chart.tip.replaceChildren(...said);
   chart.tip.hidden = false;
   const [wide, room] = [chart.tip.offsetWidth, chart.canvas.clientWidth];
   chart.tip.style.left = `${x + 14 + wide > room ? Math.max(0, x - 14 - wide) : x + 14}px`;
 }
 
-function makeChart(quantity) {
+function makeChart(own) {
   const chart = {
-    quantity,
+    ...own,
     canvas: make("canvas"),
     cursor: make("div", { className: "cursor" }),
     ghost: make("div", { className: "cursor hover", hidden: true }),
     tip: make("div", { className: "tip", hidden: true }),
-    head: make("span"),
   };
   const plot = make("div", { className: "plot" }, chart.canvas, chart.cursor, chart.ghost, chart.tip);
   chart.canvas.setAttribute("role", "img");
-  chart.canvas.setAttribute("aria-label", `${quantity.title} of the joints over time`);
-  chart.card = make("div", { className: "chart" }, make("h3", { textContent: quantity.title }, chart.head), plot);
+  chart.canvas.setAttribute("aria-label", chart.label);
+  chart.card = make("div", { className: "chart" }, make("h3", {}, ...chart.heading), plot);
   const at = (event) => event.clientX - plot.getBoundingClientRect().left;
   plot.addEventListener("pointermove", (event) => {
     hover(chart, at(event));
@@ -238,46 +178,8 @@ function makeChart(quantity) {
   return chart;
 }
 
-function makeLegend() {
-  const buttons = chosenArm().joints.map((joint, j) => {
-    const swatch = make("span", { className: "swatch" });
-    swatch.style.setProperty("--hue", `var(${hue(j)})`);
-    const button = make("button", { type: "button", ariaPressed: String(!hidden.has(j)) }, swatch, joint.name);
-    button.addEventListener("click", () => {
-      hidden.delete(j) || hidden.add(j);
-      button.ariaPressed = String(!hidden.has(j));
-      drawCharts();
-    });
-    return button;
-  });
-  const legend = document.getElementById("legend");
-  legend.replaceChildren(...(scale === "all" ? buttons : []));
-}
-
-function chooseArmInCharts() {
-  const choice = document.getElementById("scale");
-  scale = "all";
-  hidden.clear();
-  choice.replaceChildren(
-    make("option", { value: "all", textContent: "all joints, % of limit" }),
-    ...chosenArm().joints.map((joint, j) =>
-      make("option", { value: String(j), textContent: `${joint.name}, in its units` }),
-    ),
-  );
-  makeLegend();
-  drawCharts();
-}
-
-function startCharts() {
-  document.getElementById("charts-card").hidden = !data.arms.length;
-  if (!data.arms.length) return;
-  charts = QUANTITIES.map(makeChart);
-  document.getElementById("charts").append(...charts.map((chart) => chart.card));
-  document.getElementById("scale").addEventListener("change", (event) => {
-    scale = event.target.value === "all" ? "all" : Number(event.target.value);
-    makeLegend();
-    drawCharts();
-  });
-  chooseArmInCharts();
+function startCharts(own) {
+  charts = own.map(makeChart);
+  byId("charts").append(...charts.map((chart) => chart.card));
   listeners.push(moveCursors);
 }

@@ -44,8 +44,15 @@ function onKey(event, step, leap) {
   actions[event.key]();
 }
 
-// `redraw` is called when the scheme of colours changes, or the size of one of the elements that are watched.
-function startClock({ step, leap, redraw, watched }) {
+function fillPaces(paces, first) {
+  byId("rate").append(...paces.map(([pace, textContent]) => make("option", { value: String(pace), textContent })));
+  byId("rate").value = String(first);
+  now.rate = first;
+}
+
+// `paces` are those to choose from, each with its text, `pace` is the first one. `redraw` is called when the scheme of colours changes, or the size of one of the elements that are watched.
+function startClock({ paces, pace, step, leap, redraw, watched }) {
+  fillPaces(paces, pace);
   slider.max = data.duration;
   slider.addEventListener("input", () => seek(slider.value));
   byId("play").addEventListener("click", () => play(!now.playing));

@@ -1,6 +1,6 @@
 // The page of a linkage with play: its clock, and what is said of the present instant.
 
-// Paces to choose from, and how long the whole is to take at first [s].
+// Parts of the real pace to choose from, and how long the whole is to take at first [s].
 const PACES = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 const WATCHED = 12;
 
@@ -20,14 +20,10 @@ function showClock() {
   );
 }
 
-function fillPaces() {
+// As slow as it must be to last so long.
+function slowEnough() {
   const slow = data.duration / WATCHED;
-  const first = PACES.find((pace) => 1 / pace <= slow) ?? PACES.at(-1);
-  byId("rate").append(
-    ...PACES.map((pace) => make("option", { value: String(1 / pace), textContent: pace === 1 ? "1×" : `1/${pace}×` })),
-  );
-  byId("rate").value = String(1 / first);
-  now.rate = 1 / first;
+  return 1 / (PACES.find((pace) => 1 / pace <= slow) ?? PACES.at(-1));
 }
 
 // Above the slider: where a journal flies.
@@ -51,14 +47,20 @@ function redraw() {
 }
 
 function start() {
-  fillPaces();
   fillStrip();
   startView();
   startBearings();
-  startCharts();
+  startCharts(chartsOf().map(rattlingChart));
   listeners.push(showClock, drawView, drawBearings);
   const step = data.duration / Math.max(1, data.t.length - 1);
-  startClock({ step, leap: 25 * step, redraw, watched: [canvas, byId("bearings"), byId("charts")] });
+  startClock({
+    paces: PACES.map((pace) => [1 / pace, pace === 1 ? "1×" : `1/${pace}×`]),
+    pace: slowEnough(),
+    step,
+    leap: 25 * step,
+    redraw,
+    watched: [canvas, byId("bearings"), byId("charts")],
+  });
   seek(0);
 }
 

@@ -1,25 +1,12 @@
-// The page: heading and readouts.
+// The page of a run: messages, readouts and the choice of an arm.
 
-function fillHeader() {
-  byId("status").textContent = data.status;
-  byId("status").classList.toggle("good", data.status === "finished");
-  const facts = [
-    ["Duration", `${number(data.duration, 2)} s`],
-    ["Cell", data.cell_name],
-    [data.text_kind, data.program_name],
-    ["Command", data.command, "code"],
-  ];
-  if (!data.cell_name) facts.splice(1, 1);
-  const arms = data.arms.map((arm) => `${arm.name} (${arm.model})`).join(", ");
-  if (arms) facts.splice(1, 0, ["Arms", arms]);
-  byId("facts").append(
-    ...facts.map(([name, text, kind = ""]) =>
-      make("div", {}, make("dt", { textContent: name }), make("dd", { textContent: text, className: kind })),
-    ),
-  );
-  byId("messages").append(...data.messages.map(messageItem));
-  byId("generated").textContent = `Made by ${data.generated_by}`;
-}
+const PACES = [
+  [0.25, "¼×"],
+  [0.5, "½×"],
+  [1, "1×"],
+  [2, "2×"],
+  [4, "4×"],
+];
 
 function messageItem(message) {
   const item = make(
@@ -130,17 +117,24 @@ function redraw() {
 }
 
 function start() {
-  fillHeader();
+  byId("messages").append(...data.messages.map(messageItem));
   fillProgram();
   fillTrace();
   fillStages();
   byId("tree-card").hidden = !tree.changes.length;
   startView();
-  startCharts();
+  startJointCharts();
   listeners.push(showClock, showProgram, showStages, showReadout, drawView);
   if (tree.changes.length) listeners.push(showTree);
   fillArms();
-  startClock({ step: 1 / (data.animation?.fps ?? 25), leap: 1, redraw, watched: [canvas, byId("charts")] });
+  startClock({
+    paces: PACES,
+    pace: 1,
+    step: 1 / (data.animation?.fps ?? 25),
+    leap: 1,
+    redraw,
+    watched: [canvas, byId("charts")],
+  });
   seek(0);
 }
 

@@ -1,0 +1,53 @@
+"""What the commands for linkages with play share: options, clearances, settings of a simulation."""
+
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+
+import typer
+
+from armwright.cli.numbers import named_number
+
+if TYPE_CHECKING:
+    from armwright.clearance.linkage import Linkage
+    from armwright.clearance.settings import Settings
+
+LinkageName: TypeAlias = Annotated[
+    str, typer.Argument(help="Name in the catalogue, or a TOML file (docs/clearance.md).", show_default=False)
+]
+FrictionVelocity: TypeAlias = Annotated[
+    str, typer.Option(help="Which speed slides: of the surface, or of the centre as the thesis has it.")
+]
+Threshold: TypeAlias = Annotated[float, typer.Option(help="Sliding speed below which friction fades.")]
+
+
+def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float | None = None) -> "Linkage":
+    """Return the linkage with the clearances that are asked for.
+
+    Args:
+        model: the linkage.
+        clearances: of one pin each, such as ``J2=0.5`` [mm].
+        clearance_mm: of all pins that are not named; those of the linkage when left out.
+
+    Raises:
+        BadParameter: a text is something else.
+    """
+    found = {} if clearance_mm is None else dict.fromkeys(model.clearances, clearance_mm * 1e-3)
+    for text in clearances:
+        one = named_number(text, ("", "mm"), "a pin and its clearance in mm, J2=0.5", "--clearance")
+        found[one.name] = one.value * 1e-3
+    return model.with_clearances(found)
+
+
+def settings_of(velocity: str, threshold_mm_s: float, *, law: str = "linear", **others: Any) -> "Settings":
+    """Return the settings of a simulation; what stands for nothing is answered with the nearest name.
+
+    Args:
+        velocity: which speed slides.
+        threshold_mm_s: sliding speed below which friction fades.
+        law: of friction.
+        others: settings by their names, SI.
+    """
+    from armwright.clearance.equations import Rubbing
+    from armwright.clearance.settings import Settings
+
+    rubbing = Rubbing(law=law, velocity=velocity)  # type: ignore[arg-type]
+    return Settings(threshold=threshold_mm_s * 1e-3, friction=rubbing, **others)

@@ -1,0 +1,82 @@
+"""Numbers on the command line: lists of them, numbers with a name, bounds."""
+
+import math
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import typer
+
+_NAMED = re.compile(r"(?P<name>[^=]+)=(?P<number>[^=a-z%/]+)(?P<unit>[a-zA-Z%/]*)")
+
+
+def numbers(text: str, count: int, option: str) -> list[float]:
+    """Read numbers apart by commas or blanks.
+
+    Raises:
+        BadParameter: it is not ``count`` finite numbers, or one is larger than any of a robot.
+    """
+    from armwright.arrays import LARGEST
+
+    words = text.replace(",", " ").split()
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        wrong = next(word for word in words if not _is_number(word))
+        raise typer.BadParameter(f"expected {count} numbers, got '{wrong}'", param_hint=option) from None
+    if len(values) != count:
+        raise typer.BadParameter(f"expected {count} finite numbers, got {len(values)}: {text}", param_hint=option)
+    for value, word in zip(values, words, strict=True):
+        if not abs(value) <= LARGEST:  # what is NaN compares with nothing
+            raise typer.BadParameter(
+                f"every number must be finite and no larger than {LARGEST:g}, got {word}", param_hint=option
+            )
+    return values
+
+
+class Named(NamedTuple):
+    """A number with a name, such as ``RP=0.05mm``; the unit may be empty."""
+
+    name: str
+    value: float
+    unit: str
+
+
+def named_number(text: str, units: Sequence[str] | None, expected: str, option: str) -> Named:
+    """Read a number with a name.
+
+    Args:
+        text: such as ``J2=0.3``.
+        units: what may stand behind it; anything without them.
+        expected: what should have been given, in words.
+        option: whose value it is.
+
+    Raises:
+        BadParameter: it is something else.
+    """
+    match = _NAMED.fullmatch(text.replace(" ", ""))
+    if match is not None and _is_number(match["number"]) and (units is None or match["unit"] in units):
+        value = float(match["number"])
+        if not math.isnan(value):
+            return Named(match["name"], value, match["unit"])
+    raise typer.BadParameter(f"expected {expected}, got {text}", param_hint=option)
+
+
+def within(value: float, bounds: tuple[float, float], option: str) -> float:
+    """Return a number that is within its bounds.
+
+    Raises:
+        BadParameter: it is not.
+    """
+    lower, upper = bounds
+    if not lower <= value <= upper:
+        raise typer.BadParameter(f"expected {lower:g} to {upper:g}, got {value:g}", param_hint=option)
+    return value
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,22 @@
+"""Options that many commands have."""
+
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import typer
+
+ArmName: TypeAlias = Annotated[
+    str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)
+]
+Posture: TypeAlias = Annotated[
+    str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
+]
+Rows: TypeAlias = Annotated[
+    Path | None, typer.Option("--csv", help="Rows of q1 ... qn in SI units, such as motion.csv.", show_default=False)
+]
+Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
+JsonSummary: TypeAlias = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")]
+Quiet: TypeAlias = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
+QuietButWarnings: TypeAlias = Annotated[
+    bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")
+]

@@ -1,0 +1,62 @@
+"""What commands print: JSON, tables, and the command line that was given."""
+
+import json
+import sys
+from collections.abc import Collection, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+
+def command_line() -> str:
+    """Return the command as it was given, for the record."""
+    import shlex
+
+    return shlex.join(["armwright", *sys.argv[1:]])
+
+
+def json_text(data: Any) -> str:
+    """Return data as people read JSON, without an end of line."""
+    return json.dumps(data, indent=2, ensure_ascii=False)
+
+
+def print_json(data: Any) -> None:
+    """Print data as JSON; where the output knows no other letters, in ASCII."""
+    every_letter = (sys.stdout.encoding or "").lower().startswith("utf")
+    print(json_text(data) if every_letter else json.dumps(data, indent=2))
+
+
+def plain_console() -> "Console":
+    """Return a console that takes every text as it is."""
+    from rich.console import Console
+
+    return Console(markup=False, highlight=False)
+
+
+def table(
+    columns: Sequence[str],
+    rows: "Iterable[Sequence[str | Text]]" = (),
+    *,
+    title: str | None = None,
+    words: Collection[int] = (0,),
+) -> "Table":
+    """Return a table for a terminal; what is too long for it is folded, so that no number is cut off.
+
+    Args:
+        columns: their names.
+        rows: texts of each row.
+        title: above it, at the left.
+        words: columns of words, from 0; the others hold numbers and end at the right.
+    """
+    from rich import box
+    from rich.table import Table
+
+    found = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for place, name in enumerate(columns):
+        found.add_column(name, justify="left" if place in words else "right", overflow="fold")
+    for row in rows:
+        found.add_row(*row)
+    return found

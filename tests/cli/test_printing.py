@@ -1,0 +1,83 @@
+"""What commands print, and the numbers they are given."""
+
+import io
+import json
+import sys
+
+import pytest
+import typer
+from rich.console import Console
+
+from armwright.cli.numbers import named_number, numbers, within
+from armwright.cli.printing import command_line, print_json, table
+
+TEXT = {"name": "Gelenk für die Hand", "µm": [1.5, None]}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii", "latin-1"])
+def test_json_everywhere(monkeypatch: pytest.MonkeyPatch, encoding: str) -> None:
+    """JSON can be read back whatever letters the output knows."""
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, encoding=encoding, errors="backslashreplace"))
+    print_json(TEXT)
+    sys.stdout.flush()
+
+    assert json.loads(written.getvalue().decode(encoding)) == TEXT
+    assert ("für" in written.getvalue().decode(encoding)) == (encoding == "utf-8")
+
+
+def test_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command is told so that it can be given again, blanks and quotes kept."""
+    monkeypatch.setattr(sys, "argv", ["/somewhere/__main__.py", "run", "my program.rlo", "-o", "it's"])
+
+    assert command_line() == """armwright run 'my program.rlo' -o 'it'"'"'s'"""
+
+
+def test_no_number_is_cut_off() -> None:
+    """On a narrow terminal a table is folded: every digit is still there."""
+    console = Console(file=io.StringIO(), width=12, markup=False, highlight=False)
+    console.print(table(("joint", "N m"), [("shoulder", "123456789.5")]))
+
+    shown = console.file.getvalue()
+    column = "".join(line[-6:].strip() for line in shown.splitlines() if any(c.isdigit() for c in line))
+    assert "…" not in shown
+    assert column == "123456789.5"
+
+
+def test_words_left_numbers_right() -> None:
+    """Words begin at the left, numbers end at the right."""
+    console = Console(file=io.StringIO(), width=80, markup=False, highlight=False)
+    console.print(table(("pose", "mm"), [("A", "1.5"), ("station", "10.25")]))
+
+    rows = [line.rstrip() for line in console.file.getvalue().splitlines() if "." in line]
+    assert [row.split() for row in rows] == [["A", "1.5"], ["station", "10.25"]]
+    assert len({len(row) for row in rows}) == 1
+    assert len({row.index(row.split()[0]) for row in rows}) == 1
+
+
+def test_named_numbers() -> None:
+    """A number with a name has a unit that may be left out, and blanks do no harm."""
+    assert named_number("J2=0.3", ("", "mm"), "a pin", "--clearance") == ("J2", 0.3, "")
+    assert named_number("AV = -1.5 mm/s", None, "a limit", "--limit") == ("AV", -1.5, "mm/s")
+
+
+@pytest.mark.parametrize("text", ["J2", "J2=", "=0.3", "J2=thick", "J2=0.3cm", "J2=nan", "J2=0.3=0.4"])
+def test_what_is_no_named_number(text: str) -> None:
+    """What is something else is refused, with what was expected."""
+    with pytest.raises(typer.BadParameter, match=f"expected a pin and its clearance, got {text}$"):
+        named_number(text, ("", "mm"), "a pin and its clearance", "--clearance")
+
+
+def test_bounds() -> None:
+    """A number within its bounds, ends included, is taken; any other is refused with the bounds."""
+    assert [within(x, (0.1, 10), "--servo-ms") for x in (0.1, 1, 10)] == [0.1, 1, 10]
+    for value in (0.09, 10.1, float("nan")):
+        with pytest.raises(typer.BadParameter, match=f"expected 0.1 to 10, got {value:g}"):
+            within(value, (0.1, 10), "--servo-ms")
+
+
+def test_lists() -> None:
+    """Numbers stand apart by commas or blanks, and there must be as many as joints."""
+    assert numbers("1, 2.5 -3", 3, "-q") == [1.0, 2.5, -3.0]
+    with pytest.raises(typer.BadParameter, match="expected 2 finite numbers, got 3"):
+        numbers("1,2,3", 2, "-q")
