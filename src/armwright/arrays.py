@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from decimal import Decimal
 from numbers import Real
 from typing import Any, TypeAlias
@@ -129,6 +130,19 @@ def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     copy = np.array(array)
     copy.setflags(write=False)
     return copy
+
+
+def one_core() -> AbstractContextManager[Any]:
+    """Keep linear algebra on one core while small matrices are worked on: there several only wait for one another.
+
+    Without threadpoolctl, which comes with scikit-learn, nothing is changed.
+    """
+    try:
+        from threadpoolctl import threadpool_limits  # noqa: PLC0415 - not part of the core
+    except ImportError:
+        return nullcontext()
+    limits: AbstractContextManager[Any] = threadpool_limits(1)
+    return limits
 
 
 def content(array: Array) -> tuple[tuple[int, ...], bytes]:

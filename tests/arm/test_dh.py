@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from armwright.arm.dh import about_com, carry, turn
+from armwright.arm.dh import about_com, carry, from_modified, to_modified, turn, twist
 from armwright.arm.load import read_arm
 from armwright.arm.model import Arm, Link
 from armwright.arrays import Array
@@ -75,6 +75,18 @@ def test_modified_table(joints: int, rng: np.random.Generator, written: Callable
 
     for q in random_postures(table, rng, 20):
         np.testing.assert_allclose(link_poses(arm, q)[-1], modified_poses(table, q)[-1], atol=joints * ROUNDING)
+
+
+def test_there_and_back(rng: np.random.Generator) -> None:
+    """A standard table made modified and standard again is the same, but for what stands before the tool."""
+    table = random_arm(rng, 5)
+
+    rows, last = to_modified(table.joints)
+    before, joints, _ = from_modified(rows, table.links)
+
+    np.testing.assert_array_equal(before, np.eye(4))
+    assert joints[:-1] == list(table.joints[:-1])
+    np.testing.assert_allclose(last, twist(table.joints[-1].alpha, table.joints[-1].a))
 
 
 def test_standard_table(rng: np.random.Generator, written: Callable[[Arm, str], Arm]) -> None:

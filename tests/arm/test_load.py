@@ -265,6 +265,26 @@ MISTAKES = {
         "[base]\nrotation = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]\n" + TURN,
         "2: base, rotation: expected the rows of a rotation, got a matrix that is off by 2",
     ),
+    "a covariance of other errors": (
+        TURN + "[uncertainty]\nerrors = ['joint1.a', 'tool.x']\ncovariance = [[1, 0]]\n",
+        "3: uncertainty: uncertainty: expected (2, 2) for 2 errors, got (1, 2)",
+    ),
+    "a variance below none": (
+        TURN + "[uncertainty]\nerrors = ['joint1.a', 'tool.x']\ncovariance = [[1, 2], [2, 1]]\n",
+        "3: uncertainty: uncertainty: expected a covariance: symmetric, and no variance below 0",
+    ),
+    "an error twice": (
+        TURN + "[uncertainty]\nerrors = ['tool.x', 'tool.x']\ncovariance = [[1, 0], [0, 1]]\n",
+        "3: uncertainty: uncertainty: an error is named twice",
+    ),
+    "errors that are no texts": (
+        TURN + "[uncertainty]\nerrors = [1, 2]\ncovariance = [[1, 0], [0, 1]]\n",
+        "4: uncertainty, errors: expected a list of texts in quotes, got a list of 2",
+    ),
+    "no covariance": (
+        TURN + "[uncertainty]\nerrors = ['tool.x']\n",
+        "3: uncertainty, covariance: missing, expected a list of lists of 1 numbers",
+    ),
     "an unknown table": ("[tol]\nxyz_m = [0, 0, 1]\n" + TURN, "1: tol: unknown key; did you mean 'tool'?"),
     "one joint as a table": (
         '[joint]\nkind = "revolute"\n',

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Motor
+from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
 from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.recognise import shoulder_of
 from oracles.arms import random_arm, squared
@@ -173,6 +174,7 @@ def test_what_is_lost() -> None:
         gravity=(9.80665, 0, 0),
         reach=0.9,
         tool_speed=0.5,
+        uncertainty=Uncertainty(errors=["tool.x"], covariance=[[1e-8]], noise=1e-5),
     )
 
     assert lost_in_urdf(arm) == [
@@ -185,10 +187,17 @@ def test_what_is_lost() -> None:
         "gravity of (9.80665, 0, 0) m/s² is not in the file: URDF has it pointing down the z axis",
         "the reach of 0.9 m is not in the file",
         "the hand speed of 0.5 m/s is not in the file",
+        "how well its dimensions are known is not in the file",
         "the title is not in the file",
         "the source is not in the file",
     ]
     assert 'friction="4.0"' in urdf_text(arm)
+
+
+def test_as_many_tilts_as_joints(rng: np.random.Generator) -> None:
+    """Turns about y are told for every joint or for none."""
+    with pytest.raises(ShapeError, match="tilts: expected 4 of them, one for each joint, got 2"):
+        urdf_text(some_arm(rng, 4, built=True), [0.0, 0.1])
 
 
 def test_nothing_is_lost(rng: np.random.Generator, back: Callable[[Arm], Arm]) -> None:

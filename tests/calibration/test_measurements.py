@@ -7,6 +7,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
@@ -325,3 +326,91 @@ def test_six_joints_for_seven(write: Write) -> None:
     said = refused(write(table(head, ["1,2,3,4,5,6,7,8,9,10"])), load_arm("ur5"))
 
     assert said == "points.csv:1: joint_7_deg: ur5 has 6 joints; is this a measurement of another arm?"
+
+
+# ---- more than points ----------------------------------------------------------------------------------------------
+
+
+def test_quaternions_and_angles(arm: Arm, write: Write) -> None:
+    """A turn is told as a quaternion or as roll, pitch and yaw; a row may go without."""
+    wxyz = read_measurements(
+        write(table(f"{HEAD},qw,qx,qy,qz", [f"{ROWS[0]},0.7071,0,0,0.7071", f"{ROWS[1]},1,0,0,0"])), arm
+    )
+    rpy = read_measurements(
+        write(table(f"{HEAD},roll_deg,pitch_deg,yaw_deg,plane", [f"{ROWS[0]},10,-20,90,", f"{ROWS[1]},,,,"])), arm
+    )
+
+    np.testing.assert_allclose(wxyz.readings.rotations[0], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+    expected = Rotation.from_euler("xyz", (10, -20, 90), degrees=True).as_matrix()
+    np.testing.assert_allclose(rpy.readings.rotations[0], expected, atol=1e-15)
+    assert np.isnan(rpy.readings.rotations[1]).all()
+    np.testing.assert_array_equal(rpy.readings.with_rotation, (True, False))
+
+
+def test_frames(arm: Arm, write: Write) -> None:
+    """Points of a board that was set up twice name the frame they are told in."""
+    rows = [f"{row},{name}" for row, name in zip(ROWS, ("flat", "roll", "flat"), strict=True)]
+
+    readings = read_measurements(write(table(f"{HEAD},frame", rows)), arm).readings
+
+    assert readings.frames == ("flat", "roll")
+    np.testing.assert_array_equal(readings.frame, (0, 1, 0))
+
+
+def test_planes_and_distances(arm: Arm, write: Write) -> None:
+    """A row may tell that a plane was touched, or how far the tool is from an anchor or from another row."""
+    head = "name,joint_1_deg,joint_2_deg,plane,distance_mm,anchor,to"
+    rows = ["a,1,2,table,,,", "b,3,4,,250.5,wire,", "c,5,6,,20,,a", "d,5,7,floor,,,"]
+
+    readings = read_measurements(write(table(head, rows)), arm).readings
+
+    assert readings.planes == ("table", "floor")
+    assert readings.anchors == ("wire",)
+    np.testing.assert_array_equal(readings.plane, (0, -1, -1, 1))
+    np.testing.assert_array_equal(readings.anchor, (-1, 0, -1, -1))
+    np.testing.assert_allclose(readings.distances, (np.nan, 0.2505, 0.02, np.nan))
+    np.testing.assert_allclose(readings.other[2], np.radians((1, 2)))
+    assert not readings.with_point.any()
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "message"),
+    [
+        (f"{HEAD},qw,qx,qy", "1,2,3,4,5,1,0,0", "points.csv:1: qz: no such column; there are joint_1_deg"),
+        (f"{HEAD},qw,qx,qy,qz", "1,2,3,4,5,1,0,0,1", "points.csv:2: qw: expected a quaternion of length 1, got one of"),
+        (f"{HEAD},roll_deg,pitch_deg,yaw_rad", "1,2,3,4,5,1,0,0", "yaw_rad: angles have one unit in a file, and roll_"),
+        (f"{HEAD},roll_deg,qw", "1,2,3,4,5,1,0", "points.csv:1: qw: give roll, pitch and yaw, or a quaternion, not bo"),
+        (f"{HEAD},distance_mm", "1,2,3,4,5,1", "distance_mm: tell from where: a column anchor, or a column to with na"),
+        (f"{HEAD},anchor", "1,2,3,4,5,wire", "points.csv:1: anchor: no column tells the distance; there are joint_1"),
+        (f"{HEAD},distance_mm,to", "1,2,3,4,5,1,a", "points.csv:1: to: rows need names for that, in a column name"),
+        (f"{HEAD},plane", "1,2,,,,", "points.csv:2: the row tells no point, no plane and no distance"),
+        (f"{HEAD},frame", "1,2,3,4,5,", "points.csv:2: frame: empty; where one point tells its frame all do"),
+        (
+            f"{HEAD},plane,roll_deg,pitch_deg,yaw_deg",
+            "1,2,,,,t,1,2,3",
+            "the row tells how the tool was turned, and not",
+        ),
+        (
+            f"{HEAD},distance_mm,anchor",
+            "1,2,3,4,5,7,",
+            "expected one place to be so far from; the row tells neither an",
+        ),
+        (
+            f"{HEAD},distance_mm,anchor",
+            "1,2,3,4,5,,w",
+            "empty; the row tells from where a distance is, and not how far",
+        ),
+        (f"{HEAD},distance_mm,anchor", "1,2,3,4,5,-7,w", "expected a distance, got -0.007 m"),
+        (
+            f"{HEAD},name,distance_mm,to",
+            "1,2,3,4,5,first,7,fist",
+            "to: expected the name of one row, got 'fist', which 0",
+        ),
+        (f"{HEAD},name,distance_mm,to", "1,2,3,4,5,first,7,first", "points.csv:2: to: a row is not away from itself"),
+        (f"{HEAD},name,distance_mm,to,anchor", "1,2,3,4,5,a,7,b,w", "tells both an anchor and another row"),
+        (f"{HEAD},plan", "1,2,3,4,5,t", "plan: no such column. Did you mean 'plane'?"),
+    ],
+)
+def test_more_than_points_wrong(head: str, row: str, message: str, arm: Arm, write: Write) -> None:
+    """What does not belong together is named with its line and column."""
+    assert message in refused(write(table(head, [row])), arm)

@@ -8,7 +8,7 @@ from armwright.calibration.chain import chain_of
 from armwright.calibration.fitting import calibrate
 from armwright.calibration.planning import INDICES, observability, plan_poses
 from armwright.errors import InvalidValueError, UnknownNameError
-from calibration.simulated import random_errors, seen
+from calibration.simulated import postures, random_errors, seen
 
 
 @pytest.mark.parametrize("index", INDICES)
@@ -46,7 +46,7 @@ def test_planned_poses_leave_smaller_deviations() -> None:
     def mean_deviation(q: np.ndarray) -> float:
         found = calibrate(arm, q, seen(chain, q, errors, 5e-5, rng), base=np.eye(4), only=plan.names)
         assert found.names == plan.names
-        return float(np.log(found.deviations / found.noise).mean())
+        return float(np.log(found.deviations / found.noise.length).mean())
 
     chance = [mean_deviation(lower + (upper - lower) * rng.random((25, 6))) for _ in range(5)]
     assert mean_deviation(plan.q) < np.mean(chance)
@@ -69,3 +69,32 @@ def test_what_cannot_be_planned() -> None:
         plan_poses(arm, 30, candidates=10)
     with pytest.raises(UnknownNameError, match="no index 'O9'"):
         plan_poses(arm, 30, index="O9")  # type: ignore[arg-type]
+
+
+def test_next_poses_see_what_the_first_did_not() -> None:
+    """After poses in which one joint stood still, the next ones tell its errors; poses by chance tell them worse."""
+    arm = load_arm("ntu-3r")
+    rng = np.random.default_rng(0)
+    before = postures(rng, arm, 20)
+    before[:, 1] = 0.3
+
+    plan = plan_poses(arm, 3, measured=before, index="O3")
+
+    assert np.ptp(plan.q[:, 1]) > 0.5
+    assert plan.observability.O3 > plan.by_chance.O3
+    chain = chain_of(arm)
+    kept = [chain.names.index(name) for name in plan.names]
+    together = observability(chain, np.vstack([plan.q, before]), kept)
+    np.testing.assert_allclose(together, plan.observability)
+    assert observability(chain, before, kept).O3 < 0.2 * together.O3
+
+
+def test_poses_with_turns() -> None:
+    """Where turns are measured too, the turns of the tool frame are told, and half as many poses will do."""
+    arm = load_arm("puma560")
+
+    plan = plan_poses(arm, 5, turns=True)
+
+    assert {"tool.rx", "tool.ry", "tool.rz"} <= set(plan.names)
+    with pytest.raises(InvalidValueError, match=r"errors that points can tell; expected \d+ poses or more, got 5"):
+        plan_poses(arm, 5)

@@ -92,7 +92,7 @@ def test_ur5_errors() -> None:
     assert len(found.names) == 25
     assert found.deviations[lengths].max() < 1e-4
     assert found.deviations[~lengths].max() < 2.5e-4
-    assert found.after.mean() < 0.04 * found.before.mean()
+    assert found.after.distance.mean() < 0.04 * found.before.distance.mean()
 
 
 def test_wam() -> None:

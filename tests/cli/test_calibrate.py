@@ -48,7 +48,8 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "it does just what base.rz does" in done.stdout
     files = {path.name for path in (tmp_path / "out").iterdir()}
-    assert files == {"arm.toml", "arm.urdf", "errors.json", "report.html", "residuals.svg", "distances.svg"}
+    tables = {"dh_standard.csv", "dh_modified.csv", "dh_hayati.csv"}
+    assert files == {"arm.toml", "arm.urdf", "errors.json", "report.html", "residuals.svg", "distances.svg", *tables}
     rows = np.loadtxt(measured, delimiter=",", skiprows=1)
     better = load_arm(tmp_path / "out" / "arm.toml")
     off = np.linalg.norm(forward(better, np.radians(rows[:, :6]))[:, :3, 3] * 1e3 - rows[:, 6:], axis=1)
@@ -57,7 +58,8 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
     assert said.mean() > 1.0
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert page.count("<img ") == 2
-    assert "http" not in page
+    assert "http://" not in page
+    assert "https://" not in page
 
 
 def test_json(measured: Path) -> None:
@@ -67,7 +69,7 @@ def test_json(measured: Path) -> None:
     assert set(told["errors"]) | set(told["held"]) == set(chain_of(load_arm(ARM)).names)
     deviations = [one["deviation"] for one in told["errors"].values()]
     np.testing.assert_allclose(np.sqrt(np.diag(told["covariance"])), deviations, rtol=1e-9)
-    assert told["distances"]["calibrated, points held out"]["mean"] < 3e-4
+    assert told["distances"]["calibrated, held out"]["mean"] < 3e-4
 
 
 @pytest.mark.parametrize(
@@ -77,7 +79,7 @@ def test_json(measured: Path) -> None:
         (("calibrate", "ur5", "MEASURED"), 1, "are these its joints"),
         (("calibrate", "ntu-3r", "MEASURED"), 1, "joint_4_deg"),
         (("calibrate", ARM, "nowhere.csv"), 1, "nowhere.csv"),
-        (("calibrate", ARM, "MEASURED", "--tool-mm", "0,0"), 2, "expected three numbers such as 0,0,31"),
+        (("calibrate", ARM, "MEASURED", "--tool-mm", "0,0"), 2, "expected 3 finite numbers, got 2: 0,0"),
         (("calibrate", ARM, "MEASURED", "--units", "mm"), 2, "such as mm,deg"),
         (("calibrate", ARM, "MEASURED", "--folds", "1"), 1, "folds: expected 2 to 40"),
         (("plan-poses", ARM, "-n", "4"), 1, "poses or more, got 4"),
@@ -91,3 +93,26 @@ def test_mistakes(measured: Path, arguments: tuple[str, ...], status: int, says:
     assert done.returncode == status
     assert says in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_next_poses(measured: Path, tmp_path: Path) -> None:
+    """Poses are planned beside those that were measured; with turns, fewer will do."""
+    done = armwright("plan-poses", ARM, "-n", "2", "--after", measured, "-o", tmp_path / "more.csv")
+    few = armwright("plan-poses", ARM, "-n", "5", "--turns")
+
+    assert done.returncode == 0, done.stderr
+    assert len((tmp_path / "more.csv").read_text(encoding="utf-8").splitlines()) == 3
+    assert few.returncode == 0, few.stderr
+    assert "tool.rx" in few.stdout
+
+
+def test_beyond(measured: Path, tmp_path: Path) -> None:
+    """What is tried beyond geometry is told with its numbers, kept or not, on the screen and on the page."""
+    done = armwright("calibrate", ARM, measured, "--beyond", "-o", tmp_path / "out", columns=160)
+
+    assert done.returncode == 0, done.stderr
+    for words in ("joints that give under gravity", "gears, twice a turn", "what is left, learnt"):
+        assert words in done.stdout
+        assert words in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    tried = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))["beyond"]["tried"]
+    assert [one["kept"] for one in tried] == [True, False, False, False, False]

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from armwright.errors import ShapeError
-from armwright.spatial.euler import from_zyz, matlab_zyz, next_zyz, to_zyz
+from armwright.spatial.euler import from_zyz, matlab_zyz, next_zyz, to_rpy, to_zyz
 
 # Products of a dozen roundings of numbers of size 1.
 ROUNDING = 1e-12
@@ -90,3 +90,15 @@ def test_what_is_no_rotation() -> None:
         to_zyz(np.eye(2))
     with pytest.raises(ShapeError, match="ZYZ angles"):
         from_zyz([1.0, 2.0])
+
+
+@pytest.mark.parametrize("pitch", [0.3, np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-10])
+def test_roll_pitch_yaw(pitch: float, rng: np.random.Generator) -> None:
+    """Roll, pitch and yaw give their rotation again, also where yaw and roll turn about one axis."""
+    for roll, yaw in rng.uniform(-3, 3, (20, 2)):
+        R = Rotation.from_euler("xyz", (roll, pitch, yaw)).as_matrix()
+
+        found = to_rpy(R)
+
+        np.testing.assert_allclose(Rotation.from_euler("xyz", found).as_matrix(), R, atol=1e-14)
+        assert abs(found[1]) <= np.pi / 2

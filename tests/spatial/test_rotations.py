@@ -10,6 +10,7 @@ from armwright.spatial.rotations import (
     angle_between,
     nearest_rotation,
     orthonormality_error,
+    rotation_from_quaternion,
     rotation_from_vector,
     rotation_vector,
 )
@@ -100,3 +101,14 @@ def test_shape_is_checked() -> None:
         inverse(np.zeros(3))
     with pytest.raises(KindError, match="rotation: expected numbers, got 'abc'"):
         pose("abc", np.zeros(3))
+
+
+def test_rotation_from_quaternion(rng: np.random.Generator) -> None:
+    """A quaternion w, x, y, z of any length is the rotation that SciPy makes of it; many at once as one by one."""
+    many = rng.standard_normal((4, 5, 4))
+
+    R = rotation_from_quaternion(many)
+
+    expected = Rotation.from_quat(many.reshape(-1, 4), scalar_first=True).as_matrix()
+    np.testing.assert_allclose(R.reshape(-1, 3, 3), expected, atol=1e-15)
+    np.testing.assert_array_equal(rotation_from_quaternion(many[1, 2]), R[1, 2])

@@ -51,6 +51,24 @@ def from_modified(joints: Sequence[Joint], links: Sequence[Link]) -> tuple[Array
     return twist(joints[0].alpha, joints[0].a), rows, carried
 
 
+def to_modified(joints: Sequence[Joint]) -> tuple[list[Joint], Array]:
+    """Turn a standard table into the modified one.
+
+    Args:
+        joints: n standard rows.
+
+    Returns:
+        n modified rows, ``a`` and ``alpha`` of which stand in front of their joints, and the pose (4, 4) to put before
+        the tool.
+
+    Source:
+        Craig (1986) ch. 3.
+    """
+    before = [(0.0, 0.0), *((joint.alpha, joint.a) for joint in joints[:-1])]
+    rows = [attrs.evolve(joint, alpha=alpha, a=a) for joint, (alpha, a) in zip(joints, before, strict=True)]
+    return rows, twist(joints[-1].alpha, joints[-1].a)
+
+
 def carry(link: Link, X_NM: Array) -> Link:
     """Describe a link of frame M in frame N instead, X_NM (4, 4) being the pose of M seen from N."""
     R, p = X_NM[:3, :3], X_NM[:3, 3]

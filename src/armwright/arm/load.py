@@ -8,8 +8,9 @@ import numpy as np
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
 from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, vector_in
+from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
-from armwright.errors import KindError, UnknownNameError, shown
+from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
 
 _CATALOGUE = Path(__file__).parent / "catalogue"
@@ -83,6 +84,7 @@ def read_arm(path: Path | str) -> Arm:
         reach=number_in(hand, "reach", LENGTH, default=math.inf, positive=True),
         tool_speed=number_in(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
         source=top.text("source", default=""),
+        uncertainty=_uncertainty(top.table("uncertainty")),
     )
     for table in (hand, gravity, top):
         table.finish()
@@ -101,6 +103,19 @@ def read_load(path: Path | str) -> Link:
     top = Document.read(path).root
     top.number("mass_kg")  # a link may go without, a load not
     return _link(top)
+
+
+def _uncertainty(table: Table) -> Uncertainty | None:
+    if not [*table.free_keys()]:
+        return None
+    errors = table.texts("errors")
+    rows = table.vectors("covariance", len(errors))
+    noise = number_in(table, "noise", LENGTH, default=0.0)
+    table.finish()
+    try:
+        return Uncertainty(errors=errors, covariance=np.array(rows), noise=noise)
+    except (InvalidValueError, ShapeError) as error:
+        raise table.error(None, str(error)) from error
 
 
 def _joint(table: Table) -> Joint:

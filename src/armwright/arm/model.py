@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, get_args
 import attrs
 import numpy as np
 
+from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, content, exactly, number, read_only
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.spatial.poses import one_pose
@@ -293,6 +294,7 @@ class Arm:
         reach: greatest distance of the hand from the base axis that the report's speed rule divides by [m].
         tool_speed: speed of the hand at full reach [m/s].
         source: where the numbers come from.
+        uncertainty: how well they are known, if they were measured.
     """
 
     name: str
@@ -316,6 +318,7 @@ class Arm:
     reach: float = math.inf
     tool_speed: float = math.inf
     source: str = ""
+    uncertainty: Uncertainty | None = None
 
     __reduce__ = by_fields
 

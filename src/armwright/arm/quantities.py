@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.files.document import Table
 from armwright.spatial.euler import from_zyz
 from armwright.spatial.poses import pose
-from armwright.spatial.rotations import nearest_rotation, orthonormality_error
+from armwright.spatial.rotations import nearest_rotation, orthonormality_error, rotation_from_quaternion
 
 # Factors to SI by the ending of the key.
 ANGLE = {"deg": math.pi / 180, "rad": 1.0}
@@ -131,6 +131,4 @@ def _quaternion(table: Table) -> Array:
     length = float(np.linalg.norm(typed))
     if abs(length - 1) > _TYPED_QUATERNION:
         raise table.error("quaternion_wxyz", f"expected a quaternion of length 1, got one of length {length:.3g}")
-    w, *v = typed / length
-    K = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
-    return np.asarray(np.eye(3) + 2 * w * K + 2 * K @ K)
+    return rotation_from_quaternion(typed)

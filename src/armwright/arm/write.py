@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 
@@ -49,6 +50,17 @@ def _lines(arm: Arm) -> Iterator[str]:
         yield from _table("joint.limits", _limits(joint))
         yield from _table("joint.link", _link(arm, i, link))
         yield from _table("joint.motor", _motor(arm, i, motor, joint))
+    if arm.uncertainty is not None:
+        yield from _uncertainty(arm.uncertainty)
+
+
+def _uncertainty(known: Uncertainty) -> Iterator[str]:
+    yield "[uncertainty]  # covariance in m and rad"
+    yield f"errors = [{', '.join(map(_text, known.errors))}]"
+    yield "covariance = ["
+    yield from (f"    {row.tolist()!r}," for row in known.covariance + 0.0)
+    yield "]"
+    yield from _numbers({"noise_m": known.noise})
 
 
 def _limits(joint: Joint) -> dict[str, float]:

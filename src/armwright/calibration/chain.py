@@ -8,7 +8,7 @@ Source:
     Hayati & Mirmirani (1985); Mooring, Roth, Driels (1991); spec of the calibration.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple, TypeAlias
 
 import attrs
@@ -17,6 +17,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.errors import ShapeError
+from armwright.spatial.poses import pose
 
 Kind: TypeAlias = Literal["shift", "turn"]
 
@@ -43,6 +44,20 @@ class Element(NamedTuple):
     joint: int | None = None
 
 
+class Bend(NamedTuple):
+    """Something that moves a joint away from where its encoder has it, by a law of the posture.
+
+    Attributes:
+        name: of the error that it is counted by.
+        joint: number of the joint, from 0.
+        law: how much of the error there is in each of (m, n) postures, (m,) [1].
+    """
+
+    name: str
+    joint: int
+    law: Callable[[Array], Array]
+
+
 class Reached(NamedTuple):
     """Where tools are, and how that depends on the errors.
 
@@ -67,21 +82,27 @@ class Chain:
         arm: as it is said to be.
         elements: from the measuring frame to the tool.
         base: (4, 4) the arm's base frame in the measuring frame, roughly.
+        hand: (3, 3) how what is measured is turned in the arm's tool frame, roughly.
+        bends: of its joints.
     """
 
     arm: Arm
     elements: tuple[Element, ...]
     base: Array
+    hand: Array
+    bends: tuple[Bend, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The errors, in order."""
-        return tuple(element.name for element in self.elements if element.name)
+        """The errors, in order: those of the elements, then those of the bends."""
+        return (*(one.name for one in self.elements if one.name), *(bend.name for bend in self.bends))
 
     @property
     def is_length(self) -> Array:
         """(k,) whether each error is a length, not an angle."""
-        return np.array([element.kind == "shift" for element in self.elements if element.name], dtype=np.bool_)
+        shifts = [element.kind == "shift" for element in self.elements if element.name]
+        slides = [not self.arm.joints[bend.joint].revolute for bend in self.bends]
+        return np.array([*shifts, *slides], dtype=np.bool_)
 
     def reach(self, q: ArrayLike, errors: ArrayLike | None = None) -> Reached:
         """Return where the tool is, and the derivatives.
@@ -102,11 +123,18 @@ class Chain:
         R = np.tile(self.base[:3, :3], (m, 1, 1))
         p = np.tile(self.base[:3, 3], (m, 1))
         directions, origins, turning = np.zeros((count, m, 3)), np.zeros((count, m, 3)), np.zeros(count, dtype=bool)
+        parts = [bend.law(places) for bend in self.bends]
+        first = count - len(self.bends)
+        moving: dict[int, int] = {}  # number of the error of a joint's own position
         number = 0
         for element in self.elements:
             by = np.full(m, element.value)
             if element.joint is not None:
                 by += places[:, element.joint]
+                for i, (bend, part) in enumerate(zip(self.bends, parts, strict=True), first):
+                    if bend.joint == element.joint:
+                        by += off[i] * part
+                moving[element.joint] = number
             axis = R[:, :, element.axis].copy()
             if element.name:
                 by += off[number]
@@ -118,21 +146,33 @@ class Chain:
                 _turn(R, element.axis, by)
         levers = np.where(turning[:, None, None], np.cross(directions, p - origins), directions)
         turns = np.where(turning[:, None, None], directions, 0.0)
+        for i, (bend, part) in enumerate(zip(self.bends, parts, strict=True), first):
+            levers[i] = levers[moving[bend.joint]] * part[:, None]
+            turns[i] = turns[moving[bend.joint]] * part[:, None]
         return Reached(p, R, np.moveaxis(levers, 0, -1), np.moveaxis(turns, 0, -1))
 
 
-def chain_of(arm: Arm, *, base: Array | None = None) -> Chain:
+def chain_of(arm: Arm, *, base: Array | None = None, hand: Array | None = None, bends: tuple[Bend, ...] = ()) -> Chain:
     """Return an arm with all errors that its geometry can have: base, links, tool.
 
     Args:
         arm: with n joints.
         base: (4, 4) pose of the arm's base frame in the frame of the measurements, roughly; the same frame when left
             out.
+        hand: (3, 3) how what is measured is turned in the arm's tool frame, roughly; not at all when left out.
+        bends: of its joints, beside its geometry.
     """
-    return Chain(arm=arm, elements=tuple(_elements(arm)), base=np.eye(4) if base is None else base)
+    turned = np.eye(3) if hand is None else hand
+    return Chain(
+        arm=arm,
+        elements=tuple(_elements(arm, turned)),
+        base=np.eye(4) if base is None else base,
+        hand=turned,
+        bends=bends,
+    )
 
 
-def _elements(arm: Arm) -> Iterator[Element]:
+def _elements(arm: Arm, hand: Array) -> Iterator[Element]:
     yield from _errors("base")
     yield from _fixed(arm.base)
     for i, joint in enumerate(arm.joints):
@@ -144,6 +184,7 @@ def _elements(arm: Arm) -> Iterator[Element]:
         if i + 1 < arm.n and abs(np.sin(joint.alpha)) < PARALLEL:
             yield Element("turn", 1, 0.0, f"{name}.beta")
     yield from _fixed(arm.tool)
+    yield from _fixed(pose(hand, np.zeros(3)))
     yield from _errors("tool")
 
 

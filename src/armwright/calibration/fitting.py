@@ -1,42 +1,62 @@
-"""The errors of an arm from measured points: robust least squares, with the covariance of what is found.
+"""The errors of an arm from what was measured of it: robust least squares, with the covariance of what is found.
+
+A reading that is far off counts less, as a whole: all three coordinates of a point, in whatever frame they are told.
+Turns are weighed against lengths by what is left of either.
 
 Source:
-    Triggs et al. (2000) for the weights of outliers; spec of the calibration.
+    Holland & Welsch (1977) for least squares with weights; spec of the calibration.
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import attrs
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.stats import chi2
+from scipy.stats import t as student
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, floats
-from armwright.calibration.chain import Chain, chain_of
-from armwright.calibration.identifying import Held, Identified, identify
+from armwright.arrays import Array, ArrayLike, Flags
+from armwright.calibration.chain import Bend, Chain
+from armwright.calibration.identifying import KNOWN_ANGLE, KNOWN_LENGTH, Held, Identified, identify, preferred
+from armwright.calibration.model import Model, Off, Rows
+from armwright.calibration.readings import Numbers, Readings, readings
+from armwright.calibration.starting import started
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
-from armwright.spatial.poses import pose
-from armwright.spatial.rotations import nearest_rotation
 
-# Points that are off by more times their usual deviation count less.
-_USUAL = 3.0
-# From a median of absolute values to the standard deviation of a normal distribution.
-_MEDIAN = 1.4826
-# The variance of those numbers of a normal distribution that are within three deviations.
-_WITHIN = 0.97334
-_ROUNDS = 8
+# Readings that are off by more than this part of all are by their noise count less: three deviations of one number.
+_USUAL = 0.9973
+# Those that are off by twice as much as that are outliers.
+_OUTLYING = 2.0
+_ROUNDS, _WEIGHINGS = 8, 30
 # Rounds end when one finds the noise no smaller than this part of what the last found: outliers then weigh what they
 # should.
 _SETTLED = 0.9
-# A measurement that no rigid motion brings so near to the arm is of another arm, or in other units [m].
-_FARTHEST = 0.2
-_LEAST_NOISE, _FIRST_NOISE = 1e-9, 1e-4
+# Weights are settled when none changes by more.
+_WEIGHED = 1e-3
+_LEAST_LENGTH, _LEAST_TURN = 1e-9, 1e-9  # noise [m], [rad]
+_FIRST_LENGTH, _FIRST_TURN = 1e-4, 5e-4
 # A fit ends when it gets better by less than this part; its errors are then far nearer than they are known.
 _FINISHED = 1e-11
-# What is off by more than this is not believed unless the points say so clearly [m], [rad]. It binds what they hardly
-# tell: two such errors can otherwise run away together. What is told to a tenth of it is moved by a hundredth of its
-# deviation at most.
+# What is off by more than this is not believed unless the readings say so clearly [m], [rad]. It binds what they
+# hardly tell: two such errors can otherwise run away together. What is told to a tenth of it is moved by a hundredth
+# of its deviation at most.
 _BELIEVED_LENGTH, _BELIEVED_ANGLE = 0.02, 0.05
+# Bends of joints are a twentieth of that: gears run true to an arc minute or a few.
+_BENDS = 0.05
+
+
+class Noise(NamedTuple):
+    """Standard deviations of what is measured.
+
+    Attributes:
+        length: of a coordinate or a distance [m].
+        turn: of a turn about one axis [rad].
+    """
+
+    length: float
+    turn: float
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -44,24 +64,36 @@ class Calibration:
     """What a measurement says of an arm.
 
     Attributes:
-        chain: the arm with all errors that it can have.
+        model: the arm with all errors that it can have, and what it was measured against.
         identified: which of them are fitted, and why the others are not.
         errors: (k,) of all, 0 for those that are held [m], [rad].
         covariance: (f, f) of those that are fitted.
-        before: (m,) distances of the points from where the arm as said would be, its base moved to fit [m].
-        after: (m,) from where the corrected arm is [m].
-        noise: standard deviation of a coordinate, from what is left [m].
-        outliers: numbers of points that are off by more than they should be.
+        before: by how much each of m readings misses the arm as said, its base moved to fit.
+        after: by how much it misses the corrected arm.
+        noise: of the measurement, from what is left.
+        freedom: how many more numbers were measured than errors fitted.
+        outliers: numbers of readings that are off by more than they should be.
     """
 
-    chain: Chain
+    model: Model
     identified: Identified
     errors: Array
     covariance: Array
-    before: Array
-    after: Array
-    noise: float
+    before: Off
+    after: Off
+    noise: Noise
+    freedom: int
     outliers: tuple[int, ...]
+
+    @property
+    def chain(self) -> Chain:
+        """The arm with all errors that it can have."""
+        return self.model.chain
+
+    @property
+    def own(self) -> Array:
+        """The errors of the arm alone [m], [rad]."""
+        return self.errors[: len(self.chain.names)]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -83,9 +115,27 @@ class Calibration:
         """The errors that are not fitted, and why."""
         return self.identified.held
 
+    def intervals(self, part: float = 0.95) -> Array:
+        """Return (f, 2) in which each error is with this probability, by Student's t [m], [rad].
+
+        Raises:
+            InvalidValueError: ``part`` is not between 0 and 1.
+        """
+        if not 0 < part < 1:
+            raise InvalidValueError(f"part: expected between 0 and 1, got {part:g}")
+        half = float(student.ppf((1 + part) / 2, self.freedom)) * self.deviations
+        return np.stack([self.values - half, self.values + half], axis=1)
+
     def predict(self, q: ArrayLike) -> Array:
         """Return (m, 3) where the corrected arm has its tool, in the frame of the measurements [m]."""
-        return self.chain.reach(q, self.errors).position
+        return self.chain.reach(q, self.own).position
+
+    def uncertainty(self, q: ArrayLike) -> Array:
+        """Return (m, 3, 3) the covariance of where the corrected arm has its tool, from that of its errors [m²]."""
+        own = [(i, j) for i, j in enumerate(self.identified.kept) if j < len(self.chain.names)]
+        rows, columns = [i for i, _ in own], [j for _, j in own]
+        J = self.chain.reach(q, self.own).by_position[:, :, columns]
+        return np.asarray(J @ self.covariance[np.ix_(rows, rows)] @ J.swapaxes(1, 2), dtype=np.float64)
 
 
 def calibrate(
@@ -99,96 +149,94 @@ def calibrate(
     robust: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
-    """Find the errors of an arm from points that its tool was measured at.
+    """Find the errors of an arm from points or poses that its tool was measured at.
 
     Args:
         arm: as it is said to be, with n joints.
         q: (m, n) joint positions [rad] or [m].
-        points: (m, 3) where the tool was [m].
-        base: (4, 4) pose of the arm's base frame in the frame of the measurements, roughly; found when left out.
-        only: errors to fit, such as ``base.x`` or all of a part such as ``tool``; all that can be told when left out.
-        without: errors not to fit, such as ``beta`` of all joints, or ``joint3.alpha``.
-        robust: whether points that are far off count less.
-        progress: told what is being done.
+        points: (m, 3) where the tool was [m], or (m, 4, 4) how it stood.
+        base: see ``calibrate_to``.
+        only: see ``calibrate_to``.
+        without: see ``calibrate_to``.
+        robust: see ``calibrate_to``.
+        progress: see ``calibrate_to``.
 
     Raises:
         ShapeError: joint positions and points are not as many.
         InvalidValueError: there are fewer numbers than errors, or the points are those of another arm.
         UnknownNameError: ``only`` or ``without`` names what there is not.
     """
-    places, seen = np.atleast_2d(floats(q, "q")), np.atleast_2d(floats(points, "points"))
-    if places.shape[1:] != (arm.n,) or seen.shape != (len(places), 3):
-        raise ShapeError(
-            f"expected (m, {arm.n}) joint positions and (m, 3) points, got {places.shape} and {seen.shape}"
-        )
-    chain = chain_of(arm, base=registered(chain_of(arm), places, seen) if base is None else base)
-    nominal = chain.reach(places).position
-    _refuse_others(arm, nominal, seen)
-    chosen = _chosen(chain, only, without)
-    errors, kept = np.zeros(len(chain.names)), tuple[int, ...]()
+    seen = readings(q, points)
+    return calibrate_to(arm, seen, base=base, only=only, without=without, robust=robust, progress=progress)
+
+
+def calibrate_to(
+    arm: Arm,
+    seen: Readings,
+    *,
+    base: Array | None = None,
+    bends: tuple[Bend, ...] = (),
+    only: Sequence[str] | None = None,
+    without: Sequence[str] = (),
+    robust: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> Calibration:
+    """Find the errors of an arm from whatever was measured of it.
+
+    Args:
+        arm: as it is said to be, with n joints.
+        seen: points, poses, planes that were touched, distances.
+        base: (4, 4) pose of the arm's base frame in the frame of the measurements, roughly; found when left out.
+        bends: of its joints, to be found beside the errors of its geometry.
+        only: errors of the arm to fit, such as ``base.x`` or all of a part such as ``tool``; all that can be told when
+            left out.
+        without: errors not to fit, such as ``beta`` of all joints, or ``joint3.alpha``.
+        robust: whether readings that are far off count less.
+        progress: told what is being done.
+
+    Raises:
+        ShapeError: the readings are of arms with another number of joints.
+        InvalidValueError: there are fewer numbers than errors, or the readings are those of another arm.
+        UnknownNameError: ``only`` or ``without`` names what there is not.
+    """
+    if seen.q.shape[1] != arm.n:
+        raise ShapeError(f"expected readings of {arm.n} joints, as {arm.name} has, got {seen.q.shape[1]}")
+    model = started(arm, seen, base=base, bends=bends)
+    first, allowed = _chosen(model, only, without)
+    known = np.where(model.is_length, KNOWN_LENGTH, KNOWN_ANGLE) * _parts(model)
+    errors, kept = np.zeros(len(model.names)), tuple[int, ...]()
     found: Identified | None = None
     # Before anything is fitted, what is left says nothing of the noise.
-    noise = before = min(_spread((nominal - seen).ravel()), _FIRST_NOISE)
+    start = _left(model.rows(seen))
+    noise = before = Noise(min(start.length, _FIRST_LENGTH), min(start.turn, _FIRST_TURN))
     for _ in range(_ROUNDS):
-        J = chain.reach(places, errors).by_position.reshape(-1, len(chain.names))
+        rows = model.rows(seen, errors)
+        J = rows.by * _weights(rows, noise)[:, None]
         # What is fitted already comes first: of two that are nearly one, one would displace the other and run away.
-        first = list(dict.fromkeys([*kept, *chosen[0]]))
-        found = identify(chain.names, J, chain.is_length, noise, first=first, allowed=chosen[1])
-        if found.kept == kept and noise > _SETTLED * before:
+        order = list(dict.fromkeys([*kept, *first]))
+        found = identify(model.names, J, model.is_length, noise.length, first=order, allowed=allowed, known=known)
+        if found.kept == kept and all(now > _SETTLED * then for now, then in zip(noise, before, strict=True)):
             break
         kept, before = found.kept, noise
-        if len(kept) >= seen.size:
+        if len(kept) >= len(rows.off):
             raise InvalidValueError(
-                f"{len(seen)} points give {seen.size} numbers for {len(kept)} errors; measure more points, "
+                f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more, "
                 f"or fit fewer errors"
             )
         if progress is not None:
-            progress(f"fitting {len(kept)} errors to {len(seen)} points")
-        errors = _fitted(chain, (places, seen), list(kept), errors, noise, robust=robust)
-        noise = max(_spread((chain.reach(places, errors).position - seen).ravel()), _LEAST_NOISE)
+            progress(f"fitting {len(kept)} errors to {len(seen)} readings")
+        errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)
+        noise = _left(model.rows(seen, errors))
     assert found is not None  # noqa: S101 - there is a first round
-    return _told(chain, found, places, seen, errors, robust=robust)
-
-
-def registered(chain: Chain, q: Array, points: Array) -> Array:
-    """Return (4, 4) the base frame that brings the arm as it is said to be nearest to the points.
-
-    Source:
-        Kabsch (1976).
-    """
-    own = chain.reach(q).position
-    a, b = own - own.mean(axis=0), points - points.mean(axis=0)
-    R = nearest_rotation(b.T @ a)
-    return pose(R, points.mean(axis=0) - R @ own.mean(axis=0))
+    return _told(model, found, seen, errors, robust=robust)
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _refuse_others(arm: Arm, nominal: Array, seen: Array) -> None:
-    """Refuse points that are in other units or of another arm."""
-    spread, theirs = (float(np.linalg.norm(x - x.mean(axis=0), axis=1).mean()) for x in (nominal, seen))
-    ratio = theirs / max(spread, 1e-12)
-    for factor, word in (
-        (1e3, "millimetres read as metres"),
-        (1e-3, "metres read as millimetres"),
-        (39.37, "inches read as metres"),
-    ):
-        if 0.8 < ratio / factor < 1.25:
-            raise InvalidValueError(
-                f"the points spread {ratio:.4g} times as far as {arm.name} reaches in these postures: are they {word}?"
-            )
-    far = float(np.median(np.linalg.norm(nominal - seen, axis=1)))
-    if far > _FARTHEST:
-        raise InvalidValueError(
-            f"the points lie {far * 1e3:.0f} mm from where {arm.name} would have its tool, wherever it stands: are "
-            f"these its joints, in this order and these units?"
-        )
-
-
-def _chosen(chain: Chain, only: Sequence[str] | None, without: Sequence[str]) -> tuple[list[int], set[int]]:
+def _chosen(model: Model, only: Sequence[str] | None, without: Sequence[str]) -> tuple[list[int], set[int]]:
     """Return the order in which errors are taken, and those that may be."""
-    names = chain.names
+    names = model.names
 
     def named(one: str) -> set[int]:
         fits = {i for i, name in enumerate(names) if name == one or one in name.split(".")}
@@ -197,71 +245,129 @@ def _chosen(chain: Chain, only: Sequence[str] | None, without: Sequence[str]) ->
             raise UnknownNameError("error", one, [*names, *parts])
         return fits
 
-    allowed = set(range(len(names))) if only is None else set[int]().union(*map(named, only))
+    around = set(model.surroundings)
+    allowed = set(range(len(names))) if only is None else around.union(*map(named, only))
     # What there is not need not be left out.
     parts = {part for name in names for part in (name, *name.split("."))}
     allowed -= set[int]().union(*(named(one) for one in without if one in parts or one != "beta"))
-    # The tool before the last joint, which moves it as the tool's own errors do but for one direction.
-    order = [i for part in ("base.", "tool.", ".theta") for i, name in enumerate(names) if part in name]
-    return order, allowed
+    return [*sorted(around), *preferred(names)], allowed
 
 
-def _fitted(
-    chain: Chain, data: tuple[Array, Array], kept: list[int], start: Array, noise: float, *, robust: bool
-) -> Array:
-    q, seen = data
+def _weights(rows: Rows, noise: Noise) -> Array:
+    """Return (r,) what makes lengths of all numbers, by which they are weighed against one another [1], [m/rad]."""
+    return np.where(rows.turning, noise.length / noise.turn, 1.0)
+
+
+def _fitted(model: Model, seen: Readings, kept: list[int], start: Array, noise: Noise, *, robust: bool) -> Array:
     errors = start.copy()
     errors[[i for i in range(len(errors)) if i not in kept]] = 0.0
-    belief = noise * np.diag(1 / _believed(chain)[kept])
+    belief = noise.length * np.diag(1 / _believed(model)[kept])
+    rows = model.rows(seen, errors)
+    trust = scale = _weights(rows, noise)
 
     def missing(x: Array) -> Array:
         errors[kept] = x
-        return np.concatenate([(chain.reach(q, errors).position - seen).ravel(), belief @ x])
+        return np.concatenate([model.rows(seen, errors).off * trust, belief @ x])
 
     def slopes(x: Array) -> Array:
         errors[kept] = x
-        return np.vstack([chain.reach(q, errors).by_position.reshape(-1, len(errors))[:, kept], belief])
+        return np.vstack([model.rows(seen, errors).by[:, kept] * trust[:, None], belief])
 
-    options = {"loss": "soft_l1", "f_scale": max(_USUAL * noise, _LEAST_NOISE)} if robust else {}
-    found = least_squares(
-        missing, errors[kept].copy(), slopes, x_scale="jac", ftol=_FINISHED, xtol=_FINISHED, **options
-    )
-    errors[kept] = found.x
+    for _ in range(_WEIGHINGS):
+        if robust:
+            trust = scale * _trust(model.rows(seen, errors), scale, noise)
+        found = least_squares(
+            missing, errors[kept].copy(), slopes, x_scale="jac", ftol=_FINISHED, xtol=_FINISHED, gtol=None
+        )
+        errors[kept] = found.x
+        settled = scale * _trust(model.rows(seen, errors), scale, noise) if robust else trust
+        if np.all(np.abs(settled - trust) <= _WEIGHED * scale):
+            break
     return errors
 
 
-def _believed(chain: Chain) -> Array:
+def _trust(rows: Rows, scale: Array, noise: Noise) -> Array:
+    """Return (r,) by how much readings that are off count less: the root of the weight that soft L1 gives them."""
+    square, size = _by_reading(rows.of, rows.off * scale / noise.length)
+    trust = (1 + square / _limit(size)) ** -0.25
+    return np.asarray(trust[rows.of], dtype=np.float64)
+
+
+def _by_reading(of: Numbers, off: Array) -> tuple[Array, Array]:
+    """Return by reading the sum of the squares of its numbers, and how many they are."""
+    square, size = np.bincount(of, off**2), np.bincount(of)
+    return np.asarray(square, dtype=np.float64), np.asarray(size, dtype=np.float64)
+
+
+def _limit(size: Array) -> Array:
+    """Return what the squares of so many numbers of a normal distribution usually stay below."""
+    return np.asarray(chi2.ppf(_USUAL, np.maximum(size, 1)), dtype=np.float64)
+
+
+def _believed(model: Model) -> Array:
     """Return (k,) how far errors may be off without a question [m], [rad]."""
-    return np.where(chain.is_length, _BELIEVED_LENGTH, _BELIEVED_ANGLE)
+    return np.where(model.is_length, _BELIEVED_LENGTH, _BELIEVED_ANGLE) * _parts(model)
 
 
-def _told(chain: Chain, found: Identified, q: Array, seen: Array, errors: Array, *, robust: bool) -> Calibration:
+def _parts(model: Model) -> Array:
+    """Return (k,) how large errors may be as a part of those of the geometry."""
+    bends = {bend.name for bend in model.chain.bends}
+    return np.array([_BENDS if name in bends else 1.0 for name in model.names])
+
+
+def _told(model: Model, found: Identified, seen: Readings, errors: Array, *, robust: bool) -> Calibration:
     kept = list(found.kept)
-    reached = chain.reach(q, errors)
-    off = (reached.position - seen).ravel()
-    J = reached.by_position.reshape(-1, len(errors))[:, kept]
-    freedom = max(1, off.size - len(kept))
-    usual = off
-    if robust:
-        usual = off[np.abs(off) <= _USUAL * _spread(off) * np.sqrt(off.size / freedom)] / np.sqrt(_WITHIN)
-    noise = max(float(np.sqrt(np.mean(usual**2) * off.size / freedom)), _LEAST_NOISE)
-    believed = _believed(chain)[kept]
-    A = J * believed
-    inverse = np.linalg.inv(A.T @ A + noise**2 * np.eye(len(kept))) * np.outer(believed, believed)
-    distance = np.linalg.norm(off.reshape(-1, 3), axis=1)
-    typical = _MEDIAN * float(np.median(distance)) if robust else np.inf
+    rows = model.rows(seen, errors)
+    freedom = max(1, len(rows.off) - len(kept))
+    more = float(np.sqrt(len(rows.off) / freedom))
+    noise = Noise(
+        *(
+            max(_usual(rows, which, more, robust=robust) * more, least)
+            for which, least in ((~rows.turning, _LEAST_LENGTH), (rows.turning, _LEAST_TURN))
+        )
+    )
+    deviation = np.where(rows.turning, noise.turn, noise.length)
+    believed = _believed(model)[kept]
+    A = rows.by[:, kept] / deviation[:, None] * believed
+    covariance = np.linalg.inv(A.T @ A + np.eye(len(kept))) * np.outer(believed, believed)
+    square, size = _by_reading(rows.of, rows.off / deviation)
     return Calibration(
-        chain=chain,
+        model=model,
         identified=found,
         errors=errors,
-        covariance=np.asarray(noise**2 * inverse, dtype=np.float64),
-        before=np.asarray(np.linalg.norm(chain.reach(q).position - seen, axis=1), dtype=np.float64),
-        after=np.asarray(distance, dtype=np.float64),
+        covariance=np.asarray(covariance, dtype=np.float64),
+        before=model.off(seen),
+        after=model.off(seen, errors),
         noise=noise,
-        outliers=tuple(int(i) for i in np.flatnonzero(distance > 2 * _USUAL * max(typical, _LEAST_NOISE))),
+        freedom=freedom,
+        outliers=tuple(np.flatnonzero(square > _OUTLYING**2 * _limit(size)).tolist()) if robust else (),
     )
 
 
-def _spread(off: Array) -> float:
-    """Return the standard deviation of numbers about 0 as their median says, which outliers do not move."""
-    return max(float(_MEDIAN * np.median(np.abs(off))), _LEAST_NOISE)
+def _usual(rows: Rows, which: Flags, more: float, *, robust: bool) -> float:
+    """Return the root of the mean square of some numbers, without those of readings that are far off."""
+    off, of = rows.off[which], rows.of[which]
+    if not len(off):
+        return 0.0
+    if robust:
+        square, size = _by_reading(of, off)
+        limit = _limit(size)
+        near = square <= limit * (_spread(of, off) * more) ** 2
+        # What is cut off of a normal distribution would have made the mean larger.
+        within = chi2.cdf(limit, size + 2) / np.maximum(chi2.cdf(limit, size), _USUAL)
+        square, size = square[near].sum(), (size * within)[near].sum()
+        return float(np.sqrt(square / size)) if size else 0.0
+    return float(np.sqrt(np.mean(off**2)))
+
+
+def _left(rows: Rows) -> Noise:
+    """Return the noise as the numbers say that are left, whatever some of them are."""
+    spreads = (_spread(rows.of[which], rows.off[which]) for which in (~rows.turning, rows.turning))
+    return Noise(*(max(spread, least) for spread, least in zip(spreads, (_LEAST_LENGTH, _LEAST_TURN), strict=True)))
+
+
+def _spread(of: Numbers, off: Array) -> float:
+    """Return the standard deviation of numbers about 0 as half of the readings say, which outliers do not move."""
+    square, size = _by_reading(of, off)
+    there = size > 0
+    return float(np.sqrt(np.median(square[there] / chi2.ppf(0.5, size[there])))) if there.any() else 0.0

@@ -14,7 +14,7 @@ import numpy as np
 from armwright.arrays import Array
 
 # An error is told when its standard deviation would be below this [m], [rad].
-_KNOWN_LENGTH, _KNOWN_ANGLE = 2e-3, 5e-3
+KNOWN_LENGTH, KNOWN_ANGLE = 2e-3, 5e-3
 # Columns that lie in the others but for this part are rounding.
 _ROUNDING = 1e-9
 # How many others are named that do the same, and from what part on.
@@ -61,6 +61,7 @@ def identify(
     *,
     first: Sequence[int] = (),
     allowed: Collection[int] | None = None,
+    known: Array | None = None,
 ) -> Identified:
     """Return which errors can be fitted.
 
@@ -71,8 +72,10 @@ def identify(
         noise: standard deviation of a measured number [m].
         first: numbers of errors that come before all others.
         allowed: numbers of those that may be fitted; all when left out.
+        known: (k,) how well each should be known at least [m], [rad]; to 2 mm or 5 mrad when left out.
     """
-    known = np.where(is_length, _KNOWN_LENGTH, _KNOWN_ANGLE)
+    if known is None:
+        known = np.where(is_length, KNOWN_LENGTH, KNOWN_ANGLE)
     # The triangle has the same lengths and angles between columns, and few rows.
     A: Array = np.asarray(np.linalg.qr(jacobian * known, mode="r"), dtype=np.float64)
     order = [*first, *(i for i in range(len(names)) if i not in first)]
@@ -97,6 +100,14 @@ def identify(
     return Identified(
         names=tuple(names), kept=tuple(sorted(kept)), held=held, singular_values=np.asarray(values, dtype=np.float64)
     )
+
+
+def preferred(names: Sequence[str]) -> list[int]:
+    """Return the numbers of those errors that are taken before all others: base, tool, joint offsets.
+
+    The tool comes before the last joint, which moves it as the tool's own errors do but for one direction.
+    """
+    return [i for part in ("base.", "tool.", ".theta") for i, name in enumerate(names) if part in name]
 
 
 def _held(names: Sequence[str], A: Array, known: Array, kept: Sequence[int], number: int) -> Held:

@@ -1,35 +1,47 @@
-"""What was measured of an arm: joint positions and where the tool was, from CSV whose column names tell the units.
+"""What was measured of an arm, from CSV whose column names tell the units.
 
-One row for each measurement: ``joint_1_deg, joint_2_deg, ..., x_mm, y_mm, z_mm``. Where a file has targets and how far
-the tool was from them, ``x_t_mm, ..., x_dif_mm, ...`` stand in place of ``x_mm, ...``. A column ``set`` tells the rows
-that are kept to check with, and a column ``name`` names the rows. Units may be left out of the names and stated.
+One row for each measurement: ``joint_1_deg, joint_2_deg, ...`` and what was measured in that posture:
+
+- ``x_mm, y_mm, z_mm``, the place of the tool; or, where a file has targets and how far the tool was from them,
+  ``x_t_mm, ..., x_dif_mm, ...``. With ``frame``, the word for the frame that they are told in, where there are several;
+- with it ``roll_deg, pitch_deg, yaw_deg`` (about fixed x, y, z) or ``qw, qx, qy, qz``, how it was turned;
+- ``plane``, the word for a plane that the tool touched;
+- ``distance_mm`` from an ``anchor``, or ``to`` the tool in the row of that name.
+
+Cells may be empty where a row tells something else. ``set`` tells the rows that are kept to check with, and ``name``
+names the rows. Units may be left out of the names and stated.
 """
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import attrs
 import numpy as np
 
+from armwright.arm.dh import turn
 from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
+from armwright.calibration.columns import (
+    ANGLES,
+    DISTANCE,
+    LENGTHS,
+    NAMES,
+    OFFSETS,
+    POINTS,
+    QUATERNION,
+    RPY,
+    TARGETS,
+    Column,
+    read_columns,
+)
+from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import FileFormatError, closest, one_of
 from armwright.files.rows import Cells, number_in_cell, read_rows, refuse_other_widths
+from armwright.spatial.rotations import rotation_from_quaternion
 
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180}
-_NAMES = ("name", "pose", "step_order")
 _SETS = ("fit", "check")
-# Columns whose names begin so are for people.
-_NOTE = "note"
-_POINTS = ("x", "y", "z")
-_TARGETS = ("x_t", "y_t", "z_t")
-_OFFSETS = ("x_dif", "y_dif", "z_dif")
-_JOINT = re.compile(r"joint_([1-9]\d?)")
 # A joint whose positions differ by less has not moved [rad], [m].
 _MOVED = 1e-6
 # Limits of a slide that are gone beyond by so many times its way are in another unit.
@@ -38,6 +50,8 @@ _BEYOND = 20.0
 _RADIANS = 2 * math.pi
 # How many lines a warning names.
 _SHOWN = 5
+# A unit quaternion that is written with four digits.
+_WRITTEN = 1e-3
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -46,25 +60,27 @@ class Measurements:
 
     Attributes:
         path: where it was read.
-        q: (m, n) joint positions [rad] or [m].
-        points: (m, 3) where the tool was [m].
-        names: of the measurements; their lines in the file where it names none.
+        readings: m of them.
+        names: of the readings; their lines in the file where it names none.
         check: (m,) whether each is kept to check with, not to fit.
         warnings: what is odd but may be so.
     """
 
     path: Path
-    q: Array = attrs.field(converter=read_only)
-    points: Array = attrs.field(converter=read_only)
+    readings: Readings
     names: tuple[str, ...]
     check: Flags = attrs.field(converter=read_only)
     warnings: tuple[str, ...]
 
+    @property
+    def q(self) -> Array:
+        """(m, n) joint positions [rad] or [m]."""
+        return self.readings.q
 
-class _Column(NamedTuple):
-    place: int
-    unit: str
-    header: str
+    @property
+    def points(self) -> Array:
+        """(m, 3) where the tool was; NaN where that was not measured [m]."""
+        return self.readings.points
 
 
 def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | None = None) -> Measurements:
@@ -77,8 +93,8 @@ def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | No
 
     Raises:
         FileFormatError: the file is missing, empty, not separated by commas; a column is missing, unknown, given twice
-            or without unit; joints are not those of the arm; a value is no number; positions look like another unit.
-            The text has file, line and column.
+            or without unit; joints are not those of the arm; a value is no number; a row tells nothing; positions look
+            like another unit. The text has file, line and column.
         UnknownNameError: ``units`` are none.
     """
     path = Path(path)
@@ -88,162 +104,179 @@ def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | No
         else (one_of("unit of length", units[0], LENGTHS), one_of("unit of angle", units[1], ANGLES))
     )
     head, rows = read_rows(path)
-    columns = _columns(path, head, arm, stated)
+    table = _Table(path, rows, read_columns(path, head, arm, stated))
     refuse_other_widths(path, head, rows)
     joints = [f"joint_{i + 1}" for i in range(arm.n)]
-    q = _numbers(path, rows, columns, joints)
-    if _OFFSETS[0] in columns:
-        points = _numbers(path, rows, columns, _TARGETS) + _numbers(path, rows, columns, _OFFSETS)
-    else:
-        points = _numbers(path, rows, columns, _POINTS)
+    readings = _readings(table, table.numbers(joints, needed=True))
     lines = [row.line for row in rows]
-    _refuse_other_units(path, arm, q, lines, [columns[joint] for joint in joints])
-    label = next((name for name in _NAMES if name in columns), None)
+    columns = [table.columns[joint] for joint in joints]
+    _refuse_other_units(path, arm, readings.q, lines, columns)
     return Measurements(
         path=path,
-        q=q,
-        points=points,
-        names=tuple(row.cells[columns[label].place] if label else str(row.line) for row in rows),
-        check=_checks(path, rows, columns),
-        warnings=_warnings(arm, q, points, lines, [columns[joint] for joint in joints]),
+        readings=readings,
+        names=table.names,
+        check=_checks(table),
+        warnings=_warnings(arm, readings, lines, columns),
     )
-
-
-# ---- columns -------------------------------------------------------------------------------------------------------
-
-
-def _columns(path: Path, head: Cells, arm: Arm, stated: tuple[str, str] | None) -> dict[str, _Column]:
-    """Return the columns by their names without units."""
-    found: dict[str, _Column] = {}
-    for place, header in enumerate(cell.lower() for cell in head.cells):
-        if header.startswith(_NOTE):
-            continue
-        name, unit = _named(path, head.line, header, arm)
-        if name in found:
-            raise FileFormatError(path, head.line, header, f"given twice, as {found[name].header} too")
-        found[name] = _Column(place, unit, header)
-    _complete(path, head.line, found, arm)
-    for name, column in found.items():
-        units = _units(name, arm)
-        if units and not column.unit:
-            if stated is None:
-                told = " or ".join(f"{name}_{unit}" for unit in units)
-                raise FileFormatError(
-                    path, head.line, column.header, f"the name tells no unit: write {told}, or state the units"
-                )
-            found[name] = column._replace(unit=stated[0] if units is LENGTHS else stated[1])
-    for group, what in ((_POINTS, "coordinates"), ((*_TARGETS, *_OFFSETS), "targets and what was off")):
-        given = [found[name] for name in group if name in found]
-        for one in given:
-            if one.unit != given[0].unit:
-                raise FileFormatError(
-                    path, head.line, one.header, f"{what} have one unit in a file, and {given[0].header} has another"
-                )
-    return found
-
-
-def _units(name: str, arm: Arm) -> Mapping[str, float]:
-    """Return the units that a column may have; none for texts."""
-    joint = _JOINT.fullmatch(name)
-    if joint:
-        return ANGLES if arm.joints[int(joint[1]) - 1].revolute else LENGTHS
-    return {} if name in (*_NAMES, "set") else LENGTHS
-
-
-def _named(path: Path, line: int, header: str, arm: Arm) -> tuple[str, str]:
-    """Return what a column is of, and the unit that its name tells."""
-    known = [f"joint_{i + 1}" for i in range(arm.n)]
-    base, _, unit = header.rpartition("_")
-    for name, told in ((header, ""), (base, unit)):
-        joint = _JOINT.fullmatch(name)
-        if joint and int(joint[1]) > arm.n:
-            raise FileFormatError(
-                path, line, header, f"{arm.name} has {arm.n} joints; is this a measurement of another arm?"
-            )
-        if name not in (*known, *_POINTS, *_TARGETS, *_OFFSETS, *_NAMES, "set"):
-            continue
-        units = _units(name, arm)
-        if told and told not in units:
-            if joint and told in {**LENGTHS, **ANGLES}:
-                kind = "turns" if units is ANGLES else "slides"
-                raise FileFormatError(
-                    path, line, header, f"joint {joint[1]} of {arm.name} {kind}: expected {_choices(name, units)}"
-                )
-            raise FileFormatError(path, line, header, f"unknown unit '{told}': expected {_choices(name, units)}")
-        return name, told
-    choices = [
-        *(f"{name}_{'deg' if one.revolute else 'mm'}" for name, one in zip(known, arm.joints, strict=True)),
-        *(f"{name}_mm" for name in (*_POINTS, *_TARGETS, *_OFFSETS)),
-        *known,
-        *_NAMES,
-        "set",
-    ]
-    near = closest(header, choices)
-    hint = f" Did you mean '{near}'?" if near else ""
-    raise FileFormatError(
-        path,
-        line,
-        header or "''",
-        f"no such column.{hint} Known: {', '.join(choices[: arm.n + 3])}, x_t_mm ... z_dif_mm, {', '.join(_NAMES)}, "
-        f"set; note... for what is for people",
-    )
-
-
-def _choices(name: str, units: Mapping[str, float]) -> str:
-    return " or ".join(f"{name}_{unit}" for unit in units) if units else name
-
-
-def _complete(path: Path, line: int, found: Mapping[str, _Column], arm: Arm) -> None:
-    """Refuse what lacks a column, and points that are told twice."""
-    there = ", ".join(one.header for one in found.values())
-    joints = sum(1 for name in found if _JOINT.fullmatch(name))
-    for i, joint in enumerate(arm.joints):
-        if f"joint_{i + 1}" not in found:
-            raise FileFormatError(
-                path,
-                line,
-                f"joint_{i + 1}_{'deg' if joint.revolute else 'mm'}",
-                f"no such column; {arm.name} has {arm.n} joints, and the file has {joints}: {there}",
-            )
-    both = [any(name in found for name in group) for group in (_POINTS, (*_TARGETS, *_OFFSETS))]
-    if all(both):
-        raise FileFormatError(path, line, "x", f"give the points, or targets and what was off, not both: {there}")
-    for name in (*_TARGETS, *_OFFSETS) if both[1] else _POINTS:
-        if name not in found:
-            raise FileFormatError(path, line, f"{name}_mm", f"no such column; there are {there}")
-    if len(labels := [name for name in _NAMES if name in found]) > 1:
-        raise FileFormatError(path, line, labels[1], f"rows have one name, and {labels[0]} tells it")
 
 
 # ---- rows ----------------------------------------------------------------------------------------------------------
 
 
-def _numbers(path: Path, rows: Sequence[Cells], columns: Mapping[str, _Column], names: Sequence[str]) -> Array:
-    """Return (m, k) numbers in SI units."""
-    wanted = [columns[name] for name in names]
-    scales = [{**LENGTHS, **ANGLES}[one.unit] for one in wanted]
-    table = [[number_in_cell(path, row.line, one.header, row.cells[one.place]) for one in wanted] for row in rows]
-    return np.array(table, dtype=np.float64) * scales
+@attrs.frozen(eq=False)
+class _Table:
+    path: Path
+    rows: Sequence[Cells]
+    columns: Mapping[str, Column]
+
+    def numbers(self, names: Sequence[str], *, needed: bool) -> Array:
+        """Return (m, k) numbers in SI units; NaN in rows where all are empty, if they are not needed."""
+        wanted = [self.columns[name] for name in names]
+        scales = [{**LENGTHS, **ANGLES, "": 1.0}[one.unit] for one in wanted]
+        none = [math.nan] * len(wanted)
+        table = np.array(
+            [
+                none
+                if not needed and not any(row.cells[one.place] for one in wanted)
+                else [number_in_cell(self.path, row.line, one.header, row.cells[one.place]) for one in wanted]
+                for row in self.rows
+            ],
+            dtype=np.float64,
+        )
+        return np.asarray(table * scales, dtype=np.float64)
+
+    def words(self, name: str) -> tuple[str, ...]:
+        """Return the words of a column; empty ones where there is none."""
+        if name not in self.columns:
+            return ("",) * len(self.rows)
+        place = self.columns[name].place
+        return tuple(row.cells[place] for row in self.rows)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the rows; their lines where the file names none."""
+        label = next((name for name in NAMES if name in self.columns), None)
+        return self.words(label) if label else tuple(str(row.line) for row in self.rows)
+
+    def error(self, number: int, name: str, text: str) -> FileFormatError:
+        """Return the error that says something of a cell."""
+        header = self.columns[name].header if name in self.columns else name
+        return FileFormatError(self.path, self.rows[number].line, header, text)
 
 
-def _checks(path: Path, rows: Sequence[Cells], columns: Mapping[str, _Column]) -> Flags:
+def _readings(table: _Table, q: Array) -> Readings:
+    m, columns = len(q), table.columns
+    partial = bool({"plane", DISTANCE} & columns.keys())
+    points = np.full((m, 3), np.nan)
+    if OFFSETS[0] in columns:
+        points = table.numbers(TARGETS, needed=not partial) + table.numbers(OFFSETS, needed=not partial)
+    elif POINTS[0] in columns:
+        points = table.numbers(POINTS, needed=not partial)
+    rotations = _rotations(table, points)
+    frame, frames = _numbered(table.words("frame"), np.isfinite(points[:, 0]), named="frame" in columns)
+    plane, planes = _numbered(table.words("plane"))
+    distances = table.numbers([DISTANCE], needed=False)[:, 0] if DISTANCE in columns else np.full(m, np.nan)
+    anchor, anchors = _numbered(table.words("anchor"))
+    for i, word in enumerate(table.words("frame")):
+        if "frame" in columns and not word and np.isfinite(points[i, 0]):
+            raise table.error(i, "frame", "empty; where one point tells its frame all do")
+    other = _others(table, q, distances, anchor)
+    told = np.isfinite(points[:, 0]) | (plane >= 0) | np.isfinite(distances)
+    if not told.all():
+        raise table.error(int(np.argmin(told)), "", "the row tells no point, no plane and no distance")
+    return Readings(
+        q=q,
+        points=points,
+        rotations=rotations,
+        frame=frame,
+        plane=plane,
+        distances=distances,
+        anchor=anchor,
+        other=other,
+        frames=frames,
+        planes=planes,
+        anchors=anchors,
+    )
+
+
+def _numbered(
+    words: Sequence[str], which: Flags | None = None, *, named: bool = True
+) -> tuple[Numbers, tuple[str, ...]]:
+    """Return by number which word each row has, -1 for none, and the words in order."""
+    there = [bool(word) for word in words] if which is None else which.tolist()
+    order = tuple(dict.fromkeys(word for word, one in zip(words, there, strict=True) if one and (word or not named)))
+    numbers = [order.index(word) if one and word in order else -1 for word, one in zip(words, there, strict=True)]
+    return np.array(numbers, dtype=np.intp), order
+
+
+def _rotations(table: _Table, points: Array) -> Array:
+    """Return (m, 3, 3) how the tool was turned; NaN where that was not measured."""
+    m = len(points)
+    rotations = np.full((m, 3, 3), np.nan)
+    if QUATERNION[0] in table.columns:
+        numbers = table.numbers(QUATERNION, needed=False)
+    elif RPY[0] in table.columns:
+        numbers = table.numbers(RPY, needed=False)
+    else:
+        return rotations
+    for i in np.flatnonzero(np.isfinite(numbers[:, 0])):
+        if not np.isfinite(points[i, 0]):
+            raise table.error(int(i), "", "the row tells how the tool was turned, and not where it was")
+        if numbers.shape[1] == 3:
+            roll, pitch, yaw = numbers[i]
+            rotations[i] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
+            continue
+        length = float(np.linalg.norm(numbers[i]))
+        if abs(length - 1) > _WRITTEN:
+            raise table.error(int(i), "qw", f"expected a quaternion of length 1, got one of {length:.6g}")
+        rotations[i] = rotation_from_quaternion(numbers[i])
+    return rotations
+
+
+def _others(table: _Table, q: Array, distances: Array, anchor: Numbers) -> Array:
+    """Return (m, n) the postures that distances are from; NaN where they are from an anchor, or none are told."""
+    other, names = np.full(q.shape, np.nan), table.names
+    for i, to in enumerate(table.words("to")):
+        given = int(bool(to)) + int(anchor[i] >= 0)
+        if not np.isfinite(distances[i]):
+            if given:
+                raise table.error(i, DISTANCE, "empty; the row tells from where a distance is, and not how far")
+            continue
+        if given != 1:
+            both = "both an anchor and another row" if given else "neither an anchor nor another row"
+            raise table.error(i, DISTANCE, f"expected one place to be so far from; the row tells {both}")
+        if distances[i] < 0:
+            raise table.error(i, DISTANCE, f"expected a distance, got {distances[i]:g} m")
+        if not to:
+            continue
+        rows = [k for k, name in enumerate(names) if name == to]
+        if len(rows) != 1:
+            near = closest(to, names)
+            hint = f"; did you mean {near}?" if near and not rows else ""
+            raise table.error(i, "to", f"expected the name of one row, got '{to}', which {len(rows)} rows have{hint}")
+        if rows[0] == i:
+            raise table.error(i, "to", "a row is not away from itself")
+        other[i] = q[rows[0]]
+    return other
+
+
+def _checks(table: _Table) -> Flags:
     """Return which rows are kept to check with."""
-    if "set" not in columns:
-        return np.zeros(len(rows), dtype=np.bool_)
-    place = columns["set"].place
-    for row in rows:
-        word = row.cells[place].lower()
-        if word not in _SETS:
-            near = closest(word, _SETS)
+    if "set" not in table.columns:
+        return np.zeros(len(table.rows), dtype=np.bool_)
+    words = table.words("set")
+    for i, word in enumerate(words):
+        if word.lower() not in _SETS:
+            near = closest(word.lower(), _SETS)
             hint = f"; did you mean {near}?" if near else ""
-            raise FileFormatError(path, row.line, "set", f"expected fit or check, got '{row.cells[place]}'{hint}")
-    check = np.array([row.cells[place].lower() == "check" for row in rows], dtype=np.bool_)
+            raise table.error(i, "set", f"expected fit or check, got '{word}'{hint}")
+    check = np.array([word.lower() == "check" for word in words], dtype=np.bool_)
     if check.all():
-        raise FileFormatError(path, None, "set", "every row is kept to check with; none is left to fit")
+        raise FileFormatError(table.path, None, "set", "every row is kept to check with; none is left to fit")
     return check
 
 
-def _refuse_other_units(path: Path, arm: Arm, q: Array, lines: Sequence[int], columns: Sequence[_Column]) -> None:
+def _refuse_other_units(path: Path, arm: Arm, q: Array, lines: Sequence[int], columns: Sequence[Column]) -> None:
     """Refuse positions of joints that look as if they were in another unit."""
     for i, (joint, column) in enumerate(zip(arm.joints, columns, strict=True)):
         worst = int(np.argmax(np.abs(q[:, i])))
@@ -265,9 +298,9 @@ def _refuse_other_units(path: Path, arm: Arm, q: Array, lines: Sequence[int], co
             )
 
 
-def _warnings(arm: Arm, q: Array, points: Array, lines: Sequence[int], columns: Sequence[_Column]) -> tuple[str, ...]:
+def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], columns: Sequence[Column]) -> tuple[str, ...]:
     """Return what is odd but may be so."""
-    texts = []
+    texts, q = [], readings.q
     for i, (joint, column) in enumerate(zip(arm.joints, columns, strict=True)):
         scale, unit = {**LENGTHS, **ANGLES}[column.unit], column.unit
         if len(q) > 1 and np.ptp(q[:, i]) < _MOVED:
@@ -286,16 +319,17 @@ def _warnings(arm: Arm, q: Array, points: Array, lines: Sequence[int], columns: 
         largest = float(np.degrees(np.abs(q[:, turning]).max()))
         if largest < _RADIANS:
             texts.append(f"no joint is farther than {largest:.3g} degrees from 0; are these radians?")
-    texts.extend(_copies(q, points, lines))
+    texts.extend(_copies(readings, lines))
     return tuple(texts)
 
 
-def _copies(q: Array, points: Array, lines: Sequence[int]) -> list[str]:
+def _copies(readings: Readings, lines: Sequence[int]) -> list[str]:
     """Return a warning of rows that say the same to the last digit, which no second measurement does."""
     first: dict[bytes, int] = {}
     copies: list[int] = []
     originals: list[int] = []
-    for i, row in enumerate(np.hstack([q, points]) + 0.0):  # -0.0 + 0.0 is 0.0
+    told = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
+    for i, row in enumerate(np.hstack(told) + 0.0):  # -0.0 + 0.0 is 0.0
         original = first.setdefault(row.tobytes(), i)
         if original != i:
             copies.append(i)

@@ -10,9 +10,9 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.calibration.chain import Chain, chain_of
-from armwright.calibration.identifying import identify
+from armwright.calibration.identifying import identify, preferred
 from armwright.errors import InvalidValueError, one_of
 
 Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
@@ -23,8 +23,8 @@ _FREE = np.pi
 _CANDIDATES = 400
 # Poses are exchanged for better ones so often at most.
 _MOST_EXCHANGES = 200
-# Noise at which one asks what can be told at all [m].
-_USUAL_NOISE = 1e-4
+# Noise at which one asks what can be told at all [m], [rad].
+_USUAL_NOISE, _USUAL_TURN = 1e-4, 5e-4
 
 
 class Observability(NamedTuple):
@@ -50,7 +50,7 @@ class Plan(NamedTuple):
 
     Attributes:
         q: (m, n) joint positions [rad] or [m].
-        observability: of these poses.
+        observability: of these poses, with those that were measured before.
         by_chance: that of as many poses taken by chance, the median of some tries.
         names: of the errors that they tell.
     """
@@ -61,9 +61,9 @@ class Plan(NamedTuple):
     names: tuple[str, ...]
 
 
-def observability(chain: Chain, q: Array, kept: list[int]) -> Observability:
-    """Return how well poses (m, n) tell the errors with these numbers."""
-    return _indices(chain.reach(q).by_position[:, :, kept].reshape(-1, len(kept)), len(q))
+def observability(chain: Chain, q: Array, kept: list[int], *, turns: bool = False) -> Observability:
+    """Return how well poses (m, n), or their places alone, tell the errors with these numbers."""
+    return _indices(_rows(chain, q, turns=turns)[:, :, kept].reshape(-1, len(kept)), len(q))
 
 
 def plan_poses(
@@ -73,9 +73,11 @@ def plan_poses(
     index: Index = "O1",
     seed: int = 0,
     candidates: int = _CANDIDATES,
+    turns: bool = False,
+    measured: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Plan:
-    """Return poses inside the limits that tell an arm's errors well.
+    """Return poses inside the limits that tell an arm's errors well, beside those that were measured before.
 
     Poses are taken one by one from candidates drawn by chance, each the one that adds most to what is told of all
     errors together (the determinant); then single ones are exchanged as long as the index asked for gets better.
@@ -86,10 +88,13 @@ def plan_poses(
         index: O1 to O5; see ``Observability``.
         seed: of the candidates.
         candidates: how many there are.
+        turns: whether turns are measured too, not places alone.
+        measured: (k, n) postures that were measured before [rad] or [m]; none when left out.
         progress: told how many poses are chosen.
 
     Raises:
         InvalidValueError: so few poses do not tell the errors of the arm, or there are fewer candidates.
+        ShapeError: ``measured`` does not fit.
         UnknownNameError: there is no such index.
     """
     one_of("index", index, INDICES)
@@ -99,24 +104,38 @@ def plan_poses(
         raise InvalidValueError(f"candidates: expected {count} or more, got {candidates}")
     lower, upper = _limits(arm)
     q = lower + (upper - lower) * rng.random((candidates, arm.n))
-    slopes = chain.reach(q).by_position
-    told = identify(chain.names, slopes.reshape(-1, len(chain.names)), chain.is_length, _USUAL_NOISE)
+    before = np.zeros((0, arm.n)) if measured is None else np.atleast_2d(joint_array(measured, arm.n))
+    slopes = _rows(chain, np.vstack([q, before]), turns=turns)
+    J = slopes.reshape(-1, len(chain.names))
+    told = identify(chain.names, J, chain.is_length, _USUAL_NOISE, first=preferred(chain.names))
     kept = list(told.kept)
-    if 3 * count < len(kept):
+    numbers, poses = slopes.shape[1], count + len(before)
+    if numbers * poses < len(kept):
         raise InvalidValueError(
-            f"count: {arm.name} has {len(kept)} errors that points can tell; "
-            f"expected {-(-len(kept) // 3)} poses or more, got {count}"
+            f"count: {arm.name} has {len(kept)} errors that {'poses' if turns else 'points'} can tell; "
+            f"expected {-(-len(kept) // numbers) - len(before)} poses or more, got {count}"
         )
-    rows = slopes[:, :, kept]
-    taken = _greedy(rows, count, progress)
-    taken = _exchanged(rows, taken, INDICES.index(index))
-    chance = [_indices(_stacked(rows, rng.choice(candidates, count, replace=False).tolist()), count) for _ in range(15)]
+    rows, fixed = slopes[:, :, kept], list(range(candidates, len(slopes)))
+    taken = _greedy(rows, count, fixed, progress)
+    taken = _exchanged(rows, taken, fixed, INDICES.index(index))
+    chance = [
+        _indices(_stacked(rows, [*rng.choice(candidates, count, replace=False).tolist(), *fixed]), poses)
+        for _ in range(15)
+    ]
     return Plan(
         q=q[taken],
-        observability=_indices(_stacked(rows, taken), count),
+        observability=_indices(_stacked(rows, [*taken, *fixed]), poses),
         by_chance=Observability(*(float(np.median([one[i] for one in chance])) for i in range(len(INDICES)))),
         names=tuple(chain.names[i] for i in kept),
     )
+
+
+def _rows(chain: Chain, q: Array, *, turns: bool) -> Array:
+    """Return (m, 3 or 6, k) what is measured in each posture by all errors; turns as lengths of the same noise."""
+    reached = chain.reach(q)
+    if not turns:
+        return reached.by_position
+    return np.concatenate([reached.by_position, reached.by_turn * (_USUAL_NOISE / _USUAL_TURN)], axis=1)
 
 
 def _limits(arm: Arm) -> tuple[Array, Array]:
@@ -143,15 +162,16 @@ def _indices(A: Array, poses: int) -> Observability:
     )
 
 
-def _greedy(rows: Array, count: int, progress: Callable[[int], None] | None) -> list[int]:
+def _greedy(rows: Array, count: int, fixed: Sequence[int], progress: Callable[[int], None] | None) -> list[int]:
     """Return the poses that add most to the determinant, one after the other."""
-    information = 1e-6 * np.eye(rows.shape[-1])
+    known = _stacked(rows, fixed)
+    information = 1e-6 * np.eye(rows.shape[-1]) + known.T @ known
     taken: list[int] = []
     for _ in range(count):
         inverse = np.linalg.inv(information)
-        # det(I + A C Aᵀ) of the three rows of each candidate.
-        gains = np.linalg.det(np.eye(3) + rows @ inverse @ np.swapaxes(rows, 1, 2))
-        gains[taken] = -np.inf
+        # det(I + A C Aᵀ) of the rows of each candidate.
+        gains = np.linalg.det(np.eye(rows.shape[1]) + rows @ inverse @ np.swapaxes(rows, 1, 2))
+        gains[[*taken, *fixed]] = -np.inf
         best = int(np.argmax(gains))
         taken.append(best)
         information = information + rows[best].T @ rows[best]
@@ -160,16 +180,16 @@ def _greedy(rows: Array, count: int, progress: Callable[[int], None] | None) -> 
     return taken
 
 
-def _exchanged(rows: Array, taken: list[int], index: int) -> list[int]:
+def _exchanged(rows: Array, taken: list[int], fixed: list[int], index: int) -> list[int]:
     """Exchange single poses for others as long as the index gets better."""
     rng = np.random.default_rng(0)
-    best = _indices(_stacked(rows, taken), len(taken))[index]
-    others = [i for i in range(len(rows)) if i not in taken]
+    best = _indices(_stacked(rows, [*taken, *fixed]), len(taken) + len(fixed))[index]
+    others = [i for i in range(len(rows) - len(fixed)) if i not in taken]
     for _ in range(min(_MOST_EXCHANGES, len(others) * len(taken))):
         place, other = int(rng.integers(len(taken))), int(rng.integers(len(others)))
         tried = taken.copy()
         tried[place] = others[other]
-        value = _indices(_stacked(rows, tried), len(tried))[index]
+        value = _indices(_stacked(rows, [*tried, *fixed]), len(tried) + len(fixed))[index]
         if value > best:
             others[other], taken, best = taken[place], tried, value
     return taken

@@ -1,55 +1,89 @@
-"""How good a calibration is on points that it has not seen."""
+"""How good a calibration is on readings that it has not seen."""
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, floats
-from armwright.calibration.fitting import calibrate
+from armwright.arrays import Array, Flags
+from armwright.calibration.chain import Bend
+from armwright.calibration.fitting import calibrate_to
+from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import InvalidValueError
+
+# Postures whose joints differ by less are one [rad], [m].
+_SAME = 1e-9
+
+
+class HeldOut(NamedTuple):
+    """By how much readings miss arms that were calibrated without them.
+
+    Attributes:
+        distance: (m,) length of what is missed [m].
+        turn: (m,) angle of what is missed [rad]; NaN of readings that tell no turn.
+        places: (m, 3) where those arms have their tool [m].
+    """
+
+    distance: Array
+    turn: Array
+    places: Array
 
 
 def cross_validated(
     arm: Arm,
-    q: ArrayLike,
-    points: ArrayLike,
+    seen: Readings,
     *,
     folds: int = 5,
     seed: int = 0,
     base: Array | None = None,
+    bends: tuple[Bend, ...] = (),
     without: Sequence[str] = (),
     progress: Callable[[int], None] | None = None,
-) -> Array:
-    """Return how far each point is from where an arm calibrated without it would have its tool.
+) -> HeldOut:
+    """Return by how much each reading misses an arm that was calibrated without it.
 
-    The points are dealt out into folds by chance; each fold is held against a calibration by all others.
+    The postures are dealt out into folds by chance; each fold is held against a calibration by all others.
 
     Args:
         arm: as it is said to be, with n joints.
-        q: (m, n) joint positions [rad] or [m].
-        points: (m, 3) where the tool was [m].
-        folds: how many parts the points are dealt out into.
+        seen: m readings of it.
+        folds: how many parts the postures are dealt out into.
         seed: of the dealing.
-        base: see ``calibrate``.
-        without: see ``calibrate``.
+        base: see ``calibrate_to``.
+        bends: see ``calibrate_to``.
+        without: see ``calibrate_to``.
         progress: told how many folds are done.
 
-    Returns:
-        (m,) distances [m].
+    Raises:
+        InvalidValueError: there are not as many postures as folds, or too few for the errors of the arm.
+    """
+    held = HeldOut(np.zeros(len(seen)), np.zeros(len(seen)), np.zeros((len(seen), 3)))
+    for fold, away in enumerate(dealt(seen.q, folds, seed), 1):
+        found = calibrate_to(arm, seen.take(~away), base=base, bends=bends, without=without)
+        held.distance[away], held.turn[away] = found.model.off(seen.take(away), found.errors)
+        held.places[away] = found.predict(seen.q[away])
+        if progress is not None:
+            progress(fold)
+    return held
+
+
+def dealt(q: Array, folds: int, seed: int) -> list[Flags]:
+    """Return by fold which of some postures (m, n) are in it, (m,) truth values; one and the same is in one fold.
 
     Raises:
-        InvalidValueError: there are not as many points as folds, or too few for the errors of the arm.
+        InvalidValueError: there are not as many postures as folds, or fewer than two folds.
     """
-    places, seen = np.atleast_2d(floats(q, "q")), np.atleast_2d(floats(points, "points"))
-    if not 2 <= folds <= len(seen):
-        raise InvalidValueError(f"folds: expected 2 to {len(seen)}, one point in each or more, got {folds}")
-    dealt = np.random.default_rng(seed).permutation(len(seen)) % folds
-    off = np.zeros(len(seen))
-    for fold in range(folds):
-        away = dealt == fold
-        found = calibrate(arm, places[~away], seen[~away], base=base, without=without)
-        off[away] = np.linalg.norm(found.predict(places[away]) - seen[away], axis=1)
-        if progress is not None:
-            progress(fold + 1)
-    return off
+    posture = postures(q)
+    count = int(posture.max()) + 1
+    if not 2 <= folds <= count:
+        raise InvalidValueError(f"folds: expected 2 to {count}, one posture in each or more, got {folds}")
+    number = (np.random.default_rng(seed).permutation(count) % folds)[posture]
+    return [number == fold for fold in range(folds)]
+
+
+def postures(q: Array) -> Numbers:
+    """Return by number which posture each row (m, n) has, in the order in which they come first."""
+    _, first, same = np.unique(np.round(q / _SAME), axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(np.argsort(first))
+    return np.asarray(order[same.ravel()], dtype=np.intp)

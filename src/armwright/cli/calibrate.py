@@ -1,20 +1,24 @@
 """``armwright calibrate``: a better arm from measured points."""
 
-import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armwright.cli.numbers import numbers
+from armwright.cli.options import Json, Quiet
+from armwright.cli.printing import command_line, plain_console, print_json, table
+from armwright.cli.progress import waiting
+
 if TYPE_CHECKING:
-    from armwright.calibration.measurements import Measurements
+    from armwright.arm.model import Arm
     from armwright.report.calibrated import Calibrated
 
 
 def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: Annotated[str, typer.Argument(help="Name in the catalogue, an arm file or a URDF.", show_default=False)],
     measured: Annotated[
-        Path, typer.Argument(help="CSV of joints and measured points (docs/calibration.md).", show_default=False)
+        Path, typer.Argument(help="CSV of joints and what was measured (docs/calibration.md).", show_default=False)
     ],
     units: Annotated[
         str | None, typer.Option(help="Of a file whose header has none: mm,deg.", show_default=False)
@@ -22,57 +26,59 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     tool_mm: Annotated[
         str | None, typer.Option(help="The measured point in the frame of the hand: 0,0,31.", show_default=False)
     ] = None,
-    folds: Annotated[int, typer.Option(help="Parts in which points are held out to see how good it is.")] = 5,
+    folds: Annotated[int, typer.Option(help="Parts in which postures are held out to see how good it is.")] = 5,
     seed: Annotated[int, typer.Option(help="Of the parts.")] = 0,
+    beyond: Annotated[
+        bool,
+        typer.Option("--beyond", help="Also try springs in the joints, gears out of true, and learning what is left."),
+    ] = False,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the arm (TOML, URDF), errors, report and figures.")
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the arm (TOML, URDF, tables), errors, report and figures."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, in SI units.")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Find the errors of an arm from points that its tool was measured at, and write the corrected arm.
+    """Find the errors of an arm from what its tool was measured at, and write the corrected arm.
 
-    Prints which errors were found and how well, which cannot be told and why, and how far held-out points are off
-    before and after. The corrected arm has a Denavit-Hartenberg table like the one given.
+    Points, poses, touched planes and distances, alone or together. Prints which errors were found and how well, which
+    cannot be told and why, and how far held-out readings are off before and after.
 
     **Example:** `armwright calibrate ur5 examples/ur5_points.csv -o out/calibrated`
     """
-    import json
-
     from armwright.arm.load import load_arm
+    from armwright.arrays import one_core
     from armwright.calibration.measurements import read_measurements
     from armwright.files.output import write_folder
-    from armwright.report.calibrated import as_data, calibrated, calibrated_files
+    from armwright.report.calibrated import as_data, calibrated
+    from armwright.report.calibrated_files import calibrated_files
 
     model = load_arm(arm)
     if tool_mm is not None:
         model = _with_tool(model, tool_mm)
-    points = read_measurements(measured, model, units=_units(units))
-    found = _found(model, points, folds, seed, calibrated, watched=not (quiet or as_json))
+    measurements = read_measurements(measured, model, units=_units(units))
+    with waiting("calibrating", quiet=quiet or as_json) as told, one_core():
+        found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, progress=told)
     if output is not None:
-        write_folder(output, calibrated_files(found, title=f"{model.name}, {measured.name}"))
+        title = f"{model.name}, {measured.name}"
+        write_folder(output, calibrated_files(found, title=title, command=command_line()))
     if as_json:
-        print(json.dumps(as_data(found), indent=2))
+        print_json(as_data(found))
     elif not quiet:
         _print(found)
         if output is not None:
             print(f"report: {output / 'report.html'}")
 
 
-def _with_tool(model: Any, text: str) -> Any:
+def _with_tool(model: "Arm", text: str) -> "Arm":
     """Return an arm whose tool is a point of its hand."""
     import attrs
     import numpy as np
 
     from armwright.spatial.poses import pose
 
-    try:
-        place = [float(x) * 1e-3 for x in text.split(",")]
-    except ValueError:
-        place = []
-    if len(place) != 3 or not all(map(math.isfinite, place)):
-        raise typer.BadParameter(f"expected three numbers such as 0,0,31, got {text}", param_hint="--tool-mm")
-    return attrs.evolve(model, tool=pose(np.eye(3), place))
+    place = numbers(text, 3, "--tool-mm")
+    return attrs.evolve(model, tool=pose(np.eye(3), np.array(place) * 1e-3))
 
 
 def _units(text: str | None) -> tuple[str, str] | None:
@@ -84,34 +90,27 @@ def _units(text: str | None) -> tuple[str, str] | None:
     return parts[0], parts[1]
 
 
-def _found(model: Any, points: "Measurements", folds: int, seed: int, work: Any, *, watched: bool) -> "Calibrated":
-    """Calibrate, with a word on the screen while a person waits."""
-    from contextlib import nullcontext
-
-    from rich.console import Console
-
-    console = Console(stderr=True)
-    status = console.status("calibrating") if watched and console.is_terminal else None
-    with status or nullcontext():
-        result: Calibrated = work(
-            model, points, folds=folds, seed=seed, progress=status.update if status is not None else None
-        )
-    return result
-
-
 def _print(found: "Calibrated") -> None:
-    from rich.console import Console
+    from armwright.report.calibrated import shown_errors
+    from armwright.report.calibrated_files import result_tables
 
-    from armwright.cli.study_tables import study_table
-    from armwright.report.calibrated import distances, shown_errors
-
-    console = Console(markup=False, highlight=False)
+    console = plain_console()
     console.print(
-        study_table(f"{found.arm.name}: errors found", ("error", "value", "±", "unit"), shown_errors(found.full))
+        table(
+            ("error", "value", "±", "unit"),
+            shown_errors(found.full),
+            title=f"{found.arm.name}: errors found",
+            words=(0, 3),
+        )
     )
     held = ((one.name, one.why) for one in found.full.held)
-    console.print(study_table("Not fitted", ("error", "why"), held))
-    rows = ((name, f"{x.mean() * 1e3:.4f}", f"{x.max() * 1e3:.4f}") for name, x in distances(found).items())
-    console.print(study_table("Distance of the points", ("", "mean mm", "largest mm"), rows))
+    console.print(table(("error", "why"), held, title="Not fitted", words=(0, 1)))
+    for one in result_tables(found):
+        rows = list(one.rows)
+        if rows:
+            words = [i for i in range(len(one.heads)) if i not in one.numbers]
+            console.print(table(one.heads, rows, title=one.title, words=words))
+            if one.remark:
+                console.print(one.remark)
     for note in found.notes:
         console.print(note)

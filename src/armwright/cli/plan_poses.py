@@ -5,6 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.options import Json
+from armwright.cli.printing import plain_console, print_json, table
+
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.calibration.planning import Plan
@@ -15,10 +18,14 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     count: Annotated[int, typer.Option("-n", "--count", help="How many poses.")] = 30,
     index: Annotated[str, typer.Option(help="What is to be large: O1 to O5 (docs/calibration.md).")] = "O1",
     seed: Annotated[int, typer.Option(help="Of the candidates.")] = 0,
+    turns: Annotated[bool, typer.Option("--turns", help="Turns are measured too, not places alone.")] = False,
+    after: Annotated[
+        Path | None, typer.Option(help="CSV of what was measured already: the poses that tell most beside it.")
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="CSV of the poses, to be measured and given to calibrate.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON, in SI units.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Propose poses inside the limits whose measured points tell most of an arm's errors.
 
@@ -26,18 +33,18 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright plan-poses puma560 -n 30 -o out/poses.csv`
     """
-    import json
-
     from armwright.arm.load import load_arm
+    from armwright.calibration.measurements import read_measurements
     from armwright.calibration.planning import plan_poses as planned
     from armwright.files.output import write_file
 
     model = load_arm(arm)
-    plan = planned(model, count, index=index, seed=seed)  # type: ignore[arg-type]
+    measured = None if after is None else read_measurements(after, model).q
+    plan = planned(model, count, index=index, seed=seed, turns=turns, measured=measured)  # type: ignore[arg-type]
     if output is not None:
         write_file(output, _csv(model, plan))
     if as_json:
-        print(json.dumps(_as_data(plan), indent=2))
+        print_json(_as_data(plan))
     else:
         _print(model, plan)
         if output is not None:
@@ -70,16 +77,9 @@ def _csv(model: "Arm", plan: "Plan") -> str:
 
 
 def _print(model: "Arm", plan: "Plan") -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(markup=False, highlight=False)
+    console = plain_console()
     console.print(f"{len(plan.q)} poses of {model.name} tell {len(plan.names)} errors:")
     console.print(", ".join(plan.names))
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in ("index", "these poses", "by chance"):
-        table.add_column(name, justify="left" if name == "index" else "right", no_wrap=True)
-    for name, ours, chance in zip(plan.observability._fields, plan.observability, plan.by_chance, strict=True):
-        table.add_row(name, f"{ours:.4g}", f"{chance:.4g}")
-    console.print(table)
+    rows = zip(plan.observability._fields, plan.observability, plan.by_chance, strict=True)
+    shown = ((name, f"{ours:.4g}", f"{chance:.4g}") for name, ours, chance in rows)
+    console.print(table(("index", "these poses", "by chance"), shown))

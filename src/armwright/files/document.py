@@ -155,6 +155,17 @@ class Table:
             raise self.error(key, f"expected a text in quotes, got {_kind(value)}")
         return str(value)
 
+    def texts(self, key: str) -> list[str]:
+        """Return a list of strings.
+
+        Raises:
+            FileFormatError: it is missing, or not such a list.
+        """
+        value = self._value(key, _MISSING, "a list of texts in quotes")
+        if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
+            raise self.error(key, f"expected a list of texts in quotes, got {_kind(value)}")
+        return value
+
     def choice(self, key: str, choices: Collection[str], default: Any = _MISSING) -> str:
         """Return a string that is one of ``choices``.
 

@@ -1,4 +1,6 @@
-"""ZYZ Euler angles: R = Rz(phi) Ry(theta) Rz(psi), as the wrist of a PUMA turns the hand."""
+"""ZYZ Euler angles: R = Rz(phi) Ry(theta) Rz(psi), as the wrist of a PUMA turns the hand; and roll, pitch, yaw."""
+
+import math
 
 import numpy as np
 
@@ -80,3 +82,15 @@ def matlab_zyz(R: ArrayLike) -> Array:
     phi = np.where(singular, 0.0, -np.arctan2(R[..., 1, 2], -R[..., 0, 2]))
     psi = np.where(singular, -np.arctan2(-R[..., 1, 0], R[..., 1, 1]), -np.arctan2(R[..., 2, 1], R[..., 2, 0]))
     return np.stack([phi, -np.arctan2(sine, R[..., 2, 2]), psi], axis=-1)
+
+
+def to_rpy(R: Array) -> Array:
+    """Return roll, pitch and yaw (3,) of a rotation (3, 3), to the last digits also where pitch is a right angle [rad].
+
+    They turn about the fixed axes x, then y, then z. Where pitch is a right angle, yaw and roll turn about one axis.
+    Roll is read from what is left when yaw has been taken off, so any yaw will do.
+    """
+    level = math.hypot(R[0, 0], R[1, 0])
+    c, s = (R[0, 0] / level, R[1, 0] / level) if level else (1.0, 0.0)
+    rest = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0))) @ R
+    return np.array((math.atan2(-rest[1, 2], rest[1, 1]), math.atan2(-rest[2, 0], rest[0, 0]), math.atan2(s, c)))

@@ -102,3 +102,19 @@ def angle_between(R_A: ArrayLike, R_B: ArrayLike) -> Array:
     """Return the angle of the turn from R_A to R_B, (...) [rad]."""
     R_AB = np.swapaxes(of_shape(R_A, (3, 3), "rotation"), -1, -2) @ of_shape(R_B, (3, 3), "rotation")
     return np.asarray(np.linalg.norm(rotation_vector(R_AB), axis=-1))
+
+
+def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Return the rotation of a quaternion w, x, y, z, which is made a unit one.
+
+    Args:
+        quaternion: (..., 4), not 0.
+
+    Returns:
+        (..., 3, 3).
+    """
+    typed = of_shape(quaternion, (4,), "quaternion")
+    w, x, y, z = np.moveaxis(typed / np.linalg.norm(typed, axis=-1, keepdims=True), -1, 0)
+    zero = np.zeros(w.shape)
+    V = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*w.shape, 3, 3)
+    return np.asarray(np.eye(3) + 2 * (w[..., None, None] * V + V @ V))

@@ -5,7 +5,7 @@ it. So joint i+1 stands at A_i with joint i at 0, whose rpy are alpha, 0 and the
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -14,11 +14,12 @@ from armwright.arm.dh import turn, twist
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Motor
 from armwright.arm.urdf.robot import NO_LIMIT
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError
+from armwright.errors import InvalidValueError, ShapeError
+from armwright.spatial.euler import to_rpy
 from armwright.spatial.poses import pose
 
 
-def urdf_text(arm: Arm) -> str:
+def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
     """Return an arm as the text of a URDF file.
 
     The links are ``base``, ``link_0`` (frame 0 of the table), ``link_1`` to ``link_n`` and ``tool``, the joints
@@ -28,13 +29,19 @@ def urdf_text(arm: Arm) -> str:
 
     Args:
         arm: the arm; what of it URDF cannot hold, ``lost_in_urdf`` says.
+        tilts: n turns about y behind the rows of the table, as Hayati has them between parallel axes [rad]; none when
+            left out.
 
     Raises:
         InvalidValueError: its name has characters that XML cannot hold.
+        ShapeError: there are not as many tilts as joints.
     """
+    tilts = (0.0,) * arm.n if tilts is None else tilts
+    if len(tilts) != arm.n:
+        raise ShapeError(f"tilts: expected {arm.n} of them, one for each joint, got {len(tilts)}")
     if not all(_in_xml(character) for character in arm.name):
         raise InvalidValueError(f"arm {arm.name!r}: XML cannot hold every character of this name; give it another")
-    return "\n".join(["<?xml version='1.0' encoding='utf-8'?>", *_robot(arm), ""])
+    return "\n".join(["<?xml version='1.0' encoding='utf-8'?>", *_robot(arm, tilts), ""])
 
 
 def lost_in_urdf(arm: Arm) -> list[str]:
@@ -63,15 +70,17 @@ def lost_in_urdf(arm: Arm) -> list[str]:
     for name, value, unit in (("reach", arm.reach, "m"), ("hand speed", arm.tool_speed, "m/s")):
         if math.isfinite(value):
             lost.append(f"the {name} of {value:g} {unit} is not in the file")
+    if arm.uncertainty is not None:
+        lost.append("how well its dimensions are known is not in the file")
     lost += [f"the {name} is not in the file" for name in ("title", "source") if getattr(arm, name)]
     return lost
 
 
-def _robot(arm: Arm) -> Iterator[str]:
+def _robot(arm: Arm, tilts: Sequence[float]) -> Iterator[str]:
     yield f"<robot name={quoteattr(arm.name, _LINE_ENDS)}>"
     yield '  <link name="base"/>'
     yield '  <link name="link_0"/>'
-    yield from _weld("base_to_link_0", "base", "link_0", _origin(_rpy(arm.base[:3, :3]), arm.base[:3, 3]))
+    yield from _weld("base_to_link_0", "base", "link_0", _origin(to_rpy(arm.base[:3, :3]), arm.base[:3, 3]))
     X = np.eye(4)
     origin = _origin(np.zeros(3), np.zeros(3))
     for i, (joint, motor) in enumerate(zip(arm.joints, arm.motors, strict=True), 1):
@@ -79,9 +88,12 @@ def _robot(arm: Arm) -> Iterator[str]:
         X = pose(turn(2, joint.theta), (0.0, 0.0, joint.d)) @ twist(joint.alpha, joint.a)
         origin = _origin(np.array((joint.alpha, 0.0, joint.theta)), X[:3, 3])
         yield from _link(arm, i, X)
+        if tilts[i - 1]:
+            X = X @ pose(turn(1, tilts[i - 1]), np.zeros(3))
+            origin = _origin(to_rpy(X[:3, :3]), X[:3, 3])
     X = X @ arm.tool
     yield '  <link name="tool"/>'
-    yield from _weld(f"link_{arm.n}_to_tool", f"link_{arm.n}", "tool", _origin(_rpy(X[:3, :3]), X[:3, 3]))
+    yield from _weld(f"link_{arm.n}_to_tool", f"link_{arm.n}", "tool", _origin(to_rpy(X[:3, :3]), X[:3, 3]))
     yield "</robot>"
 
 
@@ -140,17 +152,6 @@ def _number(value: float) -> str:
     """Write a number so that it is read back to the last bit; one without bounds as the largest there is."""
     value = float(value) + 0.0
     return repr(math.copysign(NO_LIMIT, value) if math.isinf(value) else value)
-
-
-def _rpy(R: Array) -> Array:
-    """Return roll, pitch and yaw (3,) of a rotation, to the last digits also where pitch is a right angle.
-
-    There yaw and roll are turns about one axis. Roll is read from what is left when yaw has been taken off, so any
-    yaw will do.
-    """
-    yaw = math.atan2(R[1, 0], R[0, 0])
-    rest = turn(2, yaw).T @ R
-    return np.array((math.atan2(-rest[1, 2], rest[1, 1]), math.atan2(-rest[2, 0], rest[0, 0]), yaw))
 
 
 def _endless(limits: Limits) -> bool:

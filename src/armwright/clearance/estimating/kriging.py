@@ -7,15 +7,13 @@ Source:
 
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
-from typing import Any
 
 import attrs
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike, floats, one_core
 from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
 
 # Lengths over which a feature may change, as part of the range of a parameter.
@@ -220,16 +218,6 @@ def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | N
         found = [least_squares(missing, starts[i], slopes, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:_STARTS]]
     best = min(found, key=lambda one: float(one.cost))
     return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)
-
-
-def one_core() -> AbstractContextManager[Any]:
-    """Keep the matrices of a surrogate on one core: they are so small that several only wait for one another."""
-    try:
-        from threadpoolctl import threadpool_limits  # noqa: PLC0415 - comes with scikit-learn
-    except ImportError:
-        return nullcontext()
-    limits: AbstractContextManager[Any] = threadpool_limits(1)
-    return limits
 
 
 def _ranges(x: Array, ranges: ArrayLike | None) -> tuple[Array, Array]:

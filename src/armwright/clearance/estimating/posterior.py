@@ -13,8 +13,8 @@ import attrs
 import numpy as np
 from scipy.stats import chi2
 
-from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.estimating.kriging import Surrogate, one_core, solve_features
+from armwright.arrays import Array, ArrayLike, floats, one_core
+from armwright.clearance.estimating.kriging import Surrogate, solve_features
 from armwright.errors import InvalidValueError, ShapeError
 
 _WALKERS, _STEPS, _BURN = 60, 300, 100

@@ -1,0 +1,57 @@
+"""AP, AD and RP of measured arms."""
+
+import numpy as np
+import pytest
+
+from armwright.calibration.iso9283 import accuracy, repeatability
+from armwright.calibration.readings import readings
+from armwright.calibration.validation import dealt, postures
+
+
+def test_by_hand() -> None:
+    """Two postures, 3 and 4 mm off to either side: AP is 3.5 mm, AD what their distance grew by."""
+    q = np.array([[0.0], [1.0]])
+    seen = readings(q, [[0.0, 0.003, 0.0], [1.004, 0.0, 0.0]])
+
+    found = accuracy(seen, np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+
+    assert found is not None
+    assert pytest.approx(0.0035) == found.AP
+    assert found.AP_largest == pytest.approx(0.004)
+    assert pytest.approx(np.hypot(1.004, 0.003) - 1.0) == found.AD
+    assert repeatability(seen) is None
+
+
+def test_repeated() -> None:
+    """A posture that was measured three times has a barycentre, an RP of mean plus three deviations, and a floor."""
+    q = np.array([[0.0], [0.0], [0.0], [1.0]])
+    cloud = np.array([[0.001, 0, 0], [-0.001, 0, 0], [0, 0, 0.0]])
+    seen = readings(q, np.vstack([cloud, [[1.0, 0, 0]]]))
+
+    found, words = repeatability(seen), accuracy(seen, np.array([[0.0, 0, 0]] * 3 + [[1.0, 0, 0]]))
+
+    assert found is not None
+    assert words is not None
+    assert found.postures == 1
+    assert found.cycles == 3
+    distances = np.array([1e-3, 1e-3, 0.0])
+    assert pytest.approx(distances.mean() + 3 * distances.std(ddof=1)) == found.RP
+    assert found.floor == pytest.approx(1e-3)
+    assert pytest.approx(0.0, abs=1e-15) == words.AP
+
+
+def test_one_posture() -> None:
+    """One posture has no distance from another."""
+    assert accuracy(readings(np.zeros((2, 1)), np.zeros((2, 3))), np.zeros((2, 3))) is None
+
+
+def test_repeats_are_held_out_together() -> None:
+    """What was measured again is in the fold of the first time: it would tell the answer."""
+    q = np.repeat(np.arange(10.0), 3)[:, None]
+
+    folds = dealt(q, 5, 0)
+
+    np.testing.assert_array_equal(postures(q), np.repeat(np.arange(10), 3))
+    for away in folds:
+        assert away.reshape(10, 3).all(axis=1).sum() == 2
+        assert away.sum() == 6

@@ -1,0 +1,316 @@
+"""What is measured of an arm other than points in one frame: poses, several frames, planes, anchors, ways."""
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.calibration.chain import Bend, Chain, chain_of
+from armwright.calibration.fitting import Calibration, calibrate, calibrate_to
+from armwright.calibration.model import Model, Plane
+from armwright.calibration.readings import Readings, readings, together
+from armwright.errors import InvalidValueError, ShapeError
+from armwright.spatial.rotations import rotation_from_vector
+from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
+
+# Standard deviations of a coordinate and of a turn [m], [rad].
+NOISE, TURN = 3e-5, 1e-4
+# What central differences of steps of 1e-6 leave of derivatives of about one.
+DIFFERENCES = 1e-8
+# What rounding leaves of an arm of a metre that is found from measurements without noise [m].
+EXACT = 1e-8
+
+
+class Truth:
+    """A UR5 with errors, and what is measured of it."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.arm: Arm = load_arm("ur5")
+        self.chain: Chain = chain_of(self.arm)
+        self.errors = random_errors(rng, self.chain)
+        self.rng = rng
+
+    def postures(self, m: int) -> Array:
+        """Return (m, 6) postures."""
+        return postures(self.rng, self.arm, m)
+
+    def points(self, q: Array, noise: float = NOISE) -> Array:
+        """Return (m, 3) points seen."""
+        return seen(self.chain, q, self.errors, noise, self.rng)
+
+    def poses(self, q: Array, noise: float = NOISE, turn: float = TURN) -> Array:
+        """Return (m, 4, 4) poses seen."""
+        reached = self.chain.reach(q, self.errors)
+        X = np.tile(np.eye(4), (len(q), 1, 1))
+        X[:, :3, 3] = self.points(q, noise)
+        X[:, :3, :3] = rotation_from_vector(turn * self.rng.standard_normal((len(q), 3))) @ reached.rotation
+        return X
+
+    def missed(self, found: Calibration, *, rigid: bool = False) -> Array:
+        """Return (50,) by how much the corrected arm misses in postures never measured [m].
+
+        Args:
+            found: the calibration.
+            rigid: whether the measurements tell nothing of where the arm stands.
+        """
+        q = self.postures(50)
+        away, true = found.predict(q), self.points(q, 0.0)
+        if rigid:
+            a, b = away - away.mean(axis=0), true - true.mean(axis=0)
+            U, _, Vt = np.linalg.svd(b.T @ a)
+            away, true = a @ (U @ Vt).T, b
+        return np.asarray(np.linalg.norm(away - true, axis=1))
+
+
+@pytest.fixture
+def truth(rng: np.random.Generator) -> Truth:
+    return Truth(rng)
+
+
+def test_derivatives(rng: np.random.Generator) -> None:
+    """Equations of all kinds of readings have the derivatives that differences have."""
+    arm = random_arm(rng, 5, slides=True)
+    bends = (
+        Bend("joint1.sin", 0, lambda q: np.sin(q[:, 0])),
+        Bend("joint3.sag", 2, lambda q: np.cos(q[:, 1] + q[:, 2])),
+    )
+    chain = chain_of(arm, base=random_pose(rng, 1.0), hand=rotation_from_vector([0.1, 0.2, 0.3]), bends=bends)
+    model = Model(
+        chain=chain,
+        frames=(np.eye(4), random_pose(rng, 1.0)),
+        planes=(Plane(rng.standard_normal(3), rotation_from_vector(rng.standard_normal(3))),),
+        anchors=(rng.standard_normal(3),),
+        frame_names=("a", "b"),
+        plane_names=("table",),
+        anchor_names=("wire",),
+    )
+    q = postures(rng, arm, 6)
+    X = np.stack([random_pose(rng, 1.0) for _ in q])
+    X[:, :3, :3] = rotation_from_vector(0.3 * rng.standard_normal((6, 3))) @ chain.reach(q).rotation
+    given = together(
+        readings(q, X, frame=list("ababab")),
+        readings(q, plane=["table"] * 6),
+        readings(q, distances=rng.random(6), anchor=["wire"] * 6),
+        readings(q, distances=rng.random(6), other=q[::-1] + 0.1),
+    )
+    x, h = 0.05 * rng.standard_normal(len(model.names)), 1e-6
+
+    columns = [(model.rows(given, x + h * e).off - model.rows(given, x - h * e).off) / (2 * h) for e in np.eye(len(x))]
+
+    np.testing.assert_allclose(model.rows(given, x).by, np.stack(columns, axis=1), atol=DIFFERENCES)
+
+
+def test_poses_tell_the_tool_frame(truth: Truth) -> None:
+    """Poses tell how the tool is turned, which points do not; their two noises are found."""
+    q = truth.postures(60)
+
+    found = calibrate(truth.arm, q, truth.poses(q))
+    points = calibrate(truth.arm, q, truth.points(q))
+
+    assert {"tool.rx", "tool.ry", "tool.rz"} <= set(found.names)
+    assert not {"tool.rx", "tool.ry", "tool.rz"} & set(points.names)
+    assert found.noise.length == pytest.approx(NOISE, rel=0.2)
+    assert found.noise.turn == pytest.approx(TURN, rel=0.2)
+    assert truth.missed(found).mean() < NOISE
+    turned = found.chain.reach(q, found.own).rotation
+    truly = truth.chain.reach(q, truth.errors).rotation
+    assert np.abs(turned - truly).max() < TURN
+
+
+def test_fewer_poses_than_points(truth: Truth) -> None:
+    """Six poses give 36 numbers, more than the errors of a six-joint arm; six points do not."""
+    q = truth.postures(6)
+
+    found = calibrate(truth.arm, q, truth.poses(q))
+
+    assert len(found.names) >= 27
+    with pytest.raises(InvalidValueError, match="measure more"):
+        calibrate(truth.arm, q, truth.points(q))
+
+
+def test_poses_of_another_frame_of_the_hand(truth: Truth) -> None:
+    """A reflector that is screwed on anyhow tells the arm as well as one that is turned as the tool is."""
+    q = truth.postures(60)
+    X = truth.poses(q)
+    X[:, :3, :3] = X[:, :3, :3] @ rotation_from_vector([2.0, -1.0, 0.4])
+
+    found = calibrate(truth.arm, q, X)
+
+    assert found.noise.turn == pytest.approx(TURN, rel=0.2)
+    assert truth.missed(found).mean() < NOISE
+
+
+def test_one_pose_that_is_turned(truth: Truth) -> None:
+    """A pose whose place is right and whose turn is not is named and counts less."""
+    q = truth.postures(60)
+    X = truth.poses(q)
+    X[7, :3, :3] = X[7, :3, :3] @ rotation_from_vector([0.0, 0.05, 0.0])
+
+    found = calibrate(truth.arm, q, X)
+
+    assert found.outliers == (7,)
+    assert truth.missed(found).mean() < NOISE
+
+
+def test_a_board_set_up_three_times(truth: Truth) -> None:
+    """Points told in frames that stand anywhere tell the arm as points in one frame do."""
+    q = truth.postures(90)
+    points, frame = truth.points(q), np.repeat(["flat", "roll", "pitch"], 30)
+    for name in ("roll", "pitch"):
+        X = random_pose(truth.rng, 1.0)
+        which = frame == name
+        points[which] = (points[which] - X[:3, 3]) @ X[:3, :3]
+
+    found = calibrate_to(truth.arm, readings(q, points, frame=frame))
+
+    assert {f"frame.{name}.{six}" for name in ("roll", "pitch") for six in ("x", "rz")} <= set(found.names)
+    assert found.noise.length == pytest.approx(NOISE, rel=0.2)
+    assert truth.missed(found).mean() < 2 * NOISE
+
+
+def test_touched_planes(truth: Truth) -> None:
+    """Three planes touched in a hundred postures each, and no point measured, tell all but where the arm stands.
+
+    Planes tell no scale: an arm that is larger all over touches planes as well. One length is held for that.
+    """
+    planes = [(random_pose(truth.rng, 0.4), name) for name in ("floor", "wall", "door")]
+    parts = [readings(_on(truth, X, 100), plane=[name] * 100) for X, name in planes]
+
+    found = calibrate_to(truth.arm, together(*parts))
+
+    assert not [name for name in found.names if name.startswith("base")]
+    assert {"plane.floor.z", "plane.wall.rx", "plane.door.ry"} <= set(found.names)
+    assert found.after.distance.mean() < 1e-7
+    held = {one.name for one in found.held}
+    assert held >= {"base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"}
+    q = truth.postures(100)
+    lengths = [one.name for one in found.held if one.name in calibrate(truth.arm, q, truth.points(q)).names]
+    assert [name for name in lengths if not name.startswith("base")] == ["joint5.d"]
+
+
+def _on(truth: Truth, X: Array, m: int) -> Array:
+    """Return (m, 6) postures in which the true tool is on the plane z = 0 of a frame."""
+    taken: list[Array] = []
+    while len(taken) < m:
+        q = truth.postures(200)
+        for _ in range(30):
+            reached = truth.chain.reach(q, truth.errors)
+            height = (reached.position - X[:3, 3]) @ X[:3, 2]
+            theta = [truth.chain.names.index(f"joint{i + 1}.theta") for i in range(6)]
+            slope = np.einsum("i,mik->mk", X[:3, 2], reached.by_position[:, :, theta])
+            q = q - slope * (height / np.maximum((slope**2).sum(axis=1), 1e-3))[:, None]
+        good = (np.abs(height) < 1e-12) & (np.abs(q).max(axis=1) < 3.0)
+        taken.extend(q[good])
+    return np.array(taken[:m])
+
+
+def test_distances_from_anchors(truth: Truth) -> None:
+    """Three wires whose ends hang anywhere tell the arm's links, and where the ends are."""
+    q, ends = truth.postures(120), truth.rng.uniform(-2, 2, (3, 3))
+    true = truth.points(q, 0.0)
+    parts = [
+        readings(
+            q,
+            distances=np.linalg.norm(true - end, axis=1) + NOISE * truth.rng.standard_normal(120),
+            anchor=[name] * 120,
+        )
+        for name, end in zip("abc", ends, strict=True)
+    ]
+
+    found = calibrate_to(truth.arm, together(*parts))
+
+    assert not [name for name in found.names if name.startswith("base")]
+    assert found.noise.length == pytest.approx(NOISE, rel=0.2)
+    assert truth.missed(found, rigid=True).mean() < 3 * NOISE
+
+
+def test_distances_between_postures(truth: Truth) -> None:
+    """How far the tool goes between postures tells the arm's links, whoever measures from wherever."""
+    q, other = truth.postures(150), truth.postures(150)
+    apart = np.linalg.norm(truth.points(q, 0.0) - truth.points(other, 0.0), axis=1)
+
+    found = calibrate_to(truth.arm, readings(q, distances=apart + NOISE * truth.rng.standard_normal(150), other=other))
+
+    assert not [name for name in found.names if name.startswith("base")]
+    assert truth.missed(found, rigid=True).mean() < 3 * NOISE
+
+
+def test_points_with_distances(truth: Truth) -> None:
+    """Points and distances together tell no less than points alone."""
+    q, more = truth.postures(30), truth.postures(100)
+    away = np.linalg.norm(truth.points(more, 0.0), axis=1) + NOISE * truth.rng.standard_normal(100)
+    points = readings(q, truth.points(q))
+
+    alone = calibrate_to(truth.arm, points, without=("joint6.theta",))
+    both = calibrate_to(truth.arm, together(points, readings(more, distances=away, anchor=["wire"] * 100)))
+
+    assert truth.missed(both).mean() < truth.missed(alone).mean()
+
+
+def test_no_noise(truth: Truth) -> None:
+    """From poses without noise an arm is found to rounding."""
+    q = truth.postures(30)
+
+    found = calibrate(truth.arm, q, truth.poses(q, 0.0, 0.0))
+
+    assert truth.missed(found).max() < EXACT
+
+
+# ---- bad input -----------------------------------------------------------------------------------------------------
+
+
+def test_a_frame_on_a_line(truth: Truth) -> None:
+    """Two points of a frame do not tell where it stands."""
+    q = truth.postures(42)
+    given = readings(q, truth.points(q), frame=["one"] * 40 + ["other"] * 2)
+
+    with pytest.raises(InvalidValueError, match="frame other: 2 points do not tell where it stands; measure 3 or more"):
+        calibrate_to(truth.arm, given)
+
+
+@pytest.mark.parametrize("what", ["plane", "anchor"])
+def test_few_touches(what: str, truth: Truth) -> None:
+    """Three touches only tell where a plane is, three distances where an anchor is."""
+    q = truth.postures(40)
+    more = readings(q[:3], plane=["a"] * 3) if what == "plane" else readings(q[:3], distances=[1] * 3, anchor=["a"] * 3)
+
+    with pytest.raises(InvalidValueError, match=f"{what} a: 3 .* only tell where it is; measure 4 or more"):
+        calibrate_to(truth.arm, together(readings(q, truth.points(q)), more))
+
+
+def test_ways_in_millimetres(truth: Truth) -> None:
+    """Distances in another unit are refused with a question."""
+    q, other = truth.postures(40), truth.postures(40)
+    apart = 1e3 * np.linalg.norm(truth.points(q) - truth.points(other), axis=1)
+
+    with pytest.raises(InvalidValueError, match=r"distances are .* are they millimetres read as metres"):
+        calibrate_to(truth.arm, readings(q, distances=apart, other=other))
+
+
+def test_what_does_not_fit(truth: Truth) -> None:
+    """As many names as postures; distances from something; something measured; arms of as many joints."""
+    q = truth.postures(4)
+
+    with pytest.raises(ShapeError, match="plane: expected 4 names for as many q, got 2"):
+        readings(q, plane=["a", "b"])
+    with pytest.raises(InvalidValueError, match="tell from which anchor they are, or from which other posture"):
+        readings(q, distances=[1.0] * 4)
+    with pytest.raises(InvalidValueError, match="expected points, poses, planes or distances, got none"):
+        readings(q)
+    with pytest.raises(ShapeError, match=r"other: expected \(4, 6\) for as many q, got \(3, 6\)"):
+        readings(q, distances=[1.0] * 4, other=q[:3])
+    with pytest.raises(ShapeError, match=r"readings of arms with \[3, 6\] joints are not of one arm"):
+        together(readings(q, plane=["a"] * 4), readings(q[:, :3], plane=["a"] * 4))
+
+
+def test_taken(truth: Truth) -> None:
+    """Some of many readings keep the names of all frames."""
+    q = truth.postures(4)
+    given: Readings = readings(q, truth.points(q), frame=["a", "b", "a", "b"])
+
+    some = given.take(np.array([True, False, True, False]))
+
+    assert len(some) == 2
+    assert some.frames == ("a", "b")
+    np.testing.assert_array_equal(some.q, q[[0, 2]])
