@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test bench edges examples pictures editor fuzz clean
+.PHONY: help demo test bench edges examples docs gallery studies pictures messages editor fuzz clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -21,6 +21,11 @@ $(VENV)/test: pyproject.toml
 $(VENV)/bench: pyproject.toml $(VENV)/test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	@touch $@
+
+$(VENV)/docs: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@ $(VENV)/core
 
 demo: $(VENV)/core   ## Run the report's stacking program and write its report page
 	$(BIN)/armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out/stacking
@@ -56,6 +61,16 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright plan-poses puma560 -n 30 -o out/poses.csv
 	$(BIN)/armwright study dh-calibration -o out/dh
 
+docs: gallery     ## Build the site of the documentation into site/ (the first time 4 minutes)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	@echo "open site/index.html"
+
+gallery: $(VENV)/docs  ## Run the commands of the gallery, those whose sources have changed, and write its page
+	$(BIN)/python docs/make_gallery.py
+
+studies: $(VENV)/docs  ## Write the page of printed numbers beside computed ones (a minute)
+	$(BIN)/python docs/make_studies.py
+
 pictures: $(VENV)/core  ## Draw the pictures of the physics pages
 	$(BIN)/python docs/pictures/make.py
 
@@ -77,4 +92,4 @@ fuzz: $(VENV)/test  ## Fuzz everything that reads what a user types, a million i
 	    $(BIN)/python fuzz/fuzz.py $$target -runs=$(or $(RUNS),1000000) || exit 1; done
 
 clean:            ## Remove what was built
-	rm -rf $(VENV) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) out site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,4 +1,4 @@
-"""The page of all messages, made from what `armwright explain` knows; `make messages` runs this."""  # noqa: INP001
+"""The page of all messages, made from what `armwright explain` knows; `make messages` runs this."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,6 +1,7 @@
 """What the pages say is true."""
 
 import re
+import runpy
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from armwright.errors import FileFormatError
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study.stanford_torque import joint_table, torques
+from printed import matches
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
@@ -207,7 +209,7 @@ def check_explained(message: str) -> None:
     explained = re.findall(r"`(?:\w+\.)?(\w+)`", ARMS.replace(example(ARMS), ""))
     stems = {UNITS.sub("", key) for key in explained}
     for key in known_keys(message):
-        assert UNITS.sub("", key) in stems or re.search(rf"`\[\[{key}\]\]`|`\[joint\.{key}\]`|`{key}\.", ARMS), key
+        assert UNITS.sub("", key) in stems or re.search(rf"`\[\[{key}\]\]`|`\[(joint\.)?{key}\]`|`{key}\.", ARMS), key
         for unit in UNITS.findall(key):
             assert f"_{''.join(unit)}`" in ARMS, key
 
@@ -317,3 +319,71 @@ def test_numbers_of_the_study() -> None:
     assert f"joints 4 and 5 by {load[3]} and {load[4]} %, those of the others by {load[2]} % at most" in text
     assert max((rows[i] for i in (0, 1, 2, 5)), key=lambda row: row.load).joint == 3
     assert f"Joint 5 then needs {rows[4].peak_loaded:.1f} N m, and its motor has {rows[4].limit:g}" in text
+
+
+def test_every_page_is_on_the_site() -> None:
+    """Every page stands in the navigation of the site, alone, or in a folder all of which does."""
+    settings = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
+    whole = ("decisions/",)
+
+    for page in PAGES:
+        place = page.relative_to(DOCS).as_posix()
+        assert place.startswith(whole) or re.search(rf"[ ]{re.escape(place)}$", settings, re.MULTILINE), place
+
+
+def test_decisions_are_listed() -> None:
+    """The list of decisions has every one of them, under its own title and number."""
+    listed = (DOCS / "decisions" / "README.md").read_text(encoding="utf-8")
+
+    decisions = sorted((DOCS / "decisions").glob("0*.md"))
+
+    for number, page in enumerate(decisions, 1):
+        title = page.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ")
+        assert title.startswith(f"{number}. ")
+        assert f"{number}. [{title.removeprefix(f'{number}. ')}]({page.name})\n" in listed
+
+
+def test_site_fetches_nothing() -> None:
+    """What the site is set up with names nothing on the net: no fonts, no scripts, no styles."""
+    settings = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
+
+    assert not re.findall(r"https?:", settings)
+    assert "font: false" in settings
+    assert "iframe-worker" in settings  # without one of ours the plugin "offline" names one on the net
+    assert (DOCS / "site" / "iframe-worker.js").exists()
+
+
+def test_gallery_of_the_page() -> None:
+    """The page of the gallery is the one that its script writes, and shows every picture that was taken."""
+    made = runpy.run_path(str(DOCS / "make_gallery.py"))
+
+    assert made["text"]() == (DOCS / "gallery.md").read_text(encoding="utf-8")
+    assert {exhibit.picture for exhibit in made["EXHIBITS"]} == set((DOCS / "gallery").iterdir())
+    assert sum(exhibit.picture.stat().st_size for exhibit in made["EXHIBITS"]) < 1_500_000
+
+
+@pytest.mark.parametrize("name", ["stanford-torque", "puma-moves", "dh-calibration"])
+def test_studies_of_the_page(name: str) -> None:
+    """The page of the studies tells what the studies find; the long one is told by a run of its own."""
+    made = runpy.run_path(str(DOCS / "make_studies.py"))
+
+    assert name in made["QUICK"]
+    page = (DOCS / "studies.md").read_text(encoding="utf-8")
+    told = re.search(rf"^## {name}\n.*?(?=^## |\Z)", page, re.MULTILINE | re.DOTALL)
+    assert told is not None
+    assert matches(told[0].rstrip().splitlines(), made["section"](name).rstrip().splitlines())
+
+
+def test_reference_has_every_module() -> None:
+    """Each folder of the house has its page in the reference, and each module stands on one page, a new one too."""
+    pytest.importorskip("mkdocs", reason="the extra docs is not installed")
+    made = runpy.run_path(str(DOCS / "make_site.py"))
+    package = Path(armwright.__file__).parent
+
+    pages = made["api_pages"]()
+
+    shown = [name for page in pages.values() for name in re.findall(r"^::: armwright\.(\S+)$", page, re.MULTILINE)]
+    assert len(shown) == len(set(shown))
+    modules = {".".join(path.relative_to(package).with_suffix("").parts) for path in package.rglob("*.py")}
+    kept = {name for name in modules if not name.endswith("__init__") and name.partition(".")[0] not in made["NO_API"]}
+    assert kept <= set(shown)

@@ -1,4 +1,4 @@
-"""The pictures of the physics pages, drawn from what the package computes; `make pictures` runs this."""  # noqa: INP001
+"""The pictures of the physics pages, drawn from what the package computes; `make pictures` runs this."""
 
 import io
 from pathlib import Path

@@ -1,0 +1,150 @@
+"""Pages of the site that come of the code, and links that lead out of ``docs/``; MkDocs calls this as its hook."""
+
+import posixpath
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import typer
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+from typer.cli import get_docs_for_click
+
+import armwright
+from armwright.cli.app import app
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+PACKAGE = ROOT / "src" / "armwright"
+# Pages outside of docs/ that the site has too, under the same names.
+OUTSIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/results.md")
+# The commands have a page of their own.
+NO_API = ("__main__", "cli", "version")
+
+
+def house() -> list[str]:
+    """Return the folders and modules of the package in the order in which imports point down."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+    layers = next(contract["layers"] for contract in contracts if contract["type"] == "layers")
+    return [name for layer in layers for name in re.split(r"\s*\|\s*", layer) if name not in NO_API]
+
+
+def folders(name: str) -> list[Path]:
+    """Return a folder of the house and the folders in it that hold modules."""
+    top = PACKAGE / name
+    return [top, *sorted({path.parent for path in top.rglob("*.py") if path.parent != top})]
+
+
+def modules(folder: Path) -> Iterator[str]:
+    """Give the modules that stand in a folder, by their dotted names."""
+    package = ".".join(folder.relative_to(PACKAGE.parent).parts)
+    for path in sorted(folder.glob("*.py")):
+        if path.stem != "__init__":
+            yield f"{package}.{path.stem}"
+        elif "\n\n" in path.read_text(encoding="utf-8").strip():
+            yield package
+
+
+def api_page(folder: Path) -> str:
+    """Return the page of a folder: what it is about, then its modules with all that is public in them."""
+    first = (folder / "__init__.py").read_text(encoding="utf-8").split('"""')[1]
+    name = ".".join(folder.relative_to(PACKAGE).parts)
+    lines = [f"# {name}\n", first.partition("\n")[0], ""]
+    for module in modules(folder):
+        lines += [f"## {module.removeprefix('armwright.')}\n", f"::: {module}\n"]
+    return "\n".join(lines)
+
+
+def public_page() -> str:
+    """Return the page of what can be had from the package itself."""
+    lines = ["# armwright\n", armwright.__doc__ or "", "\n| Name | What |\n|---|---|"]
+    for name in armwright.__all__:
+        if not name.startswith("_"):
+            thing = getattr(armwright, name)
+            what = (thing.__doc__ or "").strip().partition("\n")[0].replace("|", "\\|")
+            lines.append(f"| [`{name}`][{thing.__module__}.{thing.__qualname__}] | {what} |")
+    for module in house():
+        if (PACKAGE / f"{module}.py").exists():
+            lines += [f"\n## {module}\n", f"::: armwright.{module}\n"]
+    return "\n".join(lines)
+
+
+def api_pages() -> dict[str, str]:
+    """Return the pages of the reference by their places, in the order of the house."""
+    pages = {"api/armwright.md": public_page()}
+    for name in house():
+        if (PACKAGE / name).is_dir():
+            for folder in folders(name):
+                pages[f"api/{'.'.join(folder.relative_to(PACKAGE).parts)}.md"] = api_page(folder)
+    return pages
+
+
+def commands_page() -> str:
+    """Return the page of all commands with their options, as ``--help`` has them."""
+    command = typer.main.get_command(app)
+    text = get_docs_for_click(obj=command, ctx=typer.Context(command), name="armwright", title="Commands")
+    return text.replace("\n**Usage**:\n\n```console\n$ armwright [OPTIONS] COMMAND [ARGS]...\n```\n", "", 1)
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Fill the parts of the navigation that come of the folders."""
+    assert config.nav is not None  # noqa: S101 - mkdocs.yml has one
+    for entry in config.nav:
+        if "API reference" in entry:
+            entry["API reference"] = _api_nav()
+        if "Decisions" in entry:
+            entry["Decisions"] = ["decisions/README.md", *_decisions()]
+    return config
+
+
+def _decisions() -> list[str]:
+    return [f"decisions/{path.name}" for path in sorted((HERE / "decisions").glob("0*.md"))]
+
+
+def _api_nav() -> list[Any]:
+    nav: list[Any] = ["api/armwright.md"]
+    for name in house():
+        if (PACKAGE / name).is_dir():
+            top, *inner = [".".join(folder.relative_to(PACKAGE).parts) for folder in folders(name)]
+            pages: list[Any] = [f"api/{top}.md", *({one.partition(".")[2]: f"api/{one}.md"} for one in inner)]
+            nav.append({top: pages if inner else pages[0]})
+    return nav
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add what is made, and what lies outside of ``docs/``."""
+    for place, text in {**api_pages(), "commands.md": commands_page()}.items():
+        files.append(File.generated(config, place, content=text))
+    for name in OUTSIDE:
+        files.append(File.generated(config, name, abs_src_path=str(ROOT / name)))
+    for path in sorted((ROOT / "out" / "gallery").glob("*/report.html")):
+        files.append(File.generated(config, f"gallery/{path.parent.name}.html", abs_src_path=str(path)))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Turn links that lead out of ``docs/``, or into it, to where the site has what they name."""
+    del config
+    place = page.file.src_uri
+    # Where the page lies beside the others when one looks at the files, not at the site.
+    lies = place if place in OUTSIDE else f"docs/{place}"
+
+    def turned(found: re.Match[str]) -> str:
+        target = posixpath.normpath(posixpath.join(posixpath.dirname(lies), found[1]))
+        inside = target.removeprefix("docs/")
+        if inside == target and files.get_file_from_path(target) is None:
+            return found[0]
+        return f"]({posixpath.relpath(inside, posixpath.dirname(place) or '.')}{found[2]})"
+
+    text = re.sub(r"\]\(([^)#:\s]+)(#[^)\s]*|)\)", turned, markdown)
+    if place == "gallery.md":
+        text = re.sub(r"<!-- page (\S+) -->", lambda found: _page_link(found[1], files), text)
+    return text
+
+
+def _page_link(name: str, files: Files) -> str:
+    return f"[Open the page](gallery/{name}.html)" if files.get_file_from_path(f"gallery/{name}.html") else ""
