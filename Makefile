@@ -16,6 +16,8 @@ $(VENV)/core: pyproject.toml
 $(VENV)/test: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,urdf]'
+	@# It asks for NumPy 1, and works with 2.
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps 'pybotics>=3.0,<4'
 	@touch $@ $(VENV)/core
 
 $(VENV)/bench: pyproject.toml $(VENV)/test
@@ -51,7 +53,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 	$(BIN)/python examples/measurements.py
 	$(BIN)/armwright iso9283 examples/measured_poses.csv examples/measured_paths.csv -o out/iso9283
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sweep,clearance]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sweep,clearance,calibration]'
 	$(BIN)/python examples/five_bar.py
 	$(BIN)/armwright clearance simulate five-bar --path y1 -o out/rattling
 	$(BIN)/armwright clearance estimate five-bar examples/five_bar_rest.csv
@@ -59,6 +61,8 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright clearance estimate five-bar examples/five_bar_paths.csv --sweep out/sweep --noise-um 2
 	$(BIN)/armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483 -o out/corrected
 	$(BIN)/armwright plan-poses puma560 -n 30 -o out/poses.csv
+	$(BIN)/python examples/tracked_points.py
+	$(BIN)/armwright calibrate puma560 examples/puma_points.csv --beyond -o out/calibrated
 	$(BIN)/armwright study dh-calibration -o out/dh
 
 docs: gallery     ## Build the site of the documentation into site/ (the first time 4 minutes)

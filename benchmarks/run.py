@@ -27,8 +27,21 @@ ALL = (
     "motion_online",
     "language",
     "play",
+    "calibration",
 )
-PEERS = ("pin", "roboticstoolbox-python", "eaik", "ruckig", "toppra", "lark", "exudyn", "numpy", "numba", "scipy")
+PEERS = (
+    "pin",
+    "roboticstoolbox-python",
+    "eaik",
+    "ruckig",
+    "toppra",
+    "lark",
+    "exudyn",
+    "pybotics",
+    "numpy",
+    "numba",
+    "scipy",
+)
 
 
 def main() -> None:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from armwright import inverse, link_poses, load_arm, simulate
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.calibration.measurements import read_measurements
 from armwright.clearance.ideal import point_of, tip_of
 from armwright.clearance.linkage import Place
 from armwright.clearance.paths import thesis_path
@@ -21,6 +22,8 @@ from armwright.clearance.simulation import simulate as simulate_play
 from armwright.dynamics.integrators import Adaptive
 from armwright.dynamics.simulation import Event, JointState, Simulation
 from armwright.kinematics.inverse.solution import Branch
+from armwright.report.calibrated import calibrated
+from armwright.report.calibrated_files import distances_figure
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study import puma_moves
@@ -348,6 +351,16 @@ def rattling() -> Figure:
     return figure
 
 
+# An arm before and after it is calibrated.
+
+
+def before_and_after() -> Figure:
+    """Draw how far points of the imaginary PUMA are from it as said, calibrated, and with what its joints give."""
+    arm = load_arm("puma560")
+    measured = read_measurements(HERE.parents[1] / "examples" / "puma_points.csv", arm)
+    return distances_figure(calibrated(arm, measured, beyond=True))
+
+
 def main() -> None:
     """Draw all pictures."""
     with mpl.rc_context(STYLE):
@@ -355,6 +368,7 @@ def main() -> None:
         write(released(), "released.svg")
         write(two_moves(), "two_moves.svg")
         write(rattling(), "rattling.svg")
+        write(before_and_after(), "calibrated.svg")
 
 
 if __name__ == "__main__":

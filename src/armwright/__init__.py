@@ -30,6 +30,11 @@ if TYPE_CHECKING:
     from armwright.arm.load import arm_names, load_arm
     from armwright.arm.model import Arm
     from armwright.arm.urdf.reader import load_urdf
+    from armwright.calibration.beyond import calibrate_beyond
+    from armwright.calibration.compensating import compensated
+    from armwright.calibration.correcting import corrected_arm, place_covariance
+    from armwright.calibration.fitting import calibrate, calibrate_to
+    from armwright.calibration.planning import plan_poses
     from armwright.clearance.correcting import correct_nodes, correct_path
     from armwright.clearance.estimating.static import estimate_at_rest
     from armwright.clearance.reader import load_linkage
@@ -71,12 +76,17 @@ _HOME = {
     "assess": "accuracy.assess",
     "blend_timing": "motion.blends",
     "blended": "motion.blends",
+    "calibrate": "calibration.fitting",
+    "calibrate_beyond": "calibration.beyond",
+    "calibrate_to": "calibration.fitting",
     "cartesian_move": "motion.moves",
+    "compensated": "calibration.compensating",
     "compile_arm": "dynamics.compiled",
     "continuity": "motion.continuity",
     "corner_deviations": "accuracy.corner",
     "correct_nodes": "clearance.correcting",
     "correct_path": "clearance.correcting",
+    "corrected_arm": "calibration.correcting",
     "cubic": "motion.cubic",
     "cubic_through": "motion.cubic",
     "distance_accuracy": "accuracy.distance",
@@ -104,6 +114,8 @@ _HOME = {
     "path_deviation": "accuracy.path",
     "path_velocity": "accuracy.path",
     "payload": "dynamics.payload",
+    "place_covariance": "calibration.correcting",
+    "plan_poses": "calibration.planning",
     "point_to_point": "motion.quintic",
     "pose_accuracy": "accuracy.pose",
     "pose_drift": "accuracy.variation",
@@ -143,12 +155,17 @@ __all__ = [
     "assess",
     "blend_timing",
     "blended",
+    "calibrate",
+    "calibrate_beyond",
+    "calibrate_to",
     "cartesian_move",
+    "compensated",
     "compile_arm",
     "continuity",
     "corner_deviations",
     "correct_nodes",
     "correct_path",
+    "corrected_arm",
     "cubic",
     "cubic_through",
     "distance_accuracy",
@@ -176,6 +193,8 @@ __all__ = [
     "path_deviation",
     "path_velocity",
     "payload",
+    "place_covariance",
+    "plan_poses",
     "point_to_point",
     "pose_accuracy",
     "pose_drift",

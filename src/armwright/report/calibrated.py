@@ -20,6 +20,8 @@ from armwright.calibration.validation import HeldOut, cross_validated
 
 # Turns about y, which a Denavit-Hartenberg table has no number for.
 _TILTS = ("beta",)
+# An arm whose points are farther from it is not measured in its own frame [m].
+_ELSEWHERE = 0.2
 # How many readings a note names.
 _SHOWN = 8
 
@@ -33,7 +35,8 @@ class Calibrated:
         measurements: what was measured.
         full: with all errors that can be told.
         table: without turns about y, for arm files.
-        raw: (p,) distances of the points in the measuring frame from the arm as said, in its own frame [m].
+        raw: (p,) distances of the points from the arm as said, where it stands in the measuring frame; none where it
+            stands elsewhere [m].
         held_out: from arms calibrated without the reading, all errors.
         held_out_table: likewise, without turns about y.
         checked: by how much readings that the file keeps for checking miss the corrected arm.
@@ -90,25 +93,32 @@ def calibrated(
     if any(name.endswith(_TILTS) for name in full.chain.names):
         told("holding points out: for the arm file")
         held_out_table = cross_validated(arm, seen, folds=folds, seed=seed, without=_TILTS)
+    tried = calibrate_beyond(arm, seen, folds=folds, seed=seed, progress=progress) if beyond else None
     own = seen.with_point & (seen.frame == 0)
     places = {
         "as said": chain_of(arm).reach(seen.q).position,
         "base moved": full.chain.reach(seen.q).position,
         "calibrated, held out": held_out.places,
     }
+    raw = np.linalg.norm(places["as said"][own] - seen.points[own], axis=1)
+    if not len(raw) or np.median(raw) > _ELSEWHERE:
+        raw = raw[:0]
+        del places["as said"]
+    if tried:
+        places["beyond geometry, held out"] = tried.held_out.places
     words = {name: accuracy(seen, place) for name, place in places.items()}
     return Calibrated(
         arm=arm,
         measurements=measurements,
         full=full,
         table=table,
-        raw=np.asarray(np.linalg.norm(places["as said"][own] - seen.points[own], axis=1), dtype=np.float64),
+        raw=np.asarray(raw, dtype=np.float64),
         held_out=held_out,
         held_out_table=held_out_table,
         checked=full.model.off(measurements.readings.take(~fit), full.errors),
         accuracy={name: one for name, one in words.items() if one is not None} or None,
         repeatability=repeatability(seen),
-        beyond=calibrate_beyond(arm, seen, folds=folds, seed=seed, progress=progress) if beyond else None,
+        beyond=tried,
         notes=tuple(_notes(full, measurements)),
     )
 

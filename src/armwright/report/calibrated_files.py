@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arm.write import toml_text
 from armwright.calibration.correcting import corrected_arm, corrected_tables, corrected_urdf
 from armwright.report.calibrated import Calibrated, as_data, distances, shown_bends, shown_errors, turns
-from armwright.report.figures import Drawing, svg_text
+from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
 from armwright.report.plain_page import Table, plain_page
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def calibrated_files(found: Calibrated, *, title: str, command: str) -> dict[str
             "What is left of each reading: along x, y and z where points were measured; held out below",
             svg_text(_residuals(found)),
         ),
-        Drawing("distances", "Distances before and after, sorted", svg_text(_distances(found))),
+        Drawing("distances", "Distances before and after, sorted", svg_text(distances_figure(found))),
     ]
     head = (
         f"# {found.arm.name} as calibrated with {len(found.held_out.distance)} readings, without turns about y; "
@@ -126,12 +126,10 @@ def _repeated(found: Calibrated) -> str:
 
 
 def _residuals(found: Calibrated) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
-
     seen = found.measurements.readings.take(~found.measurements.check)
     rows = found.full.model.rows(seen, found.full.errors)
     number = np.arange(1, len(seen) + 1)
-    figure = Figure(figsize=(7.4, 4.6), layout="constrained")
+    figure = empty_figure((7.4, 4.6))
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1))
     size = np.bincount(rows.of[~rows.turning], minlength=len(seen))
     points = ~rows.turning & (size[rows.of] == 3)
@@ -143,7 +141,7 @@ def _residuals(found: Calibrated) -> "Figure":
     if others.any():
         above.plot(rows.of[others] + 1, rows.off[others] * 1e3, ".", label="planes, distances", color="C4")
     above.set(ylabel="left over, mm")
-    above.legend(ncols=4, fontsize="small", loc="upper right")
+    above.legend(ncols=4, fontsize="small", loc="upper right", markerscale=2)
     below.plot(number, found.held_out.distance * 1e3, ".", color="C3", markersize=3)
     floor = found.repeatability
     if floor is not None:
@@ -155,18 +153,19 @@ def _residuals(found: Calibrated) -> "Figure":
     return figure
 
 
-def _distances(found: Calibrated) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
-    figure = Figure(figsize=(7.4, 4.0), layout="constrained")
-    axis = figure.subplots()
+def distances_figure(found: Calibrated) -> "Figure":
+    """Return the distances by which readings miss the arm before and after, sorted."""
+    figure = empty_figure((7.4, 4.0))
+    axes = plain_axes(figure, "distance, mm", "readings that are nearer, %")
     shown = distances(found)
     for name in ("base moved to fit", "calibrated, held out", "calibrated, all readings", "beyond geometry, held out"):
         if name in shown:
             x = shown[name]
             part = (np.arange(len(x)) + 0.5) / len(x) * 100
-            axis.plot(np.maximum(np.sort(x) * 1e3, 1e-6), part, label=name)
-    axis.set(xscale="log", xlabel="distance, mm", ylabel="readings that are nearer, %", ylim=(0, 100))
-    axis.grid(visible=True, which="both", alpha=0.3)
-    axis.legend()
+            axes.plot(np.maximum(np.sort(x) * 1e3, 1e-6), part, label=name)
+    axes.set(xscale="log", ylim=(0, 100))
+    floor = found.repeatability
+    if floor is not None:
+        axes.axvline(floor.floor * 1e3, color="0.4", linestyle=":", label="comes back to (root mean square)")
+    axes.legend(fontsize="small")
     return figure

@@ -1,0 +1,103 @@
+"""A calibrated arm is sent where its tool comes right."""
+
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arrays import Array
+from armwright.calibration.bending import springs
+from armwright.calibration.beyond import calibrate_beyond
+from armwright.calibration.chain import Chain, chain_of
+from armwright.calibration.compensating import compensated
+from armwright.calibration.fitting import calibrate
+from armwright.calibration.readings import readings
+from armwright.errors import ShapeError
+from calibration.simulated import postures, random_errors, seen
+
+NOISE = 2e-5
+# What the steps end at.
+MET = 1e-9
+
+
+def bent(rng: np.random.Generator) -> tuple[Chain, Array]:
+    """Return a PUMA whose dimensions are off and whose joints give."""
+    arm = load_arm("puma560")
+    chain = chain_of(arm, bends=springs(arm))
+    errors = random_errors(rng, chain)
+    errors[-len(chain.bends) :] = 1e-3
+    return chain, errors
+
+
+def test_places(rng: np.random.Generator) -> None:
+    """Sent to compensated positions, the true arm is where it should be but for the noise; sent as said, it is not."""
+    chain, errors = bent(rng)
+    q = postures(rng, chain.arm, 120)
+    found = calibrate_beyond(chain.arm, readings(q, seen(chain, q, errors, NOISE, rng)))
+    near = postures(rng, chain.arm, 10)
+    goals = chain_of(chain.arm).reach(near).position
+
+    there = compensated(found, goals, near)
+
+    assert found.tried[1].kept
+    assert there.missed.max() < MET
+    off = np.linalg.norm(chain.reach(there.q, errors).position - goals, axis=1)
+    as_said = np.linalg.norm(chain.reach(near, errors).position - goals, axis=1)
+    assert off.mean() < 2 * NOISE
+    assert as_said.mean() > 30 * off.mean()
+
+
+def test_poses(rng: np.random.Generator) -> None:
+    """Poses are met in place and turn, with turns about y that no table holds."""
+    arm = load_arm("ur5")
+    chain = chain_of(arm)
+    errors, q = random_errors(rng, chain), postures(rng, arm, 40)
+    X = np.tile(np.eye(4), (40, 1, 1))
+    reached = chain.reach(q, errors)
+    X[:, :3, 3], X[:, :3, :3] = reached.position, reached.rotation
+    found = calibrate(arm, q, X)
+
+    there = compensated(found, X[:5], q[:5] + 0.01)
+
+    assert any(name.endswith(".beta") for name in found.names)
+    assert there.missed.max() < MET
+    again = chain.reach(there.q, errors)
+    np.testing.assert_allclose(again.position, X[:5, :3, 3], atol=1e-7)
+    np.testing.assert_allclose(again.rotation, X[:5, :3, :3], atol=1e-6)
+
+
+def test_out_of_reach(rng: np.random.Generator) -> None:
+    """A goal that is out of reach is missed, and that is said."""
+    arm = load_arm("puma560")
+    chain = chain_of(arm)
+    q = postures(rng, arm, 40)
+    found = calibrate(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
+
+    there = compensated(found, (5.0, 0.0, 0.0), q[0])
+
+    assert there.missed[0] > 3.0
+
+
+def test_limits(rng: np.random.Generator) -> None:
+    """Positions beyond the limits are told."""
+    arm = load_arm("puma560")
+    chain = chain_of(arm)
+    q = 0.3 * postures(rng, arm, 40)
+    found = calibrate(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
+    beyond = arm.limit("upper") + 0.05
+
+    there = compensated(found, found.predict(beyond), beyond)
+
+    np.testing.assert_array_equal(there.inside, [False])
+
+
+def test_as_many(rng: np.random.Generator) -> None:
+    """As many joint positions as goals, or one for all."""
+    arm = load_arm("puma560")
+    q = postures(rng, arm, 40)
+    found = calibrate(arm, q, seen(chain_of(arm), q, np.zeros(len(chain_of(arm).names)), NOISE, rng))
+
+    assert compensated(found, found.predict(q[:3]), q[0]).q.shape == (3, 6)
+    with pytest.raises(ShapeError, match="near: expected 3 joint positions for as many goals, or one, got 2"):
+        compensated(found, np.zeros((3, 3)), q[:2])
+    with pytest.raises(ShapeError, match=r"goals: expected \(m, 3\) places or \(m, 4, 4\) poses, got \(3, 2\)"):
+        compensated(found, np.zeros((3, 2)), q[0])
