@@ -1,5 +1,9 @@
-"""Arrays at the door: named converters that check shape and meaning, copy to float64 and make read-only."""
+"""Arrays at the door: named converters that check shape and meaning, copy to float64 and make read-only.
 
+And how many cores work on them.
+"""
+
+import os
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -130,6 +134,11 @@ def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     copy = np.array(array)
     copy.setflags(write=False)
     return copy
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def one_core() -> AbstractContextManager[Any]:

@@ -7,7 +7,6 @@ died is done again, alone, so that the blame for a second death is its own.
 import concurrent.futures
 import gc
 import multiprocessing
-import os
 import pickle
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Future, ProcessPoolExecutor
@@ -43,11 +42,6 @@ class Crew(Protocol):
 
     def renew(self) -> None:
         """Replace workers that died."""
-
-
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def alone(task: Task, pieces: Iterable[tuple[int, Array]]) -> Iterator[tuple[int, Rows]]:

@@ -5,9 +5,9 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armwright.arrays import Array
+from armwright.arrays import Array, cores
 from armwright.errors import InvalidValueError, KindError
-from armwright.sweep.crew import alone, cluster, cores, processes, together
+from armwright.sweep.crew import alone, cluster, processes, together
 from armwright.sweep.designs import Design, whole
 from armwright.sweep.extras import NEEDED, extra
 from armwright.sweep.folder import Folder, held

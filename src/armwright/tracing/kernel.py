@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike, cores, floats
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled_module
 from armwright.tracing.emit import LANES, Emitted, Shape
@@ -201,17 +201,12 @@ def on_cores(work: Callable[[int, int], T], rows: int, threads: int | None, *, m
         most: no more than this are worth it; as many as there are blocks when left out.
     """
     blocks = -(-rows // LANES)
-    count = min(_cores() if threads is None else threads, blocks if most is None else most)
+    count = min(cores() if threads is None else threads, blocks if most is None else most)
     if count <= 1:
         return [work(0, rows)]
     cuts = [min(round(blocks * i / count) * LANES, rows) for i in range(count + 1)]
     jobs = [_pool().submit(work, a, b) for a, b in pairwise(cuts)]
     return [job.result() for job in jobs]
-
-
-def _cores() -> int:
-    """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @cache
