@@ -26,6 +26,8 @@ class Fall:
     """Every call appends the process and the speeds to this file."""
     seconds: float = 0.0
     """A call takes so long [s]."""
+    company: int = 1
+    """A call waits until so many processes have called, a minute at most."""
     raises_above: float = np.inf
     kills_above: float = np.inf
     unless: Path | None = None
@@ -57,6 +59,10 @@ class Fall:
             os.write(handle, f"{os.getpid()} {' '.join(map(repr, speed[:, 0].tolist()))}\n".encode())
             os.close(handle)
         time.sleep(self.seconds)
+        late = time.monotonic() + 60
+        while self.calls is not None and self.company > len({process for process, _ in calls_of(self.calls)}):
+            assert time.monotonic() < late
+            time.sleep(0.01)
         if (speed > self.kills_above).any() and not (self.unless and self.unless.exists()):
             if self.unless:
                 self.unless.touch()

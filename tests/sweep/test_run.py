@@ -83,7 +83,7 @@ def test_same_bits(local_cluster: Any, tmp_path: Path) -> None:
 
 def test_workers_are_processes(speeds: Design, tmp_path: Path) -> None:
     """Two workers do a sweep in processes of their own, each block once."""
-    run(Fall(calls=tmp_path / "calls", seconds=0.05), speeds, tmp_path / "out", block=5, workers=2)
+    run(Fall(calls=tmp_path / "calls", company=2), speeds, tmp_path / "out", block=5, workers=2)
 
     calls = calls_of(tmp_path / "calls")
     assert sorted(speed for _, row in calls for speed in row) == list(range(40))
