@@ -21,6 +21,7 @@ from armwright.errors import FileFormatError
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study.stanford_torque import joint_table, torques
+from cli_calls import armwright as command
 from printed import matches
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -194,6 +195,18 @@ def test_every_key_of_a_joint_is_explained(joint: str, table: str, tmp_path: Pat
     text = f"{joint}[joint.{table}]\nqqqqqqqq = 1\n" if table else f"{joint}qqqqqqqq = 1\n"
 
     check_explained(said(tmp_path / "arm.toml", text, read_arm))
+
+
+def test_code_of_the_page(tmp_path: Path) -> None:
+    """The program on the page on code becomes the code that stands below it, and that code is read."""
+    program, code = re.findall(r"^```\n(.*?)^```$", (DOCS / "code.md").read_text(), re.MULTILINE | re.DOTALL)[:2]
+    (tmp_path / "hop.rlo").write_text(program, encoding="utf-8")
+    (tmp_path / "page.rlc").write_text(code, encoding="utf-8")
+
+    made, read = (command("code", name, "--full", cwd=tmp_path) for name in ("hop.rlo", "page.rlc"))
+
+    assert made.stdout.rstrip("|\n ") == code.rstrip()
+    assert read.stdout.rstrip("|\n ") == re.sub(r" +; PTP home$", "", code, flags=re.MULTILINE).rstrip()
 
 
 @pytest.mark.parametrize("table", ["base", "tool", "hand", "gravity", ""])

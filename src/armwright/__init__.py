@@ -10,6 +10,7 @@ package costs nothing:
     postures = armwright.inverse(arm, X)
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -46,9 +47,12 @@ if TYPE_CHECKING:
     from armwright.dynamics.simulate import simulate
     from armwright.dynamics.terms import terms
     from armwright.errors import ArmwrightError, UnitWarning
+    from armwright.kinematics.damping import damped_rates
+    from armwright.kinematics.differential import differential_inverse
     from armwright.kinematics.forward import forward, link_poses
     from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
     from armwright.kinematics.jacobian import jacobian
+    from armwright.kinematics.manipulability import manipulability
     from armwright.kinematics.singularities import singularities
     from armwright.motion.blends import blend_timing, blended, via_deviations, via_distances
     from armwright.motion.continuity import continuity
@@ -89,6 +93,8 @@ _HOME = {
     "corrected_arm": "calibration.correcting",
     "cubic": "motion.cubic",
     "cubic_through": "motion.cubic",
+    "damped_rates": "kinematics.damping",
+    "differential_inverse": "kinematics.differential",
     "distance_accuracy": "accuracy.distance",
     "distance_repeatability": "accuracy.distance",
     "effort_peaks": "motion.efforts",
@@ -109,6 +115,7 @@ _HOME = {
     "load_arm": "arm.load",
     "load_linkage": "clearance.reader",
     "load_urdf": "arm.urdf.reader",
+    "manipulability": "kinematics.manipulability",
     "mass_matrix": "dynamics.mass_matrix",
     "multidirectional_variation": "accuracy.variation",
     "path_deviation": "accuracy.path",
@@ -168,6 +175,8 @@ __all__ = [
     "corrected_arm",
     "cubic",
     "cubic_through",
+    "damped_rates",
+    "differential_inverse",
     "distance_accuracy",
     "distance_repeatability",
     "effort_peaks",
@@ -188,6 +197,7 @@ __all__ = [
     "load_arm",
     "load_linkage",
     "load_urdf",
+    "manipulability",
     "mass_matrix",
     "multidirectional_variation",
     "path_deviation",
@@ -227,7 +237,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first asked for."""
     if name not in _HOME:
-        raise AttributeError(f"module 'armwright' has no attribute '{name}'")
+        # With these two Python tells the nearest public name below the traceback.
+        raise AttributeError(f"module 'armwright' has no attribute '{name}'", name=name, obj=sys.modules[__name__])
     return getattr(import_module(f"armwright.{_HOME[name]}"), name)
 
 

@@ -348,7 +348,7 @@ SLIPS = ("", "0", "-", '"', "[", "]", "x", "nan", "1e300", "true", "joint", "_mm
     gone=st.integers(0, 8),
     slip=st.sampled_from(SLIPS),
 )
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_slip(name: str, at: float, gone: int, slip: str, tmp_path: Path) -> None:
     """Whatever is mistyped in an arm file, it is an arm or refused as a file: nothing else goes wrong."""
     text = (CATALOGUE / f"{name}.toml").read_text(encoding="utf-8")

@@ -55,7 +55,7 @@ def test_random_chains(joints: int, rng: np.random.Generator, tmp_path: Path) ->
         check(read(tmp_path, text), oracle(text, "hand"), rng)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     plan=st.lists(st.tuples(st.sampled_from(KINDS), st.sampled_from(RELATIONS)), min_size=2, max_size=6),
     seed=st.integers(0, 2**32 - 1),

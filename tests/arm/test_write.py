@@ -49,7 +49,7 @@ bound = st.one_of(st.just(math.inf), positive)
 number = st.floats(-1e99, 1e99)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     joint=st.builds(
         Joint,

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from armwright.arm.load import load_arm
+from armwright.arm.model import STANDARD_GRAVITY
 from armwright.arm.write import toml_text
 from armwright.arrays import Array
 from armwright.calibration.chain import chain_of
@@ -17,8 +18,10 @@ from armwright.calibration.correcting import corrected_arm, corrected_tables, co
 from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.readings import readings
 from armwright.calibration.validation import cross_validated
+from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward import forward
+from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
 
@@ -40,6 +43,19 @@ def test_corrected_arm(n: int, rng: np.random.Generator) -> None:
 
     np.testing.assert_allclose(forward(better, q)[:, :3, 3], found.predict(q), atol=ROUNDING)
     assert better.links == arm.links
+
+
+def test_gravity_stays_where_it_was(rng: np.random.Generator) -> None:
+    """A tracker that lies on its side turns the frame of the corrected arm, not the torques that hold the arm."""
+    arm = load_arm("puma560")
+    chain = chain_of(arm, base=pose(rotation_from_vector([np.pi / 2, 0.0, 0.0]), (1.0, 2.0, 3.0)))
+    q, none = postures(rng, arm, 60), np.zeros(len(chain.names))
+
+    better = corrected_arm(calibrate(arm, q, seen(chain, q, none, 1e-7, rng), without=("beta",)))
+
+    # Angles are known to a microradian.
+    np.testing.assert_allclose(better.gravity, (0.0, STANDARD_GRAVITY, 0.0), atol=1e-4)
+    np.testing.assert_allclose(gravity_efforts(better, q), gravity_efforts(arm, q), atol=1e-3)
 
 
 def test_turns_about_y_do_not_fit_a_table(rng: np.random.Generator) -> None:

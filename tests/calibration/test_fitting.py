@@ -190,6 +190,32 @@ def test_many_outliers(seed: int) -> None:
     assert np.sqrt(np.mean((found.predict(elsewhere) - chain.reach(elsewhere, errors).position) ** 2)) < 2 * 5e-5
 
 
+def test_outliers_do_not_count() -> None:
+    """With one point in five off by centimetres, errors are missed by as much as is stated, and noise is what it was.
+
+    Counted as little as soft L1 has it, so many outliers move errors by twice their stated deviations.
+    """
+    misses, noises = [], []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        arm = random_arm(rng, 3 + seed % 5)
+        chain, q = chain_of(arm), postures(rng, arm, POINTS)
+        none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
+        told = list(calibrate(arm, q, seen(chain, q, none, 5e-5, rng), base=np.eye(4)).identified.kept)
+        true[told] = random_errors(rng, chain)[told]
+        points = seen(chain, q, true, 5e-5, rng)
+        points[:16] += rng.uniform(0.005, 0.03, (16, 3)) * rng.choice([-1, 1], (16, 3))
+        found = calibrate(arm, q, points, base=np.eye(4))
+        assert found.freedom == 3 * (POINTS - 16) - len(found.names)
+        noises.append(found.noise.length / 5e-5)
+        if list(found.identified.kept) == told:
+            misses.append((found.values - true[told]) / found.deviations)
+
+    assert len(misses) >= 8
+    assert np.sqrt(np.mean(np.concatenate(misses) ** 2)) == pytest.approx(1.0, abs=0.3)
+    assert np.mean(noises) == pytest.approx(1.0, abs=0.05)
+
+
 def test_no_outliers(ur5: Arm, rng: np.random.Generator) -> None:
     """Points with nothing but noise have no outliers, and both fits find the same but for a part of the noise."""
     q, points, _ = measured(ur5, rng, 5e-5, m=100)
@@ -341,6 +367,21 @@ def test_shapes(ur5: Arm) -> None:
         calibrate(ur5, np.zeros((5, 6)), np.zeros((4, 3)))
     with pytest.raises(ShapeError, match="expected readings of 6 joints, as ur5 has, got 7"):
         calibrate(ur5, np.zeros((5, 7)), np.zeros((5, 3)))
+
+
+@pytest.mark.parametrize(
+    ("base", "words"),
+    [
+        (np.eye(3), r"base: expected a shape ending in \(4, 4\), got \(3, 3\)"),
+        (np.ones((4, 4)), "base: expected a rotation, a place and the row 0 0 0 1"),
+    ],
+)
+def test_no_base(base: Array, words: str, ur5: Arm, rng: np.random.Generator) -> None:
+    """Where the arm stands is a pose."""
+    q, points, _ = measured(ur5, rng, 3e-5)
+
+    with pytest.raises(ValueError, match=words):
+        calibrate(ur5, q, points, base=base)
 
 
 def test_not_numbers(ur5: Arm) -> None:

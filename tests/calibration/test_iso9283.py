@@ -6,6 +6,7 @@ import pytest
 from armwright.calibration.iso9283 import accuracy, repeatability
 from armwright.calibration.readings import readings
 from armwright.calibration.validation import dealt, postures
+from armwright.errors import InvalidValueError
 
 
 def test_by_hand() -> None:
@@ -43,6 +44,12 @@ def test_repeated() -> None:
 def test_one_posture() -> None:
     """One posture has no distance from another."""
     assert accuracy(readings(np.zeros((2, 1)), np.zeros((2, 3))), np.zeros((2, 3))) is None
+
+
+def test_one_posture_cannot_be_held_out() -> None:
+    """Of one posture, however often measured, nothing is left to hold out."""
+    with pytest.raises(InvalidValueError, match="folds: 30 readings of one posture leave none to hold out"):
+        dealt(np.ones((30, 6)), 5, 0)
 
 
 def test_repeats_are_held_out_together() -> None:

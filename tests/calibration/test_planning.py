@@ -1,13 +1,16 @@
 """Poses to measure: those proposed tell an arm's errors better than poses taken by chance."""
 
+import math
+
 import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
+from armwright.arm.model import Arm, Joint, JointKind, Limits
 from armwright.calibration.chain import chain_of
 from armwright.calibration.fitting import calibrate
 from armwright.calibration.planning import INDICES, observability, plan_poses
-from armwright.errors import InvalidValueError, UnknownNameError
+from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 from calibration.simulated import postures, random_errors, seen
 
 
@@ -71,6 +74,63 @@ def test_what_cannot_be_planned() -> None:
         plan_poses(arm, 30, index="O9")  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(
+    ("kind", "lower", "upper"),
+    [
+        ("prismatic", 1.2, 2.0),
+        ("prismatic", -3.0, -1.5),
+        ("prismatic", 0.0, 3.0),
+        ("prismatic", 2.0, math.inf),
+        ("revolute", 3.3, 6.0),
+        ("revolute", -math.inf, -4.0),
+        ("revolute", -6.0, 6.0),
+    ],
+)
+def test_limits_anywhere(kind: JointKind, lower: float, upper: float) -> None:
+    """Limits that are far from 0 hold as well; where one is missing, poses go some way from the other."""
+    first = Joint(kind=kind, a=0.2, alpha=np.pi / 2, limits=Limits(lower=lower, upper=upper))
+    turning = Joint(kind="revolute", a=0.3, alpha=np.pi / 2)
+    arm = Arm(name="far", joints=[first, turning, turning])
+
+    q = plan_poses(arm, 30).q[:, 0]
+
+    assert lower <= q.min() < q.max() <= upper
+    assert np.ptp(q) > min(upper - lower, 2.0) / 2
+
+
+def test_as_many_as_asked_for() -> None:
+    """More poses than there are usually candidates may be asked for."""
+    assert len(plan_poses(load_arm("ntu-3r"), 450).q) == 450
+
+
+def test_enough_to_calibrate() -> None:
+    """The fewest poses that are proposed are enough for a calibration; one less is refused."""
+    arm, rng = load_arm("puma560"), np.random.default_rng(4)
+    chain = chain_of(arm)
+    with pytest.raises(InvalidValueError, match="expected 8 poses or more, got 7"):
+        plan_poses(arm, 7)
+
+    q = plan_poses(arm, 8).q
+
+    assert calibrate(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng)).freedom > 0
+
+
+@pytest.mark.parametrize("count", [0, -1])
+def test_no_poses(count: int) -> None:
+    """Beside enough that were measured before, too, there is one pose to propose or more."""
+    arm = load_arm("ntu-3r")
+    before = postures(np.random.default_rng(0), arm, 20)
+
+    with pytest.raises(InvalidValueError, match=f"count: expected 1 pose or more, got {count}"):
+        plan_poses(arm, count, measured=before)
+
+
+def test_measured_before_by_another_arm() -> None:
+    """Postures that were measured before have as many joints as the arm."""
+    with pytest.raises(ShapeError, match="measured: expected 6 numbers on the last axis"):
+        plan_poses(load_arm("puma560"), 20, measured=np.zeros((3, 5)))
+
+
 def test_next_poses_see_what_the_first_did_not() -> None:
     """After poses in which one joint stood still, the next ones tell its errors; poses by chance tell them worse."""
     arm = load_arm("ntu-3r")
@@ -93,7 +153,7 @@ def test_poses_with_turns() -> None:
     """Where turns are measured too, the turns of the tool frame are told, and half as many poses will do."""
     arm = load_arm("puma560")
 
-    plan = plan_poses(arm, 5, turns=True)
+    plan = plan_poses(arm, 6, turns=True)
 
     assert {"tool.rx", "tool.ry", "tool.rz"} <= set(plan.names)
     with pytest.raises(InvalidValueError, match=r"errors that points can tell; expected \d+ poses or more, got 5"):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
@@ -9,9 +10,10 @@ from armwright.arrays import Array
 from armwright.calibration.chain import Bend, Chain, chain_of
 from armwright.calibration.fitting import Calibration, calibrate, calibrate_to
 from armwright.calibration.model import Model, Plane
-from armwright.calibration.readings import Readings, readings, together
+from armwright.calibration.readings import Readings, readings, refuse_not_fitted, together
+from armwright.calibration.validation import cross_validated
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.spatial.rotations import rotation_from_vector
+from armwright.spatial.rotations import rotation_from_quaternion, rotation_from_vector
 from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
 
 # Standard deviations of a coordinate and of a turn [m], [rad].
@@ -142,7 +144,7 @@ def test_poses_of_another_frame_of_the_hand(truth: Truth) -> None:
 
 
 def test_one_pose_that_is_turned(truth: Truth) -> None:
-    """A pose whose place is right and whose turn is not is named and counts less."""
+    """A pose whose place is right and whose turn is not is named and does not count."""
     q = truth.postures(60)
     X = truth.poses(q)
     X[7, :3, :3] = X[7, :3, :3] @ rotation_from_vector([0.0, 0.05, 0.0])
@@ -151,6 +153,39 @@ def test_one_pose_that_is_turned(truth: Truth) -> None:
 
     assert found.outliers == (7,)
     assert truth.missed(found).mean() < NOISE
+
+
+def test_poses_that_are_turned_over(truth: Truth) -> None:
+    """Poses that stand the other way round, where the sine of the turn is 0 again, are half a turn off, and named."""
+    q = truth.postures(60)
+    X = truth.poses(q)
+    X[:6, :3, :3] = X[:6, :3, :3] @ rotation_from_vector([np.pi, 0.0, 0.0])
+
+    found = calibrate(truth.arm, q, X)
+
+    assert found.outliers == (0, 1, 2, 3, 4, 5)
+    np.testing.assert_allclose(found.after.turn[:6], np.pi, atol=10 * TURN)
+    assert truth.missed(found).mean() < NOISE
+
+
+@pytest.mark.parametrize("angle", [0.5, 2.0, 3.0])
+def test_derivatives_of_large_turns(angle: float, rng: np.random.Generator) -> None:
+    """Turns that are far off have the derivatives that differences have, too."""
+    arm = random_arm(rng, 4)
+    chain = chain_of(arm)
+    model = Model(chain=chain, frames=(np.eye(4), random_pose(rng, 1.0)), frame_names=("a", "b"))
+    q = postures(rng, arm, 4)
+    X, axes = np.tile(np.eye(4), (4, 1, 1)), rng.standard_normal((4, 3))
+    axes *= angle / np.linalg.norm(axes, axis=1)[:, None]
+    X[:, :3, :3] = rotation_from_vector(axes) @ chain.reach(q).rotation
+    X[2:, :3, :3] = model.frames[1][:3, :3].T @ X[2:, :3, :3]
+    given, h = readings(q, X, frame=list("aabb")), 1e-6
+    x = 0.01 * rng.standard_normal(len(model.names))
+
+    columns = [(model.rows(given, x + h * e).off - model.rows(given, x - h * e).off) / (2 * h) for e in np.eye(len(x))]
+
+    np.testing.assert_allclose(model.rows(given, x).by, np.stack(columns, axis=1), atol=DIFFERENCES)
+    np.testing.assert_allclose(model.off(given).turn, angle, rtol=1e-9)
 
 
 def test_a_board_set_up_three_times(truth: Truth) -> None:
@@ -302,6 +337,66 @@ def test_what_does_not_fit(truth: Truth) -> None:
         readings(q, distances=[1.0] * 4, other=q[:3])
     with pytest.raises(ShapeError, match=r"readings of arms with \[3, 6\] joints are not of one arm"):
         together(readings(q, plane=["a"] * 4), readings(q[:, :3], plane=["a"] * 4))
+
+
+@pytest.mark.parametrize("how", ["never turned", "x, y, z, w for w, x, y, z"])
+def test_turns_told_another_way(how: str, truth: Truth) -> None:
+    """Turns that the arm cannot have, however what is measured is fixed to the hand, are refused with a question."""
+    q = truth.postures(40)
+    X = truth.poses(q)
+    if how == "never turned":
+        X[:, :3, :3] = np.eye(3)
+    else:
+        X[:, :3, :3] = rotation_from_quaternion(Rotation.from_matrix(X[:, :3, :3]).as_quat())
+
+    with pytest.raises(InvalidValueError, match=r"half of the poses are turned \d+ degrees .* are these its turns, in"):
+        calibrate(truth.arm, q, X)
+
+
+@pytest.mark.parametrize("by", [(2.0, 2.0, 2.0), (1.0, 1.0, -1.0)])
+def test_no_poses(by: tuple[float, ...], truth: Truth) -> None:
+    """What is scaled or mirrored is no rotation, and no pose."""
+    q = truth.postures(4)
+    X = truth.poses(q)
+    X[2, :3, :3] *= by
+
+    with pytest.raises(InvalidValueError, match=r"points: expected a rotation, a place .* in every pose.* as number 3"):
+        readings(q, X)
+
+
+def test_nothing_told(truth: Truth) -> None:
+    """Postures all over the room do not touch one plane; that nothing is told is said, and soon."""
+    with pytest.raises(InvalidValueError, match=r"misses its readings by, .* mm, hides every error"):
+        calibrate_to(load_arm("puma560"), readings(truth.postures(40), plane=["table"] * 40))
+
+
+def test_nothing_fitted(truth: Truth) -> None:
+    """An arm of which nothing may be fitted that its readings tell stays as it is."""
+    q = truth.postures(40)
+
+    found = calibrate(truth.arm, q, truth.points(q), only=["tool.rx"])
+
+    assert found.names == ()
+    assert not found.errors.any()
+
+
+def test_nothing_to_hold_against(truth: Truth) -> None:
+    """Points in a frame of which all are held out, or a plane that is touched at the check alone, say nothing."""
+    q = truth.postures(44)
+    given = together(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
+
+    with pytest.raises(InvalidValueError, match=r"plane table: no reading that is fitted .* so that the 4 others"):
+        refuse_not_fitted(given.take(np.arange(40)), given.take(np.arange(40, 44)))
+    refuse_not_fitted(given, given.take(np.arange(40, 44)))
+
+
+def test_too_few_to_hold_out(truth: Truth) -> None:
+    """Where a fit without the part that is held out cannot be, the text says that it is of that part."""
+    q = truth.postures(44)
+    given = together(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
+
+    with pytest.raises(InvalidValueError, match=r"with part \d of 5 held out: plane table"):
+        cross_validated(truth.arm, given)
 
 
 def test_taken(truth: Truth) -> None:

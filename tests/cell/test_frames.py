@@ -96,7 +96,7 @@ changes = st.lists(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(changes)
 def test_any_history(history: list[tuple[str, str, str, int]]) -> None:
     """Whatever is done to a tree: there is no ring, unfix keeps places, affix keeps places, parents carry children."""

@@ -439,7 +439,7 @@ WHOLE = (EXAMPLES / "puma_cell.toml").read_text(encoding="utf-8")
 
 
 @given(at=st.floats(0, 1, exclude_max=True), gone=st.integers(0, 8), slip=st.sampled_from(SLIPS))
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_slip(at: float, gone: int, slip: str, tmp_path: Path) -> None:
     """Whatever is mistyped in a cell file, it is a cell or refused as a file: nothing else goes wrong."""
     place = int(at * len(WHOLE))

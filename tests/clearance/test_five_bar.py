@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from armwright.clearance import ideal
@@ -110,7 +110,6 @@ def test_second_goal(bar: FiveBar) -> None:
     assert found[1] == pytest.approx(-found[2], abs=ROUNDING)
 
 
-@settings(deadline=None)
 @given(UNEQUAL, CRANKS, st.sampled_from(sorted(ASSEMBLIES)))
 def test_arms_meet(bar: FiveBar, cranks: tuple[float, float], assembly: Any) -> None:
     """Both arms end in the tip, whatever their lengths and wherever the motors stand."""
@@ -120,7 +119,6 @@ def test_arms_meet(bar: FiveBar, cranks: tuple[float, float], assembly: Any) -> 
         np.testing.assert_allclose(end, tip, atol=ROUNDING / WELL)
 
 
-@settings(deadline=None)
 @given(UNEQUAL, CRANKS, st.sampled_from(sorted(ASSEMBLIES)))
 def test_one_mode_of_four_comes_back(bar: FiveBar, cranks: tuple[float, float], assembly: Any) -> None:
     """Of the four ways to stand at a tip exactly one has the cranks where they were, and all four reach the tip."""
@@ -134,7 +132,6 @@ def test_one_mode_of_four_comes_back(bar: FiveBar, cranks: tuple[float, float], 
         np.testing.assert_allclose(links_end(bar, one), [tip, tip], atol=ROUNDING / WELL)
 
 
-@settings(deadline=None)
 @given(UNEQUAL, CRANKS)
 def test_modes_are_signs(bar: FiveBar, cranks: tuple[float, float]) -> None:
     """A mode is the pair of signs of the serial measures, which no motion changes without a serial singularity."""
@@ -195,7 +192,6 @@ def test_law_takes_floats_and_arrays() -> None:
 # ---- against the generic linkage -----------------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(st.tuples(st.floats(-0.6, 0.6), st.floats(-0.9, -0.36)), MODE)
 def test_newton_agrees(tip: tuple[float, float], mode: Any) -> None:
     """Newton's iteration on the closure of the loops moves none of the coordinates that the closed form gives."""
@@ -210,7 +206,6 @@ def test_newton_agrees(tip: tuple[float, float], mode: Any) -> None:
     np.testing.assert_allclose(ideal.gaps_of(linkage, q), 0.0, atol=ROUNDING)
 
 
-@settings(deadline=None)
 @given(CRANKS, st.tuples(*[st.floats(-2, 2)] * 2), st.tuples(*[st.floats(-40, 40)] * 2))
 def test_speeds_and_accelerations_agree(
     cranks: tuple[float, float], velocity: tuple[float, float], acceleration: tuple[float, float]
@@ -260,7 +255,6 @@ def test_configuration_chooses_the_mode(linkage: Linkage, bar: FiveBar, mode: An
 # ---- singularities and workspace -----------------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(BARS, CRANKS)
 def test_jacobian_moves_the_tip(bar: FiveBar, cranks: tuple[float, float]) -> None:
     """The tip moves by the Jacobian times the turn of the cranks, to second order in the turn."""
@@ -322,7 +316,6 @@ def test_elbow_angle_to_the_singularity(bar: FiveBar) -> None:
     assert 0 < near.tip_angle <= np.pi / 2
 
 
-@settings(deadline=None)
 @given(UNEQUAL, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6))
 def test_mask_is_the_inverse(bar: FiveBar, x: float, y: float) -> None:
     """A place is inside the border exactly if the inverse kinematics has an answer for it."""
@@ -337,7 +330,6 @@ def test_mask_is_the_inverse(bar: FiveBar, x: float, y: float) -> None:
             inverse(bar, tip)
 
 
-@settings(deadline=None)
 @given(UNEQUAL, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(-np.pi, np.pi))
 def test_distance_is_one(bar: FiveBar, x: float, y: float, way: float) -> None:
     """Nobody comes nearer to the border by more than the way that he goes."""

@@ -82,6 +82,8 @@ def test_json(measured: Path) -> None:
         (("calibrate", ARM, "MEASURED", "--tool-mm", "0,0"), 2, "expected 3 finite numbers, got 2: 0,0"),
         (("calibrate", ARM, "MEASURED", "--units", "mm"), 2, "such as mm,deg"),
         (("calibrate", ARM, "MEASURED", "--folds", "1"), 1, "folds: expected 2 to 40"),
+        (("calibrate", ARM, "MEASURED", "--seed", "-1"), 2, "greater than or equal to 0"),
+        (("plan-poses", ARM, "--seed", "-1"), 2, "greater than or equal to 0"),
         (("plan-poses", ARM, "-n", "4"), 1, "poses or more, got 4"),
         (("plan-poses", ARM, "--index", "O7"), 1, "no index 'O7'"),
     ],
@@ -98,12 +100,39 @@ def test_mistakes(measured: Path, arguments: tuple[str, ...], status: int, says:
 def test_next_poses(measured: Path, tmp_path: Path) -> None:
     """Poses are planned beside those that were measured; with turns, fewer will do."""
     done = armwright("plan-poses", ARM, "-n", "2", "--after", measured, "-o", tmp_path / "more.csv")
-    few = armwright("plan-poses", ARM, "-n", "5", "--turns")
+    few = armwright("plan-poses", ARM, "-n", "6", "--turns")
 
     assert done.returncode == 0, done.stderr
     assert len((tmp_path / "more.csv").read_text(encoding="utf-8").splitlines()) == 3
     assert few.returncode == 0, few.stderr
     assert "tool.rx" in few.stdout
+
+
+def test_next_poses_without_units(measured: Path, tmp_path: Path) -> None:
+    """What was measured already may lie in a file whose units are stated."""
+    path = tmp_path / "bare.csv"
+    text = measured.read_text(encoding="utf-8")
+    path.write_text(text.replace("_deg", "").replace("_mm", ""), encoding="utf-8")
+
+    refused = armwright("plan-poses", ARM, "-n", "2", "--after", path, columns=200)
+    done = armwright("plan-poses", ARM, "-n", "2", "--after", path, "--units", "mm,deg")
+
+    assert refused.returncode == 1
+    assert "or state the units" in refused.stderr
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_frame_to_check_alone(measured: Path, tmp_path: Path) -> None:
+    """Points to check with in a frame that no other point tells cannot be held against the arm; that is said."""
+    head, *rows = measured.read_text(encoding="utf-8").splitlines()
+    lines = [f"{row},{'b,check' if i < 10 else 'a,fit'}" for i, row in enumerate(rows)]
+    path = tmp_path / "frames.csv"
+    path.write_text("\n".join([f"{head},frame,set", *lines]) + "\n", encoding="utf-8")
+
+    done = armwright("calibrate", ARM, path, columns=200)
+
+    assert done.returncode == 1
+    assert "frame b: no reading that is fitted tells where it is" in done.stderr
 
 
 def test_beyond(measured: Path, tmp_path: Path) -> None:

@@ -1,8 +1,10 @@
 """``armwright clearance sweep``, ``estimate`` and ``correct`` as a user calls them."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -95,6 +97,23 @@ def test_estimate_on_paths(folder: Path) -> None:
     check(found, 0.985)
     assert found["notes"][0] == "15 features of 3 paths, learnt from 64 simulations"
     assert "is wrong" not in found["notes"][1]
+
+
+def test_interrupted_sweep(tmp_path: Path) -> None:
+    """Who stops a sweep by Ctrl-C is told that what is finished is kept, and how it goes on."""
+    command = ["clearance", "sweep", "five-bar", "--workers", "1", "-n", "4096", "-o", "out"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "armwright", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    ) as running:
+        while not list(tmp_path.glob("out/blocks/*.npz")) and running.poll() is None:
+            time.sleep(0.1)
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+
+    assert running.returncode == 130
+    kept = "what is finished is kept in 'out', and the same command goes on from there"
+    assert said == f"armwright: interrupted; {kept}\n"
+    assert list(tmp_path.glob("out/blocks/*.npz"))
 
 
 def test_sweep_goes_on(folder: Path) -> None:

@@ -43,6 +43,17 @@ def test_steps_and_values() -> None:
     assert said[-2:] == ["    0.000 s  program, line 10", "   10      affix apf1 to obj1 at t1 ;"]
 
 
+def test_whole_words() -> None:
+    """Who types the words of other debuggers gets what their letters give."""
+    letters = debug("n", "s", "b 11", "c", "p DIST(obj1, apf1)", "t 3", "g", "x 1", "q")
+    words = debug(
+        "next", "step", "break 11", "continue", "print DIST(obj1, apf1)", "tick 3", "stage", "delete 1", "quit"
+    )
+
+    assert words == letters
+    assert "breakpoint 1 in line 11" in words[1]
+
+
 def test_stages_ticks_and_the_end() -> None:
     """Stages and ticks of a MOVE can be stepped through, a frame watched, and a finished program taken back."""
     _, said = debug("b 11", "c", "g", "t 5", "d apf1", "x 1", "c", "frames", "c", "back", "q")

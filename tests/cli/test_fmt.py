@@ -151,4 +151,4 @@ def test_help() -> None:
     result = fmt("--help")
 
     assert result.returncode == 0
-    assert "armwright fmt examples/*.rlo --check" in result.stdout.decode()
+    assert "armwright fmt examples/peg.rlo --diff" in result.stdout.decode()

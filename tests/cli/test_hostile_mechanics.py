@@ -112,7 +112,11 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
         (("simulate", "puma560", "-q", Q, "--duration", "1e9"), 1, "would be 1e+12 moments; expected at most 1e+07"),
         (("simulate", "puma560", "-q", Q, "--duration", "long"), 2, "'--duration'"),
         (("simulate", "puma560", "-q", Q, "--step-ms", "nan"), 2, "--step-ms: expected 0.001 to 1000, got nan"),
-        (("simulate", "puma560", "-q", "0,0,400,0,0,0"), 1, "joint 3 starts at 6.98132, outside its stops"),
+        (
+            ("simulate", "puma560", "-q", "0,0,400,0,0,0"),
+            1,
+            "joint 3 starts at 400 deg, outside its stops at -135 and 135 deg",
+        ),
         (("simulate", "ur5", "-q", Q, "--method", "euler"), 2, "'euler' is not one of"),
     ],
 )

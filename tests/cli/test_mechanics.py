@@ -8,6 +8,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.dynamics.terms import terms
 from armwright.kinematics.forward import forward
 from armwright.kinematics.jacobian import jacobian
 from cli_calls import armwright
@@ -62,6 +63,39 @@ def test_inverse_out_of_reach() -> None:
 
     assert done.returncode == 1
     assert "mm out of reach of 'puma560'" in done.stdout
+    assert "note" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        (("--xyz", "0.5,0.1,0.3"), "note: --xyz is in mm; in m the pose would be in reach"),
+        (("--noap", "1,0,0,0,1,0,0,0,1,500,100,300"), "note: --noap is in m; in mm the pose would be in reach"),
+    ],
+)
+def test_inverse_in_the_other_unit(place: tuple[str, str], said: str) -> None:
+    """A place in metres where millimetres are asked for is out of reach, and one is told why; and the other way."""
+    done = armwright("inverse", "puma560", *place)
+
+    assert done.returncode == 1
+    assert said in done.stdout.splitlines()
+
+
+def test_torque_of_a_file(tmp_path: Path) -> None:
+    """Every row of a long file has the efforts that it has alone."""
+    motion = np.random.default_rng(5).uniform(0.1, 0.6, (1003, 18))
+    names = ",".join(f"{kind}{i + 1}" for kind in ("q", "qd", "qdd") for i in range(6))
+    (tmp_path / "motion.csv").write_text(
+        "\n".join([names, *(",".join(map(repr, row)) for row in motion.tolist())]), encoding="utf-8"
+    )
+
+    lines = armwright("torque", "stanford", "--csv", tmp_path / "motion.csv", "--json").stdout.splitlines()
+
+    assert len(lines) == len(motion)
+    for row in (0, 999, 1000, 1002):
+        alone = terms(load_arm("stanford"), *motion[row].reshape(3, 6))
+        assert json.loads(lines[row])["total"] == alone.total.tolist()
+        assert json.loads(lines[row])["own inertia"] == alone.own.tolist()
 
 
 def test_torque_by_cause() -> None:

@@ -80,8 +80,17 @@ def test_no_branch(tmp_path: Path) -> None:
     assert done.stdout == ""
     assert "no branch carries the hand to its last pose. left, down, no-flip: at 0." in done.stderr
     assert "between poses 2 and 3" in done.stderr
-    assert done.stderr.endswith("`--around via` looks for a way round\n")
+    assert done.stderr.endswith("`--around damped` and `--around via` look for a way round\n")
     assert not (tmp_path / "out").exists()
+
+
+def test_the_other_way_round_is_named() -> None:
+    """Where no pose beside the line helps, damped rates are named: they do, as the next test finds."""
+    done = armwright("move", "cartesian", "puma560", POSES, "--around", "via")
+
+    assert done.returncode == 1
+    assert "from pose 2 to pose 3: on the line near (" in done.stderr
+    assert done.stderr.endswith("`--around damped` looks for another way round\n")
 
 
 def test_way_round() -> None:

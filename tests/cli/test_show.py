@@ -68,6 +68,13 @@ def test_tables_fit_the_screen(name: str) -> None:
         assert sum(line.startswith(heading) for line in lines) == 1
 
 
+def test_arm_without_a_title(tmp_path: Path) -> None:
+    """An arm that nobody gave a title is called by its name alone."""
+    (tmp_path / "plain.toml").write_text('[[joint]]\nkind = "revolute"\n', encoding="utf-8")
+
+    assert armwright("show", tmp_path / "plain.toml").stdout.splitlines()[0] == "plain"
+
+
 def test_numbers_of_the_puma() -> None:
     """People read degrees and millimetres: the second joint of the PUMA, row for row."""
     rows = [re.split(r"\s{2,}", line.strip()) for line in armwright("show", "puma560").stdout.splitlines()]

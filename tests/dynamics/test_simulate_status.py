@@ -77,7 +77,7 @@ def test_samples() -> None:
 def test_what_cannot_be_simulated() -> None:
     """Starts outside the stops, times that do not pass, brakes without a joint and wrong controllers are refused."""
     hoist = lift()
-    with pytest.raises(InvalidValueError, match=r"joint 1 starts at 2\.5, outside its stops at 0 and 2"):
+    with pytest.raises(InvalidValueError, match=r"joint 1 starts at 2500 mm, outside its stops at 0 and 2000 mm"):
         simulate(hoist, [2.5], duration=1.0)
     assert simulate(hoist, [2.5], duration=0.01, stops=False).status is Status.FINISHED
     with pytest.raises(InvalidValueError, match="duration: expected more than 0 s, got 0"):

@@ -138,7 +138,7 @@ def test_as_pygments(path: Path) -> None:
     assert by_grammar(text) == by_pygments(text)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.lists(st.sampled_from(sorted(_SCRAPS)), max_size=25).map("".join))
 def test_as_pygments_of_anything(text: str) -> None:
     """So has every character of texts that are no programs, unless a construction goes on over the end of a line."""

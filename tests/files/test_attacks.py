@@ -104,7 +104,7 @@ def check_toml(text: str) -> bool:
     return True
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(st.lists(st.sampled_from(TOML_PIECES), max_size=12).map("".join))
 @example('a = "\\"" # "\nb = \'\\\'\n')
 @example("\"\".'' = 2\n")
@@ -143,7 +143,7 @@ def test_odd_toml(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", VALID)
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.data())
 def test_odd_toml_with_a_slip(text: str, data: st.DataObject) -> None:
     """The same with a letter lost, doubled or put elsewhere: refused, or scanned as well as before."""
@@ -153,7 +153,7 @@ def test_odd_toml_with_a_slip(text: str, data: st.DataObject) -> None:
     )
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(st.lists(st.sampled_from(JSON_PIECES), max_size=10).map("".join), st.booleans())
 def test_what_json_accepts(text: str, braced: bool) -> None:  # noqa: FBT001
     """Every text that the parser accepts is scanned: exactly its keys are found, or one that is given twice."""
@@ -181,7 +181,7 @@ def refusal(path: Path) -> str | None:
     return None
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     st.binary(max_size=40) | st.lists(st.sampled_from(TOML_PIECES)).map(lambda p: "".join(p).encode()), st.booleans()
 )

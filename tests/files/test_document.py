@@ -316,7 +316,7 @@ PIECES = st.sampled_from(
 
 
 @given(pieces=st.lists(PIECES | st.text(max_size=3), max_size=12), ending=st.sampled_from(("json", "toml", "cell")))
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_text(pieces: list[str], ending: str, tmp_path: Path) -> None:
     """Whatever is in a file, it is read or refused as a file: nothing else goes wrong."""
     path = tmp_path / f"any.{ending}"

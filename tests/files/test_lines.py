@@ -5,7 +5,7 @@ import tomllib
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.files.lines import Keys, TwinKeyError, json_lines, toml_lines
@@ -140,7 +140,6 @@ def entries(value: Any, keys: Keys = ()) -> list[Keys]:
 
 
 @given(st.data())
-@settings(deadline=None)  # a busy machine is no mistake
 def test_lines_of_toml(data: st.DataObject) -> None:
     """Whatever the style, every key of a TOML document is told in the line in which it was written."""
     writer = Writer(data)

@@ -55,10 +55,12 @@ def test_a_file_in_the_way(tmp_path: Path) -> None:
     """A file where the folder should be is refused, and stays."""
     (tmp_path / "run").write_text("a file")
 
-    with pytest.raises(OutputError, match=r"cannot write to '.*run': File exists"):
+    with pytest.raises(OutputError, match=r"cannot write to '.*run': it is a file, and a folder is needed"):
         write_folder(tmp_path / "run", {"x.txt": "one"})
-    with pytest.raises(OutputError, match="cannot make"):
+    with pytest.raises(OutputError, match=r"cannot make '.*run': it is a file"):
         write_folder(tmp_path / "run" / "deeper", {"x.txt": "one"})
+    with pytest.raises(OutputError, match=r"cannot make '.*run/deeper/still': '.*run' is a file; nothing"):
+        write_folder(tmp_path / "run" / "deeper" / "still" / "more", {"x.txt": "one"})
 
     assert (tmp_path / "run").read_text() == "a file"
 

@@ -199,7 +199,7 @@ ANGLE = st.floats(-np.pi, np.pi)
 SPEED = st.floats(-10, 10)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     st.sampled_from(sorted(ARMS)),
     st.tuples(*[ANGLE] * 6),

@@ -4,7 +4,7 @@ import gc
 import time
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.program.messages.diagnostics import Diagnostic
@@ -238,7 +238,6 @@ WORDS = """
 """
 
 
-@settings(deadline=None)
 @given(st.lists(st.sampled_from(WORDS.split()), max_size=60), st.sampled_from(["", "BEGIN"]), st.sampled_from(Standard))
 def test_any_words(words: list[str], start: str, standard: Standard) -> None:
     """No order of the words raises or goes on for ever, and every message lies in the text."""

@@ -46,7 +46,6 @@ def coloured(text: str) -> list[tuple[_TokenType, str]]:
     return [(kind, value) for _, kind, value in RloLexer().get_tokens_unprocessed(text) if kind is not Whitespace]
 
 
-@settings(deadline=None)
 @given(st.one_of(st.text(max_size=80), PIECES))
 def test_text_comes_back(text: str) -> None:
     """Colouring changes no character of any text, and says of each where it stands."""
@@ -202,7 +201,7 @@ def test_as_the_translator_reads(path: Path) -> None:
     assert odd == []
 
 
-@settings(deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(PIECES)
 def test_cut_like_the_translator(text: str) -> None:
     """Of any text without damage the lexer and the translator see the same tokens."""

@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.program import Compilation, Source
@@ -30,7 +30,6 @@ def mutated(text: str, at: int, how: str) -> str:
     return text[: one.start] + two.text + text[one.end : two.start] + one.text + text[two.end :]
 
 
-@settings(deadline=None)
 @given(
     name=st.sampled_from(sorted(TEXTS)),
     at=st.integers(0, 1000),
@@ -59,7 +58,6 @@ def test_no_cascades(name: str) -> None:
     assert sum(count <= 2 for count in counts) >= 0.9 * len(counts)
 
 
-@settings(deadline=None)
 @given(st.text(max_size=80))
 def test_any_text(text: str) -> None:
     """No text whatever raises; what is no program has at least one error."""
@@ -74,7 +72,6 @@ WORDS = """
 """
 
 
-@settings(deadline=None)
 @given(st.lists(st.sampled_from(WORDS.split()), max_size=40))
 def test_any_words(words: list[str]) -> None:
     """No order of the words of the language raises or goes on for ever."""

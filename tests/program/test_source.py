@@ -1,7 +1,7 @@
 """Texts as editors leave them: line ends, marks at the start, numbers in front."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.program import Source
@@ -37,7 +37,6 @@ def test_byte_order_mark() -> None:
     assert translate(source).diagnostics == ()
 
 
-@settings(deadline=None)
 @given(st.text(alphabet="ab \t\r\n", max_size=30))
 def test_every_character_has_a_place(text: str) -> None:
     """Line and column of a character lead back to it."""

@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.program.text.source import Source, Span
@@ -171,7 +171,6 @@ def test_look_alikes_once() -> None:
     assert odd.notes == ("it stands in 3 places",)
 
 
-@settings(deadline=None)
 @given(st.text(max_size=60), st.sampled_from(Standard))
 def test_tokens_lie_in_the_text(text: str, standard: Standard) -> None:
     """Of any text whatever the tokens lie one behind the other, and end at its end."""

@@ -1,9 +1,13 @@
 """The thesis' study of play: what it prints beside what comes out."""
 
+import sys
+
 import numpy as np
 import pytest
 
 from armwright.clearance.paths import PickAndPlace
+from armwright.clearance.sweeping import FeatureSweep
+from armwright.errors import MissingExtraError
 from armwright.study import five_bar_clearance as study
 from armwright.study.five_bar_clearance import EstimateRow, Learnt
 
@@ -42,6 +46,15 @@ def test_features_of_arm_a() -> None:
         assert row.centre[0] == pytest.approx(row.printed[0], abs=0.04)
         assert row.surface[0] > 2
         assert abs(row.surface[1] / row.printed[1] - 1) > 0.15
+
+
+def test_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the library that learns, it is said how to get it, and nothing is simulated first."""
+    monkeypatch.setitem(sys.modules, "sklearn.gaussian_process", None)
+    monkeypatch.setattr(FeatureSweep, "__call__", lambda *_: pytest.fail("simulated"))
+
+    with pytest.raises(MissingExtraError, match=r'install it by: pip install "armwright\[clearance\]"'):
+        study.learnt()
 
 
 def test_sweep(learnt: Learnt) -> None:

@@ -248,7 +248,7 @@ def test_folder_that_is_a_file(speeds: Design, tmp_path: Path) -> None:
     """Where a file stands there can be no folder."""
     (tmp_path / "out").touch()
 
-    with pytest.raises(OutputError, match=r"cannot write to '.*out': File exists"):
+    with pytest.raises(OutputError, match=r"cannot write to '.*out': it is a file, and a folder is needed"):
         run(Fall(), speeds, tmp_path / "out", workers=1)
 
 

@@ -1,7 +1,7 @@
 """What geometry leaves: joints that give, gears that run out of true, and what is learnt of the rest.
 
 Each is tried on top of what was kept before, and kept only if points that it has not seen are hit better: by more
-than chance makes of it, and by a part worth having.
+than chance makes of it, and by a part worth having. What was kept is left out again if what came later does without.
 
 Source:
     Thesis, outlook of chapter 5; spec of the calibration.
@@ -125,22 +125,14 @@ def calibrate_beyond(
     told("holding points out: geometry")
     held = cross_validated(arm, seen, folds=folds, seed=seed, base=base)
     tried = [Tried("geometry", float(held.distance[points].mean()), 0.0, 0.0, kept=True, why="")]
-    bends: tuple[Bend, ...] = ()
-    candidates = [("joints that give under gravity", springs(arm))]
-    candidates += [(f"gears, {('once', 'twice')[order - 1]} a turn", gears(arm, order)) for order in _ORDERS]
-    for name, more in candidates:
-        if not more:
-            tried.append(Tried(name, None, 0.0, 0.0, kept=False, why=_not_there(name, arm)))
-            continue
-        told(f"holding points out: {name}")
-        try:
-            better = cross_validated(arm, seen, folds=folds, seed=seed, base=base, bends=(*bends, *more))
-        except InvalidValueError as error:
-            tried.append(Tried(name, None, 0.0, 0.0, kept=False, why=str(error)))
-            continue
-        tried.append(_judged(name, held.distance[points], better.distance[points]))
-        if tried[-1].kept:
-            bends, held = (*bends, *more), better
+    bends, held = _kept_bends(
+        arm,
+        held,
+        points=points,
+        validated=lambda bends: cross_validated(arm, seen, folds=folds, seed=seed, base=base, bends=bends),
+        tried=tried,
+        told=told,
+    )
     told("fitting all that is kept")
     found = calibrate_to(arm, seen, base=base, bends=bends)
     told("learning what is left")
@@ -155,6 +147,54 @@ def calibrate_beyond(
         held = better
         learnt = _learn(arm, seen.q[points], seen.points[points] - found.predict(seen.q[points]), seed)
     return Beyond(calibration=found, learnt=learnt, tried=tuple(tried), held_out=held)
+
+
+def _kept_bends(
+    arm: Arm,
+    held: HeldOut,
+    *,
+    points: Flags,
+    validated: Callable[[tuple[Bend, ...]], HeldOut],
+    tried: list[Tried],
+    told: Callable[[str], None],
+) -> tuple[tuple[Bend, ...], HeldOut]:
+    """Return the bends that held-out points confirm, and these points with them; say what was tried.
+
+    Args:
+        arm: as it is said to be.
+        held: of geometry alone.
+        points: (m,) which readings are judged by.
+        validated: holds readings out, with some bends.
+        tried: grows by what is tried here.
+        told: is told what is being done.
+    """
+    candidates = [("joints that give under gravity", springs(arm))]
+    candidates += [(f"gears, {('once', 'twice')[order - 1]} a turn", gears(arm, order)) for order in _ORDERS]
+    bends: tuple[Bend, ...] = ()
+    parts: list[tuple[int, tuple[Bend, ...]]] = []
+    for name, more in candidates:
+        if not more:
+            tried.append(Tried(name, None, 0.0, 0.0, kept=False, why=_not_there(name, arm)))
+            continue
+        told(f"holding points out: {name}")
+        try:
+            better = validated((*bends, *more))
+        except InvalidValueError as error:
+            tried.append(Tried(name, None, 0.0, 0.0, kept=False, why=str(error)))
+            continue
+        tried.append(_judged(name, held.distance[points], better.distance[points]))
+        if tried[-1].kept:
+            bends, held = (*bends, *more), better
+            parts.append((len(tried) - 1, more))
+    # What was kept first may have stood in for what came later.
+    for number, part in parts[:-1]:
+        told(f"holding points out: without {tried[number].name}")
+        fewer = tuple(bend for bend in bends if bend not in part)
+        less = validated(fewer)
+        if not _judged(tried[number].name, less.distance[points], held.distance[points]).kept:
+            bends, held = fewer, less
+            tried[number] = tried[number]._replace(kept=False, why="what was kept later does it too")
+    return bends, held
 
 
 def _not_there(name: str, arm: Arm) -> str:

@@ -27,7 +27,7 @@ _NUMBERS = ("theta", "d", "a", "alpha")
 def corrected_arm(calibration: Calibration) -> Arm:
     """Return the arm with the errors that were found and how well they are known.
 
-    Its base is in the frame of the measurements.
+    Its base is in the frame of the measurements, and so is gravity, which points where it did as seen from the arm.
 
     Raises:
         InvalidValueError: a turn about y was fitted, which a Denavit-Hartenberg table cannot hold without axes that
@@ -109,10 +109,12 @@ def _corrected(calibration: Calibration) -> Arm:
         attrs.evolve(joint, **{key: getattr(joint, key) + by_name[f"joint{i}.{key}"] for key in _NUMBERS})
         for i, joint in enumerate(arm.joints, 1)
     ]
+    base = chain.base @ _pose_of(chain, by_name, "base")
     return attrs.evolve(
         arm,
         joints=tuple(joints),
-        base=chain.base @ _pose_of(chain, by_name, "base") @ arm.base,
+        base=base @ arm.base,
+        gravity=base[:3, :3] @ arm.gravity,
         tool=arm.tool @ pose(chain.hand, np.zeros(3)) @ _pose_of(chain, by_name, "tool"),
         title=f"{arm.title or arm.name}, calibrated",
     )

@@ -1,7 +1,8 @@
 """The errors of an arm from what was measured of it: robust least squares, with the covariance of what is found.
 
-A reading that is far off counts less, as a whole: all three coordinates of a point, in whatever frame they are told.
-Turns are weighed against lengths by what is left of either.
+A reading that is far off counts less, as a whole: all three coordinates of a point, in whatever frame they are told;
+in the end, one that is off by twice what usual ones stay below does not count. Turns are weighed against lengths by
+what is left of either.
 
 Source:
     Holland & Welsch (1977) for least squares with weights; spec of the calibration.
@@ -27,7 +28,7 @@ from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 
 # Readings that are off by more than this part of all are by their noise count less: three deviations of one number.
 _USUAL = 0.9973
-# Those that are off by twice as much as that are outliers.
+# Those that are off by twice as much as that are outliers. In the end they do not count at all.
 _OUTLYING = 2.0
 _ROUNDS, _WEIGHINGS = 8, 30
 # Rounds end when one finds the noise no smaller than this part of what the last found: outliers then weigh what they
@@ -39,6 +40,8 @@ _LEAST_LENGTH, _LEAST_TURN = 1e-9, 1e-9  # noise [m], [rad]
 _FIRST_LENGTH, _FIRST_TURN = 1e-4, 5e-4
 # A fit ends when it gets better by less than this part; its errors are then far nearer than they are known.
 _FINISHED = 1e-11
+# It takes some ten steps; readings that make no sense could take minutes.
+_STEPS = 100
 # What is off by more than this is not believed unless the readings say so clearly [m], [rad]. It binds what they
 # hardly tell: two such errors can otherwise run away together. What is told to a tenth of it is moved by a hundredth
 # of its deviation at most.
@@ -71,8 +74,8 @@ class Calibration:
         before: by how much each of m readings misses the arm as said, its base moved to fit.
         after: by how much it misses the corrected arm.
         noise: of the measurement, from what is left.
-        freedom: how many more numbers were measured than errors fitted.
-        outliers: numbers of readings that are off by more than they should be.
+        freedom: how many more numbers were measured than errors fitted, outliers left out.
+        outliers: numbers of readings that are off by more than they should be; they do not count.
     """
 
     model: Model
@@ -196,7 +199,8 @@ def calibrate_to(
 
     Raises:
         ShapeError: the readings are of arms with another number of joints.
-        InvalidValueError: there are fewer numbers than errors, or the readings are those of another arm.
+        InvalidValueError: there are fewer numbers than errors, the readings are those of another arm, or what is left
+            of them hides every error.
         UnknownNameError: ``only`` or ``without`` names what there is not.
     """
     if seen.q.shape[1] != arm.n:
@@ -217,6 +221,11 @@ def calibrate_to(
         found = identify(model.names, J, model.is_length, noise.length, first=order, allowed=allowed, known=known)
         if found.kept == kept and all(now > _SETTLED * then for now, then in zip(noise, before, strict=True)):
             break
+        if not found.kept:
+            raise InvalidValueError(
+                f"what {arm.name} misses its readings by, {noise.length * 1e3:.3g} mm, hides every error that it may "
+                f"have: are these its readings?"
+            )
         kept, before = found.kept, noise
         if len(kept) >= len(rows.off):
             raise InvalidValueError(
@@ -228,6 +237,9 @@ def calibrate_to(
         errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)
         noise = _left(model.rows(seen, errors))
     assert found is not None  # noqa: S101 - there is a first round
+    if robust and kept:
+        # Each outlier, though it counts little, still pulls as hard as a usual reading, and many pull together.
+        errors = _fitted(model, seen, list(kept), errors, noise, robust=True, strict=True)
     return _told(model, found, seen, errors, robust=robust)
 
 
@@ -258,7 +270,10 @@ def _weights(rows: Rows, noise: Noise) -> Array:
     return np.where(rows.turning, noise.length / noise.turn, 1.0)
 
 
-def _fitted(model: Model, seen: Readings, kept: list[int], start: Array, noise: Noise, *, robust: bool) -> Array:
+def _fitted(
+    model: Model, seen: Readings, kept: list[int], start: Array, noise: Noise, *, robust: bool, strict: bool = False
+) -> Array:
+    """Return (k,) errors of which those that are kept fit the readings best; if strict, without outliers."""
     errors = start.copy()
     errors[[i for i in range(len(errors)) if i not in kept]] = 0.0
     belief = noise.length * np.diag(1 / _believed(model)[kept])
@@ -275,21 +290,33 @@ def _fitted(model: Model, seen: Readings, kept: list[int], start: Array, noise: 
 
     for _ in range(_WEIGHINGS):
         if robust:
-            trust = scale * _trust(model.rows(seen, errors), scale, noise)
+            trust = scale * _trust(model.rows(seen, errors), scale, noise, strict=strict)
         found = least_squares(
-            missing, errors[kept].copy(), slopes, x_scale="jac", ftol=_FINISHED, xtol=_FINISHED, gtol=None
+            missing,
+            errors[kept].copy(),
+            slopes,
+            x_scale="jac",
+            ftol=_FINISHED,
+            xtol=_FINISHED,
+            gtol=None,
+            max_nfev=_STEPS,
         )
         errors[kept] = found.x
-        settled = scale * _trust(model.rows(seen, errors), scale, noise) if robust else trust
+        settled = scale * _trust(model.rows(seen, errors), scale, noise, strict=strict) if robust else trust
         if np.all(np.abs(settled - trust) <= _WEIGHED * scale):
             break
     return errors
 
 
-def _trust(rows: Rows, scale: Array, noise: Noise) -> Array:
-    """Return (r,) by how much readings that are off count less: the root of the weight that soft L1 gives them."""
+def _trust(rows: Rows, scale: Array, noise: Noise, *, strict: bool) -> Array:
+    """Return (r,) by how much readings that are off count less: the root of the weight that soft L1 gives them.
+
+    If strict, outliers do not count.
+    """
     square, size = _by_reading(rows.of, rows.off * scale / noise.length)
     trust = (1 + square / _limit(size)) ** -0.25
+    if strict:
+        trust[_outlying(square, size)] = 0.0
     return np.asarray(trust[rows.of], dtype=np.float64)
 
 
@@ -302,6 +329,11 @@ def _by_reading(of: Numbers, off: Array) -> tuple[Array, Array]:
 def _limit(size: Array) -> Array:
     """Return what the squares of so many numbers of a normal distribution usually stay below."""
     return np.asarray(chi2.ppf(_USUAL, np.maximum(size, 1)), dtype=np.float64)
+
+
+def _outlying(square: Array, size: Array) -> Flags:
+    """Return which readings are outliers, by the squares of so many numbers each, in deviations."""
+    return np.asarray(square > _OUTLYING**2 * _limit(size), dtype=np.bool_)
 
 
 def _believed(model: Model) -> Array:
@@ -318,19 +350,25 @@ def _parts(model: Model) -> Array:
 def _told(model: Model, found: Identified, seen: Readings, errors: Array, *, robust: bool) -> Calibration:
     kept = list(found.kept)
     rows = model.rows(seen, errors)
-    freedom = max(1, len(rows.off) - len(kept))
-    more = float(np.sqrt(len(rows.off) / freedom))
-    noise = Noise(
-        *(
-            max(_usual(rows, which, more, robust=robust) * more, least)
-            for which, least in ((~rows.turning, _LEAST_LENGTH), (rows.turning, _LEAST_TURN))
+    outlying = np.zeros(len(seen), dtype=np.bool_)
+    # Twice: outliers are told by the noise, and the noise by what are none.
+    for _ in range(2):
+        counted = ~outlying[rows.of]
+        freedom = max(1, int(counted.sum()) - len(kept))
+        more = float(np.sqrt(counted.sum() / freedom))
+        noise = Noise(
+            *(
+                max(_usual(rows, which, more, robust=robust) * more, least)
+                for which, least in ((~rows.turning, _LEAST_LENGTH), (rows.turning, _LEAST_TURN))
+            )
         )
-    )
-    deviation = np.where(rows.turning, noise.turn, noise.length)
+        deviation = np.where(rows.turning, noise.turn, noise.length)
+        if robust:
+            outlying = _outlying(*_by_reading(rows.of, rows.off / deviation))
     believed = _believed(model)[kept]
-    A = rows.by[:, kept] / deviation[:, None] * believed
+    counted = ~outlying[rows.of]
+    A = rows.by[counted][:, kept] / deviation[counted, None] * believed
     covariance = np.linalg.inv(A.T @ A + np.eye(len(kept))) * np.outer(believed, believed)
-    square, size = _by_reading(rows.of, rows.off / deviation)
     return Calibration(
         model=model,
         identified=found,
@@ -340,7 +378,7 @@ def _told(model: Model, found: Identified, seen: Readings, errors: Array, *, rob
         after=model.off(seen, errors),
         noise=noise,
         freedom=freedom,
-        outliers=tuple(np.flatnonzero(square > _OUTLYING**2 * _limit(size)).tolist()) if robust else (),
+        outliers=tuple(np.flatnonzero(outlying).tolist()),
     )
 
 

@@ -14,6 +14,7 @@ from armwright.arrays import Array, ArrayLike, Flags
 from armwright.calibration.chain import Chain, Reached
 from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import ShapeError
+from armwright.spatial.rotations import rotation_vector
 
 _SIX = ("x", "y", "z", "rx", "ry", "rz")
 _TILTS = ("z", "rx", "ry")
@@ -132,8 +133,8 @@ class Model:
             np.sqrt(np.bincount(rows.of[which], square[which], len(readings)))
             for which in (~rows.turning, rows.turning)
         )
-        # The rows of a turn are its sine along three axes.
-        turn = np.arcsin(np.minimum(turn, 1.0))
+        # The rows of a turn are twice the sine of half of it, along three axes.
+        turn = 2 * np.arcsin(np.minimum(turn / 2, 1.0))
         return Off(distance, np.where(readings.with_rotation, turn, np.nan))
 
     # ---- the kinds of readings -----------------------------------------------------------------------------------
@@ -169,14 +170,12 @@ class Model:
             which = which[readings.with_rotation[which]]
             if not len(which):
                 continue
-            E = reached.rotation[which] @ (turned @ readings.rotations[which]).swapaxes(1, 2)
-            trace = np.trace(E, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-            sine = np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1) / 2
-            by = (trace - E) / 2 @ reached.by_turn[which]
+            apart, by_turn = _apart(reached.rotation[which], turned @ readings.rotations[which])
+            by = by_turn @ reached.by_turn[which]
             turns = np.concatenate([np.zeros((3, 3)), axes], axis=1)
-            more = (-(trace - E.swapaxes(1, 2)) / 2 @ turns).reshape(-1, 6) if i else None
+            more = (-by_turn.swapaxes(1, 2) @ turns).reshape(-1, 6) if i else None
             yield Rows(
-                sine.ravel(),
+                apart.ravel(),
                 self._wide(by.reshape(-1, by.shape[2]), first, more),
                 np.repeat(which, 3),
                 np.ones(3 * len(which), dtype=np.bool_),
@@ -223,6 +222,22 @@ class Model:
         along = away / np.maximum(distance, 1e-12)[:, None]
         by = np.einsum("mi,mik->mk", along, reached.by_position[which] - there.by_position)
         yield Rows(distance - readings.distances[which], self._wide(by), which, np.zeros(len(which), dtype=np.bool_))
+
+
+def _apart(R: Array, goals: Array) -> tuple[Array, Array]:
+    """Return by what rotations are turned from goals, both (m, 3, 3), and the derivative of that by a small turn of R.
+
+    It is the axis of the turn by twice the sine of half its angle, (m, 3): the turn itself where that is small, and
+    largest where R stands the other way round. The derivative (m, 3, 3), transposed and negative, is that by a small
+    turn of the goal.
+    """
+    w = rotation_vector(R @ goals.swapaxes(1, 2))
+    half = np.linalg.norm(w, axis=1)[:, None] / 2
+    vector = w * np.sinc(half / np.pi) / 2  # of the quaternion
+    x, y, z = vector.T
+    c = np.cos(half[:, 0])
+    by = np.stack([c, z, -y, -z, c, x, y, -x, c], axis=1).reshape(-1, 3, 3)
+    return 2 * vector, by
 
 
 def _six(X: Array, six: Array) -> tuple[Array, Array, Array]:

@@ -4,12 +4,13 @@ Source:
     Borm & Menq (1991); Driels & Pathre (1990); Nahvi, Hollerbach, Hayward (1994); Nahvi & Hollerbach (1996).
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from armwright.arm.model import Arm
+from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.calibration.chain import Chain, chain_of
 from armwright.calibration.identifying import identify, preferred
@@ -18,9 +19,10 @@ from armwright.errors import InvalidValueError, one_of
 Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
 INDICES: tuple[Index, ...] = ("O1", "O2", "O3", "O4", "O5")
 
-# Joints without limits are tried within a turn [rad], slides within a metre.
-_FREE = np.pi
-_CANDIDATES = 400
+# Joints without limits are tried within so much either way [rad], [m].
+_FREE, _FREE_SLIDE = math.pi, 1.0
+# As many candidates, and so many for each pose that is asked for.
+_CANDIDATES, _EACH = 400, 4
 # Poses are exchanged for better ones so often at most.
 _MOST_EXCHANGES = 200
 # Noise at which one asks what can be told at all [m], [rad].
@@ -72,7 +74,7 @@ def plan_poses(
     *,
     index: Index = "O1",
     seed: int = 0,
-    candidates: int = _CANDIDATES,
+    candidates: int | None = None,
     turns: bool = False,
     measured: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
@@ -87,7 +89,7 @@ def plan_poses(
         count: how many poses.
         index: O1 to O5; see ``Observability``.
         seed: of the candidates.
-        candidates: how many there are.
+        candidates: how many there are; 400 when left out, or 4 for each pose if that is more.
         turns: whether turns are measured too, not places alone.
         measured: (k, n) postures that were measured before [rad] or [m]; none when left out.
         progress: told how many poses are chosen.
@@ -98,22 +100,27 @@ def plan_poses(
         UnknownNameError: there is no such index.
     """
     one_of("index", index, INDICES)
+    if count < 1:
+        raise InvalidValueError(f"count: expected 1 pose or more, got {count}")
     chain = chain_of(arm)
     rng = np.random.default_rng(seed)
+    if candidates is None:
+        candidates = max(_CANDIDATES, _EACH * count)
     if candidates < count:
         raise InvalidValueError(f"candidates: expected {count} or more, got {candidates}")
     lower, upper = _limits(arm)
     q = lower + (upper - lower) * rng.random((candidates, arm.n))
-    before = np.zeros((0, arm.n)) if measured is None else np.atleast_2d(joint_array(measured, arm.n))
+    before = np.zeros((0, arm.n)) if measured is None else np.atleast_2d(joint_array(measured, arm.n, "measured"))
     slopes = _rows(chain, np.vstack([q, before]), turns=turns)
     J = slopes.reshape(-1, len(chain.names))
     told = identify(chain.names, J, chain.is_length, _USUAL_NOISE, first=preferred(chain.names))
     kept = list(told.kept)
     numbers, poses = slopes.shape[1], count + len(before)
-    if numbers * poses < len(kept):
+    # One number more than errors, or nothing tells noise from them.
+    if numbers * poses <= len(kept):
         raise InvalidValueError(
             f"count: {arm.name} has {len(kept)} errors that {'poses' if turns else 'points'} can tell; "
-            f"expected {-(-len(kept) // numbers) - len(before)} poses or more, got {count}"
+            f"expected {len(kept) // numbers + 1 - len(before)} poses or more, got {count}"
         )
     rows, fixed = slopes[:, :, kept], list(range(candidates, len(slopes)))
     taken = _greedy(rows, count, fixed, progress)
@@ -139,10 +146,19 @@ def _rows(chain: Chain, q: Array, *, turns: bool) -> Array:
 
 
 def _limits(arm: Arm) -> tuple[Array, Array]:
-    free = [_FREE if joint.revolute else 1.0 for joint in arm.joints]
-    lower = [max(joint.limits.lower, -most) for joint, most in zip(arm.joints, free, strict=True)]
-    upper = [min(joint.limits.upper, most) for joint, most in zip(arm.joints, free, strict=True)]
-    return np.array(lower), np.array(upper)
+    """Return (n,) between what each joint is tried, [rad] or [m]."""
+    ways = np.array([_way(joint) for joint in arm.joints])
+    return ways[:, 0], ways[:, 1]
+
+
+def _way(joint: Joint) -> tuple[float, float]:
+    lower, upper = joint.limits.lower, joint.limits.upper
+    free = _FREE if joint.revolute else _FREE_SLIDE
+    # Of a joint that may turn more than once, a turn tells all; of a slide the whole way tells more.
+    if upper - lower <= 2 * free or (math.isfinite(upper - lower) and not joint.revolute):
+        return lower, upper
+    middle = min(max(0.0, lower + free), upper - free)
+    return middle - free, middle + free
 
 
 def _stacked(rows: Array, taken: Sequence[int]) -> Array:

@@ -13,8 +13,12 @@ import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, Flags, floats, read_only
 from armwright.errors import InvalidValueError, ShapeError
+from armwright.spatial.rotations import orthonormality_error
 
 Numbers: TypeAlias = npt.NDArray[np.intp]
+
+# Rotations that are written with four digits.
+_WRITTEN = 1e-3
 
 
 def _no_numbers(m: int, *shape: int) -> Array:
@@ -102,7 +106,7 @@ def readings(
 
     Raises:
         ShapeError: they are not as many.
-        InvalidValueError: nothing was measured, or a distance from nothing.
+        InvalidValueError: nothing was measured, or a distance from nothing; a pose has no rotation in it.
     """
     places = np.atleast_2d(floats(q, "q"))
     m, n = places.shape
@@ -112,6 +116,7 @@ def readings(
         given = given[None] if given.shape in {(3,), (4, 4)} else given
         if given.shape == (m, 4, 4):
             seen, turned = given[:, :3, 3], given[:, :3, :3]
+            _refuse_no_poses(given)
         elif given.shape == (m, 3):
             seen = given
         else:
@@ -173,6 +178,32 @@ def together(*parts: Readings) -> Readings:
         planes=planes,
         anchors=anchors,
     )
+
+
+def refuse_not_fitted(fitted: Readings, others: Readings) -> None:
+    """Refuse readings whose frame, plane or anchor no reading tells that is fitted: nothing says where it is.
+
+    Raises:
+        InvalidValueError: there are some.
+    """
+    for what, names in (("frame", others.frames), ("plane", others.planes), ("anchor", others.anchors)):
+        unknown = sorted(set(getattr(others, what).tolist()) - set(getattr(fitted, what).tolist()) - {-1})
+        if unknown:
+            raise InvalidValueError(
+                f"{what} {names[unknown[0]]}: no reading that is fitted tells where it is, so that the "
+                f"{int((getattr(others, what) == unknown[0]).sum())} others in it cannot be held against the arm"
+            )
+
+
+def _refuse_no_poses(given: Array) -> None:
+    """Refuse matrices (m, 4, 4) that are no poses: a rotation that is mirrored, scaled, or not one at all."""
+    error = orthonormality_error(given[:, :3, :3]) + np.abs(given[:, 3] - (0, 0, 0, 1)).max(axis=1)
+    worst = int(np.argmax(error)) if len(error) else 0
+    if len(error) and error[worst] > _WRITTEN:
+        raise InvalidValueError(
+            f"points: expected a rotation, a place and the row 0 0 0 1 in every pose, got {given[worst].tolist()} as "
+            f"number {worst + 1}"
+        )
 
 
 def _numbered(names: ArrayLike | None, m: int, what: str) -> tuple[Numbers, tuple[str, ...]]:

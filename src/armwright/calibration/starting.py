@@ -15,11 +15,13 @@ from armwright.calibration.chain import Bend, Chain, chain_of
 from armwright.calibration.model import Model, Plane
 from armwright.calibration.readings import Readings
 from armwright.errors import InvalidValueError
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import one_pose, pose
 from armwright.spatial.rotations import nearest_rotation, rotation_vector
 
 # A measurement that no rigid motion brings so near to the arm is of another arm, or in other units [m].
 _FARTHEST = 0.2
+# Poses that are turned farther than this from the arm's, in half of all, are told in another way [rad].
+_FARTHEST_TURN = 0.5
 # What is measured is another frame of the hand, not the tool a little off, from this turn on [rad].
 _ANOTHER = 0.05
 # Points whose second width is a smaller part of the first lie on a line, and leave a turn about it free.
@@ -41,9 +43,12 @@ def started(arm: Arm, readings: Readings, *, base: Array | None = None, bends: t
         bends: of its joints.
 
     Raises:
-        InvalidValueError: the readings are those of another arm or in other units; there are too few of a frame, a
-            plane or an anchor to find it.
+        InvalidValueError: the readings are those of another arm, told otherwise or in other units; there are too few of
+            a frame, a plane or an anchor to find it; ``base`` has no rotation in it.
+        ShapeError: ``base`` is not (4, 4).
     """
+    given = base is not None
+    base = None if base is None else one_pose(base, "base")
     chain = chain_of(arm)
     first = readings.with_point & (readings.frame == 0)
     _refuse_other_units(chain, readings, first)
@@ -60,11 +65,20 @@ def started(arm: Arm, readings: Readings, *, base: Array | None = None, bends: t
         plane_names=readings.planes,
         anchor_names=readings.anchors,
     )
-    far = float(np.median(model.off(readings).distance))
+    off = model.off(readings)
+    far = float(np.median(off.distance))
     if far > _FARTHEST:
         raise InvalidValueError(
             f"the points lie {far * 1e3:.0f} mm from where {arm.name} would have its tool, wherever it stands: are "
             f"these its joints, in this order and these units?"
+        )
+    turns = off.turn[readings.with_rotation]
+    # Points on a line leave a turn of the base about it free, which the fit finds.
+    if len(turns) and np.median(turns) > _FARTHEST_TURN and (given or not _on_a_line(readings.points[first])):
+        raise InvalidValueError(
+            f"half of the poses are turned {np.degrees(np.median(turns)):.0f} degrees or more from where {arm.name} "
+            f"would have its hand, however the measured frame is fixed to it: are these its turns, in this order and "
+            f"these units?"
         )
     return model
 
@@ -122,14 +136,21 @@ def _frame(chain: Chain, readings: Readings, number: int) -> Array:
     seen, name = readings.points[which], readings.frames[number]
     if not which.any():
         return np.eye(4)  # nothing is read in it here
-    widths = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
-    if len(seen) < 3 or widths[1] < _LINE * widths[0]:
+    if _on_a_line(seen):
         raise InvalidValueError(
             f"frame {name}: {len(seen)} points"
             f"{' on a line' if len(seen) > 2 else ''} do not tell where it stands; measure 3 or more that are not "
             f"on a line"
         )
     return _brought(seen, chain.reach(readings.q[which]).position)
+
+
+def _on_a_line(points: Array) -> bool:
+    """Whether points (m, 3) lie on a line or in one place, as fewer than three always do."""
+    if len(points) < 3:
+        return True
+    widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(widths[1] <= _LINE * widths[0])
 
 
 def _plane(chain: Chain, readings: Readings, number: int) -> Plane:

@@ -9,7 +9,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.calibration.chain import Bend
 from armwright.calibration.fitting import calibrate_to
-from armwright.calibration.readings import Numbers, Readings
+from armwright.calibration.readings import Numbers, Readings, refuse_not_fitted
 from armwright.errors import InvalidValueError
 
 # Postures whose joints differ by less are one [rad], [m].
@@ -56,11 +56,16 @@ def cross_validated(
         progress: told how many folds are done.
 
     Raises:
-        InvalidValueError: there are not as many postures as folds, or too few for the errors of the arm.
+        InvalidValueError: there are not as many postures as folds, or too few for the errors of the arm; all readings
+            of a frame, a plane or an anchor are in one fold.
     """
     held = HeldOut(np.zeros(len(seen)), np.zeros(len(seen)), np.zeros((len(seen), 3)))
     for fold, away in enumerate(dealt(seen.q, folds, seed), 1):
-        found = calibrate_to(arm, seen.take(~away), base=base, bends=bends, without=without)
+        try:
+            refuse_not_fitted(seen.take(~away), seen.take(away))
+            found = calibrate_to(arm, seen.take(~away), base=base, bends=bends, without=without)
+        except InvalidValueError as error:
+            raise InvalidValueError(f"with part {fold} of {folds} held out: {error}") from error
         held.distance[away], held.turn[away] = found.model.off(seen.take(away), found.errors)
         held.places[away] = found.predict(seen.q[away])
         if progress is not None:
@@ -76,6 +81,10 @@ def dealt(q: Array, folds: int, seed: int) -> list[Flags]:
     """
     posture = postures(q)
     count = int(posture.max()) + 1
+    if count < 2:
+        raise InvalidValueError(
+            f"folds: {len(q)} readings of one posture leave none to hold out; measure in several postures"
+        )
     if not 2 <= folds <= count:
         raise InvalidValueError(f"folds: expected 2 to {count}, one posture in each or more, got {folds}")
     number = (np.random.default_rng(seed).permutation(count) % folds)[posture]

@@ -114,8 +114,9 @@ def main() -> None:
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         _end(1, f"cannot write the output: {error.strerror or error}")
-    except _Interrupted:
-        _end(130, "interrupted; nothing was written")
+    except _Interrupted as interrupted:
+        # A command that leaves something behind says so in a note.
+        _end(130, "; ".join(["interrupted", *getattr(interrupted, "__notes__", ["nothing was written"])]))
 
 
 def _end(status: int, message: str) -> NoReturn:

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.numbers import numbers
+from armwright.cli.numbers import numbers, units_of
 from armwright.cli.options import Json, Quiet
-from armwright.cli.printing import command_line, plain_console, print_json, table
+from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None, typer.Option(help="The measured point in the frame of the hand: 0,0,31.", show_default=False)
     ] = None,
     folds: Annotated[int, typer.Option(help="Parts in which postures are held out to see how good it is.")] = 5,
-    seed: Annotated[int, typer.Option(help="Of the parts.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the parts.")] = 0,
     beyond: Annotated[
         bool,
         typer.Option("--beyond", help="Also try springs in the joints, gears out of true, and learning what is left."),
@@ -56,7 +56,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     model = load_arm(arm)
     if tool_mm is not None:
         model = _with_tool(model, tool_mm)
-    measurements = read_measurements(measured, model, units=_units(units))
+    measurements = read_measurements(measured, model, units=units_of(units))
     with waiting("calibrating", quiet=quiet or as_json) as told, one_core():
         found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, progress=told)
     if output is not None:
@@ -81,35 +81,22 @@ def _with_tool(model: "Arm", text: str) -> "Arm":
     return attrs.evolve(model, tool=pose(np.eye(3), np.array(place) * 1e-3))
 
 
-def _units(text: str | None) -> tuple[str, str] | None:
-    if text is None:
-        return None
-    parts = tuple(part.strip() for part in text.split(","))
-    if len(parts) != 2:
-        raise typer.BadParameter(f"expected a length and an angle such as mm,deg, got {text}", param_hint="--units")
-    return parts[0], parts[1]
-
-
 def _print(found: "Calibrated") -> None:
     from armwright.report.calibrated import shown_errors
     from armwright.report.calibrated_files import result_tables
 
     console = plain_console()
-    console.print(
-        table(
-            ("error", "value", "±", "unit"),
-            shown_errors(found.full),
-            title=f"{found.arm.name}: errors found",
-            words=(0, 3),
-        )
+    errors = table(
+        ("error", "value", "±", "unit"), shown_errors(found.full), title=f"{found.arm.name}: errors found", words=(0, 3)
     )
+    print_table(console, errors)
     held = ((one.name, one.why) for one in found.full.held)
-    console.print(table(("error", "why"), held, title="Not fitted", words=(0, 1)))
+    print_table(console, table(("error", "why"), held, title="Not fitted", words=(0, 1)))
     for one in result_tables(found):
         rows = list(one.rows)
         if rows:
             words = [i for i in range(len(one.heads)) if i not in one.numbers]
-            console.print(table(one.heads, rows, title=one.title, words=words))
+            print_table(console, table(one.heads, rows, title=one.title, words=words))
             if one.remark:
                 console.print(one.remark)
     for note in found.notes:

@@ -7,7 +7,7 @@ import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
-from armwright.cli.printing import json_text, plain_console, print_json, table
+from armwright.cli.printing import json_text, plain_console, print_json, print_table, table
 
 if TYPE_CHECKING:
     from armwright.arrays import Array
@@ -138,7 +138,7 @@ def _files(
     told, wanted = found.path.at(times), named_path(name)
     rows = np.column_stack([times, told.at * 1e3, told.velocity * 1e3, told.acceleration * 1e3])
     head = "t_s,x_mm,y_mm,vx_mm_per_s,vy_mm_per_s,ax_mm_per_s2,ay_mm_per_s2"
-    text = "\n".join([head, *(",".join(f"{x:.9g}" for x in row) for row in rows)]) + "\n"
+    text = "\n".join([head, *(",".join(f"{x:z.9g}" for x in row) for row in rows)]) + "\n"
     panels = {
         title: {"wanted": wanted.at(times).at * 1e3, "taken": simulate(prepare(model, path, settings), usual).tip * 1e3}
         for title, path in (("path as it is", wanted), ("path corrected", found.path))
@@ -154,7 +154,7 @@ def _files(
 def _print(summary: dict[str, Any]) -> None:
     nodes = zip(summary["times"], summary["nodes"], summary["before"], summary["after"], strict=True)
     rows = (
-        (f"{t:.4g}", *(f"{x * 1e3:.4f}" for x in node), f"{before * 1e3:.4f}", f"{after * 1e3:.5f}")
+        (f"{t:.4g}", *(f"{x * 1e3:z.4f}" for x in node), f"{before * 1e3:.4f}", f"{after * 1e3:.5f}")
         for t, node, before, after in nodes
     )
-    plain_console().print(table(("at s", "told x mm", "y mm", "error before mm", "after mm"), rows, words=()))
+    print_table(plain_console(), table(("at s", "told x mm", "y mm", "error before mm", "after mm"), rows, words=()))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.linkages import LinkageName
-from armwright.cli.printing import plain_console, print_json, table
+from armwright.cli.printing import plain_console, print_json, print_table, table
+from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
     from armwright.clearance.estimating.measured import PathsMeasured, RestMeasured
@@ -117,7 +118,8 @@ def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, 
         told = json.loads(data.attrs["design"])["ranges"]
     # The two bounds of a design by chance, or the levels of a full factorial.
     ranges = [(min(told[name]), max(told[name])) for name in parameters] if set(parameters) <= set(told) else None
-    surrogate = learn(parameters, points, names, values, ranges=ranges)
+    with waiting(f"learning from {len(points)} simulations") as told_of:
+        surrogate = learn(parameters, points, names, values, ranges=ranges, progress=told_of)
     features = measured.features()
     seen = [float(getattr(features[path], feature)) for path in measured.times for feature in _FEATURES]
     found = posterior(surrogate, seen, measured.noise_of(names, noise))
@@ -155,10 +157,12 @@ def _print(told: Mapping[str, Any]) -> None:
                 f"{scale * one['deviation']:.4f}",
                 f"{low:.4f} to {high:.4f}",
                 "yes" if one["identifiable"] else "no",
-                *(f"{x:+.2f}" for x in told["correlation"][i]),
+                *(f"{x:+z.2f}" for x in told["correlation"][i]),
             )
         )
     console = plain_console()
-    console.print(table(("", "mean mm", "± mm", "90 % interval mm", "told", *(f"r {one}" for one in names)), rows))
+    print_table(
+        console, table(("", "mean mm", "± mm", "90 % interval mm", "told", *(f"r {one}" for one in names)), rows)
+    )
     for note in told["notes"]:
         console.print(note)

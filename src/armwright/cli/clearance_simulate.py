@@ -8,7 +8,7 @@ import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
-from armwright.cli.printing import command_line, json_text, plain_console, print_json, table
+from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: fl
         )
     speed = speed_rpm * 2 * math.pi / 60
     at = model.assembly.get(model.drives[0].body, 0.0)
-    name = f"{turns:g} turns at {speed_rpm:g} rev/min"
+    name = f"{turns:g} turn{'' if turns == 1 else 's'} at {speed_rpm:g} rev/min"
     return turning(name, at, speed, turns * 2 * math.pi / abs(speed))
 
 
@@ -190,12 +190,12 @@ def _print(run: "Run", told: dict[str, Any]) -> None:
          str(pin["impacts"]), f"{100 * pin['flight']:.3g}")
         for name, pin in told["pins"].items()
     )  # fmt: skip
-    console.print(table(("pin", "clearance mm", "peak N", "mean N", "impacts", "in flight %"), pins))
+    print_table(console, table(("pin", "clearance mm", "peak N", "mean N", "impacts", "in flight %"), pins))
     targets = (
-        (f"{one['time']:.4g} s", *(f"{one[key] * 1e3:.4f}" for key in ("error_x", "error_y", "distance")))
+        (f"{one['time']:.4g} s", *(f"{one[key] * 1e3:z.4f}" for key in ("error_x", "error_y", "distance")))
         for one in told["targets"]
     )
-    console.print(table(("error at", "x mm", "y mm", "distance mm"), targets))
+    print_table(console, table(("error at", "x mm", "y mm", "distance mm"), targets))
     console.print(f"error: {error['largest'] * 1e3:.4g} mm at most, {error['mean'] * 1e3:.4g} mm on average")
     console.print(
         f"energy: {energy['driven']:.4g} J from the drives, {energy['impact_loss']:.3g} J lost in impacts, "

@@ -8,7 +8,7 @@ import typer
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
 from armwright.cli.options import Quiet
 from armwright.cli.printing import print_json
-from armwright.cli.progress import sweep_bar
+from armwright.cli.progress import sweep_bar, waiting
 
 if TYPE_CHECKING:
     from armwright.clearance.sweeping import FeatureSweep
@@ -50,8 +50,10 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.sweeping import FeatureSweep
+    from armwright.sweep.extras import check_extras
     from armwright.sweep.run import run
 
+    check_extras()
     task = FeatureSweep(
         linkage=load_linkage(linkage),
         paths=tuple(dict.fromkeys(name.strip() for name in paths.split(","))),
@@ -61,9 +63,14 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     plan = _plan(task, design, (from_mm * 1e-3, to_mm * 1e-3), to_friction, levels=levels, runs=runs, seed=seed)
     # Whatever is wrong with a path is said now, and a step too long for the least play; and the simulation is compiled
     # once, not by every worker.
-    task(plan.points.min(axis=0, keepdims=True))
+    with waiting(f"{task.linkage.name}: the first run compiles it", quiet=quiet or as_json):
+        task(plan.points.min(axis=0, keepdims=True))
     with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
-        found = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
+        try:
+            found = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
+        except BaseException as error:
+            error.add_note(f"what is finished is kept in '{output}', and the same command goes on from there")
+            raise
     failed = int((found["status"] != 0).sum())
     found.close()
     if as_json:

@@ -24,7 +24,20 @@ p EXPR    a value                                 set NAME = EXPR         anothe
 frames    the tree of frames                      vars      all variables
 where     where all processes are                 list      the program around here
 th N      look at process N                       q         leave
+Whole words do as well: next, step, out, stage, continue, break, print, quit.
 An empty line repeats the last step. Ctrl-C stops a program that runs."""
+# What users of other debuggers type.
+_WHOLE_WORDS = {
+    "next": "n",
+    "step": "s",
+    "out": "o",
+    "stage": "g",
+    "continue": "c",
+    "tick": "t",
+    "break": "b",
+    "print": "p",
+    "delete": "x",
+}
 # Lines shown around the present one.
 _AROUND = 5
 _SLICE = 0.05
@@ -73,6 +86,7 @@ class Terminal:
 
     def _do(self, line: str) -> None:
         word, _, rest = line.partition(" ")
+        word = _WHOLE_WORDS.get(word, word)
         command = self._commands.get(word)
         if command is None:
             if line:

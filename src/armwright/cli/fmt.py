@@ -34,7 +34,7 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
 
     A program with a slip of syntax is left alone and told of; the others are written all the same.
 
-    **Example:** `armwright fmt examples/*.rlo --check`
+    **Example:** `armwright fmt examples/peg.rlo --diff`
     """
     from armwright.cli.rewriting import INPUT, print_difference, read_program, write_back
     from armwright.errors import ArmwrightError

@@ -29,8 +29,9 @@ def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Js
         if as_json:
             print(json.dumps({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()}))
             continue
-        for row in X[:3]:
-            print("  ".join(f"{x + 0.0:10.6f}" for x in row[:3]), f"  {row[3] * 1e3 + 0.0:12.3f} mm")
+        for *turn, place in X[:3].tolist():
+            numbers = "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in turn)
+            print(numbers, f"  {round(place * 1e3, 3) + 0.0:12.3f} mm")
 
 
 def jacobian(
@@ -58,7 +59,7 @@ def jacobian(
             print(json.dumps({"q": q.tolist(), "frame": frame, "jacobian": J.tolist()}))
             continue
         for name, row in zip(("vx", "vy", "vz", "wx", "wy", "wz"), J, strict=True):
-            print(name, "  ".join(f"{x + 0.0:10.6f}" for x in row))
+            print(name, "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in row.tolist()))
 
 
 def postures(model: "Arm", posture: str | None, csv: Path | None) -> "list[Array]":

@@ -56,6 +56,8 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
         print_json({"answer": solution.answer, "distance": solution.distance, "branches": branches})
     else:
         _print(model, solution)
+        if solution.answer == "out of reach":
+            _ask_for_the_unit(model, X, metres=noap is not None)
     if not solution.allowed:
         raise typer.Exit(1)
 
@@ -79,12 +81,24 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
     return pose(turns[0] @ turns[1] @ turns[2], np.array(numbers(xyz, 3, "--xyz")) * 1e-3)
 
 
+def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
+    """Say that a place out of reach would be in reach in the other unit, if it would."""
+    from armwright.kinematics.inverse.closed_form import inverse as postures
+    from armwright.kinematics.inverse.solution import Answer
+
+    other = X.copy()
+    other[:3, 3] *= 1e-3 if metres else 1e3
+    if postures(model, other).answer is not Answer.OUT_OF_REACH:
+        option, unit, typed = ("--noap", "m", "mm") if metres else ("--xyz", "mm", "m")
+        print(f"note: {option} is in {unit}; in {typed} the pose would be in reach")
+
+
 def _print(model: "Arm", solution) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     from armwright.cli.joints import units
 
     print(f"{solution.answer}" + ("" if solution.allowed else f": {solution.explain()}"))
     for branch in solution:
-        values = "  ".join(f"{x:9.3f}" for x in branch.q / units(model))
+        values = "  ".join(f"{x:z9.3f}" for x in branch.q / units(model))
         remarks = [f"joints {', '.join(map(str, branch.free))} free together"] if branch.free else []
         remarks += [str(violation) for violation in branch.violations]
         print(f"{values}   {branch.label}" + "".join(f"\n    {remark}" for remark in remarks))

@@ -7,7 +7,7 @@ import typer
 
 from armwright.cli.numbers import Named, named_number
 from armwright.cli.options import Json, Quiet
-from armwright.cli.printing import command_line, json_text, plain_console, print_json
+from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table
 
 if TYPE_CHECKING:
     from armwright.accuracy.assess import Assessment
@@ -156,7 +156,7 @@ def _print(found: "Assessment") -> None:
         table.add_column("", overflow="fold")
         for one in measures:
             table.add_row(*_row(one, bounded=bounded))
-        console.print(table)
+        print_table(console, table)
     for note in notes_of(found):
         console.print(note)
 

@@ -9,7 +9,7 @@ import typer
 
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, QuietButWarnings
-from armwright.cli.printing import command_line, json_text, plain_console, print_json, table
+from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
 from armwright.cli.progress import counting
 
 if TYPE_CHECKING:
@@ -160,12 +160,18 @@ def _planned(
     if kind is Kind.JOINT:
         return joint_move(arm, file.poses, **timed), file
     if around is not None:
-        return stopping_move(arm, file.poses, by=around.value, near=start, deviation=deviation), file
+        try:
+            return stopping_move(arm, file.poses, by=around.value, near=start, deviation=deviation), file
+        except PathError as error:
+            other = Around.VIA if around is Around.DAMPED else Around.DAMPED
+            hint = "" if error.cause == "reach" else f"; `--around {other}` looks for another way round"
+            raise ArmwrightError(f"{poses}: {error}{hint}") from error
     timed["orientation"] = (orientation or Orientation.GEODESIC).value
     try:
         return cartesian_move(arm, file.poses, **timed, deviation=deviation), file
     except PathError as error:
-        hint = "" if error.cause == "reach" else "; `--around via` looks for a way round"
+        # Which of them finds one is known when it is looked for, and that takes its time.
+        hint = "" if error.cause == "reach" else "; `--around damped` and `--around via` look for a way round"
         raise ArmwrightError(f"{poses}: {error}{hint}") from error
 
 
@@ -267,13 +273,13 @@ def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> 
     shown = table(("pose", "s", *names, *(["missed mm"] if planned.hand else [])))
     scale = units(planned.arm)
     for i, pose in enumerate(file.names):
-        postures = [f"{q:.1f}" for q in planned.postures[i] / scale]
+        postures = [f"{q:z.1f}" for q in planned.postures[i] / scale]
         missed = [f"{planned.misses[i] * 1e3:.1f}"] if planned.hand else []
         shown.add_row(pose, f"{planned.times[i]:.3f}", *postures, *missed, end_section=i == len(file.names) - 1)
     for limit, use in uses.items():
         parts = [Text(f"{part:.0%}", style="bold red" if part > 1 + _ROUNDING else "") for part in use]
         shown.add_row(limit, "", *parts)
-    console.print(shown)
+    print_table(console, shown)
     console.print("speed, acceleration and effort in parts of their limits")
     console.print(f"{planned.arm.name}: {planned.trajectory.duration:.3f} s, {planned.label}")
     if planned.certificate:

@@ -34,6 +34,20 @@ def numbers(text: str, count: int, option: str) -> list[float]:
     return values
 
 
+def units_of(text: str | None) -> tuple[str, str] | None:
+    """Read a unit of lengths and one of angles, apart by a comma; None where none are given.
+
+    Raises:
+        BadParameter: they are not two.
+    """
+    if text is None:
+        return None
+    parts = tuple(part.strip() for part in text.split(","))
+    if len(parts) != 2:
+        raise typer.BadParameter(f"expected a length and an angle such as mm,deg, got {text}", param_hint="--units")
+    return parts[0], parts[1]
+
+
 class Named(NamedTuple):
     """A number with a name, such as ``RP=0.05mm``; the unit may be empty."""
 

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.numbers import units_of
 from armwright.cli.options import Json
-from armwright.cli.printing import plain_console, print_json, table
+from armwright.cli.printing import plain_console, print_json, print_table, table
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -17,10 +18,13 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: Annotated[str, typer.Argument(help="Name in the catalogue, an arm file or a URDF.", show_default=False)],
     count: Annotated[int, typer.Option("-n", "--count", help="How many poses.")] = 30,
     index: Annotated[str, typer.Option(help="What is to be large: O1 to O5 (docs/calibration.md).")] = "O1",
-    seed: Annotated[int, typer.Option(help="Of the candidates.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the candidates.")] = 0,
     turns: Annotated[bool, typer.Option("--turns", help="Turns are measured too, not places alone.")] = False,
     after: Annotated[
         Path | None, typer.Option(help="CSV of what was measured already: the poses that tell most beside it.")
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Of that file, if its header has none: mm,deg.", show_default=False)
     ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="CSV of the poses, to be measured and given to calibrate.")
@@ -39,7 +43,7 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.files.output import write_file
 
     model = load_arm(arm)
-    measured = None if after is None else read_measurements(after, model).q
+    measured = None if after is None else read_measurements(after, model, units=units_of(units)).q
     plan = planned(model, count, index=index, seed=seed, turns=turns, measured=measured)  # type: ignore[arg-type]
     if output is not None:
         write_file(output, _csv(model, plan))
@@ -72,7 +76,7 @@ def _columns(model: "Arm") -> list[tuple[str, float]]:
 
 def _csv(model: "Arm", plan: "Plan") -> str:
     columns = _columns(model)
-    rows = [",".join(f"{x * scale:.4f}" for x, (_, scale) in zip(q, columns, strict=True)) for q in plan.q]
+    rows = [",".join(f"{x * scale:z.4f}" for x, (_, scale) in zip(q, columns, strict=True)) for q in plan.q]
     return "\n".join([",".join(name for name, _ in columns), *rows]) + "\n"
 
 
@@ -82,4 +86,4 @@ def _print(model: "Arm", plan: "Plan") -> None:
     console.print(", ".join(plan.names))
     rows = zip(plan.observability._fields, plan.observability, plan.by_chance, strict=True)
     shown = ((name, f"{ours:.4g}", f"{chance:.4g}") for name, ours, chance in rows)
-    console.print(table(("index", "these poses", "by chance"), shown))
+    print_table(console, table(("index", "these poses", "by chance"), shown))

@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+# Of a table that is measured: more than any has [columns].
+_WIDEST = 10_000
+
 
 def command_line() -> str:
     """Return the command as it was given, for the record."""
@@ -36,6 +39,18 @@ def plain_console() -> "Console":
     return Console(markup=False, highlight=False)
 
 
+def print_table(console: "Console", shown: "Table") -> None:
+    """Print a table, its cells folded between words where the terminal is narrow, but never within a number.
+
+    A table that is wider all the same runs over the edge, where a terminal breaks the line and a file does not.
+    """
+    room = console.options.update(max_width=_WIDEST)
+    for column in shown.columns:
+        longest = max(console.measure(text, options=room).minimum for text in (column.header, *column.cells))
+        column.min_width = max(longest, column.min_width or 0)
+    console.print(shown, crop=False)
+
+
 def table(
     columns: Sequence[str],
     rows: "Iterable[Sequence[str | Text]]" = (),
@@ -43,7 +58,7 @@ def table(
     title: str | None = None,
     words: Collection[int] = (0,),
 ) -> "Table":
-    """Return a table for a terminal; what is too long for it is folded, so that no number is cut off.
+    """Return a table for a terminal, to be printed by ``print_table``.
 
     Args:
         columns: their names.

@@ -8,7 +8,7 @@ import typer
 
 from armwright.cli.numbers import within
 from armwright.cli.options import JsonSummary, QuietButWarnings
-from armwright.cli.printing import command_line, plain_console, print_json, table
+from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, given_cell
 from armwright.cli.progress import waiting
 from armwright.program.text.words import Standard
@@ -202,9 +202,9 @@ def _places(error: "RunError") -> dict[str, list[float] | None]:
 
 def _print_summary(recording: "Recording", code: "Code", output: Path | None) -> None:
     console = plain_console()
-    console.print(_trace_table(recording, code))
+    print_table(console, _trace_table(recording, code))
     if recording.stages:
-        console.print(_stage_table(recording, code))
+        print_table(console, _stage_table(recording, code))
     for stage in recording.stages:
         if stage.stage.slowed:
             line = code.source.line(stage.span.start)
@@ -265,7 +265,7 @@ def _print_moment(error: "RunError", code: "Code") -> None:
         parent = (error.tree.parent(name) or WORLD).removesuffix(".BASE")
         place = "no value yet"
         if error.tree.has_value(name):
-            place = ", ".join(f"{x * 1e3:.1f}" for x in error.tree.world(name)[:3, 3])
+            place = ", ".join(f"{x * 1e3:z.1f}" for x in error.tree.world(name)[:3, 3])
         rows.append((code.spelled(name), "its base" if parent == name else code.spelled(parent), place))
     columns = ("frame", "hangs on", "x, y, z in the world, mm")
     shown = table(columns, rows, title=f"frames at {error.time:.3f} s", words=(0, 1))

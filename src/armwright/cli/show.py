@@ -40,7 +40,7 @@ def show(
         print_json(_as_data(model))
         return
     console = Console(highlight=False, markup=False, emoji=False)
-    console.print(f"{model.name}: {model.title}", style="bold")
+    console.print(f"{model.name}: {model.title}" if model.title else model.name, style="bold")
     if model.source:
         console.print(model.source, style="dim")
     for title, table in _tables(model):
@@ -108,7 +108,7 @@ def _limits(model: "Arm") -> "Table":
 def _links(model: "Arm") -> "Table":
     rows = []
     for i, link in enumerate(model.links, 1):
-        rows.append((str(i), f"{link.mass:g}", *(f"{x * 1e3 + 0.0:.6g}" for x in link.com)))
+        rows.append((str(i), f"{link.mass:g}", *(f"{x * 1e3:z.6g}" for x in link.com)))
     return _table(("link", "kg", "x mm", "y mm", "z mm"), rows)
 
 
@@ -116,7 +116,7 @@ def _inertia(model: "Arm") -> "Table":
     entries = {"Ixx": (0, 0), "Iyy": (1, 1), "Izz": (2, 2), "Ixy": (0, 1), "Ixz": (0, 2), "Iyz": (1, 2)}
     rows = []
     for i, link in enumerate(model.links, 1):
-        rows.append((str(i), *(f"{link.inertia[entry] + 0.0:.4g}" for entry in entries.values())))
+        rows.append((str(i), *(f"{link.inertia[entry]:z.4g}" for entry in entries.values())))
     return _table(("link", *entries), rows)
 
 
@@ -138,8 +138,8 @@ def _facts(model: "Arm") -> "Table":
 
     def noap(X: "Any") -> str:
         numbers = to_noap(X) + 0.0
-        columns = ["  ".join(f"{x:.6g}" for x in numbers[k : k + 3].round(12)) for k in (0, 3, 6)]
-        place = "  ".join(f"{x * 1e3:.6g}" for x in numbers[9:].round(12))
+        columns = ["  ".join(f"{x:z.6g}" for x in numbers[k : k + 3].round(12)) for k in (0, 3, 6)]
+        place = "  ".join(f"{x * 1e3:z.6g}" for x in numbers[9:].round(12))
         return f"n ({columns[0]})  o ({columns[1]})  a ({columns[2]})  p ({place}) mm"
 
     facts = [("base", noap(model.base)), ("tool", noap(model.tool))]
@@ -159,13 +159,13 @@ def _angle(value: float) -> str:
 
 
 def _length(value: float) -> str:
-    return f"{value * 1e3:g} mm"
+    return f"{value * 1e3:zg} mm"
 
 
 def _position(joint: "Joint", value: float, per: str = "") -> str:
     if math.isinf(value):
         return "-"
-    return f"{math.degrees(value):.4g}°{per}" if joint.revolute else f"{value * 1e3:g} mm{per}"
+    return f"{math.degrees(value):z.4g}°{per}" if joint.revolute else f"{value * 1e3:zg} mm{per}"
 
 
 def _as_data(model: "Arm") -> "dict[str, Any]":

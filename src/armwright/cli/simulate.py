@@ -101,9 +101,9 @@ def _print(model: "Arm", found: "Simulation") -> None:
     for i, joint in enumerate(model.joints):
         unit = "deg" if joint.revolute else "mm"
         start, end, speed = (values[i] / per_unit[i] for values in (found.q[0], found.q[-1], found.qd[-1]))
-        print(f"  joint {i + 1}: from {start:9.3f} to {end:9.3f} {unit}, at {speed:9.3f} {unit}/s")
+        print(f"  joint {i + 1}: from {start:z9.3f} to {end:z9.3f} {unit}, at {speed:z9.3f} {unit}/s")
     for name, value in _account(found).items():
-        print(f"  {name.replace('_', ' '):<18}{value:12.6g} J")
+        print(f"  {name.replace('_', ' '):<18}{value:z12.6g} J")
     shown = found.events[:_EVENTS]
     for event in shown:
         print(f"  {event.t:.4f} s: joint {event.joint + 1} {_word(event.before)}, then {_word(event.after)}")

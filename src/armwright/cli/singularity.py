@@ -35,7 +35,7 @@ def singularity(
         return
     print(f"singular: {', '.join(found.near)}" if found.singular else "not singular")
     for one in found.factors:
-        print(f"  {one.name:<18}{one.value:12.6f}  of {one.scale:.4g}{'  near zero' if one.near else ''}")
+        print(f"  {one.name:<18}{one.value:z12.6f}  of {one.scale:.4g}{'  near zero' if one.near else ''}")
     for title, rows in (
         ("the hand cannot make vx vy vz wx wy wz", found.lost),
         ("joints move for nothing", found.idle),
@@ -47,4 +47,4 @@ def singularity(
 
 
 def _row(values: "Array") -> str:
-    return "  ".join(f"{x + 0.0:8.4f}" for x in values)
+    return "  ".join(f"{x:z8.4f}" for x in values)

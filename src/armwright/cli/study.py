@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.printing import json_text, plain_console, print_json
+from armwright.cli.printing import json_text, plain_console, print_json, print_table
+from armwright.cli.progress import waiting
 
 # By name: the module next to this one that runs, prints and draws it.
 _STUDIES = {
@@ -15,6 +16,8 @@ _STUDIES = {
     "five-bar-clearance": "study_five_bar_clearance",
     "dh-calibration": "study_dh_calibration",
 }
+# Those that say themselves how far they are.
+_WITH_BARS = {"five-bar-clearance"}
 
 
 def study(
@@ -23,7 +26,8 @@ def study(
         typer.Argument(help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.", show_default=False),
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the figures (SVG) and the tables (JSON).")
+        Path | None,
+        typer.Option("-o", "--output", help="Folder for the figures (SVG) and the tables (JSON).", file_okay=False),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON.")] = False,
 ) -> None:
@@ -50,7 +54,8 @@ def study(
     if name not in _STUDIES:
         raise UnknownNameError("study", name, _STUDIES)
     chosen = importlib.import_module(f"armwright.cli.{_STUDIES[name]}")
-    tables = chosen.tables()
+    with waiting(name, quiet=name in _WITH_BARS):
+        tables = chosen.tables()
     if output is not None:
         write_folder(output, {"tables.json": json_text(tables) + "\n", **chosen.figures()})
     if as_json:
@@ -58,6 +63,6 @@ def study(
         return
     console = plain_console()
     for table in chosen.printed(tables):
-        console.print(table)
+        print_table(console, table)
     if output is not None:
         print(f"figures: {output}")

@@ -74,8 +74,8 @@ def _parameter(row: Mapping[str, Any]) -> tuple[str, ...]:
     scale, unit = (1e3, "mm") if part in ("d", "a", "x", "y", "z") else (180 / math.pi, "deg")
 
     def shown(x: float | None) -> str:
-        return "held" if x is None else f"{x * scale:+.3f}"
+        return "held" if x is None else f"{x * scale:+z.3f}"
 
     deviation = "" if row["deviation"] is None else f"{row['deviation'] * scale:.3f}"
-    thesis = "" if row["thesis"] is None else f"{row['thesis'] * scale:+.3f}"
+    thesis = "" if row["thesis"] is None else f"{row['thesis'] * scale:+z.3f}"
     return row["name"], unit, shown(row["true"]), thesis, shown(row["ours"]), deviation

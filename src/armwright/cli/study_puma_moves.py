@@ -76,15 +76,15 @@ def printed(found: Mapping[str, Any]) -> "Iterator[Table]":
         row
         for one in found["postures"]
         for row in (
-            (one["pose"], "printed", *(f"{q:.2f}" for q in one["printed"]), ""),
-            ("", "computed", *(f"{q:.2f}" for q in one["computed"]), one["branch"]),
+            (one["pose"], "printed", *(f"{q:z.2f}" for q in one["printed"]), ""),
+            ("", "computed", *(f"{q:z.2f}" for q in one["computed"]), one["branch"]),
             ("", "allowed", *[""] * 6, "; ".join(one["allowed"])),
         )
     )
     heads = ("pose", "", *(f"j{i + 1} deg" for i in range(6)), "branch")
     yield study_table("Postures: printed, and computed from the printed poses", heads, postures)
     angles = (
-        (one["pose"], *(f"{x:.2f}" for x in one["matlab"]), *(f"{x:.2f}" for x in one["nearest"]))
+        (one["pose"], *(f"{x:z.2f}" for x in one["matlab"]), *(f"{x:z.2f}" for x in one["nearest"]))
         for one in found["angles"]
     )
     heads = ("pose", "phi, MATLAB", "theta", "psi", "phi, nearest", "theta", "psi")

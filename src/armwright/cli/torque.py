@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from armwright.arrays import Array
     from armwright.dynamics.terms import Terms
 
+# Rows of a file that are worked out at once: many, as that takes no longer than one, but not all of a long file.
+_BLOCK = 1000
+
 
 def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
@@ -53,12 +56,15 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     held = Link() if load is None else load_in_hand(load)
     push = None if wrench is None else numbers(wrench, 6, "--wrench")
     motion = _motion(model, q, qd, qdd, csv)
-    for row in range(len(motion[0])):
-        found = terms(model, *(values[row] for values in motion), load=held, wrench=push)
-        if as_json:
-            print(json.dumps({"total": found.total.tolist(), **_causes(found)}))
-        else:
-            _print(model, found)
+    for first in range(0, len(motion[0]), _BLOCK):
+        found = terms(model, *(values[first : first + _BLOCK] for values in motion), load=held, wrench=push)
+        causes = _causes(found)
+        for row in range(len(found.total)):
+            efforts = {name: values[row].tolist() for name, values in causes.items()}
+            if as_json:
+                print(json.dumps({"total": efforts.pop("total"), **efforts}))
+            else:
+                _print(model, efforts)
 
 
 def _motion(model: "Arm", q: str | None, qd: str | None, qdd: str | None, csv: Path | None) -> "list[Array]":
@@ -75,9 +81,9 @@ def _motion(model: "Arm", q: str | None, qd: str | None, qdd: str | None, csv: P
     return [joint_values(model, still if text is None else text, option)[None] for option, text in texts]
 
 
-def _causes(found: "Terms") -> dict[str, list[float]]:
-    """Return the terms joint by joint, sums over the other joints taken."""
-    causes = {
+def _causes(found: "Terms") -> "dict[str, Array]":
+    """Return the terms joint by joint, (rows, n) each, sums over the other joints taken."""
+    return {
         "own inertia": found.own,
         "coupling": found.coupling.sum(axis=-1),
         "motor inertia": found.motor,
@@ -88,14 +94,13 @@ def _causes(found: "Terms") -> dict[str, list[float]]:
         "dry friction": found.dry,
         "load": found.load,
         "wrench": found.outside,
+        "total": found.total,
     }
-    return {name: values.tolist() for name, values in causes.items()}
 
 
-def _print(model: "Arm", found: "Terms") -> None:
+def _print(model: "Arm", efforts: dict[str, list[float]]) -> None:
     names = [f"joint {i + 1}, {'N m' if joint.revolute else 'N'}" for i, joint in enumerate(model.joints)]
     width = max(map(len, names)) + 2
     print(f"{'':<18}" + "".join(f"{name:>{width}}" for name in names))
-    for cause, values in _causes(found).items():
+    for cause, values in efforts.items():
         print(f"{cause:<18}" + "".join(f"{round(value, 4) + 0.0:>{width}.4f}" for value in values))
-    print(f"{'total':<18}" + "".join(f"{round(value, 4) + 0.0:>{width}.4f}" for value in found.total.tolist()))

@@ -141,8 +141,10 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
     """Refuse a start outside the stops, a brake without a joint, a controller that drives another arm."""
     arm = plant.arm
     for i in np.flatnonzero((q < plant.lower) | (q > plant.upper)):
+        scale, unit = (180 / np.pi, "deg") if arm.joints[i].revolute else (1e3, "mm")
+        at, lower, upper = (float(x[i]) * scale for x in (q, plant.lower, plant.upper))
         raise InvalidValueError(
-            f"joint {i + 1} starts at {q[i]:g}, outside its stops at {plant.lower[i]:g} and {plant.upper[i]:g}; "
+            f"joint {i + 1} starts at {at:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
             "start inside, or simulate without stops"
         )
     for brake in plant.brakes:

@@ -34,8 +34,7 @@ def write_folder(folder: Path, files: Mapping[str, str | bytes | Iterable[str]])
                 (Path(beside) / name).replace(folder / name)
     except OSError as error:
         _remove(made)
-        reason = error.strerror or str(error)
-        raise OutputError(f"cannot write to '{folder}': {reason}; nothing was written") from error
+        raise OutputError(f"cannot write to '{folder}': {reason(error, folder)}; nothing was written") from error
     except BaseException:
         _remove(made)
         raise
@@ -59,11 +58,18 @@ def write_file(path: Path, text: str | Iterable[str]) -> None:
             (Path(beside) / path.name).replace(path)
     except OSError as error:
         _remove(made)
-        reason = error.strerror or str(error)
-        raise OutputError(f"cannot write '{path}': {reason}; nothing was written") from error
+        raise OutputError(f"cannot write '{path}': {error.strerror or error}; nothing was written") from error
     except BaseException:
         _remove(made)
         raise
+
+
+def reason(error: OSError, folder: Path) -> str:
+    """Say why a folder cannot be made or written to; of a file that is in its place, that it is one."""
+    for place in (folder, *folder.parents):
+        if place.is_file():
+            return "it is a file, and a folder is needed" if place == folder else f"'{place}' is a file"
+    return error.strerror or str(error)
 
 
 def _write(path: Path, text: str | bytes | Iterable[str]) -> None:
@@ -86,7 +92,9 @@ def _make_parents(folder: Path) -> list[Path]:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         _remove(missing)
-        raise OutputError(f"cannot make '{folder.parent}': {error.strerror}; nothing was written") from error
+        raise OutputError(
+            f"cannot make '{folder.parent}': {reason(error, folder.parent)}; nothing was written"
+        ) from error
     return missing
 
 

@@ -16,6 +16,7 @@ from armwright.calibration.fitting import Calibration, calibrate_to
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
 from armwright.calibration.measurements import Measurements
 from armwright.calibration.model import Off
+from armwright.calibration.readings import refuse_not_fitted
 from armwright.calibration.validation import HeldOut, cross_validated
 
 # Turns about y, which a Denavit-Hartenberg table has no number for.
@@ -78,6 +79,11 @@ def calibrated(
         seed: of the parts.
         beyond: whether to try what is not geometry.
         progress: told what is being done.
+
+    Raises:
+        InvalidValueError: see ``calibrate_to`` and ``cross_validated``; readings to check with are told in a frame, of
+            a plane or from an anchor that none is fitted of.
+        ShapeError: the readings are of an arm with another number of joints.
     """
 
     def told(what: str) -> None:
@@ -86,6 +92,7 @@ def calibrated(
 
     fit = ~measurements.check
     seen = measurements.readings.take(fit)
+    refuse_not_fitted(seen, measurements.readings.take(~fit))
     full = calibrate_to(arm, seen, progress=progress)
     table = full if not any(name.endswith(_TILTS) for name in full.names) else calibrate_to(arm, seen, without=_TILTS)
     told("holding points out: all errors")
@@ -133,7 +140,7 @@ def _notes(full: Calibration, measurements: Measurements) -> Iterator[str]:
     if full.outliers:
         shown = ", ".join(measurements.names[fit[i]] for i in full.outliers[:_SHOWN])
         more = f" and {len(full.outliers) - _SHOWN} more" if len(full.outliers) > _SHOWN else ""
-        yield f"readings that are farther off than they should be, and count less: {shown}{more}"
+        yield f"readings that are farther off than they should be, and do not count: {shown}{more}"
 
 
 def distances(found: Calibrated) -> dict[str, Array]:
@@ -167,7 +174,7 @@ def shown_errors(calibration: Calibration) -> Iterator[tuple[str, str, str, str]
     lengths = dict(zip(calibration.model.names, calibration.model.is_length, strict=True))
     for name, value, deviation in zip(calibration.names, calibration.values, calibration.deviations, strict=True):
         scale, unit = (1e3, "mm") if lengths[name] else (180 / math.pi, "deg")
-        yield name, f"{value * scale:+.4f}", f"{deviation * scale:.4f}", unit
+        yield name, f"{value * scale:+z.4f}", f"{deviation * scale:.4f}", unit
 
 
 def shown_bends(beyond: Beyond) -> Iterator[tuple[str, str, str, str]]:
@@ -183,7 +190,7 @@ def shown_bends(beyond: Beyond) -> Iterator[tuple[str, str, str, str]]:
         means = f"half the swing, {unit}"
         if name.endswith(".sag"):
             means = f"{unit} under {largest[joint]:.3g} {'N m' if unit == 'mrad' else 'N'}"
-        yield name, f"{value * 1e3:+.3f}", f"{deviation * 1e3:.3f}", means
+        yield name, f"{value * 1e3:+z.3f}", f"{deviation * 1e3:.3f}", means
 
 
 def as_data(found: Calibrated) -> dict[str, Any]:

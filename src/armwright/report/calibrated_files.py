@@ -84,7 +84,7 @@ def result_tables(found: Calibrated) -> Iterator[Table]:
                     *(
                         ("", "", "")
                         if one.held_out is None
-                        else (f"{one.held_out * 1e3:.4f}", f"{one.gain * 1e3:+.4f}", f"{one.chance * 1e3:.4f}")
+                        else (f"{one.held_out * 1e3:.4f}", f"{one.gain * 1e3:+z.4f}", f"{one.chance * 1e3:.4f}")
                     ),
                     f"{'yes' if one.kept else 'no'}{': ' if one.why else ''}{one.why}",
                 )

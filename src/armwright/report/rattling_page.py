@@ -212,7 +212,7 @@ def _pin_rows(told: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
 def _target_rows(told: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     for one in told["targets"]:
         lengths = (one["error_x"], one["error_y"], one["distance"], one["nearest"])
-        yield f"{one['time']:.4g} s", *("" if length is None else f"{length * 1e3:.4f}" for length in lengths)
+        yield f"{one['time']:.4g} s", *("" if length is None else f"{length * 1e3:z.4f}" for length in lengths)
 
 
 def _totals(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

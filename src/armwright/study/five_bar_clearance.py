@@ -20,7 +20,7 @@ from armwright.accuracy.pose import pose_repeatability
 from armwright.arrays import Array
 from armwright.clearance.correcting import Correction, correct_nodes, misses
 from armwright.clearance.equations import Rubbing
-from armwright.clearance.estimating.kriging import Surrogate, learn, solve_features
+from armwright.clearance.estimating.kriging import Surrogate, check_extra, learn, solve_features
 from armwright.clearance.estimating.static import estimate_at_rest, rest_offsets
 from armwright.clearance.features import Features, features
 from armwright.clearance.ideal import closed, tip_of
@@ -149,7 +149,11 @@ def learnt(progress: Callable[[str, float], None] | None = None, *, levels: Sequ
     Args:
         progress: told what is done, and how much of it.
         levels: of each clearance; the thesis has nine [m].
+
+    Raises:
+        MissingExtraError: scikit-learn is not installed.
     """
+    check_extra()  # not after all the simulations
     points = np.array(list(product(levels, repeat=3)))
     task, block, parts = feature_sweep(), 96, []
     for first in range(0, len(points), block):

@@ -9,6 +9,16 @@ from armwright.errors import MissingExtraError
 NEEDED = ("xarray", "threadpoolctl")
 
 
+def check_extras() -> None:
+    """Import what every sweep needs.
+
+    Raises:
+        MissingExtraError: one of them is not installed.
+    """
+    for name in NEEDED:
+        extra(name)
+
+
 def extra(name: str) -> ModuleType:
     """Import a library of the extra ``sweep``.
 

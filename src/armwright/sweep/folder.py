@@ -166,7 +166,8 @@ def held(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]
         _refuse_other_things(path)
         lock = (path / _LOCK).open("a+", encoding="utf-8")
     except OSError as error:
-        raise OutputError(f"cannot write to '{path}': {error.strerror or error}") from error
+        reason = "it is a file, and a folder is needed" if path.is_file() else error.strerror or error
+        raise OutputError(f"cannot write to '{path}': {reason}") from error
     with lock:
         _take(lock, path)
         told = _begun(path, sweep, block)

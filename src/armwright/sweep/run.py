@@ -9,7 +9,7 @@ from armwright.arrays import Array, cores
 from armwright.errors import InvalidValueError, KindError
 from armwright.sweep.crew import alone, cluster, processes, together
 from armwright.sweep.designs import Design, whole
-from armwright.sweep.extras import NEEDED, extra
+from armwright.sweep.extras import check_extras
 from armwright.sweep.folder import Folder, held
 from armwright.sweep.progress import Counter, Progress
 from armwright.sweep.results import gather, load, refuse_too_long
@@ -61,8 +61,7 @@ def run(
         SweepError: the folder is of another sweep or in use, the workers cannot do the task, or the task returns
             something else than it said.
     """
-    for name in NEEDED:  # not after hours of work
-        extra(name)
+    check_extras()  # not after hours of work
     if not isinstance(design, Design):
         raise KindError(f"design: expected a Design, got {type(design).__name__}")
     check_task(task, design.names)

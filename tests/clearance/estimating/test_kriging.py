@@ -217,7 +217,9 @@ def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(builtins, "__import__", without)
     points = design(16)
-    with pytest.raises(MissingExtraError, match=r'needs scikit-learn: pip install "armwright\[clearance\]"'):
+    with pytest.raises(
+        MissingExtraError, match=r'needs scikit-learn; install it by: pip install "armwright\[clearance\]"'
+    ):
         learn(NAMES, points, ("f", "g"), smooth(points))
 
 

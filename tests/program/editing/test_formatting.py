@@ -8,7 +8,7 @@ from pathlib import Path
 
 import attrs
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lark import Lark
 
@@ -493,7 +493,6 @@ def test_senseless_options(option: str) -> None:
         layout("BEGIN END.", **{option: 0})
 
 
-@settings(deadline=None)
 @given(st.text(max_size=60), st.sampled_from(Standard))
 def test_any_text(text: str, std: Standard) -> None:
     """Any text is laid out or refused; within a comment anything may stand."""

@@ -238,15 +238,26 @@ def _ranges(x: Array, ranges: ArrayLike | None) -> tuple[Array, Array]:
     return ends[:, 0], ends[:, 1]
 
 
-def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
+def check_extra() -> None:
+    """Import what learning needs.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
     try:
-        from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
-        from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
-        from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
+        import sklearn.gaussian_process  # noqa: F401, PLC0415 - an extra
     except ImportError as error:
         raise MissingExtraError(
-            'learning from simulations needs scikit-learn: pip install "armwright[clearance]"'
+            'learning from simulations needs scikit-learn; install it by: pip install "armwright[clearance]"'
         ) from error
+
+
+def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
+    check_extra()
+    from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - an extra
+    from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
+
     kernel = ConstantKernel(10.0, _AMPLITUDE) * RBF([1.0] * unit.shape[1], _LENGTHS) + WhiteKernel(1e-5, _NOISE)
     # Scaled here, so that the way back is ours too.
     mean, scale = float(y.mean()), float(y.std()) or 1.0
