@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 from scipy.stats import norm
+from scipy.stats import t as student
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
@@ -93,6 +94,22 @@ def test_intervals_cover(trials: list[Trial]) -> None:
         covered = np.mean(off < norm.ppf((1 + part) / 2))
         # Errors of one arm are correlated: five times what independent ones would vary by.
         assert covered == pytest.approx(part, abs=5 * np.sqrt(part * (1 - part) / len(off)))
+
+
+def test_intervals_by_student(ur5: Arm, rng: np.random.Generator) -> None:
+    """With few numbers to spare an interval is wider than the normal distribution has it, by Student's t."""
+    q, points, _ = measured(ur5, rng, 3e-5, m=11)
+    found = calibrate(ur5, q, points)
+
+    lower, upper = found.intervals(0.9).T
+
+    assert found.freedom < 12
+    np.testing.assert_allclose((lower + upper) / 2, found.values, atol=EXACT)
+    half = (upper - lower) / 2 / found.deviations
+    np.testing.assert_allclose(half, student.ppf(0.95, found.freedom))
+    assert half[0] > 1.05 * norm.ppf(0.95)
+    with pytest.raises(InvalidValueError, match="part: expected between 0 and 1, got 95"):
+        found.intervals(95)
 
 
 def test_noise_is_found(trials: list[Trial]) -> None:

@@ -62,3 +62,12 @@ def test_repeats_are_held_out_together() -> None:
     for away in folds:
         assert away.reshape(10, 3).all(axis=1).sum() == 2
         assert away.sum() == 6
+
+
+def test_encoders_never_say_the_same() -> None:
+    """Positions read back from encoders differ in the last digits, and are of one posture all the same."""
+    rng = np.random.default_rng(0)
+    q = np.repeat(rng.uniform(-2, 2, (8, 6)), 4, axis=0) + 1e-6 * rng.standard_normal((32, 6))
+
+    np.testing.assert_array_equal(postures(q), np.repeat(np.arange(8), 4))
+    np.testing.assert_array_equal(postures(rng.uniform(-2, 2, (5, 6))), np.arange(5))

@@ -9,35 +9,28 @@ Source:
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import attrs
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
 from scipy.stats import t as student
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, Flags
+from armwright.arrays import Array, ArrayLike
 from armwright.calibration.chain import Bend, Chain
 from armwright.calibration.identifying import KNOWN_ANGLE, KNOWN_LENGTH, Held, Identified, identify, preferred
-from armwright.calibration.model import Model, Off, Rows
-from armwright.calibration.readings import Numbers, Readings, readings
+from armwright.calibration.model import Model, Off
+from armwright.calibration.noise import TYPICAL, Noise, estimated, remaining, trust, weights
+from armwright.calibration.readings import Readings, readings
 from armwright.calibration.starting import started
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 
-# Readings that are off by more than this part of all are by their noise count less: three deviations of one number.
-_USUAL = 0.9973
-# Those that are off by twice as much as that are outliers. In the end they do not count at all.
-_OUTLYING = 2.0
 _ROUNDS, _WEIGHINGS = 8, 30
 # Rounds end when one finds the noise no smaller than this part of what the last found: outliers then weigh what they
 # should.
 _SETTLED = 0.9
 # Weights are settled when none changes by more.
 _WEIGHED = 1e-3
-_LEAST_LENGTH, _LEAST_TURN = 1e-9, 1e-9  # noise [m], [rad]
-_FIRST_LENGTH, _FIRST_TURN = 1e-4, 5e-4
 # A fit ends when it gets better by less than this part; its errors are then far nearer than they are known.
 _FINISHED = 1e-11
 # It takes some ten steps; readings that make no sense could take minutes.
@@ -48,18 +41,6 @@ _STEPS = 100
 _BELIEVED_LENGTH, _BELIEVED_ANGLE = 0.02, 0.05
 # Bends of joints are a twentieth of that: gears run true to an arc minute or a few.
 _BENDS = 0.05
-
-
-class Noise(NamedTuple):
-    """Standard deviations of what is measured.
-
-    Attributes:
-        length: of a coordinate or a distance [m].
-        turn: of a turn about one axis [rad].
-    """
-
-    length: float
-    turn: float
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -206,40 +187,11 @@ def calibrate_to(
     if seen.q.shape[1] != arm.n:
         raise ShapeError(f"expected readings of {arm.n} joints, as {arm.name} has, got {seen.q.shape[1]}")
     model = started(arm, seen, base=base, bends=bends)
-    first, allowed = _chosen(model, only, without)
-    known = np.where(model.is_length, KNOWN_LENGTH, KNOWN_ANGLE) * _parts(model)
-    errors, kept = np.zeros(len(model.names)), tuple[int, ...]()
-    found: Identified | None = None
-    # Before anything is fitted, what is left says nothing of the noise.
-    start = _left(model.rows(seen))
-    noise = before = Noise(min(start.length, _FIRST_LENGTH), min(start.turn, _FIRST_TURN))
-    for _ in range(_ROUNDS):
-        rows = model.rows(seen, errors)
-        J = rows.by * _weights(rows, noise)[:, None]
-        # What is fitted already comes first: of two that are nearly one, one would displace the other and run away.
-        order = list(dict.fromkeys([*kept, *first]))
-        found = identify(model.names, J, model.is_length, noise.length, first=order, allowed=allowed, known=known)
-        if found.kept == kept and all(now > _SETTLED * then for now, then in zip(noise, before, strict=True)):
-            break
-        if not found.kept:
-            raise InvalidValueError(
-                f"what {arm.name} misses its readings by, {noise.length * 1e3:.3g} mm, hides every error that it may "
-                f"have: are these its readings?"
-            )
-        kept, before = found.kept, noise
-        if len(kept) >= len(rows.off):
-            raise InvalidValueError(
-                f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more, "
-                f"or fit fewer errors"
-            )
-        if progress is not None:
-            progress(f"fitting {len(kept)} errors to {len(seen)} readings")
-        errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)
-        noise = _left(model.rows(seen, errors))
-    assert found is not None  # noqa: S101 - there is a first round
+    found, errors, noise = _rounds(model, seen, _chosen(model, only, without), robust=robust, progress=progress)
+    kept = list(found.kept)
     if robust and kept:
         # Each outlier, though it counts little, still pulls as hard as a usual reading, and many pull together.
-        errors = _fitted(model, seen, list(kept), errors, noise, robust=True, strict=True)
+        errors = _fitted(model, seen, kept, errors, noise, robust=True, strict=True)
     return _told(model, found, seen, errors, robust=robust)
 
 
@@ -265,9 +217,47 @@ def _chosen(model: Model, only: Sequence[str] | None, without: Sequence[str]) ->
     return [*sorted(around), *preferred(names)], allowed
 
 
-def _weights(rows: Rows, noise: Noise) -> Array:
-    """Return (r,) what makes lengths of all numbers, by which they are weighed against one another [1], [m/rad]."""
-    return np.where(rows.turning, noise.length / noise.turn, 1.0)
+def _rounds(
+    model: Model,
+    seen: Readings,
+    chosen: tuple[list[int], set[int]],
+    *,
+    robust: bool,
+    progress: Callable[[str], None] | None,
+) -> tuple[Identified, Array, Noise]:
+    """Return what can be fitted, the errors, and the noise, which depend on one another."""
+    first, allowed = chosen
+    known = np.where(model.is_length, KNOWN_LENGTH, KNOWN_ANGLE) * _parts(model)
+    errors, kept = np.zeros(len(model.names)), tuple[int, ...]()
+    found: Identified | None = None
+    # Before anything is fitted, what is left says nothing of the noise.
+    start = remaining(model.rows(seen), 0)
+    noise = before = Noise(*map(min, start, TYPICAL))
+    for _ in range(_ROUNDS):
+        rows = model.rows(seen, errors)
+        J = rows.by * weights(rows, noise)[:, None]
+        # What is fitted already comes first: of two that are nearly one, one would displace the other and run away.
+        order = list(dict.fromkeys([*kept, *first]))
+        found = identify(model.names, J, model.is_length, noise.length, first=order, allowed=allowed, known=known)
+        if found.kept == kept and all(now > _SETTLED * then for now, then in zip(noise, before, strict=True)):
+            break
+        if not found.kept:
+            raise InvalidValueError(
+                f"what {model.chain.arm.name} misses its readings by, {noise.length * 1e3:.3g} mm, hides every error "
+                f"that it may have: are these its readings?"
+            )
+        kept, before = found.kept, noise
+        if len(kept) >= len(rows.off):
+            raise InvalidValueError(
+                f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more, "
+                f"or fit fewer errors"
+            )
+        if progress is not None:
+            progress(f"fitting {len(kept)} errors to {len(seen)} readings")
+        errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)
+        noise = remaining(model.rows(seen, errors), len(kept))
+    assert found is not None  # noqa: S101 - there is a first round
+    return found, errors, noise
 
 
 def _fitted(
@@ -278,19 +268,19 @@ def _fitted(
     errors[[i for i in range(len(errors)) if i not in kept]] = 0.0
     belief = noise.length * np.diag(1 / _believed(model)[kept])
     rows = model.rows(seen, errors)
-    trust = scale = _weights(rows, noise)
+    scale = weighed = weights(rows, noise)
 
     def missing(x: Array) -> Array:
         errors[kept] = x
-        return np.concatenate([model.rows(seen, errors).off * trust, belief @ x])
+        return np.concatenate([model.rows(seen, errors).off * weighed, belief @ x])
 
     def slopes(x: Array) -> Array:
         errors[kept] = x
-        return np.vstack([model.rows(seen, errors).by[:, kept] * trust[:, None], belief])
+        return np.vstack([model.rows(seen, errors).by[:, kept] * weighed[:, None], belief])
 
     for _ in range(_WEIGHINGS):
         if robust:
-            trust = scale * _trust(model.rows(seen, errors), scale, noise, strict=strict)
+            weighed = scale * trust(model.rows(seen, errors), noise, strict=strict)
         found = least_squares(
             missing,
             errors[kept].copy(),
@@ -302,38 +292,10 @@ def _fitted(
             max_nfev=_STEPS,
         )
         errors[kept] = found.x
-        settled = scale * _trust(model.rows(seen, errors), scale, noise, strict=strict) if robust else trust
-        if np.all(np.abs(settled - trust) <= _WEIGHED * scale):
+        settled = scale * trust(model.rows(seen, errors), noise, strict=strict) if robust else weighed
+        if np.all(np.abs(settled - weighed) <= _WEIGHED * scale):
             break
     return errors
-
-
-def _trust(rows: Rows, scale: Array, noise: Noise, *, strict: bool) -> Array:
-    """Return (r,) by how much readings that are off count less: the root of the weight that soft L1 gives them.
-
-    If strict, outliers do not count.
-    """
-    square, size = _by_reading(rows.of, rows.off * scale / noise.length)
-    trust = (1 + square / _limit(size)) ** -0.25
-    if strict:
-        trust[_outlying(square, size)] = 0.0
-    return np.asarray(trust[rows.of], dtype=np.float64)
-
-
-def _by_reading(of: Numbers, off: Array) -> tuple[Array, Array]:
-    """Return by reading the sum of the squares of its numbers, and how many they are."""
-    square, size = np.bincount(of, off**2), np.bincount(of)
-    return np.asarray(square, dtype=np.float64), np.asarray(size, dtype=np.float64)
-
-
-def _limit(size: Array) -> Array:
-    """Return what the squares of so many numbers of a normal distribution usually stay below."""
-    return np.asarray(chi2.ppf(_USUAL, np.maximum(size, 1)), dtype=np.float64)
-
-
-def _outlying(square: Array, size: Array) -> Flags:
-    """Return which readings are outliers, by the squares of so many numbers each, in deviations."""
-    return np.asarray(square > _OUTLYING**2 * _limit(size), dtype=np.bool_)
 
 
 def _believed(model: Model) -> Array:
@@ -350,21 +312,8 @@ def _parts(model: Model) -> Array:
 def _told(model: Model, found: Identified, seen: Readings, errors: Array, *, robust: bool) -> Calibration:
     kept = list(found.kept)
     rows = model.rows(seen, errors)
-    outlying = np.zeros(len(seen), dtype=np.bool_)
-    # Twice: outliers are told by the noise, and the noise by what are none.
-    for _ in range(2):
-        counted = ~outlying[rows.of]
-        freedom = max(1, int(counted.sum()) - len(kept))
-        more = float(np.sqrt(counted.sum() / freedom))
-        noise = Noise(
-            *(
-                max(_usual(rows, which, more, robust=robust) * more, least)
-                for which, least in ((~rows.turning, _LEAST_LENGTH), (rows.turning, _LEAST_TURN))
-            )
-        )
-        deviation = np.where(rows.turning, noise.turn, noise.length)
-        if robust:
-            outlying = _outlying(*_by_reading(rows.of, rows.off / deviation))
+    noise, outlying, freedom = estimated(rows, len(seen), len(kept), robust=robust)
+    deviation = np.where(rows.turning, noise.turn, noise.length)
     believed = _believed(model)[kept]
     counted = ~outlying[rows.of]
     A = rows.by[counted][:, kept] / deviation[counted, None] * believed
@@ -380,32 +329,3 @@ def _told(model: Model, found: Identified, seen: Readings, errors: Array, *, rob
         freedom=freedom,
         outliers=tuple(np.flatnonzero(outlying).tolist()),
     )
-
-
-def _usual(rows: Rows, which: Flags, more: float, *, robust: bool) -> float:
-    """Return the root of the mean square of some numbers, without those of readings that are far off."""
-    off, of = rows.off[which], rows.of[which]
-    if not len(off):
-        return 0.0
-    if robust:
-        square, size = _by_reading(of, off)
-        limit = _limit(size)
-        near = square <= limit * (_spread(of, off) * more) ** 2
-        # What is cut off of a normal distribution would have made the mean larger.
-        within = chi2.cdf(limit, size + 2) / np.maximum(chi2.cdf(limit, size), _USUAL)
-        square, size = square[near].sum(), (size * within)[near].sum()
-        return float(np.sqrt(square / size)) if size else 0.0
-    return float(np.sqrt(np.mean(off**2)))
-
-
-def _left(rows: Rows) -> Noise:
-    """Return the noise as the numbers say that are left, whatever some of them are."""
-    spreads = (_spread(rows.of[which], rows.off[which]) for which in (~rows.turning, rows.turning))
-    return Noise(*(max(spread, least) for spread, least in zip(spreads, (_LEAST_LENGTH, _LEAST_TURN), strict=True)))
-
-
-def _spread(of: Numbers, off: Array) -> float:
-    """Return the standard deviation of numbers about 0 as half of the readings say, which outliers do not move."""
-    square, size = _by_reading(of, off)
-    there = size > 0
-    return float(np.sqrt(np.median(square[there] / chi2.ppf(0.5, size[there])))) if there.any() else 0.0

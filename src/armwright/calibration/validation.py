@@ -4,6 +4,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
@@ -13,7 +16,7 @@ from armwright.calibration.readings import Numbers, Readings, refuse_not_fitted
 from armwright.errors import InvalidValueError
 
 # Postures whose joints differ by less are one [rad], [m].
-_SAME = 1e-9
+_SAME = 1e-4
 
 
 class HeldOut(NamedTuple):
@@ -92,7 +95,13 @@ def dealt(q: Array, folds: int, seed: int) -> list[Flags]:
 
 
 def postures(q: Array) -> Numbers:
-    """Return by number which posture each row (m, n) has, in the order in which they come first."""
-    _, first, same = np.unique(np.round(q / _SAME), axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(np.argsort(first))
-    return np.asarray(order[same.ravel()], dtype=np.intp)
+    """Return by number which posture each row (m, n) has, in the order in which they come first.
+
+    Positions that encoders tell are never quite the same: rows that differ by less than a tenth of a milliradian or
+    millimetre are of one posture.
+    """
+    rows = len(q)
+    near = np.array([*cKDTree(q).query_pairs(_SAME)], dtype=np.intp).reshape(-1, 2)
+    _, same = connected_components(coo_array((np.ones(len(near)), near.T), shape=(rows, rows)), directed=False)
+    _, first = np.unique(same, return_index=True)
+    return np.asarray(np.argsort(np.argsort(first))[same], dtype=np.intp)

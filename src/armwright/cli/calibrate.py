@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.numbers import numbers, units_of
+from armwright.cli.measured_point import MeasuredPoint, with_tool
+from armwright.cli.numbers import units_of
 from armwright.cli.options import Json, Quiet
 from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
-    from armwright.arm.model import Arm
     from armwright.report.calibrated import Calibrated
 
 
@@ -23,9 +23,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     units: Annotated[
         str | None, typer.Option(help="Of a file whose header has none: mm,deg.", show_default=False)
     ] = None,
-    tool_mm: Annotated[
-        str | None, typer.Option(help="The measured point in the frame of the hand: 0,0,31.", show_default=False)
-    ] = None,
+    tool_mm: MeasuredPoint = None,
     folds: Annotated[int, typer.Option(help="Parts in which postures are held out to see how good it is.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of the parts.")] = 0,
     beyond: Annotated[
@@ -53,9 +51,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.report.calibrated import as_data, calibrated
     from armwright.report.calibrated_files import calibrated_files
 
-    model = load_arm(arm)
-    if tool_mm is not None:
-        model = _with_tool(model, tool_mm)
+    model = with_tool(load_arm(arm), tool_mm)
     measurements = read_measurements(measured, model, units=units_of(units))
     with waiting("calibrating", quiet=quiet or as_json) as told, one_core():
         found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, progress=told)
@@ -68,17 +64,6 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
         _print(found)
         if output is not None:
             print(f"report: {output / 'report.html'}")
-
-
-def _with_tool(model: "Arm", text: str) -> "Arm":
-    """Return an arm whose tool is a point of its hand."""
-    import attrs
-    import numpy as np
-
-    from armwright.spatial.poses import pose
-
-    place = numbers(text, 3, "--tool-mm")
-    return attrs.evolve(model, tool=pose(np.eye(3), np.array(place) * 1e-3))
 
 
 def _print(found: "Calibrated") -> None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
 from armwright.cli.options import Json
 from armwright.cli.printing import plain_console, print_json, print_table, table
@@ -26,6 +27,7 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     units: Annotated[
         str | None, typer.Option(help="Of that file, if its header has none: mm,deg.", show_default=False)
     ] = None,
+    tool_mm: MeasuredPoint = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="CSV of the poses, to be measured and given to calibrate.")
     ] = None,
@@ -42,7 +44,7 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.calibration.planning import plan_poses as planned
     from armwright.files.output import write_file
 
-    model = load_arm(arm)
+    model = with_tool(load_arm(arm), tool_mm)
     measured = None if after is None else read_measurements(after, model, units=units_of(units)).q
     plan = planned(model, count, index=index, seed=seed, turns=turns, measured=measured)  # type: ignore[arg-type]
     if output is not None:
