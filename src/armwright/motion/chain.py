@@ -1,11 +1,16 @@
 """Postures along a path: each next to the one before it."""
 
+from collections.abc import Generator, Iterator
+from typing import NamedTuple
+
 import numpy as np
 
 from armwright.arrays import Array, Flags
 from armwright.kinematics.inverse.numeric import next_posture
 from armwright.kinematics.inverse.turns import nearest_turn, travel
 from armwright.motion.solver import Solver
+from armwright.spatial.poses import between
+from armwright.spatial.rotations import angle_between
 
 # A pose is met to this [m], and to this in the entries of its rotation.
 MET, _TURN_MET = 1e-8, 1e-6
@@ -13,10 +18,37 @@ MET, _TURN_MET = 1e-8, 1e-6
 _JUMP = 1.0
 # A posture this far from the one the arm has at the start of the path is another one [rad] or [m].
 _OTHER = 1e-6
+# A step is halved at most so often; no hand has to keep nearer to its way than this [m], [rad].
+_HALVINGS, _CLOSEST = 16, (1e-6, 5e-6)
+
+
+class Room(NamedTuple):
+    """How far the hand may be from its way: in place [m], and turned [rad]."""
+
+    place: float
+    turn: float
+
+
+class Step(NamedTuple):
+    """A posture on the way through poses.
+
+    Attributes:
+        place: which pose, from 0; a fraction on the way to the next.
+        X: (4, 4) the pose.
+        q: (n,) the posture.
+    """
+
+    place: float
+    X: Array
+    q: Array
 
 
 def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
-    """Solve the poses of a path one after the other.
+    """Solve the poses of a path one after the other, each by the posture nearest to the one before it.
+
+    Beside a singularity, where a joint has to turn far between two poses, the nearest posture may be of another branch
+    or be reached by turning the other way. A motion through such postures leaves the path between the poses: whoever
+    plans one looks there, and where the path cannot be kept, asks ``step_by_step`` for what really stops the arm.
 
     A free joint stays where it was at the pose before. Without a closed form each posture is sought from the one
     before it.
@@ -35,18 +67,83 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
     if solver.inverse_branches is None:
         for k in range(1, len(X)):
             q[k] = next_posture(solver.arm, X[k], q[k - 1])
-            if _missed(solver, q[k], X[k]):
+            if missed(solver, q[k], X[k]):
                 break
     else:
         found, singular = solver.inverse_branches(X, q_start)
-        if _along_one_branch(solver, found, singular, q) and not _missed(solver, q, X).any():
+        if _along_one_branch(solver, found, singular, q) and not missed(solver, q, X).any():
             return q, None
         for k in range(1, len(X)):
-            candidates = solver.inverse_branches(X[k], q[k - 1])[0] if singular[k].any() else found[k]
-            candidates = nearest_turn(solver.arm, candidates, q[k - 1])
-            q[k] = min(candidates, key=lambda posture: travel(solver.arm, q[k - 1], posture))
-    missed = np.flatnonzero(_missed(solver, q, X))
-    return q, int(missed[0]) if len(missed) else None
+            q[k] = _nearest(solver, X[k], q[k - 1], None if singular[k].any() else found[k])
+    off = np.flatnonzero(missed(solver, q, X))
+    return q, int(off[0]) if len(off) else None
+
+
+def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
+    """Whether the branch of the first posture meets all poses (k, 4, 4) without a jump, so that no doubt is left."""
+    if solver.inverse_branches is None:
+        return False
+    q = np.empty((len(X), solver.arm.n))
+    q[:] = q_start
+    found, singular = solver.inverse_branches(X, q_start)
+    return _along_one_branch(solver, found, singular, q) and not missed(solver, q, X).any()
+
+
+def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
+    """Solve poses (k, 4, 4) each by the posture nearest to its guide (k, n); returns what ``chain`` does."""
+    q = np.array([_nearest(solver, X_k, near) for X_k, near in zip(X, guide, strict=True)])
+    off = np.flatnonzero(missed(solver, q, X))
+    return q, int(off[0]) if len(off) else None
+
+
+def step_by_step(solver: Solver, X: Array, q_start: Array, room: Room) -> Iterator[Step]:
+    """Give the postures that an arm comes to on its way through poses.
+
+    Where the hand, halfway between two postures, would be off the straight way between their poses, the step is taken
+    in two halves, and so on.
+
+    Args:
+        solver: the arm.
+        X: (k, 4, 4) poses, of which the first is that of ``q_start``.
+        q_start: (n,) joint positions at the first pose.
+        room: how far the hand may be off.
+
+    Yields:
+        Every pose and those that were put between, from the first; whether they are met is for the caller to see.
+    """
+    step = Step(0.0, X[0], q_start)
+    yield step
+    for k in range(1, len(X)):
+        step = yield from _between(solver, step, Step(float(k), X[k], step.q), room, _HALVINGS)
+
+
+def _between(solver: Solver, first: Step, goal: Step, room: Room, halvings: int) -> Generator[Step, None, Step]:
+    """Give the postures after ``first`` up to the pose of ``goal``, whose posture is not looked at; return the last."""
+    last = goal._replace(q=_nearest(solver, goal.X, first.q))
+    halfway = between(first.X, goal.X, 0.5)
+    if halvings == 0 or not _astray(solver.forward((first.q + last.q) / 2), halfway, room):
+        yield last
+        return last
+    middle = yield from _between(
+        solver, first, Step((first.place + goal.place) / 2, halfway, first.q), room, halvings - 1
+    )
+    return (yield from _between(solver, middle, goal, room, halvings - 1))
+
+
+def _astray(X: Array, X_asked: Array, room: Room) -> bool:
+    """Whether a hand is off its way."""
+    off = float(np.linalg.norm(X[:3, 3] - X_asked[:3, 3]))
+    turned = float(angle_between(X_asked[:3, :3], X[:3, :3]))
+    return off > max(room.place, _CLOSEST[0]) or turned > max(room.turn, _CLOSEST[1])
+
+
+def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None) -> Array:
+    """Return the posture (n,) at a pose that is nearest to ``q``, of ``candidates`` (k, n) where they are known."""
+    if solver.inverse_branches is None:
+        return next_posture(solver.arm, X, q)
+    if candidates is None:
+        candidates = solver.inverse_branches(X, q)[0]
+    return min(nearest_turn(solver.arm, candidates, q), key=lambda posture: travel(solver.arm, q, posture))
 
 
 def _along_one_branch(solver: Solver, found: Array, singular: Array, q: Array) -> bool:
@@ -61,7 +158,7 @@ def _along_one_branch(solver: Solver, found: Array, singular: Array, q: Array) -
     return True
 
 
-def _missed(solver: Solver, q: Array, X: Array) -> Flags:
+def missed(solver: Solver, q: Array, X: Array) -> Flags:
     """Return which postures (..., n) do not meet their poses (..., 4, 4): an arm of few joints may turn otherwise."""
     off = np.abs(solver.forward(q) - X)
     return np.asarray((off[..., :3, 3].max(axis=-1) > MET) | (off[..., :3, :3].max(axis=(-2, -1)) > _TURN_MET))

@@ -16,7 +16,7 @@ from armwright.motion.deviation import Spline, Ways, deviation_of
 from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.limit_use import slowing_for_limits
 from armwright.motion.solver import AnyArm, Solver, solver_of
-from armwright.motion.straight import CertifiedLine, Line, at_place, straight_line, timed_line
+from armwright.motion.straight import CertifiedLine, Line, at_place, certified, straight_line, timed_line
 from armwright.motion.trajectory import Trajectory, join
 from armwright.motion.xspline import xspline
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
@@ -169,9 +169,9 @@ def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation
     for ring in _rings(line, obstacle.fraction):
         for via in ring:
             try:
-                there = straight_line(arm, q, via, deviation=deviation, speed=speed)
+                there = certified(arm, q, via, deviation=deviation, speed=speed, closely=False)
                 at_via = there.trajectory(there.trajectory.duration)
-                back = straight_line(arm, at_via, line.B, deviation=deviation, speed=speed)
+                back = certified(arm, at_via, line.B, deviation=deviation, speed=speed, closely=False)
             # A leg on which gravity alone takes more than a joint may give is no way either.
             except (PathError, InvalidValueError):
                 continue

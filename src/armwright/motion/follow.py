@@ -1,6 +1,6 @@
 """Following a path: joints solved at knots, joined by X-splines, and held against path and limits."""
 
-from typing import Literal, NoReturn, TypeAlias
+from typing import NoReturn
 
 import attrs
 import numpy as np
@@ -9,26 +9,31 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import ArmwrightError
 from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.solution import Answer, InverseSolution, violations
-from armwright.kinematics.singularities import singularities
-from armwright.motion.chain import chain
+from armwright.kinematics.inverse.solution import Answer, violations
+from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of
 from armwright.motion.path import NEGLIGIBLE, Knots, Path, place_knots
 from armwright.motion.solver import Solver, solver_of
+from armwright.motion.stops import (
+    SLOWEST,
+    Cause,
+    Guide,
+    Stop,
+    cause_of,
+    changing,
+    idlest,
+    look_closely,
+    nearest_singularity,
+)
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline import xspline
 from armwright.spatial.rotations import rotation_vector
-
-Cause: TypeAlias = Literal["reach", "limits", "singular"]
 
 # The rule's knots are halved at most this often before the path is given up: 1/64 of the rule's step.
 _HALVINGS = 6
 # A path through several frames turns its corners without a stop, so it must round them; and it is gross motion. It
 # may leave the straight ways between its frames by this much more than a line may leave its own.
 _CORNER_ROOM = 20.0
-# A path that asks a joint for this many times its top speed meets a singularity; it is refused, not crawled along.
-# Accelerations say nothing of it: a short line asks much of them wherever it lies.
-SLOWEST = 20.0
 # Turning the hand by this much is allowed where the place may be off by one metre's thousandth: 5 mrad per mm.
 TURN_PER_METRE = 5.0
 
@@ -103,10 +108,41 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
         return Followed(trajectory=hold(q_start, 0.0), knots=1, deviation=0.0, turn_deviation=0.0, slowed="")
     _check_ends(arm, path)
     allowed = deviation if len(path.poses) == 2 else _CORNER_ROOM * deviation
-    solver = solver_of(arm)
+    solver, q = solver_of(arm), np.asarray(q_start, dtype=np.float64)
+    try:
+        return _followed(solver, path, q, allowed, deviation=deviation, speed=speed)
+    except PathError as error:
+        if error.cause == "reach":  # a pose out of reach is so for every posture
+            raise
+        knots = place_knots(arm, path, deviation=deviation, speed=speed)
+        look = look_closely(solver, knots.poses(path), knots.times, q, Room(allowed, TURN_PER_METRE * allowed))
+        if look is None:
+            raise
+        if look.stop is not None:
+            closer = _stopped(path, knots, look.stop)
+            off = closer.segment + closer.fraction - error.segment - error.fraction
+            if look.stop.agrees(error.cause, error.joint, error.reason, abs(off)):
+                raise
+            raise closer from error
+        guide = Guide(_progress(knots), look)
+        return _followed(solver, path, q, allowed, deviation=deviation, speed=speed, guide=guide)
+
+
+def _followed(
+    solver: Solver,
+    path: Path,
+    q_start: Array,
+    allowed: float,
+    *,
+    deviation: float,
+    speed: float,
+    guide: Guide | None = None,
+) -> Followed:
+    """Put knots on a path until the hand stays within what is allowed, and keep the limits."""
+    arm = solver.arm
     for halving in range(_HALVINGS + 1):
         knots = place_knots(arm, path, deviation=deviation, speed=speed, finer=2**halving)
-        q = _solve(solver, path, knots, np.asarray(q_start, dtype=np.float64))
+        q = _solve(solver, path, knots, q_start, guide)
         trajectory = xspline(knots.times, q)
         found = _deviation(solver, path, knots, trajectory, allowed)
         excess = np.maximum(found.place, found.turn / TURN_PER_METRE) / allowed
@@ -125,16 +161,6 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     )
 
 
-def nearest_singularity(arm: Arm, q: ArrayLike) -> str:
-    """Return the name of the factor that is nearest to zero, such as ``wrist``; see ``Factor``."""
-    return min(singularities(arm, q).factors, key=lambda factor: abs(factor.value) / factor.scale).name
-
-
-def cause_of(solution: InverseSolution) -> Cause:
-    """Return why no posture of a solution can be taken."""
-    return "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
-
-
 def _check_ends(arm: Arm, path: Path) -> None:
     """Refuse a path to a pose that no posture reaches, before anything between is looked at."""
     for segment, X in enumerate(path.poses[1:]):
@@ -143,10 +169,33 @@ def _check_ends(arm: Arm, path: Path) -> None:
             raise PathError(cause_of(solution), segment, 1.0, solution.explain())
 
 
-def _solve(solver: Solver, path: Path, knots: Knots, q_start: Array) -> Array:
-    """Solve every knot by the posture nearest to the one before it."""
+def _progress(knots: Knots) -> Array:
+    """Return where on a path knots are (k,): the number of the way, and the fraction of it."""
+    return np.add(knots.segments, knots.fractions)
+
+
+def _stopped(path: Path, knots: Knots, stop: Stop) -> PathError:
+    """Return the error for what a close look found."""
+    before, part = int(stop.place), stop.place % 1
+    after = min(before + 1, len(knots.segments) - 1)
+    segment = knots.segments[after if part else before]
+    since = knots.fractions[before] if knots.segments[before] == segment else 0.0
+    fraction = since + part * (knots.fractions[after] - since) if part else knots.fractions[before]
+    x, y, z = path.at(segment, fraction)[:3, 3] * 1e3
+    return PathError(
+        stop.cause,
+        segment,
+        fraction,
+        f"near ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base {stop.reason}" if stop.cause == "singular" else stop.reason,
+        joint=stop.joint,
+        reason=stop.reason,
+    )
+
+
+def _solve(solver: Solver, path: Path, knots: Knots, q_start: Array, guide: Guide | None) -> Array:
+    """Solve every knot by the posture nearest to the one before it, or to the guide."""
     arm, X = solver.arm, knots.poses(path)
-    q, missed = chain(solver, X, q_start)
+    q, missed = chain(solver, X, q_start) if guide is None else beside(solver, X, guide.postures(_progress(knots)))
     met = q[:missed]
     outside = np.any((met < arm.limit("lower")) | (met > arm.limit("upper")), axis=1)
     for k in np.flatnonzero(outside):
@@ -157,8 +206,9 @@ def _solve(solver: Solver, path: Path, knots: Knots, q_start: Array) -> Array:
         solution = inverse(arm, X[missed], q[missed - 1])
         if solution.answer is Answer.OUT_OF_REACH:
             raise PathError("reach", *place, solution.explain())
-        message = f"the posture would have to change near {_place(path, knots, missed)}"
-        raise PathError("singular", *place, message, reason="the posture would have to change there")
+        before, why = q[missed - 1], changing(arm, q[missed - 1])
+        message = f"near {_place(path, knots, missed)} {why}"
+        raise PathError("singular", *place, message, joint=idlest(arm, before), reason=why)
     return q
 
 

@@ -12,13 +12,14 @@ from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.solution import Violation, violations
 from armwright.kinematics.inverse.turns import travel
 from armwright.motion.blends import Ends
-from armwright.motion.chain import chain
+from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import HandBounds, cubic_peaks, half_sines, hand_bounds
-from armwright.motion.follow import SLOWEST, TURN_PER_METRE, Cause, PathError, cause_of, nearest_singularity
+from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.hand_path import HandPath
 from armwright.motion.polynomials import evaluate
 from armwright.motion.postures import Posture
 from armwright.motion.solver import Solver
+from armwright.motion.stops import SLOWEST, Cause, Guide, cause_of, changing, idlest, look_closely, nearest_singularity
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline import smooth_weight, xspline
 
@@ -136,11 +137,38 @@ def _divided(times: Array, parts: Counts) -> Array:
 def _carried(
     solver: Solver, hand: HandPath, t: Array, start: Posture, *, ends: Ends, deviation: float
 ) -> Carried | _Stop:
-    """Follow one branch: what it comes to, or what stops it."""
+    """Follow one branch: what it comes to, or what really stops it."""
+    found = _knotted(solver, hand, t, start, ends=ends, deviation=deviation)
+    if isinstance(found, Carried) or found.cause == "reach":  # a pose out of reach is so for every posture
+        return found
+    room = Room(deviation, TURN_PER_METRE * deviation)
+    look = look_closely(solver, hand(t), t, start.q, room, poses_only=True)
+    if look is None:
+        return found
+    times = np.interp(look.places, np.arange(len(t)), t)
+    beyond = _stopped(solver.arm, _turned_inside(solver.arm, look.q, None), None, hand(times), times)
+    if beyond is None and look.stop is not None:
+        beyond = _Stop(look.stop.cause, look.stop.reason, look.stop.joint, float(times[-1]))
+    if beyond is not None:
+        return found if (found.cause, found.joint) == (beyond.cause, beyond.joint) else beyond
+    return _knotted(solver, hand, t, start, ends=ends, deviation=deviation, guide=Guide(t, look))
+
+
+def _knotted(
+    solver: Solver,
+    hand: HandPath,
+    t: Array,
+    start: Posture,
+    *,
+    ends: Ends,
+    deviation: float,
+    guide: Guide | None = None,
+) -> Carried | _Stop:
+    """Put knots on one branch until the hand stays within the deviation."""
     arm = solver.arm
     for _ in range(_ROUNDS):
         X = hand(t)
-        q, missed = chain(solver, X, start.q)
+        q, missed = chain(solver, X, start.q) if guide is None else beside(solver, X, guide.postures(t))
         q = _turned_inside(arm, q, missed)
         if (stop := _stopped(arm, q, missed, X, t)) is not None:
             return stop
@@ -189,7 +217,8 @@ def _stopped(arm: Arm, q: Array, missed: int | None, X: Array, t: Array) -> _Sto
         return None
     solution = inverse(arm, X[missed], q[missed - 1])
     if solution.allowed:
-        return _Stop("singular", "the posture would have to change", None, float(t[missed]))
+        before = q[missed - 1]
+        return _Stop("singular", changing(arm, before), idlest(arm, before), float(t[missed]))
     return _Stop(cause_of(solution), solution.explain(), None, float(t[missed]))
 
 

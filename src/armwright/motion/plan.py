@@ -14,10 +14,11 @@ from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.turns import images, travel
 from armwright.motion.certificate import LimitName
 from armwright.motion.detour import By, Detour, line_or_detour
-from armwright.motion.follow import Cause, PathError, cause_of, follow
+from armwright.motion.follow import PathError, follow
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.quintic import point_to_point
 from armwright.motion.rounded import rounded_move
+from armwright.motion.stops import Cause, cause_of
 from armwright.motion.trajectory import Trajectory, whole_ticks
 
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].

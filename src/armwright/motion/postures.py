@@ -9,7 +9,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.turns import images
-from armwright.motion.follow import PathError, cause_of
+from armwright.motion.follow import PathError
+from armwright.motion.stops import cause_of
 
 
 class Posture(NamedTuple):

@@ -14,13 +14,23 @@ from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import clean_pose
 from armwright.kinematics.inverse.solution import Answer, violations
 from armwright.motion.certificate import Certificate, LimitName, slowing
-from armwright.motion.chain import chain
+from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned, turning_points
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
-from armwright.motion.follow import SLOWEST, TURN_PER_METRE, PathError, nearest_singularity
+from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, report_speed, report_step
 from armwright.motion.quintic import check_speed
 from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.stops import (
+    SLOWEST,
+    Guide,
+    Stop,
+    at_speed,
+    changing,
+    idlest,
+    look_closely,
+    nearest_singularity,
+)
 from armwright.motion.trajectory import Trajectory, hold, whole_ticks
 from armwright.motion.xspline import xspline
 from armwright.spatial.rotations import rotation_vector
@@ -116,6 +126,24 @@ def straight_line(
         InvalidValueError: deviation, turn or speed are out of range, or gravity alone takes more than a joint may
             give.
     """
+    return certified(arm, q_start, X_goal, deviation=deviation, turn=turn, speed=speed, period=period, closely=True)
+
+
+def certified(
+    arm: AnyArm,
+    q_start: ArrayLike,
+    X_goal: ArrayLike,
+    *,
+    deviation: float,
+    turn: float | None = None,
+    speed: float = 100.0,
+    period: float | None = None,
+    closely: bool,
+) -> CertifiedLine:
+    """Plan a straight line as ``straight_line`` does; unless ``closely``, no look at what really stops it is taken.
+
+    That is for those who try many lines and ask for no reason.
+    """
     solver = solver_of(arm)
     q, A, B = _ends(solver, q_start, X_goal, deviation)
     turn = TURN_PER_METRE * deviation if turn is None else number(turn, "turn")
@@ -124,7 +152,7 @@ def straight_line(
     line = timed_line(solver.arm, A, B, speed)
     if line is None:
         return _nowhere(solver.arm, q, A, deviation, turn)
-    spline, found, times = _refined(solver, line, q, deviation, turn)
+    spline, found, times = _planned(solver, line, q, Room(deviation, turn), closely=closely)
     trajectory = Trajectory(times=times, coefficients=spline.joints)
     _check_positions(solver.arm, line, trajectory)
     trajectory, slower = _kept_to_limits(arm, line, spline, found, trajectory)
@@ -185,10 +213,8 @@ def _slowing(
     factor, because = slowing(arm, {"speed": found.speed.max(axis=0), "acceleration": found.acceleration.max(axis=0)})
     if because is not None and because[0] == "speed" and factor > SLOWEST:
         time = trajectory.times[found.speed[:, because[1]].argmax()]
-        reason = f"would have to move {factor:.0f} times as fast as it may"
-        raise _singular(
-            arm, line, trajectory(time), float(line.fractions(np.array([time]))[0]), joint=because[1], reason=reason
-        )
+        s = float(line.fractions(np.array([time]))[0])
+        raise _singular(line, s, nearest_singularity(arm, trajectory(time)), joint=because[1] + 1, factor=factor)
     return factor, because
 
 
@@ -227,17 +253,47 @@ def timed_line(arm: Arm, A: Array, B: Array, speed: float) -> Line | None:
     return Line(A, B, turn, length / report_speed(arm, A[:3, 3], B[:3, 3], speed) / (1 - _RAMP))
 
 
-def _refined(
-    solver: Solver, line: Line, q_start: Array, deviation: float, turn: float
+def _planned(
+    solver: Solver, line: Line, q_start: Array, room: Room, *, closely: bool
 ) -> tuple[Spline, Deviation, Array]:
-    """Put knots on the line until the deviation is within its bounds everywhere."""
-    n = solver.arm.n
+    """Return the joint motion along the line, how far the hand strays, and the times of the knots."""
     length = float(np.linalg.norm(line.B[:3, 3] - line.A[:3, 3]))
-    rule = length / report_step(solver.arm, line.A[:3, 3], line.B[:3, 3], deviation)
+    rule = length / report_step(solver.arm, line.A[:3, 3], line.B[:3, 3], room.place)
     times = np.linspace(0.0, line.duration, min(max(_FEWEST, math.ceil(rule) + 2), _MOST // 4))
+    try:
+        return _refined(solver, line, times, q_start, room)
+    except PathError as error:
+        s = line.fractions(times)
+        # A pose out of reach is so for every posture.
+        doubtful = closely and error.cause != "reach"
+        look = look_closely(solver, line.poses(s), times, q_start, room) if doubtful else None
+        if look is None:
+            raise
+        if look.stop is not None:
+            place = float(np.interp(look.stop.place, np.arange(len(s)), s))
+            if look.stop.agrees(error.cause, error.joint, error.reason, abs(place - error.fraction)):
+                raise
+            raise _stopped(line, place, look.stop) from error
+        return _refined(solver, line, times, q_start, room, guide=Guide(s, look))
+
+
+def _stopped(line: Line, s: float, stop: Stop) -> PathError:
+    """Return the error for what a close look found at a fraction of the way."""
+    if stop.rush is not None and stop.joint is not None:
+        return _singular(line, s, stop.near, joint=stop.joint, factor=stop.rush)
+    return PathError(
+        stop.cause, 0, s, f"on the line near {at_place(line, s)} {stop.reason}", joint=stop.joint, reason=stop.reason
+    )
+
+
+def _refined(
+    solver: Solver, line: Line, times: Array, q_start: Array, room: Room, *, guide: Guide | None = None
+) -> tuple[Spline, Deviation, Array]:
+    """Put knots between ``times`` until the deviation is within its bounds everywhere."""
+    n, (deviation, turn) = solver.arm.n, room
     for _ in range(_ROUNDS):
         s = line.fractions(times)
-        q = _solved(solver, line, line.poses(s), s, q_start)
+        q = _solved(solver, line, s, q_start, guide)
         c = xspline(times, np.concatenate([q, s[:, None]], axis=1)).coefficients
         spline = Spline(np.diff(times), c[..., :n], c[..., n])
         ways = Ways.of_one(line.A, line.B, line.turn, len(spline.lengths))
@@ -253,7 +309,8 @@ def _refined(
         times = np.append(np.concatenate(inside), line.duration)
     worst = int(excess.argmax())
     joint = int(np.abs(q[worst + 1] - q[worst]).argmax())
-    raise _singular(solver.arm, line, q[worst], float(s[worst]), joint=joint, reason="would have to move at once")
+    near = nearest_singularity(solver.arm, q[worst])
+    raise _singular(line, float(s[worst]), near, joint=joint + 1, factor=math.inf)
 
 
 def _check_rush(arm: Arm, line: Line, found: Deviation, lengths: Array, q: Array) -> None:
@@ -261,21 +318,21 @@ def _check_rush(arm: Arm, line: Line, found: Deviation, lengths: Array, q: Array
     rush = np.where((lengths < line.duration / _SHORT)[:, None], found.speed / arm.limit("speed"), 0.0)
     if rush.max() > SLOWEST:
         worst, joint = np.unravel_index(int(rush.argmax()), rush.shape)
-        reason = f"would have to move {rush.max():.0f} times as fast as it may"
         s = float(line.fractions(np.cumsum(lengths)[worst : worst + 1])[0])
-        raise _singular(arm, line, q[worst], s, joint=int(joint), reason=reason)
+        raise _singular(line, s, nearest_singularity(arm, q[worst]), joint=int(joint) + 1, factor=float(rush.max()))
 
 
-def _singular(arm: Arm, line: Line, q: Array, s: float, *, joint: int, reason: str) -> PathError:
-    """Return the error for a place where the arm is singular, and say by which factor, and what a joint has to do."""
-    why = f"the arm is singular there ({nearest_singularity(arm, q)}), joint {joint + 1} {reason}"
+def _singular(line: Line, s: float, near: str, *, joint: int, factor: float) -> PathError:
+    """Return the error for a place where the arm is singular, so that a joint, from 1, would have to rush."""
+    why = f"the arm is singular there ({near}), {at_speed(joint, factor)}"
     message = f"the hand cannot stay on the line near {at_place(line, s)}: {why}"
-    return PathError("singular", 0, s, message, joint=joint + 1, reason=f"the hand cannot stay on the line: {why}")
+    return PathError("singular", 0, s, message, joint=joint, reason=f"the hand cannot stay on the line: {why}")
 
 
-def _solved(solver: Solver, line: Line, X: Array, s: Array, q_start: Array) -> Array:
-    """Return the postures (k, n) at poses (k, 4, 4), each next to the one before."""
-    q, missed = chain(solver, X, q_start)
+def _solved(solver: Solver, line: Line, s: Array, q_start: Array, guide: Guide | None) -> Array:
+    """Return the postures (k, n) at fractions (k,) of the way, each next to the one before, or beside the guide."""
+    X = line.poses(s)
+    q, missed = chain(solver, X, q_start) if guide is None else beside(solver, X, guide.postures(s))
     # What stops the hand first is told: a limit before the pose that is not met, or that pose.
     met = q[:missed]
     outside = (met < solver.arm.limit("lower")) | (met > solver.arm.limit("upper"))
@@ -289,8 +346,8 @@ def _solved(solver: Solver, line: Line, X: Array, s: Array, q_start: Array) -> A
         if solution.answer is Answer.OUT_OF_REACH:
             why = solution.explain()
             raise PathError("reach", 0, float(s[missed]), f"{at}: {why}", reason=why)
-        why = "the posture would have to change"
-        raise PathError("singular", 0, float(s[missed]), f"{at} {why}", reason=f"{why} there")
+        before, why = q[missed - 1], changing(solver.arm, q[missed - 1])
+        raise PathError("singular", 0, float(s[missed]), f"{at} {why}", joint=idlest(solver.arm, before), reason=why)
     return q
 
 
