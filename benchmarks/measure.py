@@ -50,7 +50,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 def section(title: str, *parts: str) -> None:
     """Print a section of the results."""
-    print("\n\n".join([f"## {title}", *parts]), flush=True)
+    print("\n\n".join([f"## {title}", *parts, ""]), flush=True)
 
 
 def progress(text: str) -> None:
