@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 from PIL import Image
 
 HERE = Path(__file__).parent
@@ -27,6 +28,8 @@ there is a page, `report.html`, which opens from the disk. `make gallery` makes 
 # Of a page: how much of it is shown [px], and how many colours are enough.
 WINDOW = {"width": 1280, "height": 860}
 COLOURS = 96
+# Pictures of a page are one if no point of them differs by more.
+SHADE = 16
 
 
 @attrs.frozen(kw_only=True)
@@ -277,7 +280,17 @@ _SET_CLOCK = """(moment) => {
 def keep(photo: bytes, picture: Path) -> None:
     """Write a picture with few colours, which is a third of the bytes."""
     image: Any = Image.open(io.BytesIO(photo)).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    if picture.exists() and alike(image, Image.open(picture)):
+        return
     image.save(picture, optimize=True)
+
+
+def alike(new: Any, old: Any) -> bool:
+    """Whether two pictures are one but for shades, which come out a little otherwise each time."""
+    if new.size != old.size:
+        return False
+    apart = np.abs(np.asarray(new.convert("RGB"), dtype=int) - np.asarray(old.convert("RGB"), dtype=int)).max(axis=2)
+    return bool(apart.max() <= SHADE)
 
 
 def lines() -> Iterator[str]:
