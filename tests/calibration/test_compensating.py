@@ -12,6 +12,7 @@ from armwright.calibration.compensating import compensated
 from armwright.calibration.fitting import calibrate
 from armwright.calibration.readings import readings
 from armwright.errors import ShapeError
+from armwright.spatial.rotations import rotation_vector
 from calibration.simulated import postures, random_errors, seen
 
 NOISE = 2e-5
@@ -63,6 +64,24 @@ def test_poses(rng: np.random.Generator) -> None:
     again = chain.reach(there.q, errors)
     np.testing.assert_allclose(again.position, X[:5, :3, 3], atol=1e-7)
     np.testing.assert_allclose(again.rotation, X[:5, :3, :3], atol=1e-6)
+
+
+def test_a_hand_the_other_way_round(rng: np.random.Generator) -> None:
+    """A pose is not met by a hand at its place that is turned over: it turns, or says by how much it misses."""
+    arm = load_arm("puma560")
+    chain = chain_of(arm)
+    q = postures(rng, arm, 40)
+    found = calibrate(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
+    near = np.array([0.3, -0.7, 0.4, 0.2, 0.9, 0.1])
+    reached = found.chain.reach(near, found.own)
+    goal = np.eye(4)
+    goal[:3, 3], goal[:3, :3] = reached.position[0], reached.rotation[0] @ np.diag([-1.0, -1.0, 1.0])
+
+    there = compensated(found, goal, near)
+
+    turned = found.chain.reach(there.q, found.own).rotation[0]
+    assert there.missed[0] >= np.linalg.norm(rotation_vector(goal[:3, :3] @ turned.T)) - MET
+    assert np.abs(there.q[0] - near).max() > 1.0
 
 
 def test_out_of_reach(rng: np.random.Generator) -> None:

@@ -1,6 +1,5 @@
 """Tables of measurements: CSV whose column names tell the units, read row by row into SI units."""
 
-import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -10,24 +9,20 @@ import attrs
 from armwright.accuracy.cycles import ASKED, Kind
 from armwright.accuracy.measured import ANGLES
 from armwright.errors import FileFormatError, closest, shown
-from armwright.files.rows import Cells, number_in_cell, read_rows, refuse_other_widths
+from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, NOTE, Cells, number_in_cell, read_rows, refuse_other_widths
 
 # SI values of the units that names of columns end in.
-_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
-_ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180}
 _TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 _LOADS = {"n": 1.0, "kn": 1e3}
 _SPEEDS = {"m_per_s": 1.0, "mm_per_s": 1e-3, "m_per_min": 1 / 60, "mm_per_min": 1e-3 / 60}
 _UNITS: dict[str, Mapping[str, float]] = {
-    **dict.fromkeys("xyz", _LENGTHS),
-    **dict.fromkeys(ANGLES, _ANGLES),
+    **dict.fromkeys("xyz", LENGTH_UNITS),
+    **dict.fromkeys(ANGLES, ANGLE_UNITS),
     "t": _TIMES,
     "load": _LOADS,
     "speed": _SPEEDS,
 }
 _TEXTS = ("test", "pose", "path", "condition", "cycle", "direction", "robot")
-# Columns whose names begin so are for people.
-_NOTE = "note"
 COMMANDED = "commanded"
 
 
@@ -103,7 +98,7 @@ def _columns(path: Path, head: Cells) -> dict[str, _Column]:
     """Return the columns by their name without the unit."""
     found: dict[str, _Column] = {}
     for place, header in enumerate(cell.lower() for cell in head.cells):
-        if header.startswith(_NOTE):
+        if header.startswith(NOTE):
             continue
         name, scale = _named(path, head.line, header)
         if name in found:

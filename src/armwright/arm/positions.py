@@ -6,11 +6,13 @@ import warnings
 
 import numpy as np
 
-from armwright.arm.model import Arm
+from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.errors import KindError, ShapeError, UnitWarning, shown
 
 _TURN = 2 * math.pi
+# Joints without limits are tried within so much either way [rad], [m].
+_FREE, _FREE_SLIDE = math.pi, 1.0
 _PACKAGE = __name__.partition(".")[0]
 
 
@@ -70,6 +72,16 @@ def admitted(arm: Arm) -> Array:
     return np.array([far if joint.revolute else math.inf for far, joint in zip(farthest, arm.joints, strict=True)])
 
 
+def ranges(arm: Arm) -> tuple[Array, Array]:
+    """Return (n,) between what each joint is tried where its whole range is to be seen [rad], [m].
+
+    These are its limits. Of a joint that may turn more than once, one turn about where it is nearest to 0 tells all; of
+    a slide without an end, a metre either way is taken.
+    """
+    ends = np.array([_range(joint) for joint in arm.joints])
+    return ends[:, 0], ends[:, 1]
+
+
 def degrees_by_mistake(arm: Arm, q: Array) -> str:
     """Say of joint positions (..., n) that they look like degrees, by the first such joint; empty if none does."""
     rows = np.abs(q.reshape(-1, arm.n))
@@ -82,6 +94,15 @@ def degrees_by_mistake(arm: Arm, q: Array) -> str:
         f"joint {i + 1} of '{arm.name}' stands at {value:g} rad, {abs(value) / _TURN:.1f} turns. If degrees are meant, "
         f"{value:g} degrees are {math.radians(value):.6g} rad"
     )
+
+
+def _range(joint: Joint) -> tuple[float, float]:
+    lower, upper = joint.limits.lower, joint.limits.upper
+    free = _FREE if joint.revolute else _FREE_SLIDE
+    if upper - lower <= 2 * free or (math.isfinite(upper - lower) and not joint.revolute):
+        return lower, upper
+    middle = min(max(0.0, lower + free), upper - free)
+    return middle - free, middle + free
 
 
 def _known(*limits: float) -> list[float]:

@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from armwright.arm.model import Arm
+from armwright.arm.positions import ranges
 from armwright.arrays import Array
 from armwright.calibration.chain import Bend
 from armwright.dynamics.shares import gravity_efforts
@@ -44,13 +45,7 @@ def springs(arm: Arm) -> tuple[Bend, ...]:
 
 def largest_efforts(arm: Arm) -> Array:
     """Return (n,) the largest effort of gravity that each joint meets in many postures [N m] or [N]."""
-    ends = [
-        (max(joint.limits.lower, -np.pi), min(joint.limits.upper, np.pi))
-        if joint.revolute
-        else (max(joint.limits.lower, -1.0), min(joint.limits.upper, 1.0))
-        for joint in arm.joints
-    ]
-    lower, upper = np.array(ends).T
+    lower, upper = ranges(arm)
     q = lower + (upper - lower) * np.random.default_rng(0).random((_LOOKS, arm.n))
     return np.asarray(np.abs(gravity_efforts(arm, q)).max(axis=0), dtype=np.float64)
 

@@ -60,12 +60,14 @@ class Beyond:
         calibration: with the bends of joints that are kept.
         learnt: what is added to where it has the tool; None where learning did not help.
         tried: everything that was tried, in order; the first is geometry alone.
+        geometry: held out, of geometry alone.
         held_out: of all that is kept.
     """
 
     calibration: Calibration
     learnt: "Learnt | None"
     tried: tuple[Tried, ...]
+    geometry: HeldOut
     held_out: HeldOut
 
     def predict(self, q: ArrayLike) -> Array:
@@ -123,7 +125,7 @@ def calibrate_beyond(
     if not points.any():
         raise InvalidValueError("expected points in the measuring frame, on which what is left is seen; got none")
     told("holding points out: geometry")
-    held = cross_validated(arm, seen, folds=folds, seed=seed, base=base)
+    held = geometry = cross_validated(arm, seen, folds=folds, seed=seed, base=base)
     tried = [Tried("geometry", float(held.distance[points].mean()), 0.0, 0.0, kept=True, why="")]
     bends, held = _kept_bends(
         arm,
@@ -140,13 +142,13 @@ def calibrate_beyond(
         better = _learnt_held_out(arm, seen, points, bends=bends, base=base, folds=folds, seed=seed)
     except MissingExtraError as error:
         tried.append(Tried("what is left, learnt", None, 0.0, 0.0, kept=False, why=str(error)))
-        return Beyond(calibration=found, learnt=None, tried=tuple(tried), held_out=held)
+        return Beyond(calibration=found, learnt=None, tried=tuple(tried), geometry=geometry, held_out=held)
     tried.append(_judged("what is left, learnt", held.distance[points], better.distance[points]))
     learnt = None
     if tried[-1].kept:
         held = better
         learnt = _learn(arm, seen.q[points], seen.points[points] - found.predict(seen.q[points]), seed)
-    return Beyond(calibration=found, learnt=learnt, tried=tuple(tried), held_out=held)
+    return Beyond(calibration=found, learnt=learnt, tried=tuple(tried), geometry=geometry, held_out=held)
 
 
 def _kept_bends(

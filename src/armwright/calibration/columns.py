@@ -1,6 +1,5 @@
 """The columns of a file of measurements: what each is of, and the unit that its name tells."""
 
-import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,10 +7,8 @@ from typing import NamedTuple
 
 from armwright.arm.model import Arm
 from armwright.errors import FileFormatError, closest
-from armwright.files.rows import Cells
+from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, NOTE, Cells
 
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180}
 NAMES = ("name", "pose", "step_order")
 POINTS = ("x", "y", "z")
 TARGETS = ("x_t", "y_t", "z_t")
@@ -22,8 +19,6 @@ DISTANCE = "distance"
 # Columns of words.
 _WORDS = (*NAMES, "set", "frame", "plane", "anchor", "to")
 _ALL = (*POINTS, *TARGETS, *OFFSETS, *RPY, *QUATERNION, DISTANCE, *_WORDS)
-# Columns whose names begin so are for people.
-_NOTE = "note"
 _JOINT = re.compile(r"joint_([1-9]\d?)")
 
 
@@ -55,7 +50,7 @@ def read_columns(path: Path, head: Cells, arm: Arm, stated: tuple[str, str] | No
     """
     found: dict[str, Column] = {}
     for place, header in enumerate(cell.lower() for cell in head.cells):
-        if header.startswith(_NOTE):
+        if header.startswith(NOTE):
             continue
         name, unit = _named(path, head.line, header, arm)
         if name in found:
@@ -70,7 +65,7 @@ def read_columns(path: Path, head: Cells, arm: Arm, stated: tuple[str, str] | No
                 raise FileFormatError(
                     path, head.line, column.header, f"the name tells no unit: write {told}, or state the units"
                 )
-            found[name] = column._replace(unit=stated[0] if units is LENGTHS else stated[1])
+            found[name] = column._replace(unit=stated[0] if units is LENGTH_UNITS else stated[1])
     groups = ((POINTS, "coordinates"), ((*TARGETS, *OFFSETS), "targets and what was off"), (RPY, "angles"))
     for group, what in groups:
         given = [found[name] for name in group if name in found]
@@ -86,10 +81,10 @@ def _units(name: str, arm: Arm) -> Mapping[str, float]:
     """Return the units that a column may have; none for texts."""
     joint = _JOINT.fullmatch(name)
     if joint:
-        return ANGLES if arm.joints[int(joint[1]) - 1].revolute else LENGTHS
+        return ANGLE_UNITS if arm.joints[int(joint[1]) - 1].revolute else LENGTH_UNITS
     if name in RPY:
-        return ANGLES
-    return {} if name in (*_WORDS, *QUATERNION) else LENGTHS
+        return ANGLE_UNITS
+    return {} if name in (*_WORDS, *QUATERNION) else LENGTH_UNITS
 
 
 def _named(path: Path, line: int, header: str, arm: Arm) -> tuple[str, str]:
@@ -106,8 +101,8 @@ def _named(path: Path, line: int, header: str, arm: Arm) -> tuple[str, str]:
             continue
         units = _units(name, arm)
         if told and told not in units:
-            if joint and told in {**LENGTHS, **ANGLES}:
-                kind = "turns" if units is ANGLES else "slides"
+            if joint and told in {**LENGTH_UNITS, **ANGLE_UNITS}:
+                kind = "turns" if units is ANGLE_UNITS else "slides"
                 raise FileFormatError(
                     path, line, header, f"joint {joint[1]} of {arm.name} {kind}: expected {_choices(name, units)}"
                 )

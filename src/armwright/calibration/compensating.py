@@ -8,6 +8,7 @@ from armwright.arrays import Array, ArrayLike, Flags, floats, joint_array
 from armwright.calibration.beyond import Beyond
 from armwright.calibration.fitting import Calibration
 from armwright.errors import ShapeError
+from armwright.spatial.rotations import rotation_vector
 
 _STEPS = 50
 # Steps end when every goal is met to this, in metres and radians.
@@ -65,7 +66,8 @@ def compensated(found: Calibration | Beyond, goals: ArrayLike, near: ArrayLike) 
         shift = 0.0 if learnt is None else learnt.shift(q)
         off, J = places - reached.position - shift, reached.by_position[:, :, own]
         if wanted.ndim == 3:
-            off = np.concatenate([off, _turn(wanted[:, :3, :3] @ reached.rotation.swapaxes(1, 2))], axis=1)
+            turned = rotation_vector(wanted[:, :3, :3] @ reached.rotation.swapaxes(1, 2))
+            off = np.concatenate([off, turned], axis=1)
             J = np.concatenate([J, reached.by_turn[:, :, own]], axis=1)
         missed = np.linalg.norm(off, axis=1)
         if step == _STEPS or np.all(missed < _MET):
@@ -73,8 +75,3 @@ def compensated(found: Calibration | Beyond, goals: ArrayLike, near: ArrayLike) 
         q = q + np.clip((np.linalg.pinv(J, rcond=_WEAK) @ off[:, :, None])[:, :, 0], -_FARTHEST, _FARTHEST)
     lower, upper = chain.arm.limit("lower"), chain.arm.limit("upper")
     return Compensated(q, np.asarray(missed, dtype=np.float64), np.all((q >= lower) & (q <= upper), axis=1))
-
-
-def _turn(E: Array) -> Array:
-    """Return (m, 3) the small turns that rotations (m, 3, 3) are."""
-    return np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1) / 2

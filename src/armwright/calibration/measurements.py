@@ -24,9 +24,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
 from armwright.calibration.columns import (
-    ANGLES,
     DISTANCE,
-    LENGTHS,
     NAMES,
     OFFSETS,
     POINTS,
@@ -38,7 +36,7 @@ from armwright.calibration.columns import (
 )
 from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import FileFormatError, closest, one_of
-from armwright.files.rows import Cells, number_in_cell, read_rows, refuse_other_widths
+from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, Cells, number_in_cell, read_rows, refuse_other_widths
 from armwright.spatial.rotations import rotation_from_quaternion
 
 _SETS = ("fit", "check")
@@ -101,7 +99,7 @@ def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | No
     stated = (
         None
         if units is None
-        else (one_of("unit of length", units[0], LENGTHS), one_of("unit of angle", units[1], ANGLES))
+        else (one_of("unit of length", units[0], LENGTH_UNITS), one_of("unit of angle", units[1], ANGLE_UNITS))
     )
     head, rows = read_rows(path)
     table = _Table(path, rows, read_columns(path, head, arm, stated))
@@ -132,7 +130,7 @@ class _Table:
     def numbers(self, names: Sequence[str], *, needed: bool) -> Array:
         """Return (m, k) numbers in SI units; NaN in rows where all are empty, if they are not needed."""
         wanted = [self.columns[name] for name in names]
-        scales = [{**LENGTHS, **ANGLES, "": 1.0}[one.unit] for one in wanted]
+        scales = [{**LENGTH_UNITS, **ANGLE_UNITS, "": 1.0}[one.unit] for one in wanted]
         none = [math.nan] * len(wanted)
         table = np.array(
             [
@@ -302,7 +300,7 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], columns: Seque
     """Return what is odd but may be so."""
     texts, q = [], readings.q
     for i, (joint, column) in enumerate(zip(arm.joints, columns, strict=True)):
-        scale, unit = {**LENGTHS, **ANGLES}[column.unit], column.unit
+        scale, unit = {**LENGTH_UNITS, **ANGLE_UNITS}[column.unit], column.unit
         if len(q) > 1 and np.ptp(q[:, i]) < _MOVED:
             texts.append(
                 f"joint {i + 1} never moved: it stands at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. What it "

@@ -4,13 +4,13 @@ Source:
     Borm & Menq (1991); Driels & Pathre (1990); Nahvi, Hollerbach, Hayward (1994); Nahvi & Hollerbach (1996).
 """
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from armwright.arm.model import Arm, Joint
+from armwright.arm.model import Arm
+from armwright.arm.positions import ranges
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.calibration.chain import Chain, chain_of
 from armwright.calibration.identifying import identify, preferred
@@ -19,8 +19,6 @@ from armwright.errors import InvalidValueError, one_of
 Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
 INDICES: tuple[Index, ...] = ("O1", "O2", "O3", "O4", "O5")
 
-# Joints without limits are tried within so much either way [rad], [m].
-_FREE, _FREE_SLIDE = math.pi, 1.0
 # As many candidates, and so many for each pose that is asked for.
 _CANDIDATES, _EACH = 400, 4
 # Poses are exchanged for better ones so often at most.
@@ -108,7 +106,7 @@ def plan_poses(
         candidates = max(_CANDIDATES, _EACH * count)
     if candidates < count:
         raise InvalidValueError(f"candidates: expected {count} or more, got {candidates}")
-    lower, upper = _limits(arm)
+    lower, upper = ranges(arm)
     q = lower + (upper - lower) * rng.random((candidates, arm.n))
     before = np.zeros((0, arm.n)) if measured is None else np.atleast_2d(joint_array(measured, arm.n, "measured"))
     slopes = _rows(chain, np.vstack([q, before]), turns=turns)
@@ -143,22 +141,6 @@ def _rows(chain: Chain, q: Array, *, turns: bool) -> Array:
     if not turns:
         return reached.by_position
     return np.concatenate([reached.by_position, reached.by_turn * (_USUAL_NOISE / _USUAL_TURN)], axis=1)
-
-
-def _limits(arm: Arm) -> tuple[Array, Array]:
-    """Return (n,) between what each joint is tried, [rad] or [m]."""
-    ways = np.array([_way(joint) for joint in arm.joints])
-    return ways[:, 0], ways[:, 1]
-
-
-def _way(joint: Joint) -> tuple[float, float]:
-    lower, upper = joint.limits.lower, joint.limits.upper
-    free = _FREE if joint.revolute else _FREE_SLIDE
-    # Of a joint that may turn more than once, a turn tells all; of a slide the whole way tells more.
-    if upper - lower <= 2 * free or (math.isfinite(upper - lower) and not joint.revolute):
-        return lower, upper
-    middle = min(max(0.0, lower + free), upper - free)
-    return middle - free, middle + free
 
 
 def _stacked(rows: Array, taken: Sequence[int]) -> Array:

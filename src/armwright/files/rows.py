@@ -1,6 +1,7 @@
 """Tables in CSV as people send them: rows of cells with their lines, and the numbers in them."""
 
 import csv
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -8,6 +9,12 @@ from typing import NamedTuple
 from armwright.arrays import LARGEST
 from armwright.errors import FileFormatError, shown
 from armwright.files.document import read_text
+
+# SI values of the units that names of columns end in.
+LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+ANGLE_UNITS = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180}
+# Columns whose names begin so are for people.
+NOTE = "note"
 
 
 class Cells(NamedTuple):

@@ -95,12 +95,13 @@ def calibrated(
     refuse_not_fitted(seen, measurements.readings.take(~fit))
     full = calibrate_to(arm, seen, progress=progress)
     table = full if not any(name.endswith(_TILTS) for name in full.names) else calibrate_to(arm, seen, without=_TILTS)
+    tried = calibrate_beyond(arm, seen, folds=folds, seed=seed, progress=progress) if beyond else None
     told("holding points out: all errors")
-    held_out = held_out_table = cross_validated(arm, seen, folds=folds, seed=seed)
+    held_out = tried.geometry if tried else cross_validated(arm, seen, folds=folds, seed=seed)
+    held_out_table = held_out
     if any(name.endswith(_TILTS) for name in full.chain.names):
         told("holding points out: for the arm file")
         held_out_table = cross_validated(arm, seen, folds=folds, seed=seed, without=_TILTS)
-    tried = calibrate_beyond(arm, seen, folds=folds, seed=seed, progress=progress) if beyond else None
     own = seen.with_point & (seen.frame == 0)
     places = {
         "as said": chain_of(arm).reach(seen.q).position,
