@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test bench edges examples docs gallery studies pictures messages editor fuzz clean
+.PHONY: help demo test proof bench edges examples docs gallery studies pictures messages editor fuzz clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
@@ -38,6 +38,11 @@ test: $(VENV)/test   ## Run lint, types, the import contracts and all tests
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n auto
+
+proof: $(VENV)/test  ## Run every random sample at its full size and write docs/proof.md (hours; ONLY=tests/motion)
+	rm -rf out/proof
+	ARMWRIGHT_PROOF=$(CURDIR)/out/proof $(BIN)/python -m pytest -n auto -m proof --timeout 0 $(ONLY); status=$$?; \
+	    $(BIN)/python docs/make_proof.py out/proof && exit $$status
 
 examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/bench.rlo --cell examples/stanford_cell.toml -o out/bench

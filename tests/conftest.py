@@ -1,12 +1,16 @@
-"""What all tests share: chance that can be repeated, and one browser."""
+"""What all tests share: chance that can be repeated, random samples, and one browser."""
 
+import os
 import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import settings
+
+from samples import Sample, drawn
 
 # No test depends on how fast a machine is.
 settings.register_profile("untimed", deadline=None)
@@ -17,6 +21,32 @@ settings.load_profile("untimed")
 def rng() -> np.random.Generator:
     """Random numbers, the same in every run."""
     return np.random.default_rng(83008)
+
+
+@pytest.fixture
+def sample(request: pytest.FixtureRequest) -> Iterator[Sample]:
+    """Random cases, drawn anew in every run; a failure says how to repeat them."""
+    mine = drawn(request.node.nodeid)
+    yield mine
+    if folder := os.environ.get("ARMWRIGHT_PROOF"):
+        mine.keep(Path(folder))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what draws random samples: `make proof` runs it whole."""
+    for item in items:
+        if "sample" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.proof)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Any:
+    """Put the seed into the report of a test that failed on a random sample."""
+    report = yield
+    mine = getattr(item, "funcargs", {}).get("sample")
+    if isinstance(mine, Sample) and report.failed:
+        report.sections.append(("random sample", f"repeat with: {mine.how_to_repeat()}"))
+    return report
 
 
 @pytest.fixture(scope="module")
