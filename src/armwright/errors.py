@@ -51,6 +51,14 @@ class FileFormatError(ArmwrightError, ValueError):
         super().__init__(f"{place}: {key}: {message}" if key else f"{place}: {message}")
 
 
+class ContradictionError(ArmwrightError, ValueError):
+    """What was measured contradicts the model: no values of its parameters explain the data."""
+
+
+class CheckFailedError(ArmwrightError, ValueError):
+    """All was done, and what was to be checked does not hold; the text says what."""
+
+
 class UnsupportedArmError(ArmwrightError, ValueError):
     """The method does not fit this arm."""
 

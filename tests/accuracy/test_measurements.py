@@ -47,6 +47,44 @@ def test_poses(read: Read) -> None:
     assert {(one.cycles, one.asked, one.few) for one in found.measures} == {(2, 30, True)}
 
 
+@pytest.mark.parametrize(
+    "test", ["pose", "distance", "drift", "multidirectional", "exchangeability", "path", "reorientation"]
+)
+@pytest.mark.parametrize("angles", ["c", "b", "ac", "abc"])
+def test_angles_have_the_names_of_their_columns(read: Read, test: str, angles: str) -> None:
+    """A planar arm turns about z alone: its file has c_deg, and its measures are AP_c and RP_c, never AP_a."""
+    goal, turn = (",".join(x for _ in angles) for x in ("0", "0.1"))
+    columns = ",".join(f"{one}_deg" for one in angles)
+    if test in {"path", "reorientation"}:
+        head = f"test,path,cycle,x_mm,y_mm,{columns}"
+        rows = [f"{test},L,{cycle},{x},0,{goal}" for cycle in ("commanded", "1", "2") for x in (0, 100)]
+    else:
+        head = f"test,pose,cycle,t_s,direction,robot,x_mm,y_mm,{columns}"
+        poses = {"distance": ("P1", "P2")}.get(test, ("P1",))
+        parts = 2 if test in {"drift", "multidirectional", "exchangeability"} else 1
+        rows = [f"{test},{pose},commanded,,,,0,0,{goal}" for pose in poses]
+        rows += [
+            f"{test},{pose},{cycle},{part},{part},{part},0,{cycle},{turn}"
+            for pose in poses
+            for part in range(parts)
+            for cycle in (1, 2)
+        ]
+
+    found = assess(read("\n".join([head, *rows, ""])), few=True)
+
+    turning = {one.symbol.partition("_")[2] for one in found.measures if one.unit == "rad"}
+    assert turning == set(angles)
+
+
+def test_files_of_other_angles_are_not_mixed(read: Read) -> None:
+    """A turn about z is not compared with one about x because each is the only one of its file."""
+    with pytest.raises(FileFormatError, match="other coordinates or angles"):
+        read(
+            "test,pose,cycle,x_mm,y_mm,c_deg\npose,P,commanded,0,0,1\n",
+            "test,pose,cycle,x_mm,y_mm,a_deg\npose,P,1,0,0,1\n",
+        )
+
+
 def test_units(read: Read) -> None:
     """Metres, inches, degrees, milliradians, minutes: all become SI units; files may have different ones."""
     commanded = "test,pose,cycle,x_m,y_m,z_m,c_rad\npose,P1,commanded,0.4,0.1,0.3,1.5707963\n"

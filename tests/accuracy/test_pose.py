@@ -141,6 +141,42 @@ def test_distances() -> None:
     assert spread.distance == pytest.approx(3e-3 * np.sqrt(2))
 
 
+def test_angles_of_distances() -> None:
+    """Of 10 degrees asked 10.1 and 10.3 are attained: AD_c is 0.2 degrees, RD_c three times 0.2 / sqrt(2)."""
+    place, turned = np.zeros((2, 2)), np.radians([[10.1], [10.3]])
+    angles = (np.zeros((2, 1)), turned)
+
+    off = distance_accuracy(place, place, (0, 0), (0, 0), angles=angles, commanded_angles=([0], [np.pi / 18]), few=True)
+    spread = distance_repeatability(place, place, angles=angles, few=True)
+
+    np.testing.assert_allclose(np.degrees(off.angles), [0.2], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(spread.angles), [3 * 0.2 / np.sqrt(2)], atol=1e-9)
+
+
+def test_half_a_turn_between_two_poses() -> None:
+    """Turns of 179.9 and 180.1 degrees, of 180 asked, lie 0.2 degrees apart: AD is 0 and no angle is folded back."""
+    place = np.zeros((2, 2))
+    angles = (np.radians([[-90.0], [-90.0]]), np.radians([[89.9], [-269.9]]))
+    goals = ([-np.pi / 2], [np.pi / 2])
+
+    off = distance_accuracy(place, place, (0, 0), (0, 0), angles=angles, commanded_angles=goals, few=True)
+    spread = distance_repeatability(place, place, angles=angles, few=True)
+
+    np.testing.assert_allclose(np.degrees(off.angles), [0.0], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(spread.angles), [3 * 0.2 / np.sqrt(2)], atol=1e-9)
+
+
+def test_drift_of_angles() -> None:
+    """A hand that turns by 2 mrad while the robot warms up, and scatters twice as much, drifts by that."""
+    places = [np.zeros((10, 2))] * 2
+    turn = 1e-3 * np.resize((1.0, -1.0), (10, 1))
+
+    found = pose_drift([0, 600], places, (0, 0), angles=[turn, 2 * turn + 2e-3], commanded_angles=[0.0])
+
+    np.testing.assert_allclose(found.accuracy_change_angles, [2e-3], atol=ROUNDING)
+    np.testing.assert_allclose(found.repeatability_change_angles, [3e-3 * np.sqrt(10 / 9)], atol=ROUNDING)
+
+
 def test_compliance() -> None:
     """A spring of 1e5 N/m gives way by 1e-5 m/N along the force, and by a tenth of it across."""
     loads = np.repeat(np.arange(0.0, 110.0, 10.0), 3)

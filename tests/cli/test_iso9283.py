@@ -25,8 +25,9 @@ def test_report(tmp_path: Path) -> None:
         "iso9283", POSES, PATHS, "-o", tmp_path / "out", "--limit", "RP=0.05mm", "--limit", "AT=0.2mm", columns=110
     )
 
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    assert done.returncode == 5
+    assert done.stderr.startswith("armwright: limit exceeded: RP of pose P1")
+    assert done.stderr.endswith("mm, and at most 0.05 mm is allowed\n")
     written = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"report.html", "measures.json", "01-pose.svg", "05-path.svg", "07-cornering.svg"} <= written
     rows = {line.split()[0]: line for line in done.stdout.split("\n") if line.strip()}
@@ -37,6 +38,17 @@ def test_report(tmp_path: Path) -> None:
     assert page.count("<img ") == len(written) - 2
     assert "http" not in page.replace("http-equiv", "")
     assert "limit exceeded" in page
+
+
+@pytest.mark.parametrize("how", ["-q", "--json"])
+def test_exceeded_limit_ends_with_status_five(how: str) -> None:
+    """Whoever asks for a limit in a script learns that it is exceeded from the status and one line, and which it is."""
+    done = armwright("iso9283", POSES, "--limit", "RP=0.05mm", "--limit", "AP=1mm", how)
+
+    assert done.returncode == 5
+    assert done.stderr.startswith("armwright: limit exceeded: RP of pose P1")
+    assert "AP" not in done.stderr
+    assert (done.stdout == "") == (how == "-q")
 
 
 def test_json() -> None:

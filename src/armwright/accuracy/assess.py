@@ -46,6 +46,11 @@ class Assessment:
         """Whether any measure was made of fewer cycles than the standard asks for."""
         return any(measure.few for measure in self.measures)
 
+    @property
+    def exceeded(self) -> tuple[Measure, ...]:
+        """The measures that do not keep their limits."""
+        return tuple(measure for measure in self.measures if measure.holds is False)
+
     def within(self, limits: Mapping[str, float]) -> "Assessment":
         """Return the same with limits that measures should keep.
 
@@ -130,11 +135,17 @@ def _of_poses(test: PoseTest, *, few: bool) -> tuple[Result, ...]:
         )
     if test.kind == "distance":
         goals = [_goal(cloud) for cloud in clouds]
-        return distance_accuracy(*places, *goals, few=few), distance_repeatability(*places, few=few)
+        turned = (clouds[0].commanded_angles, clouds[1].commanded_angles)
+        return (
+            distance_accuracy(*places, *goals, angles=(angles[0], angles[1]), commanded_angles=turned, few=few),
+            distance_repeatability(*places, angles=(angles[0], angles[1]), few=few),
+        )
     if test.kind == "drift":
         rising = sorted(clouds, key=lambda cloud: cloud.t or 0.0)
         times = [cloud.t or 0.0 for cloud in rising]
-        return (pose_drift(times, [cloud.places for cloud in rising], _goal(one), few=few),)
+        turns, asked = [cloud.angles for cloud in rising], one.commanded_angles
+        warming = [cloud.places for cloud in rising]
+        return (pose_drift(times, warming, _goal(one), angles=turns, commanded_angles=asked, few=few),)
     if test.kind == "compliance":
         return tuple(_compliance(cloud, test.size, few=few) for cloud in clouds)
     vary = multidirectional_variation if test.kind == "multidirectional" else exchangeability

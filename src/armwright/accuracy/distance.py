@@ -3,9 +3,10 @@
 import attrs
 import numpy as np
 
+from armwright.accuracy.angles import mean_angles, wrapped
 from armwright.accuracy.cycles import checked_cycles
-from armwright.accuracy.measured import frozen_array, place_of, places_of
-from armwright.arrays import Array, ArrayLike, by_fields
+from armwright.accuracy.measured import angles_of, frozen_array, place_of, places_of
+from armwright.arrays import Array, ArrayLike, by_fields, floats
 from armwright.errors import ShapeError
 
 
@@ -16,12 +17,14 @@ class DistanceAccuracy:
     Attributes:
         distance: AD, mean attained less commanded distance [m]; negative where attained poses are too near.
         components: (2,) or (3,) AD_x, AD_y, AD_z, the same of the distances along each axis [m].
+        angles: (k,) AD_a, AD_b, AD_c, the same of the angles between the two poses [rad].
         commanded: the commanded distance [m].
         cycles: n.
     """
 
     distance: float
     components: Array = attrs.field(converter=frozen_array)
+    angles: Array = attrs.field(converter=frozen_array)
     commanded: float
     cycles: int
 
@@ -35,18 +38,27 @@ class DistanceRepeatability:
     Attributes:
         distance: RD, three standard deviations, to be read as plus or minus [m].
         components: (2,) or (3,) RD_x, RD_y, RD_z, the same along each axis [m].
+        angles: (k,) RD_a, RD_b, RD_c, the same of the angles between the two poses [rad].
         cycles: n.
     """
 
     distance: float
     components: Array = attrs.field(converter=frozen_array)
+    angles: Array = attrs.field(converter=frozen_array)
     cycles: int
 
     __reduce__ = by_fields
 
 
 def distance_accuracy(
-    first: ArrayLike, second: ArrayLike, commanded_first: ArrayLike, commanded_second: ArrayLike, *, few: bool = False
+    first: ArrayLike,
+    second: ArrayLike,
+    commanded_first: ArrayLike,
+    commanded_second: ArrayLike,
+    *,
+    angles: tuple[ArrayLike, ArrayLike] | None = None,
+    commanded_angles: tuple[ArrayLike | None, ArrayLike | None] | None = None,
+    few: bool = False,
 ) -> DistanceAccuracy:
     """Return AD between two poses.
 
@@ -55,6 +67,8 @@ def distance_accuracy(
         second: likewise of the second, of the same cycles [m].
         commanded_first: (2,) or (3,) [m].
         commanded_second: (2,) or (3,) [m].
+        angles: (n, k) attained angles about a, b, c of both poses [rad].
+        commanded_angles: (k,) the commanded ones of both [rad].
         few: take fewer than 30 cycles.
 
     Raises:
@@ -69,20 +83,27 @@ def distance_accuracy(
     count = checked_cycles("distance", [len(ways)], few=few, least=1)
     start, end = (place_of(one, ways.shape[1]) for one in (commanded_first, commanded_second))
     asked = float(np.linalg.norm(end - start))
+    A, B = _angles(angles, len(ways))
+    goals = [_commanded(one, A.shape[1]) for one in commanded_angles or (None, None)]
+    turn = wrapped(goals[1] - goals[0])
     return DistanceAccuracy(
         distance=float(np.linalg.norm(ways, axis=1).mean()) - asked,
         components=np.abs(ways).mean(axis=0) - np.abs(end - start),
+        angles=np.abs(_between(A, B, turn)).mean(axis=0) - np.abs(turn),
         commanded=asked,
         cycles=count,
     )
 
 
-def distance_repeatability(first: ArrayLike, second: ArrayLike, *, few: bool = False) -> DistanceRepeatability:
+def distance_repeatability(
+    first: ArrayLike, second: ArrayLike, *, angles: tuple[ArrayLike, ArrayLike] | None = None, few: bool = False
+) -> DistanceRepeatability:
     """Return RD between two poses.
 
     Args:
         first: (n, 2) or (n, 3) attained places of the first pose, one per cycle [m].
         second: likewise of the second, of the same cycles [m].
+        angles: (n, k) attained angles about a, b, c of both poses [rad].
         few: take fewer than 30 cycles.
 
     Raises:
@@ -95,9 +116,12 @@ def distance_repeatability(first: ArrayLike, second: ArrayLike, *, few: bool = F
     """
     ways = _ways(first, second)
     count = checked_cycles("distance", [len(ways)], few=few, least=2)
+    A, B = _angles(angles, len(ways))
+    turns = _between(A, B, mean_angles(B - A, "angles between the two poses"))
     return DistanceRepeatability(
         distance=3 * float(np.linalg.norm(ways, axis=1).std(ddof=1)),
         components=3 * np.abs(ways).std(axis=0, ddof=1),
+        angles=3 * np.abs(turns).std(axis=0, ddof=1),
         cycles=count,
     )
 
@@ -107,3 +131,28 @@ def _ways(first: ArrayLike, second: ArrayLike) -> Array:
     if P.shape != Q.shape:
         raise ShapeError(f"distance: the two poses need the same cycles, got shapes {P.shape} and {Q.shape}")
     return np.asarray(Q - P)
+
+
+def _angles(angles: tuple[ArrayLike, ArrayLike] | None, rows: int) -> tuple[Array, Array]:
+    """Return the angles (n, k) of both poses; none where none were measured."""
+    first, second = (None, None) if angles is None else angles
+    A, B = angles_of(first, rows, "angles of the first pose"), angles_of(second, rows, "angles of the second pose")
+    if A.shape != B.shape:
+        raise ShapeError(f"distance: both poses need the same angles, got shapes {A.shape} and {B.shape}")
+    return A, B
+
+
+def _commanded(angles: ArrayLike | None, size: int) -> Array:
+    """Return the commanded angles (k,) of a pose [rad]."""
+    goal = np.empty(0) if angles is None else floats(angles, "commanded angles")
+    if goal.shape != (size,):
+        raise ShapeError(f"commanded angles: expected {size} numbers, as many as were measured, got shape {goal.shape}")
+    return goal
+
+
+def _between(A: Array, B: Array, near: Array) -> Array:
+    """Return by how much the second pose is turned from the first (n, k), those of the circle nearest to (k,) [rad].
+
+    Half a turn more or less is not taken for half a turn the other way.
+    """
+    return np.asarray(near + wrapped(B - A - near))

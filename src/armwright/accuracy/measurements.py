@@ -68,12 +68,14 @@ class PoseTest:
         name: of the pose; of both poses for a distance.
         condition: in free words; may be empty.
         clouds: its parts, in order of the file.
+        angle_names: about which of a, b, c its angles turn.
     """
 
     kind: Kind
     name: str
     condition: str
     clouds: tuple[Cloud, ...]
+    angle_names: tuple[str, ...]
 
     @property
     def size(self) -> int:
@@ -92,6 +94,7 @@ class PathTest:
         commanded: the commanded path; None where none is needed.
         runs: one per cycle.
         speed: commanded [m/s]; None where none is told.
+        angle_names: about which of a, b, c its angles turn.
     """
 
     kind: Kind
@@ -100,6 +103,7 @@ class PathTest:
     commanded: Trace | None
     runs: tuple[Trace, ...]
     speed: float | None
+    angle_names: tuple[str, ...]
 
     @property
     def size(self) -> int:
@@ -159,7 +163,13 @@ def _pose_test(rows: list[Found]) -> PoseTest:
     names = list(dict.fromkeys(one.row.name for one in rows))
     if first.test == "distance":
         found = _paired(rows, found, names)
-    return PoseTest(kind=first.test, name=" to ".join(names), condition=first.condition, clouds=found)
+    return PoseTest(
+        kind=first.test,
+        name=" to ".join(names),
+        condition=first.condition,
+        clouds=found,
+        angle_names=first.angle_names,
+    )
 
 
 def _part(one: Found) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -243,6 +253,7 @@ def _path_test(rows: list[Found]) -> PathTest:
         commanded=commanded,
         runs=traces,
         speed=speeds.pop() if speeds else None,
+        angle_names=first.angle_names,
     )
 
 
@@ -286,7 +297,7 @@ def _one_layout(rows: Iterable[Found]) -> None:
     """Refuse rows of one test of which some are in a plane and some in space, or have other angles."""
     first, *others = rows
     for one in others:
-        if (len(one.row.place), len(one.row.angles)) != (len(first.row.place), len(first.row.angles)):
+        if (len(one.row.place), one.row.angle_names) != (len(first.row.place), first.row.angle_names):
             raise one.error(
                 "x", f"{first.path}:{first.row.line} has other coordinates or angles of the same {first.row.test} test"
             )

@@ -10,7 +10,6 @@ from armwright.accuracy.compliance import StaticCompliance
 from armwright.accuracy.corner import CornerDeviation
 from armwright.accuracy.cycles import ASKED, DIRECTIONS, LOADS, ROBOTS, Kind
 from armwright.accuracy.distance import DistanceAccuracy, DistanceRepeatability
-from armwright.accuracy.measured import ANGLES
 from armwright.accuracy.measurements import AnyTest, PoseTest
 from armwright.accuracy.path import PathDeviation, PathVelocity
 from armwright.accuracy.pose import PoseAccuracy, PoseRepeatability
@@ -94,20 +93,20 @@ def _axes(symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[s
         yield {"symbol": f"{symbol}_{axis}", "what": f"{what} along {axis}", "value": value, "unit": "m", **more}
 
 
-def _turns(symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:
-    for angle, value in zip(ANGLES, values.tolist(), strict=False):
+def _turns(test: AnyTest, symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:
+    for angle, value in zip(test.angle_names, values.tolist(), strict=True):
         yield {"symbol": f"{symbol}_{angle}", "what": f"{what} about {angle}", "value": value, "unit": "rad", **more}
 
 
-def _pose_accuracy(_test: AnyTest, one: PoseAccuracy) -> Iterator[dict[str, Any]]:
+def _pose_accuracy(test: AnyTest, one: PoseAccuracy) -> Iterator[dict[str, Any]]:
     yield {"symbol": "AP", "what": "pose accuracy", "value": one.position, "unit": "m"}
     yield from _axes("AP", "pose accuracy", one.components)
-    yield from _turns("AP", "pose accuracy", one.angles)
+    yield from _turns(test, "AP", "pose accuracy", one.angles)
 
 
-def _pose_repeatability(_test: AnyTest, one: PoseRepeatability) -> Iterator[dict[str, Any]]:
+def _pose_repeatability(test: AnyTest, one: PoseRepeatability) -> Iterator[dict[str, Any]]:
     yield {"symbol": "RP", "what": "pose repeatability", "value": one.radius, "unit": "m"}
-    yield from _turns("RP", "pose repeatability", one.angles, either_way=True)
+    yield from _turns(test, "RP", "pose repeatability", one.angles, either_way=True)
 
 
 def _variation(test: AnyTest, one: Variation) -> Iterator[dict[str, Any]]:
@@ -118,7 +117,7 @@ def _variation(test: AnyTest, one: Variation) -> Iterator[dict[str, Any]]:
     few = _lacking(len(one.barycentres), asked, parts)
     note = f"between {' and '.join(labels[i] for i in one.pair)}{few}"
     yield {"symbol": symbol, "what": what, "value": one.position, "unit": "m", "note": note, "lacking": bool(few)}
-    yield from _turns(symbol, what, one.angles, lacking=bool(few))
+    yield from _turns(test, symbol, what, one.angles, lacking=bool(few))
 
 
 def _lacking(count: int, asked: int, parts: str) -> str:
@@ -126,22 +125,26 @@ def _lacking(count: int, asked: int, parts: str) -> str:
     return f", {count} of {asked} {parts}" if count < asked else ""
 
 
-def _drift(_test: AnyTest, one: PoseDrift) -> Iterator[dict[str, Any]]:
+def _drift(test: AnyTest, one: PoseDrift) -> Iterator[dict[str, Any]]:
     note = f"over {(one.times[-1] - one.times[0]) / 3600:.3g} h, {len(one.times)} measurements"
     yield {"symbol": "dAP", "what": "drift of pose accuracy", "value": one.accuracy_change, "unit": "m", "note": note}
     yield {"symbol": "dRP", "what": "drift of pose repeatability", "value": one.repeatability_change, "unit": "m"}
+    yield from _turns(test, "dAP", "drift of pose accuracy", one.accuracy_change_angles)
+    yield from _turns(test, "dRP", "drift of pose repeatability", one.repeatability_change_angles)
 
 
-def _distance_accuracy(_test: AnyTest, one: DistanceAccuracy) -> Iterator[dict[str, Any]]:
+def _distance_accuracy(test: AnyTest, one: DistanceAccuracy) -> Iterator[dict[str, Any]]:
     note = f"of {one.commanded * 1e3:.6g} mm"
     yield {"symbol": "AD", "what": "distance accuracy", "value": one.distance, "unit": "m", "note": note}
     yield from _axes("AD", "distance accuracy", one.components)
+    yield from _turns(test, "AD", "distance accuracy", one.angles)
 
 
-def _distance_repeatability(_test: AnyTest, one: DistanceRepeatability) -> Iterator[dict[str, Any]]:
+def _distance_repeatability(test: AnyTest, one: DistanceRepeatability) -> Iterator[dict[str, Any]]:
     what = "distance repeatability"
     yield {"symbol": "RD", "what": what, "value": one.distance, "unit": "m", "either_way": True}
     yield from _axes("RD", what, one.components, either_way=True)
+    yield from _turns(test, "RD", what, one.angles, either_way=True)
 
 
 def _settling(_test: AnyTest, one: Settling) -> Iterator[dict[str, Any]]:
@@ -155,14 +158,14 @@ def _posing(_test: AnyTest, one: PosingTime) -> Iterator[dict[str, Any]]:
     yield {"symbol": "TP", "what": "minimum posing time", "value": one.time, "unit": "s", "note": note}
 
 
-def _path(_test: AnyTest, one: PathDeviation) -> Iterator[dict[str, Any]]:
+def _path(test: AnyTest, one: PathDeviation) -> Iterator[dict[str, Any]]:
     for symbol, what, value, at, angles in (
         ("AT", "path accuracy", one.accuracy, one.accuracy_at, one.accuracy_angles),
         ("RT", "path repeatability", one.repeatability, one.repeatability_at, one.repeatability_angles),
     ):
         note = f"at {at * 1e3:.4g} mm along"
         yield {"symbol": symbol, "what": what, "value": value, "unit": "m", "note": note}
-        yield from _turns(symbol, what, angles, either_way=symbol == "RT")
+        yield from _turns(test, symbol, what, angles, either_way=symbol == "RT")
 
 
 def _velocity(_test: AnyTest, one: PathVelocity) -> Iterator[dict[str, Any]]:

@@ -86,7 +86,7 @@ def pose_accuracy(
     return PoseAccuracy(
         position=float(np.linalg.norm(barycentre - goal)),
         components=barycentre - goal,
-        angles=_from_commanded(A, commanded_angles),
+        angles=from_commanded(A, commanded_angles),
         barycentre=barycentre,
         cycles=count,
     )
@@ -133,7 +133,8 @@ def _cloud(places: ArrayLike, angles: ArrayLike | None) -> tuple[Array, Array]:
     return P, angles_of(angles, len(P))
 
 
-def _from_commanded(A: Array, commanded: ArrayLike | None) -> Array:
+def from_commanded(A: Array, commanded: ArrayLike | None) -> Array:
+    """Return the means of angles (n, k) less the commanded ones (k,), on the circle [rad]."""
     goal = np.empty(0) if commanded is None else floats(commanded, "commanded angles")
     if goal.shape != A.shape[1:]:
         raise ShapeError(

@@ -42,6 +42,7 @@ class Row(NamedTuple):
         speed: commanded speed [m/s].
         place: two or three coordinates [m].
         angles: none to three [rad].
+        angle_names: about which of a, b, c each of them turns.
     """
 
     line: int
@@ -56,6 +57,7 @@ class Row(NamedTuple):
     speed: float | None
     place: tuple[float, ...]
     angles: tuple[float, ...]
+    angle_names: tuple[str, ...]
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -178,6 +180,7 @@ class _Line:
             speed=self._number("speed"),
             place=self._numbers("xyz"),
             angles=self._numbers(ANGLES),
+            angle_names=tuple(name for name in ANGLES if name in self._columns),
         )
 
     def _text(self, name: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from armwright.accuracy.angles import mean_angles, wrapped
 from armwright.accuracy.cycles import DIRECTIONS, ROBOTS, Kind, checked_cycles, checked_parts
 from armwright.accuracy.measured import angles_of, frozen_array, one_size, place_of, places_of
-from armwright.accuracy.pose import repeatability
+from armwright.accuracy.pose import from_commanded, repeatability
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -42,6 +42,8 @@ class PoseDrift:
     Attributes:
         accuracy_change: dAP_P, between the first measurement and the last [m].
         repeatability_change: dRP, likewise [m].
+        accuracy_change_angles: (k,) dAP_a, dAP_b, dAP_c, likewise [rad].
+        repeatability_change_angles: (k,) dRP_a, dRP_b, dRP_c, likewise [rad].
         times: (m,) of the measurements [s].
         accuracy: (m,) AP_P at each [m].
         repeatability: (m,) RP_l at each [m].
@@ -50,6 +52,8 @@ class PoseDrift:
 
     accuracy_change: float
     repeatability_change: float
+    accuracy_change_angles: Array = attrs.field(converter=frozen_array)
+    repeatability_change_angles: Array = attrs.field(converter=frozen_array)
     times: Array = attrs.field(converter=frozen_array)
     accuracy: Array = attrs.field(converter=frozen_array)
     repeatability: Array = attrs.field(converter=frozen_array)
@@ -102,13 +106,23 @@ def exchangeability(
     return _variation("exchangeability", places, angles, few=few)
 
 
-def pose_drift(times: ArrayLike, places: Sequence[ArrayLike], commanded: ArrayLike, *, few: bool = False) -> PoseDrift:
+def pose_drift(
+    times: ArrayLike,
+    places: Sequence[ArrayLike],
+    commanded: ArrayLike,
+    *,
+    angles: Sequence[ArrayLike] | None = None,
+    commanded_angles: ArrayLike | None = None,
+    few: bool = False,
+) -> PoseDrift:
     """Return dAP and dRP: how accuracy and repeatability change from cold to warm.
 
     Args:
         times: (m,) when each measurement was made, rising [s].
         places: (n, 2) or (n, 3) attained places of each measurement [m].
         commanded: (2,) or (3,) the commanded place [m].
+        angles: (n, k) attained angles of each measurement [rad].
+        commanded_angles: (k,) the commanded ones [rad].
         few: take fewer than 10 cycles per measurement.
 
     Raises:
@@ -127,12 +141,16 @@ def pose_drift(times: ArrayLike, places: Sequence[ArrayLike], commanded: ArrayLi
         raise InvalidValueError("drift: needs two measurements at least, each later than the one before")
     one_size(clouds, "drift")
     goal = place_of(commanded, clouds[0].shape[1])
-    found = [repeatability("drift", P, angles_of(None, len(P)), few=few) for P in clouds]
+    turns = _angles_of_all("drift", clouds, angles)
+    found = [repeatability("drift", P, A, few=few) for P, A in zip(clouds, turns, strict=True)]
     accuracy = np.array([np.linalg.norm(one.barycentre - goal) for one in found])
     radius = np.array([one.radius for one in found])
+    off = [from_commanded(A, commanded_angles) for A in (turns[0], turns[-1])]
     return PoseDrift(
         accuracy_change=float(abs(accuracy[-1] - accuracy[0])),
         repeatability_change=float(abs(radius[-1] - radius[0])),
+        accuracy_change_angles=np.abs(wrapped(off[1] - off[0])),
+        repeatability_change_angles=np.abs(found[-1].angles - found[0].angles),
         times=t,
         accuracy=accuracy,
         repeatability=radius,
@@ -142,11 +160,8 @@ def pose_drift(times: ArrayLike, places: Sequence[ArrayLike], commanded: ArrayLi
 
 def _variation(kind: Kind, places: Sequence[ArrayLike], angles: Sequence[ArrayLike] | None, *, few: bool) -> Variation:
     clouds = [places_of(one) for one in places]
-    if angles is not None and len(angles) != len(clouds):
-        raise ShapeError(f"{kind}: {len(clouds)} clouds of places but {len(angles)} of angles")
-    turns = [angles_of(None if angles is None else angles[h], len(P)) for h, P in enumerate(clouds)]
+    turns = _angles_of_all(kind, clouds, angles)
     one_size(clouds, kind)
-    one_size(turns, f"{kind}, angles")
     count = checked_cycles(kind, [len(P) for P in clouds], few=few, least=1)
     centres = np.array([P.mean(axis=0) for P in clouds])
     means = np.array([mean_angles(A) for A in turns])
@@ -160,3 +175,12 @@ def _variation(kind: Kind, places: Sequence[ArrayLike], angles: Sequence[ArrayLi
         barycentres=centres,
         cycles=count,
     )
+
+
+def _angles_of_all(kind: Kind, clouds: Sequence[Array], angles: Sequence[ArrayLike] | None) -> list[Array]:
+    """Return the angles (n, k) of each cloud of places; none where none were measured."""
+    if angles is not None and len(angles) != len(clouds):
+        raise ShapeError(f"{kind}: {len(clouds)} clouds of places but {len(angles)} of angles")
+    turns = [angles_of(None if angles is None else angles[h], len(P)) for h, P in enumerate(clouds)]
+    one_size(turns, f"{kind}, angles")
+    return turns

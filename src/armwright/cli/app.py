@@ -32,7 +32,7 @@ from armwright.cli.simulate import simulate
 from armwright.cli.singularity import singularity
 from armwright.cli.study import study
 from armwright.cli.torque import torque
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, CheckFailedError, ContradictionError
 from armwright.version import __version__
 
 app = typer.Typer(
@@ -105,6 +105,10 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")
     try:
         app()
+    except CheckFailedError as error:
+        _end(5, str(error))
+    except ContradictionError as error:
+        _end(3, str(error))
     except ArmwrightError as error:
         _end(1, str(error))
     except BrokenPipeError:

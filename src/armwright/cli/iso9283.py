@@ -8,8 +8,11 @@ import typer
 from armwright.cli.numbers import Named, named_number
 from armwright.cli.options import Json, Quiet
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table
+from armwright.errors import CheckFailedError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from armwright.accuracy.assess import Assessment
     from armwright.accuracy.measures import Measure
 
@@ -40,7 +43,8 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
 
     Accuracy and repeatability of poses (AP, RP, vAP), of distances (AD, RD) and of paths (AT, RT, AV, RV, FV), coming
     to rest (t, OV, TP), corners (CR, CO), drift, exchangeability, compliance and weaving. A test with fewer cycles than
-    the standard asks for is refused unless --few is given.
+    the standard asks for is refused unless --few is given. A measure that exceeds its --limit ends the command with
+    exit status 5, after everything is printed and written.
 
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
@@ -56,6 +60,21 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
         _print(found)
         if output is not None:
             print(f"report: {output / 'report.html'}")
+    if found.exceeded:
+        raise CheckFailedError(_exceeded(found.exceeded))
+
+
+def _exceeded(measures: "Sequence[Measure]") -> str:
+    """Say which measures exceed their limits, and by how much."""
+    from armwright.report.accuracy_page import shown_measure
+
+    told = []
+    for one in measures:
+        seen = shown_measure(one)
+        unit = seen.unit
+        of = f"{one.test} {one.name}{f', {one.condition}' if one.condition else ''}"
+        told.append(f"{one.symbol} of {of} is {seen.value} {unit}, and at most {seen.limit} {seen.unit} is allowed")
+    return f"limit exceeded: {'; '.join(told)}"
 
 
 def _assessed(

@@ -70,7 +70,7 @@ def notes_of(found: Assessment) -> list[str]:
         notes.append(f"planar reduction: {which} measured in a plane, without z; distances are taken in it")
     if found.few:
         notes.append("fewer cycles than ISO 9283 asks for, where n or the note says so: such a measure is an estimate")
-    over = sorted({one.symbol for one in found.measures if one.holds is False})
+    over = sorted({one.symbol for one in found.exceeded})
     if over:
         notes.append(f"limit exceeded: {', '.join(over)}")
     return notes
