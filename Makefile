@@ -2,29 +2,32 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# What was tested together; empty for the newest of everything.
+CONSTRAINTS ?= constraints.txt
+export PIP_CONSTRAINT := $(if $(CONSTRAINTS),$(abspath $(CONSTRAINTS)))
 
-.PHONY: help demo test proof bench edges examples docs gallery studies pictures messages editor fuzz clean
+.PHONY: help demo test proof bench edges examples docs gallery studies pictures messages editor fuzz versions sbom clean
 
 help:             ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' Makefile
 
-$(VENV)/core: pyproject.toml
+$(VENV)/core: pyproject.toml $(CONSTRAINTS)
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
 	@touch $@
 
-$(VENV)/test: pyproject.toml
+$(VENV)/test: pyproject.toml $(CONSTRAINTS)
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,urdf]'
 	@# It asks for NumPy 1, and works with 2.
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps 'pybotics>=3.0,<4'
 	@touch $@ $(VENV)/core
 
-$(VENV)/bench: pyproject.toml $(VENV)/test
+$(VENV)/bench: pyproject.toml $(CONSTRAINTS) $(VENV)/test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	@touch $@
 
-$(VENV)/docs: pyproject.toml
+$(VENV)/docs: pyproject.toml $(CONSTRAINTS)
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@ $(VENV)/core
@@ -99,6 +102,20 @@ fuzz: $(VENV)/test  ## Fuzz everything that reads what a user types, a million i
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
 	for target in $(or $(TARGET),tokens tree cell code program format); do \
 	    $(BIN)/python fuzz/fuzz.py $$target -runs=$(or $(RUNS),1000000) || exit 1; done
+
+versions:         ## Write constraints.txt from the newest versions of everything, to be tested then
+	rm -rf build/versions && $(PYTHON) -m venv build/versions
+	PIP_CONSTRAINT= build/versions/bin/python -m pip install --quiet --disable-pip-version-check --editable \
+	    '.[test,urdf,docs,bench,online,optimal,sweep,clearance,calibration,lsp]'
+	PIP_CONSTRAINT= build/versions/bin/python -m pip install --quiet --disable-pip-version-check --no-deps 'pybotics>=3.0,<4'
+	sed -n '/^#/p' constraints.txt > build/constraints.txt
+	build/versions/bin/python -m pip --disable-pip-version-check freeze --exclude-editable >> build/constraints.txt
+	mv build/constraints.txt constraints.txt && rm -rf build/versions
+
+sbom: $(VENV)/core  ## Write what armwright is installed with as a CycloneDX list, out/sbom.json
+	$(PYTHON) -m venv build/sbom && build/sbom/bin/python -m pip install --quiet --disable-pip-version-check cyclonedx-bom
+	mkdir -p out && build/sbom/bin/cyclonedx-py environment $(BIN)/python --pyproject pyproject.toml -o out/sbom.json
+	rm -rf build/sbom
 
 clean:            ## Remove what was built
 	rm -rf $(VENV) out site build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

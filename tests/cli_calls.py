@@ -19,5 +19,5 @@ def armwright(
         cwd=cwd,
         preexec_fn=before,
         env={**os.environ, "COLUMNS": str(columns), "NO_COLOR": "1"},
-        timeout=120,
+        timeout=300,
     )

@@ -27,7 +27,7 @@ class Fall:
     seconds: float = 0.0
     """A call takes so long [s]."""
     company: int = 1
-    """A call waits until so many processes have called, a minute at most."""
+    """A call waits until so many processes have called, five minutes at most."""
     raises_above: float = np.inf
     kills_above: float = np.inf
     unless: Path | None = None
@@ -59,7 +59,7 @@ class Fall:
             os.write(handle, f"{os.getpid()} {' '.join(map(repr, speed[:, 0].tolist()))}\n".encode())
             os.close(handle)
         time.sleep(self.seconds)
-        late = time.monotonic() + 60
+        late = time.monotonic() + 300
         while self.calls is not None and self.company > len({process for process, _ in calls_of(self.calls)}):
             assert time.monotonic() < late
             time.sleep(0.01)

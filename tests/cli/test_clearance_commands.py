@@ -105,15 +105,15 @@ def test_interrupted_sweep(tmp_path: Path) -> None:
     with subprocess.Popen(
         [sys.executable, "-m", "armwright", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True
     ) as running:
-        while not list(tmp_path.glob("out/blocks/*.npz")) and running.poll() is None:
+        while not list(tmp_path.glob("out/blocks/??????.npz")) and running.poll() is None:
             time.sleep(0.1)
         running.send_signal(signal.SIGINT)
-        _, said = running.communicate(timeout=60)
+        _, said = running.communicate(timeout=300)
 
     assert running.returncode == 130
     kept = "what is finished is kept in 'out', and the same command goes on from there"
     assert said == f"armwright: interrupted; {kept}\n"
-    assert list(tmp_path.glob("out/blocks/*.npz"))
+    assert list(tmp_path.glob("out/blocks/??????.npz"))
 
 
 def test_sweep_goes_on(folder: Path) -> None:
@@ -241,7 +241,7 @@ print(json.dumps(answers))
         text=True,
         check=False,
         cwd=place,
-        timeout=200,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr
     assert {path.name for path in place.iterdir()} == {"x2.csv"}

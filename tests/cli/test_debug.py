@@ -18,7 +18,7 @@ def debug(*commands: str, program: Path = BENCH) -> tuple[int, list[str]]:
         text=True,
         check=False,
         env={**os.environ, "NO_COLOR": "1"},
-        timeout=120,
+        timeout=300,
     )
     assert done.stderr == ""
     return done.returncode, done.stdout.replace("(rlo) ", "").splitlines()

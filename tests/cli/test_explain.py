@@ -21,7 +21,7 @@ def explain(*arguments: str) -> subprocess.CompletedProcess[str]:
         check=False,
         encoding="utf-8",
         env=ENVIRONMENT,
-        timeout=120,
+        timeout=300,
     )
 
 

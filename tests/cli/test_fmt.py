@@ -23,7 +23,7 @@ def fmt(
         check=False,
         cwd=folder,
         env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1", "PYTHONUTF8": "1"},
-        timeout=120,
+        timeout=300,
     )
 
 

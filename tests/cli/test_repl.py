@@ -24,7 +24,7 @@ CELL = ROOT / "tests" / "program" / "corpus" / "cell1.json"
 STACKING = ROOT / "examples" / "stacking.rlo"
 PLACE = "a = (1,0,0, 0,-1,0, 0,0,-1, 0.40, 0.15, 0.20)"
 # A terminal answers at once; this long it may take to start on a busy machine.
-PATIENCE = 60.0
+PATIENCE = 300.0
 
 
 def fed(*lines: str, options: tuple[str | Path, ...] = ("--cell", CELL), cwd: Path | None = None) -> tuple[int, str]:
@@ -37,7 +37,7 @@ def fed(*lines: str, options: tuple[str | Path, ...] = ("--cell", CELL), cwd: Pa
         check=False,
         cwd=cwd,
         env={**os.environ, "NO_COLOR": "1", "COLUMNS": "100"},
-        timeout=120,
+        timeout=300,
     )
     assert "Traceback" not in done.stdout + done.stderr
     return done.returncode, done.stdout + done.stderr

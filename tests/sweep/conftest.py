@@ -1,5 +1,6 @@
 """What the tests of sweeps share."""
 
+import gc
 from collections.abc import Iterator
 from typing import Any
 
@@ -7,6 +8,25 @@ import numpy as np
 import pytest
 
 from armwright.sweep.designs import Design, full_factorial
+
+
+@pytest.fixture(autouse=True)
+def _collected() -> Iterator[None]:
+    """Whatever a test left to the collector is collected behind it, not in the midst of the next one."""
+    yield
+    gc.collect()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _patient() -> Iterator[None]:
+    """On a busy machine a cluster takes its time to start."""
+    try:
+        import dask
+    except ImportError:
+        yield
+        return
+    with dask.config.set({f"distributed.comm.timeouts.{what}": "240s" for what in ("connect", "tcp")}):
+        yield
 
 
 @pytest.fixture(scope="module")

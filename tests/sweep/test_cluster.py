@@ -1,5 +1,7 @@
 """A Dask cluster as the crew of a sweep."""
 
+import gc
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +73,49 @@ def test_nobody_answers(speeds: Design, tmp_path: Path, monkeypatch: pytest.Monk
 
     with pytest.raises(SweepError, match=r"no Dask scheduler answers at 'tcp://127.0.0.1:1'"):
         run(Fall(), speeds, tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+
+
+def clients() -> list[Any]:
+    """The clients of Dask that are there, after a collection."""
+    gc.collect()
+    return [one for one in gc.get_objects() if isinstance(one, distributed.Client)]
+
+
+def test_silence(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where something listens and never speaks, nobody waits for ever, and no client is left to the collector."""
+    monkeypatch.setattr(crew, "PATIENCE", 0.5)
+    before = clients()
+    with socket.create_server(("127.0.0.1", 0)) as deaf:
+        address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
+        with pytest.raises(SweepError, match=f"no Dask scheduler answers at '{address}'"):
+            run(Fall(), speeds, tmp_path / "out", scheduler=address)
+
+    assert clients() == before
+
+
+def test_scheduler_lost_at_once(
+    local_cluster: Any, speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client whose scheduler goes away while it is being made is closed where it was made."""
+    made: list[Any] = []
+
+    async def lost(self: Any, **_: Any) -> None:
+        made.append(self)
+        raise OSError("the line is dead")
+
+    monkeypatch.setattr(distributed.Client, "_ensure_connected", lost)
+    with pytest.raises(SweepError, match=r"no Dask scheduler answers at 'inproc://.*the line is dead"):
+        run(Fall(), speeds, tmp_path / "out", scheduler=local_cluster.scheduler_address)
+
+    assert [client.status for client in made] == ["closed"]
+
+
+def test_address_of_a_worker(local_cluster: Any, speeds: Design, tmp_path: Path) -> None:
+    """A worker of Dask is no scheduler."""
+    worker = next(iter(local_cluster.scheduler_info["workers"]))
+
+    with pytest.raises(SweepError, match=r"answers 'Worker' of Dask; expected the address of its scheduler"):
+        run(Fall(), speeds, tmp_path / "out", scheduler=worker)
 
 
 def test_address_that_is_none(speeds: Design, tmp_path: Path) -> None:

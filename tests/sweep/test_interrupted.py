@@ -44,7 +44,7 @@ if __name__ == "__main__":
 """
 
 
-def until(true: Callable[[], Any], seconds: float = 30.0) -> None:
+def until(true: Callable[[], Any], seconds: float = 240.0) -> None:
     """Wait for something."""
     end = time.monotonic() + seconds
     while not true():

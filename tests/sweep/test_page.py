@@ -24,7 +24,7 @@ def test_example(tmp_path: Path) -> None:
         capture_output=True,
         encoding="utf-8",
         check=False,
-        timeout=60,
+        timeout=300,
     )
 
     assert done.stderr == ""

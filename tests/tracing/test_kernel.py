@@ -176,8 +176,8 @@ def _start(cache: Path) -> subprocess.Popen[str]:
 
 def test_second_start_compiles_nothing(tmp_path: Path) -> None:
     """Another process finds the compiled kernel on the disk."""
-    first, _ = _start(tmp_path).communicate(timeout=120)
-    second, _ = _start(tmp_path).communicate(timeout=120)
+    first, _ = _start(tmp_path).communicate(timeout=300)
+    second, _ = _start(tmp_path).communicate(timeout=300)
 
     assert first.split() == [repr(math.sin(0.5) * 1.25), "0"]
     assert second.split() == [repr(math.sin(0.5) * 1.25), "1"]
@@ -186,7 +186,7 @@ def test_second_start_compiles_nothing(tmp_path: Path) -> None:
 def test_processes_that_start_together(tmp_path: Path) -> None:
     """Four processes that want the same kernel at once all get it, and one of them compiles it."""
     running = [_start(tmp_path) for _ in range(4)]
-    said = [process.communicate(timeout=180)[0].split() for process in running]
+    said = [process.communicate(timeout=300)[0].split() for process in running]
 
     assert {line[0] for line in said} == {repr(math.sin(0.5) * 1.25)}
     assert sum(line[1] == "0" for line in said) == 1
@@ -196,7 +196,7 @@ def test_a_home_that_cannot_be_written(tmp_path: Path) -> None:
     """Without a cache folder the kernel is compiled for the process alone."""
     (tmp_path / "file").write_text("in the way")
 
-    said, _ = _start(tmp_path / "file").communicate(timeout=120)
+    said, _ = _start(tmp_path / "file").communicate(timeout=300)
 
     assert said.split()[0] == repr(math.sin(0.5) * 1.25)
 

@@ -4,8 +4,8 @@ A crew gets pieces of a design and gives back their rows, in any order. It outli
 died is done again, alone, so that the blame for a second death is its own.
 """
 
+import asyncio
 import concurrent.futures
-import gc
 import multiprocessing
 import pickle
 from collections.abc import Callable, Iterable, Iterator
@@ -233,23 +233,59 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
     """Be a client of a Dask cluster.
 
     Raises:
-        SweepError: nobody answers at the address.
+        SweepError: nobody answers at the address, or what answers is no scheduler.
     """
     distributed = extra("distributed")
-    # A client that nobody answered is closed when it is collected; while another one starts, both would wait for ever.
-    gc.collect()
-    collecting = gc.isenabled()
-    gc.disable()
+    _refuse_silence(address)
+    with _client(distributed.Client, address) as client, extra("threadpoolctl").threadpool_limits(1):
+        # Where the workers are threads of this process, its threads are theirs.
+        yield Cluster(client, address, task)
+
+
+@contextmanager
+def _client(kind: Any, address: str) -> Iterator[Any]:
+    """Have a Dask client that is closed here whatever happens, also while it is being made.
+
+    One that is left to the collector is closed by it, in the midst of anything: where that holds the lock that closing
+    takes (another client or a cluster being started), both wait for ever.
+    """
+    client = kind.__new__(kind)
     try:
-        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
+        client.__init__(address, timeout=PATIENCE, set_as_default=False)
+        yield client
+    except OSError as error:
         raise SweepError(f"no Dask scheduler answers at '{address}': {shown(error)}") from error
     finally:
-        if collecting:
-            gc.enable()
-    # Where the workers are threads of this process, its threads are theirs.
-    with client, extra("threadpoolctl").threadpool_limits(1):
-        yield Cluster(client, address, task)
+        client.close()
+
+
+def _refuse_silence(address: str) -> None:
+    """See to it that a scheduler answers at an address before a client is made.
+
+    Raises:
+        SweepError: nobody answers there, or what does is no scheduler.
+    """
+    # In a thread of its own: the caller may have an event loop that runs, as notebooks do.
+    with concurrent.futures.ThreadPoolExecutor(1) as thread:
+        try:
+            kind = thread.submit(asyncio.run, _kind_of(address)).result()
+        except (OSError, ValueError) as error:
+            raise SweepError(f"no Dask scheduler answers at '{address}': {shown(error)}") from error
+    if kind != "Scheduler":
+        raise SweepError(f"at '{address}' answers {shown(kind)} of Dask; expected the address of its scheduler")
+
+
+async def _kind_of(address: str) -> object:
+    """Ask what stands at an address of Dask: a scheduler or a worker."""
+    from distributed import Security, rpc  # noqa: PLC0415 - a library of the extra
+
+    async with asyncio.timeout(PATIENCE):
+        there = rpc(address, timeout=PATIENCE, connection_args=Security().get_connection_args("client"))
+        try:
+            answer = await there.identity()
+        finally:
+            await there.close_rpc()
+    return answer.get("type") if isinstance(answer, dict) else answer
 
 
 def pickled(task: Task, dumps: Callable[[Task], bytes]) -> bytes:

@@ -14,7 +14,7 @@ from typing import Any, Self
 from program.running import CORPUS
 
 # A request that is not answered by then never is [s].
-PATIENCE = 60.0
+PATIENCE = 300.0
 
 
 class Client:

@@ -547,7 +547,7 @@ def test_questions_that_make_no_sense(asked: object) -> None:
     end = json.dumps({"jsonrpc": "2.0", "method": lsp.EXIT}).encode()
     messages = b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(one), one) for one in (body, end))
     command = [sys.executable, "-m", "armwright", "lsp"]
-    said = subprocess.run(command, input=messages, capture_output=True, check=False, timeout=60).stdout
+    said = subprocess.run(command, input=messages, capture_output=True, check=False, timeout=300).stdout
 
     answer, _ = json.JSONDecoder().raw_decode(said.decode().partition("\r\n\r\n")[2])
     assert (answer["id"], answer["error"]["code"]) == (7, -32602)
@@ -557,7 +557,7 @@ def test_without_pygls() -> None:
     """Where the library of the protocol is missing, the message says how to get it."""
     without = "import sys; sys.modules['pygls'] = None; sys.argv = ['armwright', 'lsp']"
     script = f"{without}; from armwright.cli.app import main; main()"
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60)
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=300)
 
     assert result.returncode == 1
     assert result.stderr == (
