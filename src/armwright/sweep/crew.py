@@ -277,10 +277,10 @@ def _refuse_silence(address: str) -> None:
 
 async def _kind_of(address: str) -> object:
     """Ask what stands at an address of Dask: a scheduler or a worker."""
-    from distributed import Security, rpc  # noqa: PLC0415 - a library of the extra
-
+    distributed = extra("distributed")
     async with asyncio.timeout(PATIENCE):
-        there = rpc(address, timeout=PATIENCE, connection_args=Security().get_connection_args("client"))
+        arguments = distributed.Security().get_connection_args("client")
+        there = distributed.rpc(address, timeout=PATIENCE, connection_args=arguments)
         try:
             answer = await there.identity()
         finally:
