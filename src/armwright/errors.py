@@ -79,6 +79,10 @@ class UnitWarning(UserWarning):
     """A number looks as if it were in another unit: degrees where radians belong."""
 
 
+class CacheWarning(UserWarning):
+    """The cache folder cannot be trusted and is not used; every start compiles anew."""
+
+
 def one_of(kind: str, name: str, known: Iterable[str]) -> str:
     """Return ``name`` if it is one of those known.
 

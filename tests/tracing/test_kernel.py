@@ -12,10 +12,10 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import InvalidValueError, ShapeError
+from armwright.files.store import cache_folder
 from armwright.kinematics.inverse.closed_form import BRANCHES
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.shoulder import first_three
-from armwright.tracing.cache import cache_folder
 from armwright.tracing.emit import LANES, emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import atan2, cos, sin

@@ -22,13 +22,11 @@ CONTROLS: tuple[Control, ...] = ("effort", "pd+ff")
 
 _SOURCE = """{head}{helpers}
 {functions}
-@njit(
-    types.void(
-        int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True), float64, int64,
-        types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
-    ),
-    error_model="numpy", nogil=True, cache=True,
+SIGNATURE = types.void(
+    int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True), float64, int64,
+    types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
 )
+
 def simulate(first, last, start, contacts, gains, table, h, stride, samples, counts, peaks):
     steps = table.shape[0]
     x = np.zeros({inputs} * {lanes})
@@ -216,7 +214,7 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
             "body": " " * 16 + "rates(x, y)",
         }
     return _SOURCE.format(
-        head=head(f"simulation of {layout.linkage.name}", sum(body.operations.values())),
+        head=head(sum(body.operations.values())),
         helpers=body.helpers,
         outputs=body.outputs,
         advance=_filled(_RK4 if integrator == "rk4" else _SEMI_IMPLICIT, sizes),

@@ -22,7 +22,7 @@ from armwright.clearance.preparing import Task
 from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import check_step, contact_stiffness
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.tracing.cache import compiled_module
+from armwright.tracing.cache import compiled
 from armwright.tracing.kernel import on_cores
 
 # A tip that is farther off than this has left its path for good [m].
@@ -211,7 +211,7 @@ class _Shape:
 def _compiled(shape: _Shape, rubbing: Rubbing, control: Control, located: bool, integrator: Integrator) -> Any:  # noqa: FBT001 - a part of the key
     layout = Layout(linkage=shape.linkage, rubbing=rubbing, control=control, located=located)
     source = emit_simulation(layout, integrator)
-    return compiled_module(source, f"the simulation of {shape.linkage.name}").simulate
+    return compiled(source, "simulate", f"the simulation of {shape.linkage.name}")
 
 
 def _told(task: Task, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:

@@ -57,6 +57,8 @@ class Terminal:
 @contextlib.contextmanager
 def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
     """Let the arrow keys bring back earlier lines, also of earlier sessions, and the tab key complete words."""
+    from armwright.files.store import make_private
+
     try:
         import readline
     except ImportError:  # a Python without it: lines can be typed all the same
@@ -64,8 +66,9 @@ def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
         return
     history = history_file()
     # A history that cannot be read or kept is no reason to do without a session.
-    with contextlib.suppress(OSError):
-        readline.read_history_file(history)
+    if history:
+        with contextlib.suppress(OSError):
+            readline.read_history_file(history)
     readline.set_history_length(_LONGEST_HISTORY)
     readline.set_completer_delims(_DELIMITERS)
 
@@ -80,16 +83,18 @@ def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
         yield
     finally:
         readline.set_completer(None)
-        with contextlib.suppress(OSError):
-            history.parent.mkdir(parents=True, exist_ok=True)
-            readline.write_history_file(history)
+        if history:
+            with contextlib.suppress(OSError):
+                make_private(history.parent)
+                readline.write_history_file(history)
 
 
-def history_file() -> Path:
-    """Return where the lines of sessions are kept: in the user's cache folder."""
-    from armwright.tracing.cache import cache_folder
+def history_file() -> Path | None:
+    """Return where the lines of sessions are kept: in the user's cache folder, if there is one and it is private."""
+    from armwright.files.store import cache_folder, distrust
 
-    return cache_folder() / "repl_history"
+    folder = cache_folder()
+    return None if folder is None or distrust(folder) else folder / "repl_history"
 
 
 def completions(session: "Session", commands: tuple[str, ...], before: str, word: str) -> list[str]:

@@ -1,73 +1,114 @@
-"""Where compiled kernels are kept: made once per source, version and processor, safe with several processes."""
+"""Compiled functions: taken from the user's cache where they are there, otherwise compiled, once, and kept.
+
+A source is executed from memory, never from a file, and what was compiled comes out of a store that checks every byte
+(``armwright.files.store``): Numba writes and reads no files of its own.
+"""
 
 import contextlib
-import fcntl
 import hashlib
-import importlib.util
-import os
+import marshal
+import pickle
 import sys
-import tempfile
 import threading
-from collections.abc import Iterator
-from pathlib import Path
-from types import ModuleType
+from collections.abc import Callable
+from types import CodeType, ModuleType
 from typing import Any
 
+import attrs
 import numpy as np
 
+from armwright.errors import shown
+from armwright.files.store import user_store
 from armwright.version import __version__
 
-_LOADED: dict[str, ModuleType] = {}
+_LOADED: dict[str, Callable[..., Any]] = {}
 _LOADING = threading.Lock()
 
 
-def cache_folder() -> Path:
-    """Return where kernels are kept: ``$ARMWRIGHT_CACHE``, or armwright in the user's cache folder."""
-    own = os.environ.get("ARMWRIGHT_CACHE")
-    if own:
-        return Path(own)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "armwright"
-
-
-def compiled_module(source: str, title: str) -> ModuleType:
-    """Import a source from the cache folder, writing and compiling it first where it is not there.
+def compiled(source: str, entry: str, title: str) -> Callable[..., Any]:
+    """Return the compiled function of a source; the first time it is compiled, and then kept on disk.
 
     The first compilation takes a second or more and is announced on the error output when a person watches.
 
     Args:
-        source: Python for Numba.
+        source: Python for Numba: a function and, as ``SIGNATURE``, its type. It holds numbers and names of ours only:
+            no text that came from a user.
+        entry: the name of the function.
         title: what it computes, for the announcement.
     """
     key = _key(source)
     with _LOADING:
         if key not in _LOADED:
-            folder = cache_folder() / "kernels" / key
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-            except OSError:
-                # A home that cannot be written to: compile for this process alone.
-                folder = Path(tempfile.mkdtemp(prefix="armwright-kernel-"))
-            with _alone(folder):
-                _LOADED[key] = _import(folder, source, title)
+            _LOADED[key] = _load(key, source, entry, title)
         return _LOADED[key]
 
 
-def _import(folder: Path, source: str, title: str) -> ModuleType:
-    file = folder / "kernel.py"
-    if not file.exists():
-        # Never rewritten: the compiler's cache goes by the time of the file.
-        file.write_text(source, encoding="utf-8")
-    done = folder / "compiled"
-    if not done.exists() and sys.stderr.isatty():
-        print(f"armwright: compiling {title}, once", file=sys.stderr)  # noqa: T201 - asked for by who watches
-    spec = importlib.util.spec_from_file_location(f"armwright_kernel_{folder.name}", file)
-    assert spec is not None  # noqa: S101 - the file is there
-    assert spec.loader is not None  # noqa: S101
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # the compiled code, taken from disk, looks for its module there
-    spec.loader.exec_module(module)
-    done.touch()
-    return module
+def _load(key: str, source: str, entry: str, title: str) -> Callable[..., Any]:
+    store = user_store("compiled")
+    kept = store.get(key)
+    with contextlib.nullcontext() if kept else store.alone(key):
+        kept = kept or store.get(key)  # another process may have made it meanwhile
+        if kept:
+            # Sound bytes may still come from a Numba that writes them in another way.
+            with contextlib.suppress(Exception):
+                code, made = pickle.loads(kept)  # noqa: S301 - our own, checked by the store
+                return _function(key, entry, marshal.loads(code), _Exchange(made=made))  # noqa: S302
+        if sys.stderr.isatty():
+            print(f"armwright: compiling {shown(title)}, once", file=sys.stderr)  # noqa: T201 - asked for by who watches
+        code = compile(source, f"<{_module_name(key)}>", "exec")
+        exchange = _Exchange(made=None)
+        function = _function(key, entry, code, exchange)
+        store.put(key, pickle.dumps((marshal.dumps(code), exchange.made)))
+        return function
+
+
+def _function(key: str, entry: str, code: CodeType, exchange: "_Exchange") -> Callable[..., Any]:
+    """Return the compiled function of a code that this process, or one like it, has emitted."""
+    from numba import njit  # noqa: PLC0415 - costs half a second, and only kernels need it
+    from numba.core.typeinfer import register_dispatcher  # noqa: PLC0415
+
+    module = ModuleType(_module_name(key))
+    sys.modules[module.__name__] = module  # what was compiled looks for its module there
+    exec(code, module.__dict__)  # noqa: S102 - numbers and names of ours
+    dispatcher: Any = njit(error_model="numpy", nogil=True)(getattr(module, entry))
+    dispatcher._cache = exchange  # noqa: SLF001 - Numba's own cache trusts the files that it finds
+    with register_dispatcher(dispatcher):
+        dispatcher.compile(module.SIGNATURE)
+    dispatcher.disable_compile()
+    return dispatcher  # type: ignore[no-any-return]
+
+
+@attrs.define
+class _Exchange:
+    """What stands in for the cache of a Numba function.
+
+    Attributes:
+        made: what was compiled, taken apart to bytes; None where it has to be compiled now.
+    """
+
+    made: bytes | None
+    cache_path: str = ""
+
+    def load_overload(self, _signature: Any, context: Any) -> Any:
+        """Return what was compiled before."""
+        from numba.core import compiler  # noqa: PLC0415
+
+        if self.made is None:
+            return None
+        context.refresh()
+        results: Any = compiler.CompileResult
+        return results._rebuild(context, *pickle.loads(self.made))  # noqa: S301, SLF001 - as above
+
+    def save_overload(self, _signature: Any, result: Any) -> None:
+        """Take apart what has been compiled."""
+        from numba.core import serialize  # noqa: PLC0415
+
+        dumps: Any = serialize.dumps
+        self.made = dumps(result._reduce())  # noqa: SLF001
+
+
+def _module_name(key: str) -> str:
+    return f"armwright_kernel_{key}"
 
 
 def _key(source: str) -> str:
@@ -75,16 +116,6 @@ def _key(source: str) -> str:
     import llvmlite.binding as llvm  # noqa: PLC0415 - costs a quarter of a second, and only kernels need it
     import numba  # noqa: PLC0415
 
-    parts: list[Any] = [source, __version__, sys.version, np.__version__, numba.__version__, llvm.get_host_cpu_name()]
-    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()[:32]
-
-
-@contextlib.contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Keep other processes from compiling the same kernel meanwhile; they wait, and then find it done."""
-    with (folder / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        try:
-            yield
-        finally:
-            fcntl.flock(lock, fcntl.LOCK_UN)
+    processor = [llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()]
+    parts: list[Any] = [source, __version__, sys.version, np.__version__, numba.__version__, *processor]
+    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()

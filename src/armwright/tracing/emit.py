@@ -11,11 +11,13 @@ import inspect
 import math
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from keyword import iskeyword
 from typing import Literal, NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
 
+from armwright.errors import InvalidValueError, shown
 from armwright.tracing import elementary
 from armwright.tracing.fuse import fused
 from armwright.tracing.graph import Graph, Node, Traced, operation_count, reachable
@@ -45,7 +47,7 @@ _INFIX = {
 
 _NOT_FINITE = {"nan": "np.nan", "inf": "np.inf", "-inf": "-np.inf"}
 
-_HEAD = '''"""Emitted by armwright: {title}. {count} operations per configuration."""
+_HEAD = '''"""Emitted by armwright. {count} operations per configuration."""
 
 from math import sqrt
 
@@ -72,7 +74,8 @@ else:
 '''
 
 _ROWS = """
-@njit(int64(int64, int64, {signature}), error_model="numpy", nogil=True, cache=True)
+SIGNATURE = int64(int64, int64, {signature})
+
 def rows(first, last, {arguments}):
     if {misfit}:
         return 1
@@ -93,7 +96,8 @@ def rows(first, last, {arguments}):
 """
 
 _ONE = """
-@njit(int64({signature}), error_model="numpy", nogil=True, cache=True)
+SIGNATURE = int64({signature})
+
 def one({arguments}):
     if {misfit}:
         return 1
@@ -157,13 +161,19 @@ def emit(
     """Trace an equation and write its kernel.
 
     Args:
-        title: what it computes, in words.
+        title: what it computes, in words; it stands beside the source, not in it.
         equation: takes one list of scalars per input, returns one list per output, or ``Guarded`` ones.
         inputs: of each input, by its name, the width or the shape of one value; a matrix comes to the equation row
             by row.
         shapes: shape of one value of each output; vectors when left out.
         flags: numbers of the outputs that are truth values.
+
+    Raises:
+        InvalidValueError: the name of an input is no identifier: names become part of what is executed.
     """
+    for name in inputs:
+        if not (name.isascii() and name.isidentifier()) or iskeyword(name):
+            raise InvalidValueError(f"inputs: expected names such as 'qd', got {shown(name)}")
     graph = Graph()
     taken = {name: (shape,) if isinstance(shape, int) else shape for name, shape in inputs.items()}
     lists = [graph.inputs(math.prod(shape)) for shape in taken.values()]
@@ -175,7 +185,7 @@ def emit(
     code = _Code(graph, flat, [_node(graph, x) for x in positive], [x.node for row in lists for x in row])
     operations = operation_count(graph, flat)
     door = _Door(tuple(taken.values()), given, tuple(flags))
-    top = head(title, sum(operations.values()))
+    top = head(sum(operations.values()))
     helpers = "".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations))
     return Emitted(
         title=title,
@@ -231,14 +241,15 @@ def stretch(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: int) -
     )
 
 
-def head(title: str, count: int) -> str:
+def head(count: int) -> str:
     """Return the first lines of an emitted source.
 
+    No name or title stands in it: a source is executed, and those are texts that a user wrote.
+
     Args:
-        title: what it computes, in words.
         count: operations per configuration.
     """
-    return _HEAD.format(title=title, count=count)
+    return _HEAD.format(count=count)
 
 
 _HELPERS = {"sine_cosine": {"sin", "cos"}, "arc_tangent": {"atan2"}}

@@ -13,7 +13,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, cores, floats
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.tracing.cache import compiled_module
+from armwright.tracing.cache import compiled
 from armwright.tracing.emit import LANES, Emitted, Shape
 
 T = TypeVar("T")
@@ -22,9 +22,9 @@ T = TypeVar("T")
 _ROWS_PER_THREAD = 4096
 
 # The function that is called with arrays: the shortest way for those that come as they should, which is why its text
-# is made for the kernel. What does not come so goes the careful way.
+# is made for the kernel. What does not come so goes the careful way. The inputs are names that ``emit`` has checked.
 _DOOR = """
-def {name}({inputs}, *, threads=None, out=None):
+def door({inputs}, *, threads=None, out=None):
     if out is None:
         try:
             if {first}.ndim == {axes}:
@@ -57,12 +57,12 @@ class Kernel:
     @cached_property
     def one(self) -> Callable[..., int]:
         """The function of one configuration, for calls from other compiled code: see ``Emitted``."""
-        return compiled_module(self.emitted.one, self.emitted.title).one  # type: ignore[no-any-return]
+        return compiled(self.emitted.one, "one", self.emitted.title)
 
     @cached_property
     def rows(self) -> Callable[..., int]:
         """The function of many configurations: see ``Emitted``."""
-        return compiled_module(self.emitted.rows, self.emitted.title).rows  # type: ignore[no-any-return]
+        return compiled(self.emitted.rows, "rows", self.emitted.title)
 
     def function(self, name: str, doc: str = "") -> Callable[..., Any]:
         """Return the function that evaluates the equation for one configuration or many.
@@ -97,7 +97,6 @@ class Kernel:
 
         known |= {part: when_needed(part) for part in ("one", "rows")}
         text = _DOOR.format(
-            name=name,
             inputs=", ".join(inputs),
             first=next(iter(inputs)),
             axes=len(next(iter(inputs.values()))),
@@ -108,9 +107,9 @@ class Kernel:
             blanks_of_many=blanks("rows_asked, "),
             outputs=", ".join(outputs),
         )
-        exec(text, known)  # noqa: S102 - the text is ours, the names are those of the equation
-        made: Callable[..., Any] = known[name]
-        made.__doc__ = doc
+        exec(text, known)  # noqa: S102 - numbers, and names that are identifiers
+        made: Callable[..., Any] = known["door"]
+        made.__name__, made.__qualname__, made.__doc__ = name, name, doc
         return made
 
     def __call__(self, *inputs: ArrayLike, threads: int | None = None, out: Any = None) -> Any:
