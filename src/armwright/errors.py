@@ -3,9 +3,11 @@
 A message says what, what was got, what was expected and, where there is one, the nearest valid choice.
 """
 
+import enum
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
+from typing import ClassVar
 
 # Glyphs that a scan, a listing or a tired eye takes for one another.
 _CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "B": "8"})
@@ -13,24 +15,54 @@ _CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "
 _LONGEST_SHOWN = 60
 
 
+class ExitStatus(enum.IntEnum):
+    """How a command of the command line ended (docs/exit_status.md)."""
+
+    DONE = 0
+    PROGRAM_ERRORS = 1
+    USAGE = 2
+    INFEASIBLE = 3
+    FILE = 4
+    CHECK_FAILED = 5
+    INTERNAL_ERROR = 70
+    HANGUP = 129
+    INTERRUPTED = 130
+    BROKEN_PIPE = 141
+    TERMINATED = 143
+
+
 class ArmwrightError(Exception):
-    """The caller asked for something that cannot be; the text says what and what to do."""
+    """The caller asked for something that cannot be; the text says what and what to do.
+
+    Attributes:
+        exit_status: with which a command ends that raises it; each class has its own.
+    """
+
+    exit_status: ClassVar[ExitStatus] = ExitStatus.INFEASIBLE
 
 
 class KindError(ArmwrightError, TypeError):
     """A value is of the wrong kind: a text where numbers belong, a name where an arm does."""
 
+    exit_status = ExitStatus.USAGE
+
 
 class ShapeError(ArmwrightError, ValueError):
     """An array has the wrong shape."""
+
+    exit_status = ExitStatus.USAGE
 
 
 class InvalidValueError(ArmwrightError, ValueError):
     """A value is of the right kind but has no meaning here."""
 
+    exit_status = ExitStatus.USAGE
+
 
 class UnknownNameError(ArmwrightError, LookupError):
     """A name stands for nothing; the text lists what there is."""
+
+    exit_status = ExitStatus.USAGE
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
         """Say that no ``kind`` is called ``name``, and what is known instead."""
@@ -43,6 +75,8 @@ class UnknownNameError(ArmwrightError, LookupError):
 
 class FileFormatError(ArmwrightError, ValueError):
     """A file does not say what it should; the text names file, line and key."""
+
+    exit_status = ExitStatus.FILE
 
     def __init__(self, path: Path | str, line: int | None, key: str, message: str) -> None:
         """Point at ``key`` in ``line`` of ``path`` and say what is wrong there."""
@@ -58,6 +92,8 @@ class ContradictionError(ArmwrightError, ValueError):
 class CheckFailedError(ArmwrightError, ValueError):
     """All was done, and what was to be checked does not hold; the text says what."""
 
+    exit_status = ExitStatus.CHECK_FAILED
+
 
 class UnsupportedArmError(ArmwrightError, ValueError):
     """The method does not fit this arm."""
@@ -69,6 +105,8 @@ class MissingExtraError(ArmwrightError, ImportError):
 
 class OutputError(ArmwrightError, OSError):
     """A result could not be written; nothing half-written was left behind."""
+
+    exit_status = ExitStatus.FILE
 
 
 class RotationWarning(UserWarning):

@@ -136,7 +136,7 @@ def test_no_such_program(tmp_path: Path) -> None:
     """A program that is not there is a caller's mistake, told in one line."""
     result = check(tmp_path / "nothing.rlo")
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     assert result.stderr.startswith("armwright: ")
     assert result.stderr.count("\n") == 1
 
@@ -147,7 +147,7 @@ def test_not_text(tmp_path: Path) -> None:
     path.write_bytes(b"BEGIN\n\xff\xfe END.")
     result = check(path)
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     assert f"{path}:2: not UTF-8 text" in result.stderr
 
 

@@ -97,7 +97,7 @@ def test_slips(arguments: list[str], said: str) -> None:
     """A slip ends with one line that names the nearest thing, or what is expected."""
     done = armwright("clearance", "simulate", *arguments, columns=200)
 
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert done.stderr.startswith("armwright: ")
     assert done.stderr.count("\n") == 1
     assert said in done.stderr

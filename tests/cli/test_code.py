@@ -56,7 +56,7 @@ def test_code_that_makes_no_sense(tmp_path: Path) -> None:
     path.write_text("program 5\nsource\n")
     result = armwright("run", path, "--cell", CELL)
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     assert f"{path}:1: expected text" in result.stderr
 
 
@@ -66,7 +66,7 @@ def test_code_that_does_not_fit_together(tmp_path: Path) -> None:
     path.write_text(armwright("code", EXAMPLES / "bench.rlo", "--full").stdout.replace("GRASP  ARM_1", "QUIT", 1))
     result = armwright("run", path, "--cell", CELL)
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     assert result.stderr.startswith(f"armwright: {path}: ")
     assert "Traceback" not in result.stderr
 
@@ -113,7 +113,7 @@ def test_programs_without_end(tmp_path: Path, option: tuple[str, ...], code: str
     path.write_text(f"VAR n : SCALAR ; BEGIN n = 0 ; WHILE n < 1 DO BEGIN {pause} n = 0 END END.")
     result = armwright("run", path, "--cell", CELL, *option)
 
-    assert result.returncode == 1
+    assert result.returncode == 3
     assert f"error[{code}]" in result.stdout
 
 

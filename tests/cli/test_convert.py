@@ -82,14 +82,14 @@ def test_other_commands_read_urdf() -> None:
         (("puma560", "-o", "puma.xml"), 2, "expected a name that ends in .urdf or .toml, got puma.xml"),
         (("puma560", "-o", "puma.toml", "--tip", "hand"), 2, "only URDF files have links and joints to name"),
         (("puma560", "-o", "puma.toml", "--lock", "j1"), 2, "only URDF files have links and joints to name"),
-        (("pumma560", "-o", "puma.toml"), 1, "Did you mean 'puma560'?"),
-        ((EXAMPLE, "-o", "seven.toml", "--tip", "tool_pont"), 1, "no link 'tool_pont'. Did you mean 'tool_point'?"),
-        ((EXAMPLE, "-o", "seven.toml", "--lock", "waits"), 1, "no joint 'waits'. Did you mean 'waist'?"),
-        (("no.urdf", "-o", "no.toml"), 1, "no.urdf: no such file"),
+        (("pumma560", "-o", "puma.toml"), 2, "Did you mean 'puma560'?"),
+        ((EXAMPLE, "-o", "seven.toml", "--tip", "tool_pont"), 2, "no link 'tool_pont'. Did you mean 'tool_point'?"),
+        ((EXAMPLE, "-o", "seven.toml", "--lock", "waits"), 2, "no joint 'waits'. Did you mean 'waist'?"),
+        (("no.urdf", "-o", "no.toml"), 4, "no.urdf: no such file"),
     ],
 )
 def test_mistakes(arguments: tuple[str | Path, ...], status: int, said: str, tmp_path: Path) -> None:
-    """A call that cannot be understood ends with status 2, a name that is not there with 1; nothing is written."""
+    """A call that cannot be understood ends with status 2, a file that is not there with 4; nothing is written."""
     done = armwright("convert", *arguments, cwd=tmp_path, columns=400)
 
     assert done.returncode == status
@@ -115,6 +115,6 @@ def test_cannot_be_written(tmp_path: Path) -> None:
 
     done = armwright("convert", "puma560", "-o", tmp_path / "puma.toml")
 
-    assert done.returncode == 1
+    assert done.returncode == 4
     assert done.stderr.startswith(f"armwright: cannot write '{tmp_path / 'puma.toml'}': ")
     assert [path.name for path in tmp_path.iterdir()] == ["puma.toml"]

@@ -106,10 +106,10 @@ def test_json() -> None:
 
 
 def test_unknown_code() -> None:
-    """A code that does not exist ends with the nearest and status 1."""
+    """A code that does not exist ends with the nearest and status 2."""
     result = explain("E232")
 
-    assert result.returncode == 1
+    assert result.returncode == 2
     assert result.stderr.startswith("armwright: no code 'E232'. Did you mean 'E202'? Known: E201,")
 
 

@@ -82,7 +82,7 @@ def test_several_programs(wrong: Path) -> None:
     missing = wrong.with_name("wrnog.rlo")
     result = fix(missing, wrong)
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     assert result.stderr == f"armwright: {missing}: no such file; did you mean '{wrong}'?\n"
     assert wrong.read_text() == CURED
 

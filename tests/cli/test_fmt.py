@@ -48,7 +48,7 @@ def test_in_place(written: Path) -> None:
 def test_check(written: Path) -> None:
     """With --check nothing is written, and the exit status tells whether something would have been."""
     result = fmt(written, "--check")
-    assert (result.returncode, result.stdout.decode()) == (1, f"would change: {written}\n")
+    assert (result.returncode, result.stdout.decode()) == (5, f"would change: {written}\n")
     assert written.read_text() == WRITTEN
 
     written.write_text(LAID_OUT)
@@ -87,7 +87,7 @@ def test_stdout_and_numbers(written: Path) -> None:
 def test_standard_input() -> None:
     """``-`` reads what is typed and prints it."""
     assert fmt("-", typed=WRITTEN).stdout.decode() == LAID_OUT
-    assert fmt("-", "--check", typed=WRITTEN).returncode == 1
+    assert fmt("-", "--check", typed=WRITTEN).returncode == 5
     assert fmt("-", "--check", typed=LAID_OUT).returncode == 0
 
 
@@ -95,7 +95,7 @@ def test_standard_input_that_is_no_text() -> None:
     """Bytes that are no text are refused with their line."""
     result = fmt("-", typed=b"BEGIN\n\xff END.")
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     assert result.stderr.decode() == "armwright: standard input:2: not UTF-8 text: byte 0xff has no meaning\n"
 
 
@@ -105,7 +105,7 @@ def test_wrong_program(written: Path) -> None:
     wrong.write_text("begin\ngrasp grasp\nend.")
     result = fmt(wrong, missing, written)
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     first, second = result.stderr.decode().splitlines()
     assert first == f"armwright: {wrong}:2:6: cannot be laid out: missing `;` between two statements (E104)"
     assert second.startswith(f"armwright: {missing}: no such file")
@@ -140,7 +140,7 @@ def test_json(written: Path) -> None:
     result = fmt(written, wrong, "--check", "--json")
     right, bad = json.loads(result.stdout)
 
-    assert result.returncode == 1
+    assert result.returncode == 5
     assert right == {"program": str(written), "changed": True}
     assert bad["program"] == str(wrong)
     assert "the program has no END" in bad["error"]

@@ -27,7 +27,7 @@ Call = Callable[..., tuple[int, str, str]]
 @pytest.fixture
 def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
     """The command line without a process of its own: exit status, what it printed, what it said is wrong."""
-    monkeypatch.setattr("armwright.cli.app.signal.signal", lambda *_: None)
+    monkeypatch.setattr("armwright.cli.failures.signal.signal", lambda *_: None)
     monkeypatch.setenv("COLUMNS", "300")
     monkeypatch.setenv("NO_COLOR", "1")
 
@@ -82,14 +82,14 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
-        (("forward", "pumma560", "-q", Q), 1, "no arm 'pumma560'. Did you mean 'puma560'?"),
-        (("show", "PUMA560"), 1, "no arm 'PUMA560'. Did you mean 'puma560'?"),
-        (("show", ""), 1, "no arm ''. Known: "),
-        (("singularity", "nowhere/arm.toml", "-q", Q), 1, "nowhere/arm.toml: no such file"),
-        (("simulate", "/", "-q", Q), 1, "/: expected a file, got a folder"),
-        (("torque", "\0.toml", "-q", Q), 1, "'\\x00.toml': no such file can be"),
-        (("kernel", "ur5", "jacobain"), 1, "no quantity 'jacobain'. Did you mean 'jacobian'?"),
-        (("study", "stanford-torqe"), 1, "no study 'stanford-torqe'. Did you mean 'stanford-torque'?"),
+        (("forward", "pumma560", "-q", Q), 2, "no arm 'pumma560'. Did you mean 'puma560'?"),
+        (("show", "PUMA560"), 2, "no arm 'PUMA560'. Did you mean 'puma560'?"),
+        (("show", ""), 2, "no arm ''. Known: "),
+        (("singularity", "nowhere/arm.toml", "-q", Q), 4, "nowhere/arm.toml: no such file"),
+        (("simulate", "/", "-q", Q), 4, "/: expected a file, got a folder"),
+        (("torque", "\0.toml", "-q", Q), 4, "'\\x00.toml': no such file can be"),
+        (("kernel", "ur5", "jacobain"), 2, "no quantity 'jacobain'. Did you mean 'jacobian'?"),
+        (("study", "stanford-torqe"), 2, "no study 'stanford-torqe'. Did you mean 'stanford-torque'?"),
         (("show",), 2, "Missing argument"),
         (("arms", "puma560"), 2, "unexpected extra argument"),
         (("jacobian", "puma560", "-q", Q, "--frame", ""), 2, "--frame: expected base or tool, got"),
@@ -97,8 +97,8 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
         (("inverse", "puma560", "--xyz", "1e200,0,0"), 2, "--xyz: every number must be finite and no larger than"),
         (("inverse", "puma560", "--xyz", "1,2,3", "--rpy", "0"), 2, "--rpy: expected 3 finite numbers, got 1"),
         (("inverse", "puma560", "--noap", "1 2 3"), 2, "--noap: expected 12 finite numbers, got 3"),
-        (("inverse", "puma560", "--noap", " ".join("0" * 12)), 1, "pose: expected"),
-        (("inverse", "puma560", "--noap", "1 0 0 0 1 0 0 0 -1 .4 .1 .2"), 1, "pose: expected"),
+        (("inverse", "puma560", "--noap", " ".join("0" * 12)), 2, "pose: expected"),
+        (("inverse", "puma560", "--noap", "1 0 0 0 1 0 0 0 -1 .4 .1 .2"), 2, "pose: expected"),
         (
             ("inverse", "puma560", "--noap", "1 0 0 0 1 0 0 0 1 .4 .1 .2", "--rpy", "0,0,90"),
             2,
@@ -107,14 +107,14 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
         (("torque", "puma560"), 2, "-q: give the motion"),
         (("torque", "puma560", "--qd", Q), 2, "-q: give the motion"),
         (("torque", "puma560", "--csv", "x.csv", "--qd", Q), 2, "--csv: a file has its own speeds and accelerations"),
-        (("simulate", "puma560", "-q", Q, "--duration", "-1"), 1, "duration: expected more than 0 s, got -1.0"),
-        (("simulate", "puma560", "-q", Q, "--duration", "nan"), 1, "duration: expected more than 0 s, got nan"),
-        (("simulate", "puma560", "-q", Q, "--duration", "1e9"), 1, "would be 1e+12 moments; expected at most 1e+07"),
+        (("simulate", "puma560", "-q", Q, "--duration", "-1"), 2, "duration: expected more than 0 s, got -1.0"),
+        (("simulate", "puma560", "-q", Q, "--duration", "nan"), 2, "duration: expected more than 0 s, got nan"),
+        (("simulate", "puma560", "-q", Q, "--duration", "1e9"), 2, "would be 1e+12 moments; expected at most 1e+07"),
         (("simulate", "puma560", "-q", Q, "--duration", "long"), 2, "'--duration'"),
         (("simulate", "puma560", "-q", Q, "--step-ms", "nan"), 2, "--step-ms: expected 0.001 to 1000, got nan"),
         (
             ("simulate", "puma560", "-q", "0,0,400,0,0,0"),
-            1,
+            2,
             "joint 3 starts at 400 deg, outside its stops at -135 and 135 deg",
         ),
         (("simulate", "ur5", "-q", Q, "--method", "euler"), 2, "'euler' is not one of"),
@@ -151,7 +151,7 @@ def test_files_that_are_no_rows(call: Call, tmp_path: Path, command: str, what: 
 
     status, out, error = call(command, "puma560", "--csv", file)
 
-    assert (status, out) == (1, "")
+    assert (status, out) == (4, "")
     assert error.startswith(f"armwright: {file}:")
     assert said in error
 
@@ -263,8 +263,8 @@ def test_simulation_with_a_load(call: Call) -> None:
         ("heavy", 2, "--load: expected 4 numbers, got 'heavy'; or give a file that ends in .toml"),
         ("-1,0,0,0", 2, "--load: expected a mass of 0 kg or more, got -1"),
         ("nan,0,0,0", 2, "--load: every number must be finite"),
-        ("missing.toml", 1, "missing.toml: no such file"),
-        ("/", 1, "/: expected a file, got a folder"),
+        ("missing.toml", 4, "missing.toml: no such file"),
+        ("/", 4, "/: expected a file, got a folder"),
     ],
 )
 def test_impossible_loads(call: Call, command: str, load: str, status: int, said: str) -> None:
@@ -308,5 +308,5 @@ def test_as_a_user_calls() -> None:
     """In a process of its own a mistake ends with one line on the error output, and no traceback."""
     done = armwright("torque", "puma560", "-q", Q, "--load", "nowhere.toml")
 
-    assert (done.returncode, done.stdout) == (1, "")
+    assert (done.returncode, done.stdout) == (4, "")
     assert done.stderr == "armwright: nowhere.toml: no such file\n"

@@ -69,7 +69,7 @@ def test_the_page_of_the_format(tmp_path: Path) -> None:
 
     refused, taken = armwright("iso9283", path), armwright("iso9283", path, "--few")
 
-    assert refused.returncode == 1
+    assert refused.returncode == 3
     assert refused.stderr == "armwright: pose P1: ISO 9283 asks for 30 cycles, got 2; --few takes fewer\n"
     assert taken.returncode == 0, taken.stderr
     assert "2 of 30" in taken.stdout
@@ -96,7 +96,7 @@ def test_mistakes_of_the_page(slip: int, tmp_path: Path) -> None:
 
     done = armwright("iso9283", "today.csv", cwd=tmp_path)
 
-    assert done.returncode == 1
+    assert done.returncode == 4
     said = done.stderr.removeprefix("armwright: ").strip()
     assert f"`{said}`" in DOCS
 
@@ -104,13 +104,13 @@ def test_mistakes_of_the_page(slip: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
-        ((EXAMPLES / "measured_pose.csv",), 1, "no such file; did you mean"),
+        ((EXAMPLES / "measured_pose.csv",), 4, "no such file; did you mean"),
         ((POSES, "--limit", "RP=0.05"), 2, "RP is in mm: RP=0.05mm, got ''"),
         ((POSES, "--limit", "RP=0.05m"), 2, "RP is in mm: RP=0.05mm, got 'm'"),
         ((POSES, "--limit", "RP"), 2, "expected a symbol and a number with its unit, RP=0.05mm, got RP"),
-        ((POSES, "--limit", "RQ=1mm"), 1, "no measure 'RQ'"),
+        ((POSES, "--limit", "RQ=1mm"), 2, "no measure 'RQ'"),
         ((POSES, "--band-mm", "0"), 2, "expected a number above 0, got 0"),
-        ((PATHS,), 1, "settling P1: no band is given, and no test of pose P1 is there"),
+        ((PATHS,), 2, "settling P1: no band is given, and no test of pose P1 is there"),
         ((), 2, "Missing argument"),
     ],
 )

@@ -76,7 +76,7 @@ def test_no_branch(tmp_path: Path) -> None:
     """Where no branch carries through it is said why, in one line and with a way out, and nothing is written."""
     done = armwright("move", "cartesian", "puma560", POSES, "-o", tmp_path / "out")
 
-    assert done.returncode == 1
+    assert done.returncode == 3
     assert done.stdout == ""
     assert "no branch carries the hand to its last pose. left, down, no-flip: at 0." in done.stderr
     assert "between poses 2 and 3" in done.stderr
@@ -88,7 +88,7 @@ def test_the_other_way_round_is_named() -> None:
     """Where no pose beside the line helps, damped rates are named: they do, as the next test finds."""
     done = armwright("move", "cartesian", "puma560", POSES, "--around", "via")
 
-    assert done.returncode == 1
+    assert done.returncode == 3
     assert "from pose 2 to pose 3: on the line near (" in done.stderr
     assert done.stderr.endswith("`--around damped` looks for another way round\n")
 
@@ -116,8 +116,8 @@ def test_a_servo_slower_than_the_move(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "status", "said"),
     [
-        (("joint", "puma56", POSES), 1, "no arm 'puma56'. Did you mean 'puma560'?"),
-        (("joint", "puma560", EXAMPLES / "puma_pose.toml"), 1, "no such file; did you mean "),
+        (("joint", "puma56", POSES), 2, "no arm 'puma56'. Did you mean 'puma560'?"),
+        (("joint", "puma560", EXAMPLES / "puma_pose.toml"), 4, "no such file; did you mean "),
         (("slide", "puma560", POSES), 2, "'slide' is not one of 'joint', 'cartesian'"),
         (("joint", "puma560", POSES, "--orientation", "zyz"), 2, "only a cartesian move has one"),
         (("joint", "puma560", POSES, "--near", "1,2"), 2, "expected 6 finite numbers, got 2"),

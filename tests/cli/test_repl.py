@@ -154,7 +154,7 @@ def test_no_such_file() -> None:
     """A program or a cell that is not there ends the command with one message."""
     for arguments in (("nowhere.rlo",), ("--cell", "nowhere.toml")):
         done = armwright("repl", *arguments)
-        assert done.returncode == 1
+        assert done.returncode == 4
         assert done.stderr.startswith("armwright: nowhere")
 
 

@@ -28,10 +28,10 @@ PUMA = EXAMPLES / "puma_cell.toml"
 FILES = {"motion.csv", "events.jsonl", "frames.json", "run.json", "report.html"}
 
 
-def fails(*arguments: str | Path, **keywords: object) -> str:
-    """Call it with a mistake: exit status 1, no traceback; return what it says."""
+def fails(*arguments: str | Path, status: int, **keywords: object) -> str:
+    """Call it with a mistake: that exit status, no traceback; return what it says."""
     done = armwright(*arguments, **keywords)  # type: ignore[arg-type]
-    assert done.returncode == 1, done
+    assert done.returncode == status, done
     assert "Traceback" not in done.stderr + done.stdout
     return done.stdout + done.stderr
 
@@ -178,9 +178,9 @@ def test_a_cell_that_goes_round(tmp_path: Path) -> None:
     call = ("run", EXAMPLES / "around.rlo", "--cell", cell, "--servo-ms", "8")
 
     assert "W402" in armwright(*call).stdout
-    assert "error[E403]" in fails(*call, "--around", "none")
+    assert "error[E403]" in fails(*call, "--around", "none", status=3)
     cell.write_text(PUMA.read_text() + 'around = "dampd"\n')
-    assert "did you mean 'damped'?" in fails(*call)
+    assert "did you mean 'damped'?" in fails(*call, status=4)
     assert armwright(*call, "--around", "over").returncode == 2
 
 
@@ -194,8 +194,8 @@ def test_option_out_of_range() -> None:
 
 def test_missing_files(tmp_path: Path) -> None:
     """A missing program or cell is one line that names it, and the file that was probably meant."""
-    assert "nope.rlo: no such file" in fails("run", tmp_path / "nope.rlo", "--cell", STANFORD)
-    said = fails("run", STACKING, "--cell", EXAMPLES / "stanfrd_cell.toml")
+    assert "nope.rlo: no such file" in fails("run", tmp_path / "nope.rlo", "--cell", STANFORD, status=4)
+    said = fails("run", STACKING, "--cell", EXAMPLES / "stanfrd_cell.toml", status=4)
     assert "no such file; did you mean" in said
     assert "stanford_cell.toml" in said
     assert said.count("\n") == 1
@@ -205,9 +205,9 @@ def test_broken_cell(tmp_path: Path) -> None:
     """Broken TOML and an unknown arm are told with file and line."""
     cell = tmp_path / "cell.toml"
     cell.write_text("[arms.ARM_1\nmodel = 3\n")
-    assert f"{cell}:1: not valid TOML" in fails("run", STACKING, "--cell", cell)
+    assert f"{cell}:1: not valid TOML" in fails("run", STACKING, "--cell", cell, status=4)
     cell.write_text('# a cell\n[arms.ARM_1]\nmodel = "stanfort"\nhand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]\n')
-    said = fails("run", STACKING, "--cell", cell)
+    said = fails("run", STACKING, "--cell", cell, status=4)
     assert f"{cell}:3: arms, ARM_1, model: no arm 'stanfort'. Did you mean 'stanford'?" in said
 
 
@@ -216,7 +216,7 @@ def test_wrong_program(tmp_path: Path) -> None:
     program = tmp_path / "p.rlo"
     program.write_text("VAR f : FRAME ; BEGIN MOVE ARM_1 TO f ; MOVE ARM_7 TO f ; END.")
 
-    said = fails("run", program, "--cell", STANFORD, "-o", tmp_path / "out")
+    said = fails("run", program, "--cell", STANFORD, "-o", tmp_path / "out", status=1)
 
     assert "E304" in said
     assert "ARM_7" in said
@@ -229,7 +229,7 @@ def test_unreachable_goal(tmp_path: Path) -> None:
     lines = ["VAR far : FRAME ;", "BEGIN", "  far = (1,0,0,0,-1,0,0,0,-1,3,0,0.2) ;", "  MOVE ARM_1 TO far ;", "END."]
     program.write_text("\n".join(lines))
 
-    said = fails("run", program, "--cell", STANFORD, "-o", tmp_path / "out")
+    said = fails("run", program, "--cell", STANFORD, "-o", tmp_path / "out", status=3)
 
     assert "error[E402]: `far` cannot be reached by ARM_1" in said
     assert "--> far.rlo:4:" in said
@@ -258,7 +258,7 @@ def test_full_disk(tmp_path: Path) -> None:
     def small_files() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
-    said = fails("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "deep" / "out", before=small_files)
+    said = fails("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "deep" / "out", before=small_files, status=4)
 
     assert "File too large; nothing was written" in said
     assert list(tmp_path.iterdir()) == []
@@ -276,7 +276,7 @@ def test_full_output() -> None:
             timeout=300,
         )
 
-    assert done.returncode == 1
+    assert done.returncode == 4
     assert done.stderr == "armwright: cannot write the output: No space left on device\n"
 
 
@@ -321,10 +321,10 @@ def test_a_name_that_is_no_text(tmp_path: Path) -> None:
 def test_json_of_a_failure(tmp_path: Path) -> None:
     """With --json a program that cannot be translated, or cannot go on, is told in JSON too."""
     (tmp_path / "p.rlo").write_text("BEGIN MOVE ARM_1 TO f ; END.")
-    data = json.loads(fails("run", tmp_path / "p.rlo", "--cell", STANFORD, "--json"))
+    data = json.loads(fails("run", tmp_path / "p.rlo", "--cell", STANFORD, "--json", status=1))
     assert data["diagnostics"][0]["code"] == "E202"
     (tmp_path / "q.rlo").write_text("VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,3,0,0) ; MOVE ARM_1 TO f ; END.")
-    data = json.loads(fails("run", tmp_path / "q.rlo", "--cell", STANFORD, "--json"))
+    data = json.loads(fails("run", tmp_path / "q.rlo", "--cell", STANFORD, "--json", status=3))
     assert data["diagnostics"][0]["code"] == "E402"
     assert data["frames"]["F"] == [3.0, 0.0, 0.0]
 
@@ -341,7 +341,7 @@ def test_output_in_the_way(tmp_path: Path) -> None:
     """An output folder that is a file is refused, and the file stays."""
     (tmp_path / "out").write_text("mine")
 
-    said = fails("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "out")
+    said = fails("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "out", status=4)
 
     assert "cannot write to" in said
     assert (tmp_path / "out").read_text() == "mine"

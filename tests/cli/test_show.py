@@ -158,7 +158,7 @@ def test_a_narrow_screen() -> None:
     ],
 )
 def test_mistakes(argument: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A mistake of the caller's ends with exit status 1, one line that says what to do, and no traceback."""
+    """A mistake of the caller's ends with one line that says what to do: a name with status 2, a file with 4."""
     (tmp_path / "lift.toml").write_text(LIFT)
     (tmp_path / "bad.toml").write_text('[[joint]]\nkind = "rotary"\n')
     (tmp_path / "lines.toml").write_text('title = 3\n[[joint]]\nkind = "revolute"\n')
@@ -167,7 +167,7 @@ def test_mistakes(argument: str, message: str, tmp_path: Path, monkeypatch: pyte
 
     result = armwright("show", argument)
 
-    assert (result.returncode, result.stdout) == (1, "")
+    assert (result.returncode, result.stdout) == (2 if message.startswith("no arm") else 4, "")
     assert result.stderr == f"armwright: {message}\n"
 
 

@@ -95,6 +95,6 @@ def test_starting_outside_the_stops() -> None:
     """A start beyond a stop is refused with the joint."""
     done = armwright("simulate", "puma560", "-q", "0,0,170,0,0,0")
 
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert "joint 3" in done.stderr

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
-from armwright.errors import InvalidValueError
+from armwright.errors import ExitStatus, InvalidValueError
 
 Kind: TypeAlias = Literal[
     "pose",
@@ -42,6 +42,8 @@ DIRECTIONS, ROBOTS, LOADS = 3, 5, 10
 
 class TooFewError(InvalidValueError):
     """A test was repeated less often than the standard asks for; ``few`` takes it nevertheless."""
+
+    exit_status = ExitStatus.INFEASIBLE
 
 
 def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int, what: str = "cycles") -> int:

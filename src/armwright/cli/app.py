@@ -1,10 +1,8 @@
 """The command ``armwright``: its commands, and what becomes of errors."""
 
 import io
-import os
-import signal
 import sys
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
@@ -16,6 +14,7 @@ from armwright.cli.code import code
 from armwright.cli.convert import convert
 from armwright.cli.debug import debug
 from armwright.cli.explain import explain
+from armwright.cli.failures import Commands, run_and_exit
 from armwright.cli.fix import fix
 from armwright.cli.fmt import fmt
 from armwright.cli.forward import forward, jacobian
@@ -32,11 +31,11 @@ from armwright.cli.simulate import simulate
 from armwright.cli.singularity import singularity
 from armwright.cli.study import study
 from armwright.cli.torque import torque
-from armwright.errors import ArmwrightError, CheckFailedError, ContradictionError
 from armwright.version import __version__
 
 app = typer.Typer(
     name="armwright",
+    cls=Commands,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -88,41 +87,10 @@ def root(
     """
 
 
-class _Interrupted(BaseException):
-    """Ctrl-C; an exception of our own, since Typer takes KeyboardInterrupt for itself and says nothing."""
-
-
-def _interrupt(_signal: int, _frame: object) -> None:
-    raise _Interrupted
-
-
 def main() -> None:
-    """Run the command line; a caller's mistake ends it with one message and exit status 1."""
-    signal.signal(signal.SIGINT, _interrupt)
+    """Run the command line; an error ends it with one message and the exit status of its kind."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # A terminal that knows no degree sign gets an escape, not a traceback.
             stream.reconfigure(errors="backslashreplace")
-    try:
-        app()
-    except CheckFailedError as error:
-        _end(5, str(error))
-    except ContradictionError as error:
-        _end(3, str(error))
-    except ArmwrightError as error:
-        _end(1, str(error))
-    except BrokenPipeError:
-        # The reader of our output has gone (as in `armwright show ur5 | head`): nothing is left to say.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
-    except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        _end(1, f"cannot write the output: {error.strerror or error}")
-    except _Interrupted as interrupted:
-        # A command that leaves something behind says so in a note.
-        _end(130, "; ".join(["interrupted", *getattr(interrupted, "__notes__", ["nothing was written"])]))
-
-
-def _end(status: int, message: str) -> NoReturn:
-    print(f"armwright: {message}", file=sys.stderr)
-    sys.exit(status)
+    run_and_exit(app)

@@ -9,6 +9,7 @@ import typer
 
 from armwright.cli.printing import print_json
 from armwright.cli.programs import ProgramFile, Std, Strict
+from armwright.errors import ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Check an RLO program without running it.
 
-    Exit status 0: it can run (there may be warnings); 1: it cannot.
+    Exit status 0: it can run (there may be warnings); 1: it has errors.
 
     **Example:** `armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code`
     """
@@ -67,7 +68,7 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
         if not emit or compiled.diagnostics:
             print_diagnostics(compiled.diagnostics, compiled.source, to_errors=emit is not None)
     if compiled.code is None:
-        raise typer.Exit(1)
+        raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
 
 
 def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:

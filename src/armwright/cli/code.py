@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.programs import CODE_SUFFIX, CellFile, Std, Strict
+from armwright.errors import ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -59,5 +60,5 @@ def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> 
     if compiled.diagnostics:
         print_diagnostics(compiled.diagnostics, compiled.source, to_errors=True)
     if compiled.code is None:
-        raise typer.Exit(1)
+        raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
     return compiled.code

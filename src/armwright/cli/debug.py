@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.programs import CODE_SUFFIX, CellFile, Std
+from armwright.errors import ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def debug(
         loaded = load(launch)
     except LoadError as error:
         print(error.page, end="")
-        raise typer.Exit(1) from None
+        raise typer.Exit(ExitStatus.PROGRAM_ERRORS) from None
     Terminal(loaded).run()
 
 

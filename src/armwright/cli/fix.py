@@ -8,6 +8,7 @@ import typer
 
 from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
+from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -35,11 +36,11 @@ def fix(
     """
     from armwright.cli.programs import given_cell
     from armwright.cli.rewriting import print_difference, read_program, write_back
-    from armwright.errors import ArmwrightError
     from armwright.program.editing.fixing import fixed
 
     acted_on = given_cell(cell)
     rows: list[dict[str, Any]] = []
+    statuses: list[ExitStatus] = []
     for path in programs:
         try:
             source = read_program(path)
@@ -48,18 +49,21 @@ def fix(
                 write_back(path, result.text)
         except ArmwrightError as error:
             rows.append({"program": str(path), "errors": 1, "error": str(error)})
+            statuses.append(error.exit_status)
             if not as_json:
                 print(f"armwright: {error}", file=sys.stderr)
             continue
         rows.append(_as_data(result))
+        if rows[-1]["errors"]:
+            statuses.append(ExitStatus.PROGRAM_ERRORS)
         if not as_json:
             if diff and result.cures:
                 print_difference(source, result.text)
             _print(result, done="could be cured" if diff else "cured")
     if as_json:
         print_json(rows)
-    if any(row["errors"] for row in rows):
-        raise typer.Exit(1)
+    if statuses:
+        raise typer.Exit(max(statuses))
 
 
 def _translator(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":

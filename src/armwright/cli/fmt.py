@@ -8,18 +8,19 @@ import typer
 
 from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
+from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from armwright.program.text.source import Source
 
 
-def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
+def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
     programs: Annotated[
         list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
     ],
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; exit with 1 if something would change.")
+        bool, typer.Option("--check", help="Write nothing; end with exit status 5 if something would change.")
     ] = False,
     diff: Annotated[bool, typer.Option("--diff", help="Write nothing; show what would change.")] = False,
     stdout: Annotated[bool, typer.Option("--stdout", help="Print the programs and leave their files alone.")] = False,
@@ -37,10 +38,10 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
     from armwright.cli.rewriting import INPUT, print_difference, read_program, write_back
-    from armwright.errors import ArmwrightError
     from armwright.program.editing.formatting import formatted
 
     rows: list[dict[str, Any]] = []
+    statuses: list[ExitStatus] = []
     for path in programs:
         row: dict[str, Any] = {"program": str(path)}
         rows.append(row)
@@ -52,6 +53,7 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
                 write_back(path, after)
         except ArmwrightError as error:
             row["error"] = str(error)
+            statuses.append(error.exit_status)
             if not as_json:
                 print(f"armwright: {error}", file=sys.stderr)
             continue
@@ -65,8 +67,10 @@ def fmt(  # noqa: PLR0917 - Typer reads one parameter per option
             print(_said(source, changed=row["changed"], check=check))
     if as_json:
         print_json(rows)
-    if any("error" in row or (check and row["changed"]) for row in rows):
-        raise typer.Exit(1)
+    if check and any(row.get("changed") for row in rows):
+        statuses.append(ExitStatus.CHECK_FAILED)
+    if statuses:
+        raise typer.Exit(max(statuses))
 
 
 def _said(source: "Source", *, changed: bool, check: bool) -> str:

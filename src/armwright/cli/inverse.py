@@ -6,6 +6,7 @@ import typer
 
 from armwright.cli.options import ArmName, Json
 from armwright.cli.printing import print_json
+from armwright.errors import ExitStatus
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -29,7 +30,7 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Print every posture that puts the tool at a pose, judged: inside the limits, out of them, out of reach, singular.
 
-    Exit status 1 when no posture is inside the limits.
+    Exit status 3 when no posture is inside the limits.
 
     **Example:** `armwright inverse puma560 --xyz 500,100,300 --rpy 0,90,0`
     """
@@ -59,7 +60,7 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
         if solution.answer == "out of reach":
             _ask_for_the_unit(model, X, metres=noap is not None)
     if not solution.allowed:
-        raise typer.Exit(1)
+        raise typer.Exit(ExitStatus.INFEASIBLE)
 
 
 def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":

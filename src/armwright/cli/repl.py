@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.programs import CellFile, Std
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def repl(
     if not watched:
         _converse(session, commands, Script(), talk)
         if talk.wrong:
-            raise typer.Exit(1)
+            raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
         return
     _greet(session)
     with _interruptible(), editing(session, COMMANDS):

@@ -11,6 +11,7 @@ from armwright.cli.options import JsonSummary, QuietButWarnings
 from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, given_cell
 from armwright.cli.progress import waiting
+from armwright.errors import ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -179,7 +180,7 @@ def _fail(
     *,
     as_json: bool,
 ) -> NoReturn:
-    """Say why a program did not run, or did not run to its end, and stop with status 1."""
+    """Say why a program did not run, or did not run to its end, and stop."""
     from armwright.cli.programs import print_diagnostics
     from armwright.program.messages.diagnostics import to_json
 
@@ -191,7 +192,7 @@ def _fail(
         print_diagnostics(diagnostics, source)
         if error and code:
             _print_moment(error, code)
-    raise typer.Exit(1)
+    raise typer.Exit(ExitStatus.PROGRAM_ERRORS if error is None else error.exit_status)
 
 
 def _places(error: "RunError") -> dict[str, list[float] | None]:

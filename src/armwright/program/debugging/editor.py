@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 
 from armwright.cell.model import Cell
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.debugging.breakpoints import Breakpoint
 from armwright.program.debugging.debugger import Command, Debugger
 from armwright.program.debugging.protocol import Arguments, RequestError
@@ -75,6 +75,8 @@ class LoadError(ArmwrightError, ValueError):
     Attributes:
         page: all that is wrong with it, with the lines.
     """
+
+    exit_status = ExitStatus.PROGRAM_ERRORS
 
     def __init__(self, message: str, page: str) -> None:
         """Keep both texts."""

@@ -1,6 +1,6 @@
 """Laying a program out: every program that says the same in the same words looks the same."""
 
-from armwright.errors import InvalidValueError
+from armwright.errors import ExitStatus, InvalidValueError
 from armwright.program.compiler import no_collection
 from armwright.program.editing.blanks import set_blanks
 from armwright.program.editing.filling import lines_of
@@ -26,6 +26,8 @@ class UnformattableError(InvalidValueError):
         source: the program.
         first: the first thing that is wrong.
     """
+
+    exit_status = ExitStatus.PROGRAM_ERRORS
 
     def __init__(self, source: Source, first: Diagnostic) -> None:
         """Say what is wrong first, and where."""

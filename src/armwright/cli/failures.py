@@ -1,0 +1,156 @@
+"""How a command ends that could not do what was asked: one message, or one JSON document, and its exit status."""
+
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from typer.core import TyperGroup
+
+from armwright.cli.printing import print_json
+from armwright.errors import ArmwrightError, ExitStatus, FileFormatError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+
+# Set to anything, an error of our own shows where it arose.
+DEBUG = "ARMWRIGHT_DEBUG"
+# What a wrong call raises: a base of all such errors of Typer, whose place depends on its version.
+_CallError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupted(BaseException):
+    """A signal asks the command to end; an exception of our own, since Typer takes KeyboardInterrupt for itself."""
+
+    def __init__(self, number: int) -> None:
+        """Keep the number of the signal."""
+        self.number = number
+        super().__init__(number)
+
+
+class _Raised(BaseException):
+    """Carries past Typer an error that it would end on by itself."""
+
+    def __init__(self, error: Exception) -> None:
+        self.error = error
+
+
+class Commands(TyperGroup):
+    """All commands; what they raise arrives in ``main`` whatever it is."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Call the command that was asked for."""
+        try:
+            return super().invoke(ctx)
+        except (EOFError, OSError) as error:
+            raise _Raised(error) from error
+
+
+def run_and_exit(app: "Callable[..., Any]") -> None:
+    """Run the command line and end with its status; an error becomes a message, under ``--json`` a document."""
+    for number in _SIGNALS:
+        # What `nohup` made deaf stays so.
+        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _interrupt)
+    as_json = "--json" in sys.argv[1:]
+    try:
+        status = _status(app, as_json=as_json)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader of our output has gone (as in `armwright show ur5 | head`): nothing is left to say.
+        status = ExitStatus.BROKEN_PIPE
+    except OSError as error:
+        print(f"armwright: cannot write the output: {error.strerror or error}", file=sys.stderr)
+        status = ExitStatus.FILE
+    if status in (ExitStatus.BROKEN_PIPE, ExitStatus.FILE):
+        # What is still to be written would fail again when the interpreter ends.
+        _forget_output()
+    sys.exit(status)
+
+
+def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
+    """Run the command line; return its exit status, what is wrong having been told.
+
+    Raises:
+        BrokenPipeError: nobody reads the output any more.
+    """
+    try:
+        # Typer shows a wrong call itself, with the usage of the command, unless a program reads along.
+        return int(app(standalone_mode=not as_json) or ExitStatus.DONE)
+    except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):
+            # Rich has met it, and ended with a status of its own.
+            raise end.__context__ from None
+        return end.code if isinstance(end.code, int) else ExitStatus.DONE
+    except _Raised as raised:
+        error: BaseException = raised.error
+    except (Exception, Interrupted) as other:  # noqa: BLE001 - all that is not foreseen is our fault, and told as such
+        error = other
+    if isinstance(error, BrokenPipeError):
+        raise error
+    status, message = _judged(error)
+    if as_json:
+        print_json(failure_data(status, error, message))
+    else:
+        print(f"armwright: {message}", file=sys.stderr)
+    return status
+
+
+def _judged(error: BaseException) -> tuple[int, str]:
+    """Return with which status an error ends a command, and what is said."""
+    match error:
+        case ArmwrightError():
+            return error.exit_status, str(error)
+        case _CallError():
+            return ExitStatus.USAGE, error.format_message()  # type: ignore[attr-defined]
+        case Interrupted():
+            # A command that leaves something behind says so in a note.
+            notes = getattr(error, "__notes__", ["nothing was written"])
+            return 128 + error.number, "; ".join(["interrupted", *notes])
+        case OSError():
+            place = "write the output" if error.filename is None else f"read or write '{error.filename}'"
+            return ExitStatus.FILE, f"cannot {place}: {error.strerror or error}"
+        case MemoryError():
+            return ExitStatus.INFEASIBLE, "this takes more memory than there is"
+        case _:
+            return ExitStatus.INTERNAL_ERROR, _our_fault(error)
+
+
+def failure_data(status: int, error: BaseException, message: str) -> dict[str, Any]:
+    """Return an error as the document that ``--json`` prints.
+
+    Args:
+        status: the exit status.
+        error: what was raised.
+        message: what is said of it.
+    """
+    details: dict[str, Any] = {"class": type(error).__name__, "message": message}
+    if isinstance(error, FileFormatError):
+        details |= {"file": str(error.path), "line": error.line, "key": error.key or None}
+    return {"exit_status": int(status), "error": details}
+
+
+def _our_fault(error: BaseException) -> str:
+    """Say where a defect of armwright showed, and what its user can do; with the traceback where it is asked for."""
+    if os.environ.get(DEBUG):
+        traceback.print_exception(error)
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    text = " ".join(str(error).split())
+    said = f"{type(error).__name__}: {text}" if text else type(error).__name__
+    return (
+        f"a defect of armwright, not of what was given: {said} (in {last.name}, {Path(last.filename).name}:"
+        f"{last.lineno}); please report it with the command and its files; {DEBUG}=1 shows more"
+    )
+
+
+def _interrupt(number: int, _frame: "FrameType | None") -> None:
+    raise Interrupted(number)
+
+
+def _forget_output() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
