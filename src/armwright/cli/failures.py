@@ -11,7 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from armwright.cli.printing import print_json
-from armwright.errors import ArmwrightError, ExitStatus, FileFormatError
+from armwright.errors import ArmwrightError, CheckFailedError, ExitStatus, FileFormatError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,13 +63,12 @@ def run_and_exit(app: "Callable[..., Any]") -> None:
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader of our output has gone (as in `armwright show ur5 | head`): nothing is left to say.
+        _forget_output()
         status = ExitStatus.BROKEN_PIPE
     except OSError as error:
+        _forget_output()
         print(f"armwright: cannot write the output: {error.strerror or error}", file=sys.stderr)
         status = ExitStatus.FILE
-    if status in (ExitStatus.BROKEN_PIPE, ExitStatus.FILE):
-        # What is still to be written would fail again when the interpreter ends.
-        _forget_output()
     sys.exit(status)
 
 
@@ -77,7 +76,7 @@ def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
     """Run the command line; return its exit status, what is wrong having been told.
 
     Raises:
-        BrokenPipeError: nobody reads the output any more.
+        OSError: the output cannot be written; a ``BrokenPipeError``: nobody reads it any more.
     """
     try:
         # Typer shows a wrong call itself, with the usage of the command, unless a program reads along.
@@ -91,10 +90,11 @@ def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
         error: BaseException = raised.error
     except (Exception, Interrupted) as other:  # noqa: BLE001 - all that is not foreseen is our fault, and told as such
         error = other
-    if isinstance(error, BrokenPipeError):
+    if isinstance(error, OSError) and not isinstance(error, ArmwrightError) and error.filename is None:
         raise error
     status, message = _judged(error)
-    if as_json:
+    # Of a check that failed the document is printed already: what was found.
+    if as_json and not isinstance(error, CheckFailedError):
         print_json(failure_data(status, error, message))
     else:
         print(f"armwright: {message}", file=sys.stderr)
@@ -113,8 +113,7 @@ def _judged(error: BaseException) -> tuple[int, str]:
             notes = getattr(error, "__notes__", ["nothing was written"])
             return 128 + error.number, "; ".join(["interrupted", *notes])
         case OSError():
-            place = "write the output" if error.filename is None else f"read or write '{error.filename}'"
-            return ExitStatus.FILE, f"cannot {place}: {error.strerror or error}"
+            return ExitStatus.FILE, f"cannot read or write '{error.filename}': {error.strerror or error}"
         case MemoryError():
             return ExitStatus.INFEASIBLE, "this takes more memory than there is"
         case _:
@@ -153,4 +152,5 @@ def _interrupt(number: int, _frame: "FrameType | None") -> None:
 
 
 def _forget_output() -> None:
+    """Keep the interpreter from writing at its end what cannot be written."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
