@@ -11,6 +11,10 @@ from typing import ClassVar
 
 # Glyphs that a scan, a listing or a tired eye takes for one another.
 _CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "B": "8"})
+# A longer word is no misspelt name, and comparing two such takes the square of their length.
+_LONGEST_NAME = 100
+# Of the names that are known, a message lists this many.
+_MOST_LISTED = 100
 # Of a value that is not what was expected, a message shows this many characters.
 _LONGEST_SHOWN = 60
 
@@ -69,7 +73,9 @@ class UnknownNameError(ArmwrightError, LookupError):
         name, choices = str(name), sorted(known)
         near = closest(name, choices)
         hint = f" Did you mean '{near}'?" if near else ""
-        listing = f" Known: {', '.join(choices)}." if choices else " There is none."
+        more = f" and {len(choices) - _MOST_LISTED:,} more" if len(choices) > _MOST_LISTED else ""
+        listing = f" Known: {', '.join(choices[:_MOST_LISTED])}{more}." if choices else " There is none."
+        name = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}..."
         super().__init__(f"no {kind} '{name}'.{hint}{listing}")
 
 
@@ -158,6 +164,8 @@ def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
     Returns:
         The nearest name, or None when none is near.
     """
+    if len(name) > _LONGEST_NAME:
+        return None
     word = name.upper()
     glyphs = word.translate(_CONFUSABLE)
     best: tuple[int, str] | None = None

@@ -129,14 +129,17 @@ def test_mistakes_in_a_call(call: Call, arguments: tuple[str, ...], status: int,
 
 
 FILES = {
-    "empty": ("", ":1: q1: no such column; expected q1 to q6, with commas"),
+    "empty": ("", ": the file is empty; its first line should name the columns"),
     "columns without rows": (HEADER + "\n", ": no rows below the names of the columns"),
-    "semicolons": (HEADER.replace(",", ";") + "\n1;2;3;4;5;6\n", ":1: q1: no such column; expected q1 to q6, with"),
+    "semicolons": (
+        HEADER.replace(",", ";") + "\n1;2;3;4;5;6\n",
+        ":1: columns are separated by semicolons; expected commas",
+    ),
     "a column twice": (HEADER + ",q2\n1,1,1,1,1,1,1\n", ":1: q2: there are two columns of this name"),
-    "a short row": (HEADER + "\n1,1\n", ":2: expected 6 numbers, got 2"),
-    "a word": (HEADER + "\n1,1,1,1,1,1\n\n1,1,one,1,1,1\n", ":4: expected 6 numbers: could not convert string"),
-    "an endless number": (HEADER + "\n1,1,1,1,1,inf\n", ":2: every number must be finite"),
-    "a zero byte": (HEADER + "\n1,1,1,1,1,\0001\n", ":2: expected 6 numbers: could not convert string"),
+    "a short row": (HEADER + "\n1,1\n", ":2: expected 6 values, as there are columns, got 2"),
+    "a word": (HEADER + "\n1,1,1,1,1,1\n\n1,1,one,1,1,1\n", ":4: q3: expected a number, got 'one'"),
+    "an endless number": (HEADER + "\n1,1,1,1,1,inf\n", ":2: q6: every number must be finite"),
+    "a zero byte": (HEADER + "\n1,1,1,1,1,\0001\n", ":2: q6: expected a number, got "),
     "a number of a page": (HEADER + "\n" + "1" * 200_000 + ",1,1,1,1,1\n", "not valid CSV: field larger than"),
 }
 

@@ -98,7 +98,7 @@ def check_toml(text: str) -> bool:
     except (tomllib.TOMLDecodeError, RecursionError):
         return False
     text = text.replace("\r\n", "\n")
-    lines = toml_lines(text)
+    lines = dict(toml_lines(text).all())
     assert set(lines) == set(entries(data))
     assert set(lines.values()) <= set(range(1, text.count("\n") + 2))
     return True
@@ -167,7 +167,7 @@ def test_what_json_accepts(text: str, braced: bool) -> None:  # noqa: FBT001
         with pytest.raises(TwinKeyError):
             json_lines(text)
         return
-    lines = json_lines(text)
+    lines = dict(json_lines(text).all())
     assert set(lines) == set(entries(json.loads(text)))
     assert set(lines.values()) <= set(range(1, text.count("\n") + 2))
 

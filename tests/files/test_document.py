@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from armwright.errors import FileFormatError
-from armwright.files.document import Document, Table, read_text
+from armwright.files.document import Document, Table
+from armwright.files.reading import read_text
 
 
 @pytest.fixture
@@ -252,6 +253,13 @@ def test_nothing_is_known(at: Callable[..., Table], tmp_path: Path) -> None:
     assert refused(tmp_path, top.table("camera").finish) == "thing.toml:2: camera, x: unknown key; none is known here"
 
 
+TOO_DEEP = (
+    " nested too deeply: more, and at most 60 levels are read; `armwright --raise nesting=NUMBER ...` allows more"
+)
+TOO_MANY_DIGITS = (
+    " a whole number in it has too many digits: more, and at most 1,000 digits are read; "
+    "`armwright --raise digits=NUMBER ...` allows more"
+)
 BROKEN = {
     "no value": ("a.toml", "x = 1\nmass_kg =\n", "2: not valid TOML: Invalid value, column 10"),
     "an open list": ("a.toml", "x = 1\ny = [1,\n\n", "2: not valid TOML: Invalid value, at the end of the file"),
@@ -261,10 +269,10 @@ BROKEN = {
     "a JSON key twice": ("a.json", '{"x": 1, "y": [{"x": 1}],\n "x": 2}', "2: x: this key is given twice"),
     "a JSON key twice, below": ("a.json", '{"y": [0, {"x": 1,\n"x": 1}]}', "2: y 2, x: this key is given twice"),
     "a JSON list": ("a.json", "[1, 2]", "1: expected keys and values in braces, got a list of 2"),
-    "deep lists": ("a.toml", f"x = {'[' * 9000}{']' * 9000}", " nested too deeply"),
-    "deep JSON": ("a.json", f'{{"x": {"[" * 200000}{"]" * 200000}}}', " nested too deeply"),
-    "many digits": ("a.toml", f"x = 1{'0' * 5000}", " a whole number in it has too many digits"),
-    "many digits in JSON": ("a.json", f'{{"x": 1{"0" * 5000}}}', " a whole number in it has too many digits"),
+    "deep lists": ("a.toml", f"x = {'[' * 9000}{']' * 9000}", TOO_DEEP),
+    "deep JSON": ("a.json", f'{{"x": {"[" * 200000}{"]" * 200000}}}', TOO_DEEP),
+    "many digits": ("a.toml", f"x = 1{'0' * 5000}", TOO_MANY_DIGITS),
+    "many digits in JSON": ("a.json", f'{{"x": 1{"0" * 5000}}}', TOO_MANY_DIGITS),
 }
 
 

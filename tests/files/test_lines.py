@@ -148,7 +148,7 @@ def test_lines_of_toml(data: st.DataObject) -> None:
         writer.section()
     writer.blank()
 
-    found = toml_lines(writer.text)
+    found = dict(toml_lines(writer.text).all())
 
     assert found == writer.lines
     assert set(found) == set(entries(tomllib.loads(writer.text)))
@@ -160,14 +160,14 @@ def test_values_do_not_hide_the_next_key(value: str) -> None:
     text = f"first = {value}\nsecond = 2\n"
 
     assert tomllib.loads(text)["second"] == 2
-    assert toml_lines(text)[("second",)] == text.count("\n")
+    assert toml_lines(text).of(("second",)) == text.count("\n")
 
 
 def test_arm_file() -> None:
     """A table below the second of two [[joint]] belongs to that one."""
     text = 'title = "two"\n\n[[joint]]\nd_m = 1\n[joint.link]\nmass_kg = 1\n[[joint]]\n[joint.link]\nmass_kg = 2\n'
 
-    lines = toml_lines(text)
+    lines = dict(toml_lines(text).all())
 
     assert lines["joint", 0] == 3
     assert lines["joint", 0, "link", "mass_kg"] == 6
@@ -177,7 +177,7 @@ def test_arm_file() -> None:
 
 def test_a_table_opened_after_its_child() -> None:
     """[a.b] names a in passing; once [a] has a header of its own, that is where it stands."""
-    assert toml_lines("[a.b]\nx = 1\n[a]\ny = 2\n")[("a",)] == 3
+    assert toml_lines("[a.b]\nx = 1\n[a]\ny = 2\n").of(("a",)) == 3
 
 
 json_values = st.recursive(
@@ -204,18 +204,18 @@ def test_lines_of_json(value: dict[str, Any], indent: int, ascii_only: bool) -> 
     lines: dict[Keys, int] = {}
     one_entry_a_line(value, (), 1, lines)
 
-    assert json_lines(json.dumps(value, indent=indent, ensure_ascii=ascii_only)) == lines
+    assert dict(json_lines(json.dumps(value, indent=indent, ensure_ascii=ascii_only)).all()) == lines
 
 
 @given(st.dictionaries(st.text(), json_values, max_size=5))
 def test_json_in_one_line(value: dict[str, Any]) -> None:
     """Everything in a JSON text of one line stands in line 1."""
-    assert json_lines(json.dumps(value)) == dict.fromkeys(entries(value), 1)
+    assert dict(json_lines(json.dumps(value)).all()) == dict.fromkeys(entries(value), 1)
 
 
 def test_twin_keys() -> None:
     """The second of two keys of one object is found; the same key in another object, or as a value, is none."""
-    assert json_lines('{"a": "b", "b": {"a": 1},\n "c": [{"a": 1}, {"a": 2}]}')["c", 1, "a"] == 2
+    assert json_lines('{"a": "b", "b": {"a": 1},\n "c": [{"a": 1}, {"a": 2}]}').of(("c", 1, "a")) == 2
     with pytest.raises(TwinKeyError) as caught:
         json_lines('{"a": "b",\n "c": {"b": 1},\n "b": 0,\n "c": {"x": 1}}')
 

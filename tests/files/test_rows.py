@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armwright.errors import FileFormatError
-from armwright.files.rows import Cells, number_in_cell, read_rows, refuse_other_widths
+from armwright.files.rows import Cells, number_in_cell, of_one_width, read_rows
 
 Write = Callable[[str], Path]
 
@@ -26,7 +26,7 @@ def test_rows(write: Write) -> None:
     head, rows = read_rows(write('\ufeffa, b\r\n\r\n1 ,"2,5"\r\n,\r\n3,4\r\n'))
 
     assert head == Cells(1, ("a", "b"))
-    assert rows == [Cells(3, ("1", "2,5")), Cells(5, ("3", "4"))]
+    assert [*rows] == [Cells(3, ("1", "2,5")), Cells(5, ("3", "4"))]
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_rows(write: Write) -> None:
 def test_no_table(text: str, message: str, write: Write) -> None:
     """What is no table is refused with file and line."""
     with pytest.raises(FileFormatError) as caught:
-        read_rows(write(text))
+        [*read_rows(write(text))[1]]
 
     assert message in str(caught.value)
 
@@ -62,10 +62,10 @@ def test_no_table(text: str, message: str, write: Write) -> None:
 def test_widths(cells: tuple[str, ...], message: str) -> None:
     """A row has as many cells as there are columns."""
     head = Cells(1, ("a", "b"))
-    refuse_other_widths("t.csv", head, [Cells(2, ("1", "2"))])
+    assert [*of_one_width("t.csv", head, [Cells(2, ("1", "2"))])] == [Cells(2, ("1", "2"))]
 
     with pytest.raises(FileFormatError) as caught:
-        refuse_other_widths("t.csv", head, [Cells(2, ("1", "2")), Cells(7, cells)])
+        [*of_one_width("t.csv", head, [Cells(2, ("1", "2")), Cells(7, cells)])]
 
     assert str(caught.value) == message
 

@@ -9,7 +9,7 @@ import attrs
 from armwright.accuracy.cycles import ASKED, Kind
 from armwright.accuracy.measured import ANGLES
 from armwright.errors import FileFormatError, closest, shown
-from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, NOTE, Cells, number_in_cell, read_rows, refuse_other_widths
+from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, NOTE, Cells, number_in_cell, of_one_width, read_rows
 
 # SI values of the units that names of columns end in.
 _TIMES = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
@@ -24,6 +24,8 @@ _UNITS: dict[str, Mapping[str, float]] = {
 }
 _TEXTS = ("test", "pose", "path", "condition", "cycle", "direction", "robot")
 COMMANDED = "commanded"
+# The number of a cycle has fewer.
+_CYCLE_DIGITS = 10
 
 
 class Row(NamedTuple):
@@ -91,8 +93,7 @@ def read_table(path: Path | str) -> Table:
     path = Path(path)
     head, lines = read_rows(path)
     columns = _columns(path, head)
-    refuse_other_widths(path, head, lines)
-    rows = tuple(_Line(path, one, columns).row() for one in lines)
+    rows = tuple(_Line(path, one, columns).row() for one in of_one_width(path, head, lines))
     return Table(path=path, columns=tuple(columns), rows=rows)
 
 
@@ -190,7 +191,8 @@ class _Line:
         text = self._text("cycle")
         if text.lower() == COMMANDED:
             return None
-        if not (text.isascii() and text.isdigit() and 0 < int(text) < 10**9):
+        # Nine digits at most: Python reads no number of many thousand.
+        if not (text.isascii() and text.isdigit() and len(text) < _CYCLE_DIGITS and int(text) > 0):
             raise self._error("cycle", f"expected 1, 2, 3 ... or the word {COMMANDED}, got {shown(text)}")
         return int(text)
 

@@ -7,11 +7,12 @@ import numpy as np
 
 from armwright.arm.dh import about_com, from_modified
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
-from armwright.arm.quantities import ANGLE, LENGTH, number_in, per, pose_in, vector_in
+from armwright.arm.quantities import ANGLE, LENGTH, given, number_in, per, pose_in, vector_in
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
 from armwright.files.document import Document, Table
+from armwright.files.limits import beyond, limit
 
 _CATALOGUE = Path(__file__).parent / "catalogue"
 
@@ -59,7 +60,7 @@ def read_arm(path: Path | str) -> Arm:
     path = Path(path)
     top = Document.read(path).root
     convention = top.choice("convention", ("standard", "modified"), default="standard")
-    tables = top.tables("joint")
+    tables = top.tables("joint", "joints")
     joints, links, motors = [], [], []
     for table in tables:
         joints.append(_joint(table))
@@ -134,6 +135,14 @@ def _joint(table: Table) -> Joint:
     if not values["lower"] < values["upper"]:
         lower, upper = (_written(kind, values[name]) for name in ("lower", "upper"))
         raise limits.error(None, f"the lower limit must be below the upper, got {lower} and {upper}")
+    most = limit("turns") * math.tau
+    for name in ("lower", "upper"):
+        if kind == "revolute" and most < abs(values[name]) < math.inf:
+            raise limits.error(
+                given(limits, name, units) and f"{name}_{given(limits, name, units)}",
+                f"too far from zero: {beyond('turns', _written(kind, values[name]))}; a joint that turns without end "
+                "has no limit: leave it out",
+            )
     return Joint(
         kind="revolute" if kind == "revolute" else "prismatic",
         theta=number_in(table, "theta", ANGLE, default=0.0),

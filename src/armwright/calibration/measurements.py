@@ -36,7 +36,7 @@ from armwright.calibration.columns import (
 )
 from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import FileFormatError, closest, one_of
-from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, Cells, number_in_cell, read_rows, refuse_other_widths
+from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, Cells, number_in_cell, of_one_width, read_rows
 from armwright.spatial.rotations import rotation_from_quaternion
 
 _SETS = ("fit", "check")
@@ -101,9 +101,10 @@ def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | No
         if units is None
         else (one_of("unit of length", units[0], LENGTH_UNITS), one_of("unit of angle", units[1], ANGLE_UNITS))
     )
-    head, rows = read_rows(path)
-    table = _Table(path, rows, read_columns(path, head, arm, stated))
-    refuse_other_widths(path, head, rows)
+    head, below = read_rows(path)
+    named = read_columns(path, head, arm, stated)
+    rows = tuple(of_one_width(path, head, below))
+    table = _Table(path, rows, named)
     joints = [f"joint_{i + 1}" for i in range(arm.n)]
     readings = _readings(table, table.numbers(joints, needed=True))
     lines = [row.line for row in rows]
@@ -202,9 +203,12 @@ def _numbered(
 ) -> tuple[Numbers, tuple[str, ...]]:
     """Return by number which word each row has, -1 for none, and the words in order."""
     there = [bool(word) for word in words] if which is None else which.tolist()
-    order = tuple(dict.fromkeys(word for word, one in zip(words, there, strict=True) if one and (word or not named)))
-    numbers = [order.index(word) if one and word in order else -1 for word, one in zip(words, there, strict=True)]
-    return np.array(numbers, dtype=np.intp), order
+    order: dict[str, int] = {}
+    for word, one in zip(words, there, strict=True):
+        if one and (word or not named):
+            order.setdefault(word, len(order))
+    numbers = [order.get(word, -1) if one else -1 for word, one in zip(words, there, strict=True)]
+    return np.array(numbers, dtype=np.intp), tuple(order)
 
 
 def _rotations(table: _Table, points: Array) -> Array:
@@ -234,6 +238,9 @@ def _rotations(table: _Table, points: Array) -> Array:
 def _others(table: _Table, q: Array, distances: Array, anchor: Numbers) -> Array:
     """Return (m, n) the postures that distances are from; NaN where they are from an anchor, or none are told."""
     other, names = np.full(q.shape, np.nan), table.names
+    called: dict[str, list[int]] = {}
+    for k, name in enumerate(names):
+        called.setdefault(name, []).append(k)
     for i, to in enumerate(table.words("to")):
         given = int(bool(to)) + int(anchor[i] >= 0)
         if not np.isfinite(distances[i]):
@@ -247,7 +254,7 @@ def _others(table: _Table, q: Array, distances: Array, anchor: Numbers) -> Array
             raise table.error(i, DISTANCE, f"expected a distance, got {distances[i]:g} m")
         if not to:
             continue
-        rows = [k for k, name in enumerate(names) if name == to]
+        rows = called.get(to, [])
         if len(rows) != 1:
             near = closest(to, names)
             hint = f"; did you mean {near}?" if near and not rows else ""

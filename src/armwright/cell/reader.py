@@ -16,6 +16,8 @@ from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.names import arm_name
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
+from armwright.files.limits import beyond, limit
+from armwright.files.reading import regular
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.solution import violations
 from armwright.spatial.poses import from_noap, pose
@@ -82,6 +84,7 @@ def _around(motion: Table) -> Around | None:
 
 def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
     arms: dict[str, CellArm] = {}
+    _refuse_more(table, "arms")
     for key in table.free_keys():
         match = _ARM_NAME.fullmatch(key)
         if match is None:
@@ -99,7 +102,7 @@ def _arm(table: Table, folder: Path) -> CellArm:
     name = table.text("model", default=_REPORT_ARM)
     try:
         # The file of an arm is looked for from the folder of the cell, wherever the command was started.
-        arm = load_arm(folder / name if is_path(name) else name)
+        arm = load_arm(regular(folder / name) if is_path(name) else name)
     except ArmwrightError as error:
         raise table.error("model", str(error)) from error
     if arm.n < _PLACE_AND_TURN:
@@ -140,6 +143,7 @@ def _start(table: Table, arm: Arm, base: Array) -> Array:
 
 
 def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
+    _refuse_more(table, "frames")
     frames: dict[str, Node] = {}
     keys: dict[str, str] = {}
     for key in table.free_keys():
@@ -154,28 +158,39 @@ def _frames(table: Table, arms: Iterable[str]) -> dict[str, Node]:
         else:
             frames[name] = Node(parent=WORLD, relation=_pose(table, key))
     known = {WORLD, "STATION", *arms, *frames}
+    most = limit("hanging")
     for name, node in frames.items():
         if node.parent not in known:
             near = closest(node.parent, known - {name})
             hint = f"; did you mean {near}?" if near else ""
             raise table.table(keys[name]).error("on", f"{name} hangs on {node.parent}, which is no frame here{hint}")
-        way = _way_up(name, frames)
+        way = _way_up(name, frames, most)
         if frames[way[-1]].parent == name:
             by = f" by way of {', '.join(way[1:])}" if len(way) > 1 else ""
             raise table.table(keys[name]).error("on", f"{name} hangs on itself{by}")
+        if len(way) > most:
+            raise table.table(keys[name]).error("on", f"{name} hangs too far from WORLD: {beyond('hanging')}")
     return frames
 
 
-def _way_up(name: str, frames: Mapping[str, Node]) -> list[str]:
-    """Return the frames of the file from ``name`` upwards, none twice."""
+def _way_up(name: str, frames: Mapping[str, Node], most: int) -> list[str]:
+    """Return the frames of the file from ``name`` upwards, none twice, and one more than ``most`` at the most."""
     way, above = {name: None}, frames[name].parent
-    while above in frames and above not in way:
+    while above in frames and above not in way and len(way) <= most:
         way[above] = None
         above = frames[above].parent
     return list(way)
 
 
+def _refuse_more(table: Table, bound: str) -> None:
+    """Refuse a table with more keys than a limit."""
+    got = sum(1 for _ in table.free_keys())
+    if got > limit(bound):
+        raise table.error(None, f"too many: {beyond(bound, got)}")
+
+
 def _visions(table: Table) -> dict[str, tuple[Array, ...]]:
+    _refuse_more(table, "entries")
     visions: dict[str, tuple[Array, ...]] = {}
     for key in table.free_keys():
         name = _name(table, key, visions)
@@ -185,6 +200,7 @@ def _visions(table: Table) -> dict[str, tuple[Array, ...]]:
 
 
 def _devices(table: Table) -> frozenset[str]:
+    _refuse_more(table, "entries")
     devices: set[str] = set()
     for key in table.free_keys():
         devices.add(_name(table, key, devices))

@@ -53,11 +53,11 @@ def read_linkage(path: Path) -> Linkage:
     """
     top = Document.read(path).root
     ground = Body(name=GROUND, points=_points(top.table("ground", required=True)))
-    bodies = tuple(_body(table) for table in top.tables("body"))
-    joints = tuple(_joint(table) for table in top.tables("joint"))
-    pins = tuple(_play(table) for table in top.tables("play"))
-    drives = tuple(_drive(table) for table in top.tables("drive"))
-    loads = tuple(_load(table) for table in (top.tables("load") if "load" in top else ()))
+    bodies = tuple(_body(table) for table in top.tables("body", "bodies"))
+    joints = tuple(_joint(table) for table in top.tables("joint", "bodies"))
+    pins = tuple(_play(table) for table in top.tables("play", "bodies"))
+    drives = tuple(_drive(table) for table in top.tables("drive", "bodies"))
+    loads = tuple(_load(table) for table in (top.tables("load", "bodies") if "load" in top else ()))
     material = _material(top.table("material"))
     name = top.text("name", default=path.stem)
     zero = math.radians(top.number("zero_deg", default=0.0))

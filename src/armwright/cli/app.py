@@ -75,8 +75,33 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _raise_limits(texts: list[str]) -> list[str]:
+    """Let this command, and the processes that it starts, read more of what a limit bounds."""
+    from armwright.files.limits import VARIABLE, parsed
+
+    try:
+        found = {name: number for text in texts for name, number in parsed(text).items()}
+    except ArmwrightError as error:
+        raise typer.BadParameter(str(error)) from error
+    if found:
+        before = os.environ.get(VARIABLE)
+        told = ",".join(f"{name}={number}" for name, number in found.items())
+        os.environ[VARIABLE] = f"{before},{told}" if before else told
+    return texts
+
+
 @app.callback()
 def root(
+    _limits: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--raise",
+            help="Read more than is usual, such as table_rows=10000000 (docs/limits.md lists the limits).",
+            metavar="NAME=NUMBER",
+            callback=lambda texts: _raise_limits(texts or []),
+            show_default=False,
+        ),
+    ] = None,
     _version: Annotated[
         bool, typer.Option("--version", help="Print the version and stop.", callback=_version, is_eager=True)
     ] = False,

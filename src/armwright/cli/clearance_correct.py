@@ -105,7 +105,7 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
     import numpy as np
 
     from armwright.errors import FileFormatError
-    from armwright.files.document import read_text
+    from armwright.files.reading import read_text
 
     text = read_text(estimate)
     try:

@@ -51,11 +51,11 @@ def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> 
         typer.Exit: the program has errors.
     """
     from armwright.cli.programs import given_cell, in_its_cell, print_diagnostics
-    from armwright.files.document import read_text
+    from armwright.files.reading import read_program
     from armwright.program.intermediate.assembly import assemble
 
     if path.suffix == CODE_SUFFIX:
-        return assemble(read_text(path), str(path))
+        return assemble(read_program(path), str(path))
     compiled, _ = in_its_cell(path, given_cell(cell), strict=strict, std=std)
     if compiled.diagnostics:
         print_diagnostics(compiled.diagnostics, compiled.source, to_errors=True)

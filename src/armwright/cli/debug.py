@@ -68,7 +68,7 @@ def load(launch: "Launch") -> "Loaded":
         FileFormatError: a file cannot be read.
     """
     from armwright.cli.programs import given_cell, imported_files, in_its_cell
-    from armwright.files.document import read_text
+    from armwright.files.reading import read_program
     from armwright.program.debugging.editor import Loaded, LoadError
     from armwright.program.intermediate.assembly import assemble
     from armwright.program.messages.diagnostics import count_line
@@ -79,7 +79,7 @@ def load(launch: "Launch") -> "Loaded":
         if given is None:
             message = f"{launch.program.name} needs a cell to run in"
             raise LoadError(message, f"{message}\n")
-        return Loaded(code=assemble(read_text(launch.program), str(launch.program)), cell=given, is_listed=True)
+        return Loaded(code=assemble(read_program(launch.program), str(launch.program)), cell=given, is_listed=True)
     compiled, place = in_its_cell(launch.program, given, strict=False, std=launch.std)
     if compiled.code is None:
         raise LoadError(

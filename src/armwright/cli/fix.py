@@ -35,7 +35,7 @@ def fix(
     **Example:** `armwright fix examples/bench.rlo --diff`
     """
     from armwright.cli.programs import given_cell
-    from armwright.cli.rewriting import print_difference, read_program, write_back
+    from armwright.cli.rewriting import print_difference, read_source, write_back
     from armwright.program.editing.fixing import fixed
 
     acted_on = given_cell(cell)
@@ -43,7 +43,7 @@ def fix(
     statuses: list[ExitStatus] = []
     for path in programs:
         try:
-            source = read_program(path)
+            source = read_source(path)
             result = fixed(source, _translator(path.parent, acted_on, std))
             if result.cures and not diff:
                 write_back(path, result.text)

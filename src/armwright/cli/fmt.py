@@ -37,7 +37,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
-    from armwright.cli.rewriting import INPUT, print_difference, read_program, write_back
+    from armwright.cli.rewriting import INPUT, print_difference, read_source, write_back
     from armwright.program.editing.formatting import formatted
 
     rows: list[dict[str, Any]] = []
@@ -46,7 +46,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
         row: dict[str, Any] = {"program": str(path)}
         rows.append(row)
         try:
-            source = read_program(path)
+            source = read_source(path)
             after = formatted(source, std=std, numbers=numbers)
             row["changed"] = after != source.text
             if row["changed"] and not (check or diff or stdout or path == INPUT):

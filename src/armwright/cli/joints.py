@@ -40,19 +40,15 @@ def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     Raises:
         FileFormatError: the file, a column or all rows are missing, or a value is no finite number.
     """
-    import csv
+    from array import array
 
     import numpy as np
 
     from armwright.errors import FileFormatError
-    from armwright.files.document import read_text
+    from armwright.files.rows import number_in_cell, of_one_width, read_rows
 
-    reader = csv.reader(read_text(path).splitlines())
-    try:
-        lines = [(reader.line_num, row) for row in reader if row]
-    except csv.Error as error:
-        raise FileFormatError(path, reader.line_num + 1, "", f"not valid CSV: {error}") from error
-    header = [name.strip() for name in lines[0][1]] if lines else []
+    head, below = read_rows(path)
+    header = head.cells
     wanted = [f"{quantity}{i + 1}" for quantity in quantities for i in range(arm.n)]
     missing = [name for name in wanted if name not in header]
     if missing:
@@ -60,23 +56,14 @@ def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     twice = [name for name in wanted if header.count(name) > 1]
     if twice:
         raise FileFormatError(path, 1, twice[0], "there are two columns of this name")
-    places = [header.index(name) for name in wanted]
-    table = []
-    for line, row in lines[1:]:
-        try:
-            values = [float(row[place]) for place in places]
-        except IndexError as error:
-            raise FileFormatError(path, line, "", f"expected {len(header)} numbers, got {len(row)}") from error
-        except ValueError as error:
-            raise FileFormatError(path, line, "", f"expected {len(header)} numbers: {error}") from error
-        if not all(map(math.isfinite, values)):
-            raise FileFormatError(path, line, "", "every number must be finite")
-        table.append(values)
-    if not table:
-        raise FileFormatError(path, None, "", "no rows below the names of the columns")
-    array = np.array(table).reshape(len(table), len(quantities), arm.n)
-    _ask_for_degrees(arm, path, array[:, 0])
-    return [array[:, i] for i in range(len(quantities))]
+    places = [(name, header.index(name)) for name in wanted]
+    # Eight bytes a number: a table may have many millions.
+    values = array("d")
+    for row in of_one_width(path, head, below):
+        values.extend(number_in_cell(path, row.line, name, row.cells[place]) for name, place in places)
+    table = np.array(values).reshape(-1, len(quantities), arm.n)
+    _ask_for_degrees(arm, path, table[:, 0])
+    return [table[:, i] for i in range(len(quantities))]
 
 
 def _ask_for_degrees(arm: "Arm", path: Path, q: "Array") -> None:

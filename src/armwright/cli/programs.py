@@ -42,11 +42,11 @@ def translate_file(
     Raises:
         FileFormatError: the file cannot be read, or is not text.
     """
-    from armwright.files.document import read_text
+    from armwright.files.reading import read_program
     from armwright.program import Source, known_cell
     from armwright.program import compile as translate
 
-    source = Source(path.name, read_text(path))
+    source = Source(path.name, read_program(path))
     known = known_cell(cell) if cell else None
     return translate(source, known, strict=strict, std=std, read_import=import_reader(path.parent))
 
@@ -68,8 +68,9 @@ def import_reader(folder: Path) -> "ReadImport":
 
     def read(name: str) -> Imported:
         from armwright.cell.reader import read_cell
+        from armwright.files.reading import regular
 
-        cell = read_cell(folder / name, arms_needed=False)
+        cell = read_cell(regular(folder / name), arms_needed=False)
         return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     return read

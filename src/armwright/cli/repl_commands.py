@@ -129,11 +129,13 @@ class Commands:
         Raises:
             FileFormatError: it cannot be read.
         """
-        from armwright.files.document import read_text
+        from armwright.files.reading import read_program
         from armwright.program.text.source import Source
 
         # What a file imports it names as seen from its own folder.
-        return self._session.load(Source(path.name, read_text(path)), lambda name: os.path.normpath(path.parent / name))
+        return self._session.load(
+            Source(path.name, read_program(path)), lambda name: os.path.normpath(path.parent / name)
+        )
 
     def save(self, argument: str) -> Reply:
         """Write the session as a program that runs to the same end."""

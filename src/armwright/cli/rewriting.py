@@ -10,31 +10,20 @@ if TYPE_CHECKING:
 INPUT = Path("-")
 
 
-def read_program(path: Path) -> "Source":
+def read_source(path: Path) -> "Source":
     """Read a program, or the standard input for ``-``.
 
     Raises:
-        FileFormatError: it cannot be read, or is not UTF-8 text.
+        FileFormatError: it cannot be read, is larger than the limit, or is not UTF-8 text.
     """
-    from armwright.files.document import read_text
-    from armwright.program.text.source import Source
-
-    return Source("standard input", _typed()) if path == INPUT else Source(str(path), read_text(path))
-
-
-def _typed() -> str:
     import sys
 
-    from armwright.errors import FileFormatError
+    from armwright.files.reading import read_program, read_typed_program
+    from armwright.program.text.source import Source
 
-    try:
-        return sys.stdin.buffer.read().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        byte = error.object[error.start]
-        raise FileFormatError(
-            "standard input", line, "", f"not UTF-8 text: byte 0x{byte:02x} has no meaning"
-        ) from error
+    if path == INPUT:
+        return Source("standard input", read_typed_program(sys.stdin.buffer))
+    return Source(str(path), read_program(path))
 
 
 def print_difference(source: "Source", after: str) -> None:

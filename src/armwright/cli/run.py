@@ -121,13 +121,13 @@ def _translated(
 ) -> "tuple[Code, Cell, tuple[Diagnostic, ...], tuple[Path, ...]]":
     """Return the code of a program, its cell, what was said of it, and the files that it imports."""
     from armwright.cli.programs import imported_files, in_its_cell
-    from armwright.files.document import read_text
+    from armwright.files.reading import read_program
     from armwright.program.intermediate.assembly import assemble
 
     if program.suffix == CODE_SUFFIX:
         if given is None:
             _no_cell(program)
-        return assemble(read_text(program), str(program)), given, (), ()
+        return assemble(read_program(program), str(program)), given, (), ()
     compiled, place = in_its_cell(program, given, strict=strict, std=std)
     if compiled.code is None:
         _fail(compiled.source, compiled.diagnostics, as_json=as_json)

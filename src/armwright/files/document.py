@@ -4,6 +4,7 @@ import json
 import math
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,9 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, closest
-from armwright.files.lines import Keys, TwinKeyError, json_lines, toml_lines
+from armwright.files.limits import beyond, limit
+from armwright.files.lines import Keys, Line, TwinKeyError, json_lines, longest_dotted_key, toml_lines
+from armwright.files.reading import read_text
 
 _MISSING: Any = object()
 # No quantity of a robot is larger, and products of three such numbers are still numbers.
@@ -25,13 +28,14 @@ class Document:
 
     Attributes:
         path: where it was read.
+        text: of the file, its line ends line feeds.
         root: the cursor at its top.
     """
 
-    def __init__(self, path: Path, data: Mapping[str, Any], lines: Mapping[Keys, int]) -> None:
+    def __init__(self, path: Path, text: str, data: Mapping[str, Any], *, is_json: bool) -> None:
         """Keep a parsed text; ``read`` does the parsing."""
-        self.path = path
-        self._lines = lines
+        self.path, self.text = path, text
+        self._is_json = is_json
         self.root = Table(self, (), data)
 
     @classmethod
@@ -39,36 +43,24 @@ class Document:
         """Read a file: JSON when it ends in .json or begins with a brace, TOML otherwise.
 
         Raises:
-            FileFormatError: it is missing, a folder, not UTF-8, or has a slip of syntax.
+            FileFormatError: it is missing, a folder, not UTF-8, has a slip of syntax, or is beyond a limit.
         """
         path = Path(path)
         text = read_text(path)
-        as_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
-        try:
-            data = json.loads(text) if as_json else tomllib.loads(text)
-            lines = json_lines(text) if as_json else toml_lines(text)
-        except tomllib.TOMLDecodeError as error:
-            raise _toml_error(path, text, error) from error
-        except json.JSONDecodeError as error:
-            raise FileFormatError(
-                path, error.lineno, "", f"not valid JSON: {error.msg}, column {error.colno}"
-            ) from error
-        except TwinKeyError as error:
-            raise FileFormatError(path, error.line, _shown(error.keys), "this key is given twice") from error
-        except RecursionError as error:
-            raise FileFormatError(path, None, "", "nested too deeply") from error
-        except ValueError as error:  # what remains: Python reads no integers of many thousand digits
-            raise FileFormatError(path, None, "", "a whole number in it has too many digits") from error
+        is_json = path.suffix.lower() == ".json" or (path.suffix.lower() != ".toml" and text.lstrip().startswith("{"))
+        data = _parsed(path, text, is_json=is_json)
         if not isinstance(data, dict):
             raise FileFormatError(path, 1, "", f"expected keys and values in braces, got {_kind(data)}")
-        return cls(path, data, lines)
+        return cls(path, text, data, is_json=is_json)
 
     def line(self, keys: Keys) -> int | None:
         """Return the line of a key, or of the nearest table around it."""
-        for length in range(len(keys), 0, -1):
-            if keys[:length] in self._lines:
-                return self._lines[keys[:length]]
-        return None
+        return self._lines.of(keys)
+
+    @cached_property
+    def _lines(self) -> Line:
+        # Only who has something to say of a key asks where it stands.
+        return json_lines(self.text) if self._is_json else toml_lines(self.text)
 
 
 class Table:
@@ -191,15 +183,22 @@ class Table:
             raise self.error(key, f"expected a table, got {_kind(value)}")
         return Table(self._document, (*self.keys, key), value)
 
-    def tables(self, key: str) -> list["Table"]:
+    def tables(self, key: str, bound: str = "entries") -> list["Table"]:
         """Return the cursors at the tables of an array such as ``[[joint]]``.
 
+        Args:
+            key: of the array.
+            bound: the name of the limit of how many there may be.
+
         Raises:
-            FileFormatError: it is missing, empty, or no array of tables.
+            FileFormatError: it is missing, empty, no array of tables, or has more than the limit.
         """
         value = self._value(key, _MISSING, f"one or more tables [[{key}]]")
         if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
             raise self.error(key, f"expected one or more tables [[{key}]], got {_kind(value)}")
+        most = limit(bound)
+        if len(value) > most:
+            raise self.error(key, f"too many: {beyond(bound, len(value))}", most)
         return [Table(self._document, (*self.keys, key, i), row) for i, row in enumerate(value)]
 
     def free_keys(self) -> Iterator[str]:
@@ -260,48 +259,77 @@ class Table:
         return FileFormatError(self._document.path, self._document.line(keys), _shown(keys), message)
 
 
-def read_bytes(path: Path | str) -> bytes:
-    """Return what a file holds.
+def _parsed(path: Path, text: str, *, is_json: bool) -> Any:
+    """Return what a text says, in tables and lists that are not deeper than the limit.
 
     Raises:
-        FileFormatError: it is missing (the nearest name in its folder is told), or a folder.
+        FileFormatError: it has a slip of syntax, or is beyond a limit.
     """
-    path = Path(path)
+    too_deep = FileFormatError(path, None, "", f"nested too deeply: {beyond('nesting')}")
+    if not is_json and longest_dotted_key(text) > limit("nesting"):
+        raise too_deep
     try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        near = closest(path.name, _names_in(path.parent))
-        hint = f"; did you mean '{path.parent / near}'?" if near else ""
-        raise FileFormatError(path, None, "", f"no such file{hint}") from None
-    except IsADirectoryError:
-        raise FileFormatError(path, None, "", "expected a file, got a folder") from None
-    except OSError as error:
-        raise FileFormatError(path, None, "", f"cannot be read: {error.strerror}") from error
-    except ValueError as error:  # a zero byte in the name
-        raise FileFormatError(repr(str(path)), None, "", "no such file can be") from error
+        data = json.loads(text, object_pairs_hook=_object) if is_json else tomllib.loads(text)
+    except _TwinError as error:
+        raise _twin(path, text) or too_deep from error
+    except tomllib.TOMLDecodeError as error:
+        raise _toml_error(path, text, error) from error
+    except json.JSONDecodeError as error:
+        raise FileFormatError(path, error.lineno, "", f"not valid JSON: {error.msg}, column {error.colno}") from error
+    except RecursionError as error:
+        raise too_deep from error
+    except ValueError as error:  # what remains: Python reads no integers of many thousand digits
+        raise _too_many_digits(path) from error
+    if not _measured(path, data):
+        raise too_deep
+    return data
 
 
-def read_text(path: Path | str) -> str:
-    """Return the text of a UTF-8 file; a mark of byte order is dropped, line ends become line feeds.
+class _TwinError(Exception):
+    """A key of a JSON object is given twice; JSON lets that pass, and the first value would be lost."""
+
+
+def _object(members: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(members)
+    if len(found) < len(members):
+        raise _TwinError
+    return found
+
+
+def _twin(path: Path, text: str) -> FileFormatError | None:
+    try:
+        json_lines(text)
+    except TwinKeyError as error:
+        return FileFormatError(path, error.line, _shown(error.keys), "this key is given twice")
+    except RecursionError:
+        pass
+    return None
+
+
+def _measured(path: Path, data: Any) -> bool:
+    """Whether nothing is deeper than the limit.
 
     Raises:
-        FileFormatError: it is missing (the nearest name in its folder is told), a folder, or not UTF-8.
+        FileFormatError: a whole number has more digits than the limit.
     """
-    data = read_bytes(path)
-    try:
-        return data.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        # The decoder counts behind a mark of byte order, so its own bytes are those to look at.
-        line = error.object[: error.start].count(b"\n") + 1
-        byte = error.object[error.start]
-        raise FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} has no meaning") from error
+    largest = 10 ** limit("digits")
+    row = [data]
+    for _ in range(limit("nesting") + 1):
+        if any(type(value) is int and abs(value) >= largest for value in row):
+            raise _too_many_digits(path)
+        row = [
+            below
+            for value in row
+            if isinstance(value, dict | list)
+            for below in (value.values() if isinstance(value, dict) else value)
+        ]
+        if not row:
+            return True
+    return False
 
 
-def _names_in(folder: Path) -> list[str]:
-    try:
-        return sorted(path.name for path in folder.iterdir())
-    except OSError:
-        return []
+def _too_many_digits(path: Path) -> FileFormatError:
+    return FileFormatError(path, None, "", f"a whole number in it has too many digits: {beyond('digits')}")
 
 
 def _toml_error(path: Path, text: str, error: tomllib.TOMLDecodeError) -> FileFormatError:

@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.arm.quantities import typed_pose
 from armwright.arrays import Array
-from armwright.files.document import Document, Table, read_text
+from armwright.files.document import Document, Table
 
 # A rotation that was changed by less was computed, not typed.
 _ROUNDING = 1e-9
@@ -79,7 +79,7 @@ def read_poses(path: Path | str) -> PosesFile:
         i = blends.index(None)
         raise tables[i].error("blend_s", "missing; other poses have one: give it to all, or once at the top")
     return PosesFile(
-        text=read_text(path),
+        text=document.text,
         title=title,
         names=tuple(names),
         poses=np.array(poses),

@@ -10,6 +10,10 @@ from armwright.arm.model import Link
 from armwright.arm.urdf.robot import Robot, UrdfJoint, axis_of, body_of
 from armwright.arrays import Array
 from armwright.errors import one_of
+from armwright.files.limits import beyond, limit
+
+# Of links and joints, a message lists this many.
+_MOST_LISTED = 50
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -68,6 +72,8 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
     stops = [joint for joint in route if not joint.fixed]
     if not stops:
         raise robot.error(f"no joint moves between the links '{base}' and '{tip}'")
+    if len(stops) > limit("joints"):
+        raise robot.error(f"too many joints between '{base}' and '{tip}': {beyond('joints', len(stops))}")
     X, moving = np.eye(4), []
     beside: list[UrdfJoint] = []
     for joint in route:
@@ -167,4 +173,5 @@ def _carries(robot: Robot, joint: UrdfJoint) -> bool:
 
 
 def _listed(names: list[str]) -> str:
-    return ", ".join(f"'{name}'" for name in names)
+    more = f" and {len(names) - _MOST_LISTED:,} more" if len(names) > _MOST_LISTED else ""
+    return ", ".join(f"'{name}'" for name in names[:_MOST_LISTED]) + more

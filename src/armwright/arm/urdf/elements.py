@@ -17,7 +17,8 @@ import numpy as np
 
 from armwright.arrays import LARGEST, Array
 from armwright.errors import FileFormatError, MissingExtraError, closest, shown
-from armwright.files.document import read_bytes
+from armwright.files.limits import beyond, limit
+from armwright.files.reading import read_bytes
 
 _MISSING: Any = object()
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -156,7 +157,10 @@ def read_elements(path: Path) -> Element:
     data = read_bytes(path)
     etree = _lxml()
     # Nothing is fetched, and entities stay as they are: a file from elsewhere cannot make this read other files.
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True)
+    # What is deep or huge is refused by the parser itself.
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True, huge_tree=False
+    )
     try:
         raw = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
@@ -169,7 +173,18 @@ def read_elements(path: Path) -> Element:
     foreign = next((one for one in raw.iter() if "xacro" in _split(one)[0]), None)
     if foreign is not None:
         raise FileFormatError(path, foreign.sourceline, f"<{_split(foreign)[1]}>", _XACRO)
+    _refuse_deep(path, raw)
     return _element(path, raw, space, "")
+
+
+def _refuse_deep(path: Path, raw: Any) -> None:
+    """Refuse elements in one another beyond the limit."""
+    row, most = list(raw), limit("nesting")
+    for _ in range(most):
+        row = [below for one in row for below in one]
+        if not row:
+            return
+    raise FileFormatError(path, row[0].sourceline, "", f"nested too deeply: {beyond('nesting')}")
 
 
 def _lxml() -> Any:

@@ -12,6 +12,7 @@ from armwright.arm.model import Limits, Link, Motor, impossible_moments
 from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, closest, one_of
+from armwright.files.limits import beyond, limit
 from armwright.spatial.poses import pose
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
@@ -246,6 +247,14 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
             "that turns without end is of type continuous",
         )
     lower, upper = (value if abs(value) < NO_LIMIT else math.copysign(math.inf, value) for value in (lower, upper))
+    most = limit("turns") * math.tau
+    for key, value in (("lower", lower), ("upper", upper)):
+        if joint.kind == "revolute" and most < abs(value) < math.inf:
+            raise element.error(
+                key,
+                f"too far from zero: {beyond('turns', f'{value:g} rad')}; a joint that turns without end is of type "
+                "continuous",
+            )
     return Limits(lower=lower, upper=upper, **largest), notes
 
 

@@ -5,7 +5,6 @@ sample: ``path, t_s, x_mm, y_mm``; those after the end of the path are left out.
 file in the same unit; time in s or ms.
 """
 
-import csv
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,7 +18,7 @@ from armwright.clearance.features import Features, features_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.errors import FileFormatError, closest
-from armwright.files.document import read_text
+from armwright.files.rows import number_in_cell, of_one_width, read_rows
 
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 _TIMES = {"s": 1.0, "ms": 1e-3}
@@ -105,29 +104,16 @@ def read_measured(path: Path | str) -> RestMeasured | PathsMeasured:
             farther off than any play lets it be. The text has file and line.
     """
     path = Path(path)
-    try:
-        table = list(enumerate(csv.reader(read_text(path).splitlines()), 1))
-    except csv.Error as error:
-        raise FileFormatError(path, None, "", f"not a table: {error}") from error
-    rows = [(i, row) for i, row in table if row and "".join(row).strip()]
-    if not rows:
-        raise FileFormatError(path, None, "", "there is nothing in it; expected a line of column names")
-    line, head = rows[0]
-    if len(head) == 1 and ";" in head[0]:
-        raise FileFormatError(path, line, "", "columns are separated by `;`; expected commas, and points in numbers")
-    columns, scales = _columns(path, line, [name.strip().lower() for name in head])
-    if len(rows) == 1:
-        raise FileFormatError(path, line, "", "there is no row below the column names")
+    head, below = read_rows(path)
+    columns, scales = _columns(path, head.line, [name.lower() for name in head.cells])
     wanted = _AT_REST if "pose" in columns else _ON_PATHS
     found: dict[str, list[tuple[int, list[float]]]] = {}
-    for number, row in rows[1:]:
-        if len(row) != len(head):
-            raise FileFormatError(path, number, "", f"expected {len(head)} columns, got {len(row)}")
-        values = [_number(path, number, name, row[columns[name]]) * scales[name] for name in wanted[1:]]
-        name = row[columns[wanted[0]]].strip()
+    for row in of_one_width(path, head, below):
+        values = [number_in_cell(path, row.line, name, row.cells[columns[name]]) * scales[name] for name in wanted[1:]]
+        name = row.cells[columns[wanted[0]]]
         if not name:
-            raise FileFormatError(path, number, wanted[0], "expected a name, got nothing")
-        found.setdefault(name, []).append((number, values))
+            raise FileFormatError(path, row.line, wanted[0], "expected a name, got nothing")
+        found.setdefault(name, []).append((row.line, values))
     return _at_rest(path, found) if "pose" in columns else _on_paths(path, found)
 
 
@@ -169,16 +155,6 @@ def _columns(path: Path, line: int, head: list[str]) -> tuple[dict[str, int], di
 
 def _expected(wanted: tuple[str, ...]) -> str:
     return ", ".join([wanted[0], *(f"{name}_s" if name == "t" else f"{name}_mm" for name in wanted[1:])])
-
-
-def _number(path: Path, line: int, name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise FileFormatError(path, line, name, f"expected a number, got {text.strip()!r}")
-    return value
 
 
 def _at_rest(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) -> RestMeasured:

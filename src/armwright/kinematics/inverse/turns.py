@@ -11,6 +11,8 @@ from armwright.kinematics.inverse.solution import violations
 _TURN = 2 * math.pi
 # An image this far beyond a limit is on it [rad].
 _ON_LIMIT = 1e-9
+# Of one posture so many images are listed: of joints with room for more turns those nearest to it.
+_MOST_IMAGES = 4096
 
 
 def travel(arm: Arm, q_from: ArrayLike, q_to: ArrayLike) -> float:
@@ -31,12 +33,13 @@ def nearest_image(arm: Arm, q: ArrayLike, near: ArrayLike) -> Array:
 
 
 def images(arm: Arm, q: ArrayLike) -> Array:
-    """Return all images of one posture by whole turns that are inside the limits, (k, n); k is 0 if none is.
+    """Return the images of one posture by whole turns that are inside the limits, (k, n); k is 0 if none is.
 
-    A joint without limits has endless images; it stays where it is.
+    A joint without limits has endless images; it stays where it is. Where limits leave room for very many, those
+    nearest to the posture are returned, some thousand.
     """
     values = joint_array(q, arm.n).tolist()
-    rows = np.stack(np.meshgrid(*_images(arm, q, values), indexing="ij"), axis=-1).reshape(-1, arm.n)
+    rows = np.stack(np.meshgrid(*_few(_images(arm, q, values), values), indexing="ij"), axis=-1).reshape(-1, arm.n)
     inside = [row for row in rows if not violations(arm, row)]
     return np.array(inside).reshape(len(inside), arm.n)
 
@@ -59,9 +62,20 @@ def middle(arm: Arm) -> Array:
     return np.where(bounded, (np.where(bounded, lower, 0) + np.where(bounded, upper, 0)) / 2, 0.0)
 
 
+def _few(choices: list[list[float]], values: list[float]) -> list[list[float]]:
+    """Leave out, where there are too many combinations, the images farthest from ``values`` of joints with the most."""
+    most = max(map(len, choices))
+    while math.prod(min(len(turns), most) for turns in choices) > _MOST_IMAGES:
+        most -= 1
+    return [
+        sorted(sorted(turns, key=lambda x: abs(x - value))[:most]) for turns, value in zip(choices, values, strict=True)
+    ]
+
+
 def _images(arm: Arm, q: ArrayLike, starts: list[float]) -> list[list[float]]:
     """List, joint by joint, the images inside the limits; where there is none, the one least outside.
 
+    Of very many those are listed that are nearest to ``starts``.
     Of the endless images of a joint with a limit missing only the one next to ``starts`` is listed.
     """
     result = []
@@ -72,6 +86,9 @@ def _images(arm: Arm, q: ArrayLike, starts: list[float]) -> list[list[float]]:
         elif math.isfinite(upper - lower):
             first = math.ceil((lower - _ON_LIMIT - value) / _TURN)
             last = math.floor((upper + _ON_LIMIT - value) / _TURN)
+            # As many on either side as there may be in all, around the one nearest to the start.
+            nearest = min(max(round((start - value) / _TURN), first), last)
+            first, last = max(first, nearest - _MOST_IMAGES), min(last, nearest + _MOST_IMAGES)
             least = value + _TURN * round(((lower + upper) / 2 - value) / _TURN)
             result.append([value + k * _TURN for k in range(first, last + 1)] or [least])
         else:

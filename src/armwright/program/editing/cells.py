@@ -11,6 +11,7 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.document import Document
+from armwright.files.reading import regular
 from armwright.program.meaning.known import Imported
 
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
@@ -78,7 +79,7 @@ class Cells:
         Raises:
             FileFormatError: it cannot be read.
         """
-        cell = self.read(folder / name).cell
+        cell = self.read(regular(folder / name)).cell
         return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     def around(self, folder: Path | None, text: str, setting: Path | None) -> Surroundings:
@@ -98,11 +99,17 @@ class Cells:
         if folder is None:
             return Surroundings()
         for name in dict.fromkeys(_IMPORT.findall(text)):
-            imported = self._with_arms(folder / name)
+            imported = self._imported_with_arms(folder / name)
             if imported is not None:
                 return Surroundings(file=imported)
         beside = [file for file in map(self._with_arms, _candidates(folder)) if file is not None]
         return Surroundings(file=beside[0] if len(beside) == 1 else None)
+
+    def _imported_with_arms(self, path: Path) -> CellFile | None:
+        try:
+            return self._with_arms(regular(path))
+        except FileFormatError:
+            return None
 
     def _with_arms(self, path: Path) -> CellFile | None:
         try:

@@ -1,0 +1,186 @@
+"""Reading files, never more of one than its limit allows, and never what is no file where data name it."""
+
+import codecs
+import io
+import itertools
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from armwright.errors import FileFormatError, closest
+from armwright.files.limits import MEGABYTE, beyond, limit
+
+_PIECE = 1 << 20
+_KINDS = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFDIR: "a folder",
+}
+# Names of a folder among which the nearest to a missing one is looked for.
+_MOST_NAMES = 1000
+
+
+def regular(path: Path) -> Path:
+    """Return the path of a file that data name: an import, the model of an arm. It must be a regular file.
+
+    What the user names on the command line may be a pipe; what a file names may not, as reading it might never end.
+
+    Raises:
+        FileFormatError: it is a pipe, a device, a socket or a folder.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return path  # reading it says what is wrong
+    if not stat.S_ISREG(mode):
+        kind = _KINDS.get(stat.S_IFMT(mode), "something else")
+        raise FileFormatError(path, None, "", f"expected a file, got {kind}")
+    return path
+
+
+def pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
+    """Give what a file holds, piece by piece, not more than a limit.
+
+    Args:
+        path: the file, or a pipe.
+        bound: the name of the limit of its size, in MB.
+
+    Raises:
+        FileFormatError: it is missing (the nearest name in its folder is told), a folder, or larger than the limit.
+    """
+    path, most, got = Path(path), limit(bound) * MEGABYTE, 0
+    try:
+        with path.open("rb", buffering=0) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > most:
+                raise _too_large(path, bound, size)
+            while piece := file.read(_PIECE):
+                got += len(piece)
+                if got > most:
+                    raise _too_large(path, bound, None)
+                yield piece
+    except FileNotFoundError:
+        near = closest(path.name, _names_in(path.parent))
+        hint = f"; did you mean '{path.parent / near}'?" if near else ""
+        raise FileFormatError(path, None, "", f"no such file{hint}") from None
+    except IsADirectoryError:
+        raise FileFormatError(path, None, "", "expected a file, got a folder") from None
+    except OSError as error:
+        raise FileFormatError(path, None, "", f"cannot be read: {error.strerror}") from error
+    except ValueError as error:  # a zero byte in the name
+        if isinstance(error, FileFormatError):
+            raise
+        raise FileFormatError(repr(str(path)), None, "", "no such file can be") from error
+
+
+def read_bytes(path: Path | str, bound: str = "file_mb") -> bytes:
+    """Return what a file holds.
+
+    Args:
+        path: the file, or a pipe.
+        bound: the name of the limit of its size, in MB.
+
+    Raises:
+        FileFormatError: it is missing (the nearest name in its folder is told), a folder, or larger than the limit.
+    """
+    return b"".join(pieces(path, bound))
+
+
+def read_text(path: Path | str, bound: str = "file_mb") -> str:
+    """Return the text of a UTF-8 file; a mark of byte order is dropped, line ends become line feeds.
+
+    Args:
+        path: the file, or a pipe.
+        bound: the name of the limit of its size, in MB.
+
+    Raises:
+        FileFormatError: it is missing (the nearest name in its folder is told), a folder, larger than the limit, or not
+            UTF-8.
+    """
+    return decoded(read_bytes(path, bound), path)
+
+
+def read_lines(path: Path | str, bound: str = "table_mb") -> Iterator[str]:
+    """Give the lines of a UTF-8 file, one after the other, with their ends; never more than a piece of it is held.
+
+    Args:
+        path: the file, or a pipe.
+        bound: the name of the limit of its size, in MB.
+
+    Raises:
+        FileFormatError: it cannot be read, it or a line is larger than the limit, or it is not UTF-8.
+    """
+    decoder = codecs.getincrementaldecoder("utf-8-sig")()
+    rest, number, longest = "", 0, limit("line_characters")
+    for piece in itertools.chain(pieces(path, bound), [b""]):
+        try:
+            text = rest + decoder.decode(piece, final=not piece)
+        except UnicodeDecodeError as error:
+            line = number + 1 + rest.count("\n") + error.object[: error.start].count(b"\n")
+            raise not_utf8(path, line, error.object[error.start]) from error
+        # What follows the last line feed waits for its end; where there is none, carriage returns may end lines.
+        whole = len(text) if not piece else max(text.rfind("\n"), text.rfind("\r", 0, -1)) + 1
+        rest = text[whole:]
+        if len(rest) > longest:
+            raise FileFormatError(path, number + 1, "", f"a line is too long: {beyond('line_characters')}")
+        for line_text in io.StringIO(text[:whole], newline=""):
+            number += 1
+            yield line_text
+
+
+def read_program(path: Path | str) -> str:
+    """Return the text of a program, or of intermediate code; see ``read_text``.
+
+    Raises:
+        FileFormatError: it cannot be read, is larger than the limit, or not UTF-8.
+    """
+    return read_text(path, "program_mb")
+
+
+def read_typed_program(stream: BinaryIO) -> str:
+    """Return the text of a program that is typed or piped into the standard input.
+
+    Raises:
+        FileFormatError: it is larger than the limit, or not UTF-8.
+    """
+    most = limit("program_mb") * MEGABYTE
+    data = stream.read(most + 1)
+    if len(data) > most:
+        raise FileFormatError("standard input", None, "", f"too large: {beyond('program_mb')}")
+    return decoded(data, "standard input")
+
+
+def decoded(data: bytes, path: Path | str) -> str:
+    """Return the text that bytes are; a mark of byte order is dropped, line ends become line feeds.
+
+    Raises:
+        FileFormatError: they are not UTF-8; the text names ``path`` and the line.
+    """
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        # The decoder counts behind a mark of byte order, so its own bytes are those to look at.
+        line = error.object[: error.start].count(b"\n") + 1
+        raise not_utf8(path, line, error.object[error.start]) from error
+
+
+def not_utf8(path: Path | str, line: int, byte: int) -> FileFormatError:
+    """Return the error that says which byte of a line is no UTF-8."""
+    return FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} has no meaning")
+
+
+def _too_large(path: Path, bound: str, size: int | None) -> FileFormatError:
+    got = None if size is None else f"{size / MEGABYTE:,.1f}"
+    return FileFormatError(path, None, "", f"too large: {beyond(bound, got)}")
+
+
+def _names_in(folder: Path) -> list[str]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entry.name for entry, _ in zip(entries, range(_MOST_NAMES), strict=False))
+    except OSError:
+        return []

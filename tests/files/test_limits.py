@@ -1,0 +1,311 @@
+"""The limits of readers: one table, every limit kept, named in the message, and raised where one asks for it."""
+
+import io
+import os
+import re
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from armwright.arm.load import load_arm, load_urdf, read_arm
+from armwright.cell.reader import read_cell
+from armwright.clearance.reader import read_linkage
+from armwright.cli.app import app
+from armwright.cli.programs import translate_file
+from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
+from armwright.files import limits
+from armwright.files.document import Document
+from armwright.files.limits import LIMITS, limit, parsed, raised
+from armwright.files.lines import longest_dotted_key
+from armwright.files.reading import read_lines, read_text, read_typed_program
+from armwright.files.rows import read_rows
+from armwright.motion.poses_file import read_poses
+from armwright.program.editing.cells import Cells
+from armwright.program.messages.rendering import render
+
+ROOT = Path(__file__).resolve().parents[2]
+IDENTITY = "[1,0,0, 0,1,0, 0,0,1, 0,0,0]"
+
+
+def refused(action: Callable[[], object]) -> str:
+    with pytest.raises(FileFormatError) as caught:
+        action()
+    return str(caught.value)
+
+
+def urdf(links: int) -> str:
+    joints = "".join(
+        f"<joint name='j{i}' type='continuous'><parent link='l{i}'/><child link='l{i + 1}'/></joint>"
+        for i in range(links - 1)
+    )
+    return "<robot name='r'>" + "".join(f"<link name='l{i}'/>" for i in range(links)) + joints + "</robot>"
+
+
+# For each limit, the number that it is set to, a text just beyond it, and who reads it.
+BEYOND: dict[str, tuple[int, str, Callable[[Path], object]]] = {
+    "file_mb": (1, "x = 1\n" * 200_000, read_text),
+    "program_mb": (1, " " * 1_000_001, translate_file),
+    "table_mb": (1, "a,b\n" * 300_000, lambda path: [*read_lines(path)]),
+    "table_rows": (2, "a,b\n1,2\n1,2\n1,2\n", lambda path: [*read_rows(path)[1]]),
+    "table_columns": (2, "a,b,c\n1,2,3\n", read_rows),
+    "line_characters": (1_500_000, "a" * 3_000_000, read_rows),
+    "nesting": (3, "x = [[[[1]]]]\n", Document.read),
+    "digits": (5, "x = 100000\n", Document.read),
+    "entries": (2, "[[pose]]\n[[pose]]\n[[pose]]\n", read_poses),
+    "joints": (1, "[[joint]]\nkind = 'revolute'\n" * 2, read_arm),
+    "bodies": (1, "[ground]\npoints = { A = [0, 0] }\n" + "[[body]]\nname = 'a'\n" * 2, read_linkage),
+    "frames": (1, f"[frames]\nA = {IDENTITY}\nB = {IDENTITY}\n", lambda path: read_cell(path, arms_needed=False)),
+    "hanging": (
+        1,
+        f"[frames]\nA = {IDENTITY}\nB = {{ on = 'A', at = {IDENTITY} }}\n",
+        lambda path: read_cell(path, arms_needed=False),
+    ),
+    "arms": (1, "[arms.ARM_1]\n[arms.ARM_2]\n", read_cell),
+    "turns": (2, "[[joint]]\nkind = 'revolute'\nlimits = { upper_deg = 721, lower_deg = 0 }\n", read_arm),
+}
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_beyond(name: str, tmp_path: Path) -> None:
+    """What is beyond a limit is refused by a message with the limit and the option that raises it."""
+    number, text, read = BEYOND[name]
+    path = tmp_path / "thing.toml"
+    path.write_text(text)
+
+    with raised(**{name: number}):
+        said = refused(lambda: read(path))
+
+    assert f"at most {number:,} {LIMITS[name].unit} are read; `armwright --raise {name}=NUMBER ...` allows more" in said
+
+
+def test_urdf_limits(tmp_path: Path) -> None:
+    """The joints of a URDF chain are counted, and its elements are not deeper than the limit."""
+    path = tmp_path / "thing.urdf"
+    path.write_text(urdf(4))
+
+    assert load_urdf(path).n == 3
+    with raised(joints=2):
+        assert "too many joints between 'l0' and 'l3': 3, and at most 2 joints" in refused(lambda: load_urdf(path))
+    path.write_text("<robot name='r'>" + "<link>" * 100 + "</link>" * 100 + "</robot>")
+    assert "nested too deeply: more, and at most 60 levels" in refused(lambda: load_urdf(path))
+    path.write_text("<robot name='r'>" + "<link>" * 5000 + "</link>" * 5000 + "</robot>")
+    assert "not valid XML: Excessive depth" in refused(lambda: load_urdf(path))
+
+
+def test_entities_are_not_expanded(tmp_path: Path) -> None:
+    """A billion laughs are none, and a file is not read by the name of an entity."""
+    path = tmp_path / "thing.urdf"
+    laughs = "".join(f"<!ENTITY l{i + 1} '{f'&l{i};' * 10}'>" for i in range(9))
+    path.write_text(f"<!DOCTYPE robot [<!ENTITY l0 'ha'>{laughs}]><robot name='r'><link name='a'/>&l9;</robot>")
+
+    assert "Maximum entity amplification factor exceeded" in refused(lambda: load_urdf(path))
+    secret = tmp_path / "secret"
+    secret.write_text("swordfish")
+    path.write_text(f"<!DOCTYPE robot [<!ENTITY s SYSTEM '{secret}'>]><robot name='r'><link name='a'/>&s;</robot>")
+    assert "swordfish" not in refused(lambda: load_urdf(path))
+
+
+def test_typed_programs() -> None:
+    """What is piped into a command is read up to the limit, and not further."""
+    assert read_typed_program(io.BytesIO(b"\xef\xbb\xbfBEGIN\r\n")) == "BEGIN\n"
+    endless = io.BytesIO(b" " * 5_000_000)
+    assert refused(lambda: read_typed_program(endless)).startswith("standard input: too large: more, and at most 1 MB")
+    assert endless.tell() == 1_000_001
+    assert "standard input:2: not UTF-8" in refused(lambda: read_typed_program(io.BytesIO(b"a\n\xff")))
+
+
+# ---- what a file names ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["a pipe", "a device", "a folder"])
+def strange(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[str, str]:
+    """What is no regular file: its kind, and its path."""
+    if request.param == "a device":
+        return request.param, "/dev/zero"
+    path = tmp_path / "strange.toml"
+    if request.param == "a pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    return request.param, str(path)
+
+
+def test_what_a_program_imports(strange: tuple[str, str], tmp_path: Path) -> None:
+    """A program imports regular files alone: a pipe or a device would be read for ever."""
+    kind, path = strange
+    program = tmp_path / "a.rlo"
+    program.write_text(f'IMPORT "{path}" ;\nBEGIN PAUSE 1\nEND.\n')
+
+    compiled = translate_file(program)
+
+    assert f"expected a file, got {kind}" in render(compiled.diagnostics, compiled.source)
+    assert f"expected a file, got {kind}" in refused(lambda: Cells().imported(tmp_path, path))
+
+
+def test_the_model_of_an_arm(strange: tuple[str, str], tmp_path: Path) -> None:
+    """So does a cell with the model of an arm."""
+    kind, path = strange
+    (tmp_path / "cell.toml").write_text(f"[arms.ARM_1]\nmodel = '{path}{'' if path.endswith('.toml') else '/'}'\n")
+
+    said = refused(lambda: read_cell(tmp_path / "cell.toml"))
+
+    assert "arms, ARM_1, model" in said
+    assert f"got {kind}" in said
+
+
+def test_a_pipe_that_the_user_names() -> None:
+    """What the user names may be a pipe."""
+    out, into = os.pipe()
+    os.write(into, b"name = 'pipe'\n[[joint]]\nkind = 'revolute'\n")
+    os.close(into)
+
+    assert load_arm(Path(f"/dev/fd/{out}")).name == "pipe"
+    os.close(out)
+
+
+# ---- raising -------------------------------------------------------------------------------------------------------
+
+
+def test_raising(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A limit is raised in Python, by the environment or by an option; Python comes first."""
+    assert limit("frames") == LIMITS["frames"].usual
+    monkeypatch.setenv(limits.VARIABLE, "frames=7, table_rows=8")
+    assert (limit("frames"), limit("table_rows")) == (7, 8)
+    with raised(frames=9):
+        assert (limit("frames"), limit("table_rows")) == (9, 8)
+        with raised(table_rows=10):
+            assert (limit("frames"), limit("table_rows")) == (9, 10)
+    assert limit("frames") == 7
+
+
+@pytest.mark.parametrize(
+    "text", ["frames", "frames=", "frames=-1", "frames=1.5", "frames=1e9", "frames=" + "9" * 99, ""]
+)
+def test_no_limit(text: str) -> None:
+    """A limit is a name and a whole number."""
+    with pytest.raises(InvalidValueError, match="expected limits such as table_rows=10000000, got"):
+        parsed(text)
+
+
+def test_wrong_limits() -> None:
+    """An unknown limit is answered with the nearest; none is nothing."""
+    with pytest.raises(UnknownNameError, match=r"no limit .frame.\. Did you mean .frames."):
+        parsed("frame=1")
+    with pytest.raises(InvalidValueError, match="frames: expected a whole number of 1 or more, got 0"):
+        parsed("frames=0")
+    with (
+        pytest.raises(InvalidValueError, match="frames: expected a whole number of 1 or more, got True"),
+        raised(frames=True),
+    ):
+        pass
+
+
+def test_the_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The option of the command line stands before the command."""
+    monkeypatch.setenv(limits.VARIABLE, "file_mb=1")
+    (tmp_path / "cell.toml").write_text(f"# {'x' * 1_000_000}\n[frames]\nA = {IDENTITY}\n")
+    (tmp_path / "a.rlo").write_text('IMPORT "cell.toml" ;\nBEGIN PAUSE 1\nEND.\n')
+
+    refusal = CliRunner().invoke(app, ["check", str(tmp_path / "a.rlo")])
+    assert "at most 1 MB are read" in refusal.output
+    allowed = CliRunner().invoke(app, ["--raise", "file_mb=2", "check", str(tmp_path / "a.rlo")])
+    assert "MB" not in allowed.output
+    wrong = CliRunner().invoke(app, ["--raise", "file=2", "check", str(tmp_path / "a.rlo")])
+    assert wrong.exit_code == 2
+    assert "no limit 'file'" in wrong.output
+
+
+def test_the_page() -> None:
+    """The documentation has the table as it is: docs/make_limits.py writes it."""
+    page = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+
+    rows = [f"| `{name}` | {one.usual:,} {one.unit} | {one.bounds} |" for name, one in LIMITS.items()]
+    assert "|---|---|---|\n" + "\n".join(rows) + "\n\n" in page
+
+
+# ---- no more than once ---------------------------------------------------------------------------------------------
+
+
+def test_every_file_is_read_in_one_place() -> None:
+    """Nobody but the readers opens a file that a user names, or parses what it holds."""
+    own = {"files/reading.py", "files/document.py", "files/lines.py", "files/rows.py", "arm/urdf/elements.py"}
+    opening = re.compile(
+        r"tomllib\.|csv\.reader|etree\.(parse|fromstring)|stdin\.buffer\.read\(|\bread_bytes\(\)|\.read_text\("
+    )
+    found = {
+        f"{path.relative_to(ROOT / 'src' / 'armwright')}:{number}: {line.strip()}"
+        for path in (ROOT / "src" / "armwright").rglob("*.py")
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if opening.search(line) and str(path.relative_to(ROOT / "src" / "armwright")) not in own
+    }
+    # Files that armwright wrote itself, or that come with it.
+    ours = (
+        "report/movie.py",
+        "report/files.py",
+        "report/markup.py",
+        "explanations/explaining.py",
+        "sweep/folder.py",
+        "files/store.py",
+        "tracing/",
+    )
+    assert [one for one in sorted(found) if not any(name in one for name in ours)] == []
+
+
+def test_dotted_keys() -> None:
+    """The longest dotted key is found in any text, whatever stands in strings and comments."""
+    assert longest_dotted_key('a.b . \'c.d\'."e\\".f" = 1') == 4
+    assert longest_dotted_key("x = 'a.b.c' # a.b.c\ny = '''\na.b.c\n'''\nz = \"\"\"a.b.c\\\"\"\"\" \nu.v = 1") == 2
+    assert longest_dotted_key("[" + "a." * 999 + "a]") == 1000
+    for odd in (
+        "'",
+        '"',
+        '"""',
+        "'''",
+        "\\",
+        "a" * 100_000,
+        "'" * 100_001,
+        '"' * 100_001,
+        '"\\' * 50_000,
+        "'''\"\"\"" * 20_000,
+    ):
+        assert longest_dotted_key(odd) <= 1
+
+
+def test_a_table_is_not_held(tmp_path: Path) -> None:
+    """A table of many rows is read in the memory of a few, whatever its size."""
+    path = tmp_path / "long.csv"
+    path.write_text("a,b\n" + "1.25,2.5\n" * 400_000)
+    tracemalloc.start()
+
+    count = sum(1 for _ in read_rows(path)[1])
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+
+    assert count == 400_000
+    assert peak < 12e6, peak
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_ends_of_lines(end: str, tmp_path: Path) -> None:
+    """Lines end as on any system, also where a piece of the file ends between the two letters of an end."""
+    path = tmp_path / "a.csv"
+    for shift in range(3):
+        text = "a" * ((1 << 20) - 2 + shift - 300 * 4) + end
+        path.write_bytes(
+            text[:500_000].encode() + end.encode() + text[500_000:].encode() + ("b,c" + end).encode() * 500
+        )
+        assert [*read_lines(path)][2:] == ["b,c" + end] * 500
+    path.write_bytes(b"a,b\n1,2\n\n\xe9,1\n")
+    assert ":4: not UTF-8 text: byte 0xe9" in refused(lambda: [*read_lines(path)])
+
+
+def test_long_names_and_many() -> None:
+    """A word of a page is no misspelt name, and of many names a hundred are told."""
+    said = str(UnknownNameError("frame", "x" * 100_000, [f"F{i:05}" for i in range(20_000)]))
+
+    assert len(said) < 1200
+    assert "and 19,900 more" in said
+    assert isinstance(UnknownNameError("frame", "x", []), ArmwrightError)
