@@ -77,6 +77,9 @@ def _version(wanted: bool) -> None:
 
 def _raise_limits(texts: list[str]) -> list[str]:
     """Let this command, and the processes that it starts, read more of what a limit bounds."""
+    import os
+
+    from armwright.errors import ArmwrightError
     from armwright.files.limits import VARIABLE, parsed
 
     try:
