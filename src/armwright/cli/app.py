@@ -1,7 +1,5 @@
 """The command ``armwright``: its commands, and what becomes of errors."""
 
-import io
-import sys
 from typing import Annotated
 
 import typer
@@ -30,6 +28,7 @@ from armwright.cli.show import show
 from armwright.cli.simulate import simulate
 from armwright.cli.singularity import singularity
 from armwright.cli.study import study
+from armwright.cli.terminal import clean_output
 from armwright.cli.torque import torque
 from armwright.version import __version__
 
@@ -117,8 +116,5 @@ def root(
 
 def main() -> None:
     """Run the command line; an error ends it with one message and the exit status of its kind."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            # A terminal that knows no degree sign gets an escape, not a traceback.
-            stream.reconfigure(errors="backslashreplace")
+    clean_output()
     run_and_exit(app)

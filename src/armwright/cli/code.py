@@ -31,6 +31,7 @@ def code(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright code examples/bench.rlo -o out/bench.rlc`
     """
+    from armwright.cli.terminal import print_verbatim
     from armwright.files.output import write_file
     from armwright.program.intermediate.assembly import assembly
     from armwright.program.intermediate.code import listing
@@ -40,7 +41,7 @@ def code(  # noqa: PLR0917 - Typer reads one parameter per option
         write_file(output, assembly(found))
         print(f"code: {output}")
     else:
-        print(assembly(found) if full else listing(found), end="")
+        print_verbatim(assembly(found) if full else listing(found))
 
 
 def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> "Code":

@@ -37,8 +37,7 @@ def explain(
     if code is None:
         _list(as_json=as_json)
         return
-    from rich.console import Console
-
+    from armwright.cli.terminal import console as clean_console
     from armwright.program.explanations.explaining import explanation
     from armwright.program.explanations.trying import answer
     from armwright.program.text.source import Source
@@ -49,7 +48,7 @@ def explain(
     if as_json:
         _print_json(page, said, source)
         return
-    console = Console()
+    console = clean_console()
     if console.is_terminal:
         _show(console, page, said, source)
     else:

@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from armwright.cli.printing import print_json
+from armwright.cli.terminal import cleaned
 from armwright.errors import ArmwrightError, CheckFailedError, ExitStatus, FileFormatError
 
 if TYPE_CHECKING:
@@ -43,12 +44,31 @@ class _Raised(BaseException):
 class Commands(TyperGroup):
     """All commands; what they raise arrives in ``main`` whatever it is."""
 
+    def make_context(self, *arguments: Any, **settings: Any) -> Any:
+        """Read the options before the command."""
+        try:
+            return super().make_context(*arguments, **settings)
+        except _CallError as error:
+            raise _harmless(error) from None
+
     def invoke(self, ctx: Any) -> Any:
         """Call the command that was asked for."""
         try:
             return super().invoke(ctx)
+        except _CallError as error:
+            raise _harmless(error) from None
         except (EOFError, OSError) as error:
             raise _Raised(error) from error
+
+
+def _harmless(error: Exception) -> Exception:
+    """Return what is said of a wrong call without what a terminal would obey: Typer shows it in colours by itself."""
+    for name, value in vars(error).items():
+        if isinstance(value, str):
+            setattr(error, name, cleaned(value))
+        elif isinstance(value, list | tuple) and all(isinstance(one, str) for one in value):
+            setattr(error, name, [cleaned(one) for one in value])
+    return error
 
 
 def run_and_exit(app: "Callable[..., Any]") -> None:

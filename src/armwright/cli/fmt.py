@@ -38,6 +38,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
     from armwright.cli.rewriting import INPUT, print_difference, read_source, write_back
+    from armwright.cli.terminal import print_verbatim
     from armwright.program.editing.formatting import formatted
 
     rows: list[dict[str, Any]] = []
@@ -62,7 +63,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
         if diff:
             print_difference(source, after)
         elif stdout or (path == INPUT and not check):
-            print(after, end="")
+            print_verbatim(after)
         else:
             print(_said(source, changed=row["changed"], check=check))
     if as_json:

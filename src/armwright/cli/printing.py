@@ -5,6 +5,8 @@ import sys
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from armwright.cli.terminal import console
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -34,9 +36,7 @@ def print_json(data: Any) -> None:
 
 def plain_console() -> "Console":
     """Return a console that takes every text as it is."""
-    from rich.console import Console
-
-    return Console(markup=False, highlight=False)
+    return console(highlight=False)
 
 
 def print_table(console: "Console", shown: "Table") -> None:

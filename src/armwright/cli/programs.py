@@ -111,13 +111,12 @@ def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, 
     """Print diagnostics with the lines they are about, in colour when a person watches."""
     import sys
 
-    from rich.console import Console
-
+    from armwright.cli.terminal import console
     from armwright.program.messages.rendering import render, render_rich
 
-    console = Console(stderr=to_errors)
-    if console.is_terminal:
-        console.print(render_rich(diagnostics, source), soft_wrap=True, end="")
+    shown = console(stderr=to_errors)
+    if shown.is_terminal:
+        shown.print(render_rich(diagnostics, source), soft_wrap=True, end="")
     else:
         print(render(diagnostics, source), end="", file=sys.stderr if to_errors else sys.stdout)
 

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 def watched_console(*, quiet: bool = False) -> "Console | None":
     """Return the console of the error output; None where nobody watches, or wants to."""
-    from rich.console import Console
+    from armwright.cli.terminal import console
 
-    console = Console(stderr=True)
-    return None if quiet or not console.is_terminal else console
+    found = console(stderr=True)
+    return None if quiet or not found.is_terminal else found
 
 
 @contextmanager

@@ -137,10 +137,10 @@ class _Talk:
     """
 
     def __init__(self) -> None:
-        from rich.console import Console
+        from armwright.cli.terminal import console
 
         self.wrong = False
-        self._console = Console(markup=False, highlight=False, soft_wrap=True)
+        self._console = console(highlight=False, soft_wrap=True)
 
     def answer(self, answer: "Answer") -> None:
         """Show what was done, in order, and then what is wrong."""

@@ -30,11 +30,12 @@ def print_difference(source: "Source", after: str) -> None:
     """Print how a program would change, as ``diff -u`` does, in colour when a person watches."""
     import difflib
 
-    from rich.console import Console
     from rich.text import Text
 
+    from armwright.cli.terminal import console as clean_console
+
     before, new = source.text.split("\n"), after.split("\n")
-    console = Console()
+    console = clean_console()
     styles = {"+": "green", "-": "red", "@": "cyan"}
     for line in difflib.unified_diff(before, new, source.name, f"{source.name} (changed)", lineterm=""):
         if console.is_terminal:

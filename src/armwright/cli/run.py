@@ -255,9 +255,8 @@ def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
 
 def _print_moment(error: "RunError", code: "Code") -> None:
     """Show where every frame was when a program could not go on."""
-    from rich.console import Console
-
     from armwright.cell.frames import WORLD
+    from armwright.cli.terminal import console
 
     rows = []
     for name in error.tree:
@@ -270,4 +269,4 @@ def _print_moment(error: "RunError", code: "Code") -> None:
         rows.append((code.spelled(name), "its base" if parent == name else code.spelled(parent), place))
     columns = ("frame", "hangs on", "x, y, z in the world, mm")
     shown = table(columns, rows, title=f"frames at {error.time:.3f} s", words=(0, 1))
-    Console(stderr=True, markup=False).print(shown)
+    console(stderr=True).print(shown)

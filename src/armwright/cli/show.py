@@ -31,15 +31,14 @@ def show(
 
     **Example:** `armwright show puma560`
     """
-    from rich.console import Console
-
     from armwright.arm.load import load_arm
+    from armwright.cli.terminal import console as clean_console
 
     model = load_arm(arm)
     if as_json:
         print_json(_as_data(model))
         return
-    console = Console(highlight=False, markup=False, emoji=False)
+    console = clean_console(highlight=False, emoji=False)
     console.print(f"{model.name}: {model.title}" if model.title else model.name, style="bold")
     if model.source:
         console.print(model.source, style="dim")
@@ -49,7 +48,7 @@ def show(
         if table:
             # A narrow screen wraps the line; it must not cut numbers off.
             whole = console.measure(table, options=console.options.update(max_width=_WIDEST)).maximum
-            Console(highlight=False, width=max(whole, console.width)).print(table)
+            clean_console(highlight=False, width=max(whole, console.width)).print(table)
     console.print()
     console.print(_facts(model))
 
