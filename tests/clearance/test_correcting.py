@@ -255,3 +255,26 @@ def test_diverging() -> None:
     run = simulate(prepare(linkage(), named_path("y1"), CENTRE), ARM_A, frictions=1e4)
     with pytest.raises(InvalidValueError, match="the simulation diverged; the path cannot be corrected"):
         misses(run, named_path("y1").at([0.25]).at)
+
+
+def test_best_round_is_kept() -> None:
+    """Where a round makes the path worse, as on y2 with its late impacts, the best is returned and not the last."""
+    found = correct_path(linkage(), named_path("y2"), (0.3e-3, 0.2e-3, 0.25e-3), rounds=3)
+
+    assert found.best == int(np.argmin(found.history))
+    assert found.after.mean() == min(found.history)
+    run = simulate(prepare(linkage(), found.path), (0.3e-3, 0.2e-3, 0.25e-3))
+    goals = named_path("y2").at(np.array(found.path.targets)).at
+    assert np.linalg.norm(misses(run, goals), axis=-1).mean() == min(found.history)
+
+
+def test_no_round_that_makes_it_worse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A path that every round makes worse is left as it is."""
+    errors = iter((1e-4, 3e-4, 2e-4, 5e-4))
+    monkeypatch.setattr("armwright.clearance.correcting.misses", lambda _run, goals: np.full_like(goals, next(errors)))
+
+    found = correct_nodes(linkage(), PickAndPlace(), ARM_A, COARSE, rounds=3)
+
+    assert found.best == 0
+    np.testing.assert_array_equal(found.nodes, PickAndPlace().nodes)
+    np.testing.assert_array_equal(found.after, found.before)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 
+from armwright.clearance.paths import straight
 from armwright.clearance.preparing import prepare
+from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from clearance.mechanisms import GRAVITY, block, imbalance, left_alone, pendulum, still, thrown
@@ -85,3 +87,36 @@ def test_controller_brings_it_to_its_goal() -> None:
     t = found.time
     by_hand = 1e-3 * np.exp(-a * t) * (np.cos(b * t) + a / b * np.sin(b * t))
     np.testing.assert_allclose(found.q[:, 0] + np.pi / 2, by_hand, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("part", [0.32, 0.5, 0.83])
+def test_order_across_a_jump_within_a_step(part: float) -> None:
+    """Where the acceleration jumps within a step, Runge-Kutta keeps its order 4: the step is cut at the jump."""
+    linkage, clearances = load_linkage("five-bar"), np.full(3, 0.3e-3)
+    whole = straight("diagonal", (-0.12, -0.68), (0.11, -0.47))
+    # Up to 10 ms beyond the jump at 50 ms, before a journal comes down for the first time; the jump is off the steps.
+    knots = np.array([0.0, 0.05, 0.05 + 0.05 * 20 / (100 + part)])
+    path = attrs.evolve(whole, knots=knots, pieces=whole.pieces[:2], targets=())
+    errors = []
+    for steps in (3000, 6000, 12000, 24000):
+        task = prepare(linkage, path, Settings(step=path.duration / steps, sample=path.duration / 4))
+        assert len(task.table) == task.steps + 1
+        assert task.lengths.sum() == pytest.approx(path.duration, abs=1e-15)
+        errors.append(simulate(task, clearances, frictions=0.0).error[-1])
+
+    off = np.linalg.norm(np.array(errors[:-1]) - errors[-1], axis=1)
+    np.testing.assert_allclose(np.log2(off[:-1] / off[1:]), 4, atol=0.4)
+
+
+def test_located_impacts_in_parted_steps() -> None:
+    """Cutting steps at impacts as well as at jumps comes to the same place as a quarter of the step."""
+    linkage, clearances = load_linkage("five-bar"), np.full(3, 0.3e-3)
+    path = straight("diagonal", (-0.12, -0.68), (0.11, -0.47))
+    settings = Settings(sample=path.duration / 20, located=True)
+    runs = [
+        simulate(prepare(linkage, path, attrs.evolve(settings, step=path.duration / n)), clearances)
+        for n in (25760, 103040)
+    ]
+
+    # Until 0.064 s, beyond the jump; later impacts differ.
+    np.testing.assert_allclose(runs[0].error[:6], runs[1].error[:6], rtol=0, atol=1e-9)

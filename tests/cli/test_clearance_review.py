@@ -11,10 +11,11 @@ from cli_calls import armwright
 
 ESTIMATE = {
     "parameters": {
-        "J2": {"mean": 3e-4, "deviation": 1e-6},
-        "J3": {"mean": 2e-4, "deviation": 1e-6},
-        "J4": {"mean": 4e-4, "deviation": 1e-6},
+        "J2": {"mean": 3e-4, "deviation": 1e-6, "identifiable": True},
+        "J3": {"mean": 2e-4, "deviation": 1e-6, "identifiable": True},
+        "J4": {"mean": 4e-4, "deviation": 1e-6, "identifiable": True},
     },
+    "misfit": 0.4,
     "correlation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
 }
 # Thirty-two draws with a deviation of a micrometre lie so near to their mean [m].
@@ -41,6 +42,36 @@ def test_corrected_for_the_estimate(estimate: Path, tmp_path: Path) -> None:
     means = {name: one["mean"] for name, one in ESTIMATE["parameters"].items()}  # type: ignore[attr-defined]
     assert told["clearances"] == pytest.approx(means, abs=DRAWN)
     assert {file.name for file in folder.iterdir()} == {"path.csv", "summary.json", "paths.svg"}
+
+
+def test_no_path_for_a_contradiction(estimate: Path) -> None:
+    """What contradicts its model, or is not told, is nothing to correct a path for: the statuses are 3 and 1."""
+    estimate.write_text(json.dumps(ESTIMATE | {"misfit": 1e-9}))
+    wrong = armwright("clearance", "correct", "five-bar", "--estimate", estimate)
+    parameters = {**ESTIMATE["parameters"], "J3": {"mean": 2e-4, "deviation": 1e-4, "identifiable": False}}  # type: ignore[dict-item]
+    estimate.write_text(json.dumps(ESTIMATE | {"parameters": parameters}))
+    unknown = armwright("clearance", "correct", "five-bar", "--estimate", estimate)
+
+    assert wrong.returncode == 3
+    assert "the data contradict the model" in wrong.stderr
+    assert unknown.returncode == 1
+    assert "the measurement does not tell J3" in unknown.stderr
+
+
+def test_estimate_refuses_a_contradiction(tmp_path: Path) -> None:
+    """Columns that are swapped end with status 3, what is far off, and no number for a clearance."""
+    text = (Path(__file__).parents[2] / "examples" / "five_bar_rest.csv").read_text()
+    head, *rows = text.strip().splitlines()
+    cells = [row.split(",") for row in rows]
+    off = [(float(x) - float(a), float(y) - float(b)) for _, a, b, x, y in cells]
+    turned = [f"{p},{a},{b},{float(a) + v},{float(b) + u}" for (p, a, b, _, _), (u, v) in zip(cells, off, strict=True)]
+    (tmp_path / "turned.csv").write_text("\n".join([head, *turned, ""]))
+
+    done = armwright("clearance", "estimate", "five-bar", tmp_path / "turned.csv", "--json")
+
+    assert done.returncode == 3
+    assert "the data contradict the model: no clearances explain them" in done.stderr
+    assert "mean" not in done.stdout
 
 
 def test_given_twice(estimate: Path) -> None:

@@ -32,11 +32,12 @@ class Correction:
     """A path corrected for play.
 
     Attributes:
-        path: what to tell the linkage.
+        path: what to tell the linkage, of the best round.
         nodes: (k, 2) of the path as told [m].
         before: (..., j) error at the goals of the path as it was [m].
         after: (..., j) error there of the corrected one [m].
         history: mean error at the goals before the first and after each round [m].
+        best: number of the round whose path this is; 0 for the path as it was.
     """
 
     path: Path
@@ -44,6 +45,7 @@ class Correction:
     before: Array
     after: Array
     history: tuple[float, ...]
+    best: int
 
 
 def correct_nodes(
@@ -210,15 +212,12 @@ def _corrected(  # noqa: PLR0917 - what both kinds of corrections have in common
     c = floats(clearances, "clearances")
     if c.ndim not in (1, 2):
         raise ShapeError(f"clearances: expected one row or several, got shape {c.shape}")
-    if rounds < 0:
-        raise InvalidValueError(f"rounds: expected 0 or more, got {rounds}")
+    tried: list[tuple[Array, Array]] = []
     history: list[float] = []
-    before = after = np.zeros(0)
     for turn in range(rounds + 1):
         missing = misses(simulate(prepare(linkage, told(nodes), settings), c), goals)
-        after = np.linalg.norm(missing, axis=-1)
-        before = after if turn == 0 else before
-        history.append(float(after.mean()))
+        tried.append((nodes, np.asarray(np.linalg.norm(missing, axis=-1), dtype=np.float64)))
+        history.append(float(tried[-1][1].mean()))
         if progress is not None:
             progress(history[-1])
         if turn < rounds:
@@ -228,7 +227,10 @@ def _corrected(  # noqa: PLR0917 - what both kinds of corrections have in common
                     f"{linkage.name}: a correction of {np.abs(nodes - goals).max() * 1e3:.1f} mm would be needed; "
                     f"more than {_LARGEST * 1e3:g} mm is no play"
                 )
-    return Correction(path=told(nodes), nodes=nodes, before=before, after=after, history=tuple(history))
+    # Where impacts change from round to round the last is not the best.
+    best = int(np.argmin(history))
+    nodes, after = tried[best]
+    return Correction(path=told(nodes), nodes=nodes, before=tried[0][1], after=after, history=tuple(history), best=best)
 
 
 def misses(simulation: Simulation, goals: Array) -> Array:

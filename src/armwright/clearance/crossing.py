@@ -130,9 +130,10 @@ AGAIN = """
                 if stage == 0 and step > 0:
                     done[:] = 0.0
                     for again in range({pins}):
-                        if find(x, y, state, was, done, part, hit, h) == 0:
+                        if find(x, y, state, was, done, part, hit, lengths[step - 1]) == 0:
                             break
-                        locate(x, y, state, before, after, change, was, done, part, hit, table, step - 1, h)
+                        came = lengths[step - 1]
+                        locate(x, y, state, before, after, change, was, done, part, hit, table, step - 1, came)
                         for k in range({lanes}):
                             if hit[k] >= 0 and begin + k < last:
                                 counts[row[k], hit[k]] += 1

@@ -23,11 +23,12 @@ CONTROLS: tuple[Control, ...] = ("effort", "pd+ff")
 _SOURCE = """{head}{helpers}
 {functions}
 SIGNATURE = types.void(
-    int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True), float64, int64,
+    int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True),
+    types.Array(float64, 1, "C", readonly=True), types.Array(int64, 1, "C", readonly=True),
     types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
 )
 
-def simulate(first, last, start, contacts, gains, table, h, stride, samples, counts, peaks):
+def simulate(first, last, start, contacts, gains, table, lengths, kept, samples, counts, peaks):
     steps = table.shape[0]
     x = np.zeros({inputs} * {lanes})
     y = np.zeros({outputs} * {lanes})
@@ -53,6 +54,7 @@ def simulate(first, last, start, contacts, gains, table, h, stride, samples, cou
         y[:] = 0.0
         for step in range(steps + 1):
             now = min(step, steps - 1)
+            h = lengths[now]
             for stage in range({stages}):
                 moment = 2 if step == steps else (stage + 1) // 2
                 ahead = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
@@ -75,12 +77,12 @@ def simulate(first, last, start, contacts, gains, table, h, stride, samples, cou
                             normal = y[({states} + 3 * i + 2) * {lanes} + k]
                             if normal > peaks[row[k], i]:
                                 peaks[row[k], i] = normal
-                    if step % stride == 0:
+                    if kept[step] >= 0:
                         for k in range(min({lanes}, last - begin)):
                             for i in range({states}):
-                                samples[row[k], step // stride, i] = state[i * {lanes} + k]
+                                samples[row[k], kept[step], i] = state[i * {lanes} + k]
                             for i in range({pins}):
-                                samples[row[k], step // stride, {states} + i] = y[({states} + 3 * i + 2) * {lanes} + k]
+                                samples[row[k], kept[step], {states} + i] = y[({states} + 3 * i + 2) * {lanes} + k]
                     if step == steps:
                         break
 {advance}

@@ -20,6 +20,10 @@ _X_ROWS = (-0.7, -0.65, -0.6, -0.55, -0.5)
 _Y_COLUMNS = (-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15)
 
 
+# Times that differ by less than this part of a step are one.
+ROUNDING = 1e-9
+
+
 class Moment(NamedTuple):
     """Places, speeds and accelerations of a path.
 
@@ -89,8 +93,8 @@ class Path:
     def halves(self, steps: int) -> tuple[Moment, Moment]:
         """Return the path at the ends and middles of equal steps.
 
-        Where the acceleration jumps at one of these times there are two: an integrator sees no jump that falls on a
-        step, only one within.
+        Where the acceleration jumps at one of these times there are two: an integrator sees no jump that falls on the
+        end of a step, only one within.
 
         Args:
             steps: how many there are.
@@ -99,7 +103,7 @@ class Path:
             The path at 2 steps + 1 times, as it goes on from there, and as it came there.
         """
         times = np.linspace(0.0, self.duration, 2 * steps + 1)
-        rounding = 1e-9 * self.duration / steps
+        rounding = ROUNDING * self.duration / steps
         after = np.searchsorted(self.knots, times + rounding, side="right") - 1
         before = np.searchsorted(self.knots, times - rounding, side="right") - 1
         return self.at(times, after), self.at(times, before)

@@ -2,11 +2,12 @@
 
 import attrs
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.ideal import IdealMotion, closed, ideal_motion
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.paths import Path
+from armwright.clearance.paths import ROUNDING, Path
 from armwright.clearance.placement import Placement
 from armwright.clearance.settings import Settings
 from armwright.errors import InvalidValueError, ShapeError
@@ -28,7 +29,11 @@ class Task:
         steps: how many there are.
         h: how long each is [s].
         stride: how many of them lie between two samples; the last sample is at the end.
-        table: (steps, 3, columns) what the drives are told at the start, the middle and the end of each step.
+        table: (rows, 3, columns) what the drives are told at the start, the middle and the end of each row. A row is a
+            step, or a part of one: a step in which the acceleration jumps is made in parts that meet at the jump, since
+            no rule of integration keeps its order across one.
+        lengths: (rows,) how long each is [s].
+        marks: (rows + 1,) the number of the step that begins with each row, and the end; -1 within a step.
         ideal: the motion without play at the start of each step and at the end of the last.
     """
 
@@ -39,6 +44,8 @@ class Task:
     h: float
     stride: int
     table: Array
+    lengths: Array
+    marks: npt.NDArray[np.int64]
     ideal: IdealMotion
 
 
@@ -75,6 +82,7 @@ def prepare(linkage: Linkage, path: Path, settings: Settings | None = None, *, g
     if len(jumps):
         came = ideal_motion(linkage, q[jumps], before.velocity[jumps], before.acceleration[jumps], by_tip=by_tip)
         table[jumps // 2 - 1, 2] = _told(linkage, settings, came)
+    table, lengths, marks = _parted(linkage, path, settings, q[::2], table)
     return Task(
         linkage=linkage,
         path=path,
@@ -83,6 +91,8 @@ def prepare(linkage: Linkage, path: Path, settings: Settings | None = None, *, g
         h=path.duration / steps,
         stride=stride,
         table=np.ascontiguousarray(table),
+        lengths=lengths,
+        marks=marks,
         ideal=IdealMotion(**{one.name: getattr(ideal, one.name)[::2] for one in attrs.fields(IdealMotion)}),
     )
 
@@ -145,6 +155,33 @@ def followed(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bool) -> A
             f"configuration, where the linkage goes over to another assembly"
         )
     return q
+
+
+def _parted(
+    linkage: Linkage, path: Path, settings: Settings, q: Array, table: Array
+) -> tuple[Array, Array, npt.NDArray[np.int64]]:
+    """Return a table whose steps are parted where the acceleration jumps within one, and what else tells its rows."""
+    steps = len(table)
+    h = path.duration / steps
+    grid = np.linspace(0.0, path.duration, steps + 1)
+    knots = np.array([knot for knot in path.knots[1:-1] if np.abs(grid - knot).min() > ROUNDING * h])
+    ends = np.union1d(grid, knots)
+    marks = np.full(len(ends), -1)
+    marks[np.searchsorted(ends, grid)] = np.arange(steps + 1)
+    lengths = np.where((marks[:-1] >= 0) & (marks[1:] >= 0), h, np.diff(ends))
+    number = np.maximum.accumulate(marks)[:-1]
+    parts = np.flatnonzero((marks[:-1] < 0) | (marks[1:] < 0))
+    rows = table[number]
+    if len(parts):
+        times = ends[parts, None] + lengths[parts, None] * (0.0, 0.5, 1.0)
+        piece = np.searchsorted(path.knots, times[:, 1], side="right") - 1
+        moment = path.at(times, np.broadcast_to(piece[:, None], times.shape))
+        by_tip = path.of == "tip"
+        near = np.broadcast_to(q[number[parts], None], (*times.shape, q.shape[1]))
+        there = closed(linkage, near, **{"tip" if by_tip else "drives": moment.at})
+        ideal = ideal_motion(linkage, there, moment.velocity, moment.acceleration, by_tip=by_tip)
+        rows[parts] = _told(linkage, settings, ideal)
+    return rows, lengths, marks
 
 
 def _told(linkage: Linkage, settings: Settings, ideal: IdealMotion) -> Array:

@@ -163,16 +163,19 @@ def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: Array
 
 def _run(task: Task, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
     """Run the compiled simulation, blocks of lanes on several cores."""
-    runs, pins, stride = len(start), layout.pins, task.stride
+    runs, pins, rows = len(start), layout.pins, len(task.table)
+    marks = task.marks[: rows + 1]
+    kept = np.where((marks >= 0) & (marks % task.stride == 0), marks // task.stride, -1)
     record = Record(
-        samples=np.full((runs, task.steps // stride + 1, layout.sampled), np.nan),
+        samples=np.full((runs, task.steps // task.stride + 1, layout.sampled), np.nan),
         impacts=np.zeros((runs, pins), dtype=np.int64),
         peaks=np.zeros((runs, pins)),
     )
     gains = np.tile(task.settings.gains, (runs, len(task.linkage.drives) if layout.gains else 0))
-    rows = _simulator(layout, task.settings.integrator)
+    run = _simulator(layout, task.settings.integrator)
+    lengths = task.lengths[:rows]
     on_cores(
-        lambda first, last: rows(first, last, start, contacts, gains, task.table, task.h, stride, *record),
+        lambda first, last: run(first, last, start, contacts, gains, task.table, lengths, kept, *record),
         runs,
         threads,
     )

@@ -42,7 +42,8 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Move a path against the error that play makes, until the tip comes to where it is wanted.
 
-    Of pick-and-place the three nodes are moved; of another path the whole, smoothly. Each round is one simulation.
+    Of pick-and-place the three nodes are moved; of another path the whole, smoothly. Each round is one simulation, and
+    the path of the best is told.
 
     **Example:** `armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483`
     """
@@ -91,6 +92,7 @@ def _summary(model: "Linkage", path: str, found: "Correction", clearances: "Arra
         "before": np.atleast_2d(found.before).mean(axis=0).tolist(),
         "after": np.atleast_2d(found.after).mean(axis=0).tolist(),
         "mean errors": list(found.history),
+        "round": found.best,
     }
 
 
@@ -99,17 +101,21 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
 
     Raises:
         FileFormatError: the file is not what `clearance estimate --json` prints, or of another linkage.
+        ContradictionError: what was measured contradicts the model.
+        InvalidValueError: a clearance is not told.
     """
     import json
 
     import numpy as np
 
-    from armwright.errors import FileFormatError
+    from armwright.clearance.estimating.misfit import refuse_contradiction
+    from armwright.errors import FileFormatError, InvalidValueError
     from armwright.files.reading import read_text
 
     text = read_text(estimate)
     try:
         told = json.loads(text)
+        misfit, told_of = float(told["misfit"]), {key: one["identifiable"] for key, one in told["parameters"].items()}
         parameters, correlation = told["parameters"], np.array(told["correlation"], dtype=np.float64)
         mean, deviation = (np.array([one[key] for one in parameters.values()]) for key in ("mean", "deviation"))
         names = list(parameters)
@@ -119,6 +125,13 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
     except (AttributeError, KeyError, TypeError, ValueError, np.linalg.LinAlgError) as error:
         text = f"expected what `armwright clearance estimate --json` prints for {model.name}"
         raise FileFormatError(estimate, None, "", text) from error
+    refuse_contradiction(misfit, [], [])
+    unknown = [name for name in model.clearances if not told_of[name]]
+    if unknown:
+        raise InvalidValueError(
+            f"{estimate}: the measurement does not tell {', '.join(unknown)}; a path cannot be corrected for what is "
+            f"not known: measure more poses or paths, or give --clearance"
+        )
     # Contact needs some play.
     return np.maximum(drawn, _SMALLEST)
 

@@ -13,6 +13,7 @@ from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
     from armwright.clearance.estimating.measured import PathsMeasured, RestMeasured
+    from armwright.clearance.estimating.static import Estimate
     from armwright.clearance.linkage import Linkage
 
 # What of an error curve is compared.
@@ -39,7 +40,7 @@ def estimate(
 
     At rest a few poses are enough and no simulation is needed. On paths a sweep of simulations tells what an error
     curve means; the answer is a distribution: mean, 90 % interval, correlation, and which parameters the data do not
-    tell.
+    tell. Where no clearances explain the data none are told, and the exit status is 3.
 
     **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
     """
@@ -56,6 +57,7 @@ def estimate(
 
 
 def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) -> dict[str, Any]:
+    from armwright.clearance.estimating.misfit import widening
     from armwright.errors import InvalidValueError
 
     if noise is not None and not 0 < noise < math.inf:
@@ -74,16 +76,38 @@ def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) ->
             for i, name in enumerate(found.names)
         },
         "correlation": found.correlation.tolist(),
+        "misfit": float(found.misfit),
+        "widening": float(widening(found.square, found.spare)),
         "notes": [
             f"{len(measured.names)} poses, {sum(measured.readings)} readings; {found.residual * 1e6:.3g} µm are left",
             f"singular values of the equations: {', '.join(f'{x:.3g}' for x in found.singular_values)}",
+            *([] if noise or measured.noise else [_no_noise(found)]),
+            *_told_of_fit(float(found.misfit), float(widening(found.square, found.spare))),
             *(
-                []
-                if noise or measured.noise
-                else ["no readings of a pose differ: a noise of 1 µm was taken for granted"]
+                f"{name} is at its bound, 0 mm: the readings would have it below nothing"
+                for name, ends in zip(found.names, found.at_bound, strict=True)
+                if ends
             ),
         ],
     }
+
+
+def _no_noise(found: "Estimate") -> str:
+    """Say what was taken for the noise where no readings of a pose differ."""
+    if math.isfinite(found.freedom):
+        return (
+            f"no readings of a pose differ and --noise-um is not given: the {found.noise * 1e6:.3g} µm that are left "
+            f"are taken for the noise, and whether the model fits cannot be told"
+        )
+    return f"no readings of a pose differ: a noise of {found.noise * 1e6:.3g} µm was taken for granted"
+
+
+def _told_of_fit(misfit: float, wider: float) -> list[str]:
+    """Say how well the model explains the data."""
+    told = [f"data as far off as these come by chance in {100 * misfit:.3g} % of cases"]
+    if wider > 1:
+        told.append(f"more is left than the noise explains: deviations and intervals are {wider:.3g} times as wide")
+    return told
 
 
 def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, noise: float | None) -> dict[str, Any]:
@@ -122,7 +146,7 @@ def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, 
         surrogate = learn(parameters, points, names, values, ranges=ranges, progress=told_of)
     features = measured.features()
     seen = [float(getattr(features[path], feature)) for path in measured.times for feature in _FEATURES]
-    found = posterior(surrogate, seen, measured.noise_of(names, noise))
+    found = posterior(surrogate, seen, measured.noise_of(names, noise)).checked()
     interval = found.interval(_LEVEL)
     return {
         "by": "paths",
@@ -136,10 +160,17 @@ def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, 
             for i, name in enumerate(found.names)
         },
         "correlation": found.correlation.tolist(),
+        "misfit": found.misfit,
+        "widening": found.widening,
         "notes": [
             f"{len(names)} features of {len(measured.times)} paths, learnt from {len(points)} simulations",
-            f"features as far off as these come by chance in {100 * found.misfit:.3g} % of cases"
-            + ("; the model or the noise is wrong" if found.misfit < 1e-4 else ""),
+            *_told_of_fit(found.misfit, found.widening),
+            *(
+                f"{name.removeprefix('c_')} lies at the end of what was swept, "
+                f"{end if name == 'friction' else end * 1e3:g}{'' if name == 'friction' else ' mm'}, or beyond: "
+                f"it is not told; sweep further"
+                for name, end in found.bounds.items()
+            ),
         ],
     }
 

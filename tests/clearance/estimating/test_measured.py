@@ -230,16 +230,31 @@ def test_spreadsheets(tmp_path: Path) -> None:
 
 def test_few_readings_make_intervals_wider() -> None:
     """The noise of six readings is itself uncertain: Student's t of six numbers reaches 1.94 deviations, not 1.64."""
+    linkage, poses = load_linkage("five-bar"), np.array([(-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7)])
     readings = RestMeasured(
         names=("P1", "P2", "P3"),
-        poses=np.array([(-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7)]),
-        offsets=np.full((3, 2), 1e-4),
+        poses=poses,
+        offsets=rest_offsets(linkage, poses, np.full(3, 3e-4)),
         readings=(2, 2, 2),
         noise=1e-6,
     )
-    linkage = load_linkage("five-bar")
 
     few, known = readings.estimate(linkage), readings.estimate(linkage, noise=np.sqrt(2) * 1e-6)
 
     np.testing.assert_allclose(np.ptp(few.interval(0.9), axis=-1) / few.deviations / 2, 1.943, atol=1e-3)
     np.testing.assert_allclose(np.ptp(known.interval(0.9), axis=-1) / known.deviations / 2, 1.645, atol=1e-3)
+
+
+def test_unknown_noise_is_what_is_left(rng: np.random.Generator) -> None:
+    """Of single readings without --noise-um what is left is the noise: intervals hold the truth."""
+    linkage, true = load_linkage("five-bar"), np.array((3e-4, 2e-4, 4e-4))
+    poses = np.column_stack([rng.uniform(-0.18, 0.18, 12), rng.uniform(-0.7, -0.5, 12)])
+    offsets = rest_offsets(linkage, poses, true) + rng.normal(0.0, 2e-5, poses.shape)
+    names = tuple(map(str, range(12)))
+
+    found = RestMeasured(names=names, poses=poses, offsets=offsets, readings=(1,) * 12, noise=None).estimate(linkage)
+
+    assert found.noise == pytest.approx(2e-5, rel=0.5)
+    assert found.freedom == 21
+    low, high = found.interval(0.999).T
+    assert np.all((low <= true) & (true <= high))

@@ -12,7 +12,7 @@ from armwright.clearance.estimating.posterior import Posterior, posterior
 from armwright.clearance.features import Features, features_of
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.clearance.sweeping import feature_vector
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import ContradictionError, InvalidValueError, ShapeError
 from armwright.sweep.designs import sobol
 from clearance.arms import ARM_A, PATHS, accuracy
 from clearance.conftest import FEATURES, RANGE, Swept
@@ -181,7 +181,8 @@ def test_intervals_cover(swept: Swept, rng: np.random.Generator) -> None:
     assert binom.cdf(31, 42, 0.9) < 1 / 300
     assert held >= 32
     assert np.mean([accuracy(one.mean, c) for one, c in zip(known, true, strict=True)]) > 99
-    assert all(all(one.identifiable.values()) for one in known)
+    # What lies at the end of the sweep may lie beyond it.
+    assert all(sure or name in one.bounds for one in known for name, sure in one.identifiable.items())
     assert np.median([one.misfit for one in known]) > 0.05
 
 
@@ -204,7 +205,9 @@ def test_unknown_friction(swept: Swept) -> None:
     truth = np.array([*ARM_A, 0.08])
     assert np.all((low <= truth) & (truth <= high))
     assert np.all(free.deviations[:3] > sure.deviations)
-    assert np.all(np.abs(sure.mean - ARM_A) > 5 * sure.deviations)
+    assert np.all(np.abs(sure.mean - ARM_A) > 2 * sure.deviations)
     # It does not go unnoticed: so far off the features are by chance once in a hundred thousand times.
     assert sure.misfit < 1e-5
+    with pytest.raises(ContradictionError, match="the data contradict the model"):
+        sure.checked()
     assert free.misfit > 0.05

@@ -59,7 +59,7 @@ def test_with_noise(five_bar: Linkage, clearances: Array, rng: np.random.Generat
 
     assert accuracy(found.values, clearances).mean() > WITH_NOISE
     # The standard deviation of one that is taken of 300 draws is 4 %.
-    np.testing.assert_allclose(found.values.std(axis=0), found.deviations, rtol=0.16)
+    np.testing.assert_allclose(found.values.std(axis=0), np.sqrt(np.diag(found.covariance)), rtol=0.16)
 
 
 def test_intervals_cover(five_bar: Linkage, rng: np.random.Generator) -> None:

@@ -190,7 +190,8 @@ def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | N
     Args:
         surrogate: with f features.
         seen: (f,) features.
-        weights: (f,) standard deviations by which to compare; those of the surrogate when left out.
+        weights: (f,) standard deviations by which to compare, or their covariance (f, f); those of the surrogate when
+            left out.
 
     Raises:
         ShapeError: the features are not f.
@@ -201,20 +202,21 @@ def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | N
     width = surrogate.upper - surrogate.lower
     middle = (surrogate.lower + surrogate.upper)[None] / 2
     scale = surrogate.predict(middle)[1][0] if weights is None else floats(weights, "weights")
+    whitener = np.diag(1 / scale) if scale.ndim == 1 else np.linalg.inv(np.linalg.cholesky(scale))
 
     def missing(unit: Array) -> Array:
         mean, _ = surrogate.predict((surrogate.lower + unit * width)[None])
-        return np.asarray((mean[0] - goal) / scale, dtype=np.float64)
+        return np.asarray(whitener @ (mean[0] - goal), dtype=np.float64)
 
     def slopes(unit: Array) -> Array:
         # Differences would tell the rounding of the means, which is large where chance adds next to nothing.
-        return np.stack([process.slope(unit) for process in surrogate.processes]) / scale[:, None]
+        return np.asarray(whitener @ np.stack([process.slope(unit) for process in surrogate.processes]))
 
     rng = np.random.default_rng(0)
     starts = rng.random((_TRIED, len(width)))
     with one_core():
         means, _ = surrogate.predict(surrogate.lower + starts * width)
-        order = np.argsort((((means - goal) / scale) ** 2).sum(axis=-1))
+        order = np.argsort((((means - goal) @ whitener.T) ** 2).sum(axis=-1))
         found = [least_squares(missing, starts[i], slopes, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:_STARTS]]
     best = min(found, key=lambda one: float(one.cost))
     return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)

@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.clearance.estimating.misfit import refuse_contradiction
 from armwright.clearance.estimating.static import Estimate, estimate_at_rest
 from armwright.clearance.features import Features, features_of
 from armwright.clearance.linkage import Linkage
@@ -26,6 +27,8 @@ _AT_REST = ("pose", "commanded_x", "commanded_y", "x", "y")
 _ON_PATHS = ("path", "t", "x", "y")
 # An error beyond this is no play but another unit, or another arm [m].
 _LARGEST = 0.02
+# No instrument that is meant tells a resting tip to less [m].
+LEAST_NOISE = 1e-6
 # Samples of a measured path, at least, and how much of the path they must tell.
 _FEWEST, _WHOLE = 20, 0.99
 
@@ -54,12 +57,35 @@ class RestMeasured:
 
         Args:
             linkage: that was measured.
-            noise: standard deviation of one coordinate of one reading; that of the readings themselves without it [m].
+            noise: standard deviation of one coordinate of one reading; that of the readings themselves without it, and
+                where none of them differ, what is left of the fit [m].
+
+        Raises:
+            ContradictionError: no clearances explain the readings.
+            InvalidValueError: the poses do not tell all clearances.
         """
         own = self.noise if noise is None else noise / math.sqrt(min(self.readings))
-        found = estimate_at_rest(linkage, self.poses, self.offsets, own or 1e-6)
-        told = noise is None and self.noise is not None
-        return attrs.evolve(found, freedom=2.0 * sum(n - 1 for n in self.readings)) if told else found
+        found = estimate_at_rest(linkage, self.poses, self.offsets, own or LEAST_NOISE)
+        if noise is None and self.noise is not None:
+            found = attrs.evolve(found, freedom=2.0 * sum(n - 1 for n in self.readings))
+        if own is None and found.spare > 0 and found.square > found.spare:
+            # Nothing but what is left says how large the noise is, and it cannot contradict the model too.
+            more = float(found.square) / found.spare
+            return attrs.evolve(
+                found,
+                noise=found.noise * math.sqrt(more),
+                covariance=more * found.covariance,
+                freedom=float(found.spare),
+            )
+        off = (found.missing / found.noise).tolist()
+        farthest = [
+            (f"{axis} of {name}", x)
+            for name, pair in zip(self.names, off, strict=True)
+            for axis, x in zip("xy", pair, strict=True)
+        ]
+        bounds = [f"{name} at 0" for name, ends in zip(found.names, found.at_bound, strict=True) if ends]
+        refuse_contradiction(float(found.misfit), farthest, bounds)
+        return found
 
 
 @attrs.frozen(kw_only=True, eq=False)

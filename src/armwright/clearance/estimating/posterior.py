@@ -11,14 +11,16 @@ from collections.abc import Callable, Mapping
 
 import attrs
 import numpy as np
-from scipy.stats import chi2
 
 from armwright.arrays import Array, ArrayLike, floats, one_core
 from armwright.clearance.estimating.kriging import Surrogate, solve_features
+from armwright.clearance.estimating.misfit import chance, refuse_contradiction, widening
 from armwright.errors import InvalidValueError, ShapeError
 
 _WALKERS, _STEPS, _BURN = 60, 300, 100
 _STRETCH = 2.0
+# A parameter is at a bound when it is nearer than this part of its range, or than its deviation.
+_NEAR = 1e-3
 # A parameter is told when its standard deviation is at most this part of what was known before.
 _TOLD = 0.3
 
@@ -34,6 +36,9 @@ class Posterior:
         upper: (k,).
         misfit: probability that features as far off as these are seen where the model holds; small ones say that
             the model, or the noise it was told, is wrong.
+        best: (k,) the likeliest.
+        farthest: (f,) by how many standard deviations each feature is off there.
+        widening: by what the deviations have grown, since the features are farther off than noise explains.
     """
 
     names: tuple[str, ...]
@@ -41,6 +46,33 @@ class Posterior:
     lower: Array
     upper: Array
     misfit: float
+    best: Array
+    farthest: Mapping[str, float]
+    widening: float
+
+    @property
+    def bounds(self) -> Mapping[str, float]:
+        """Parameters that may lie beyond what was swept, and the end of the range near which they were found.
+
+        A coefficient of friction that is 0 lies at no end of what was swept but of what there is.
+        """
+        ends = {}
+        for i, name in enumerate(self.names):
+            near = max(float(self.deviations[i]), _NEAR * float(self.upper[i] - self.lower[i]))
+            for end in (float(self.lower[i]), float(self.upper[i])):
+                if abs(float(self.best[i]) - end) < near and end != 0:
+                    ends[name] = end
+        return ends
+
+    def checked(self) -> "Posterior":
+        """Return the same, if features and model do not contradict one another.
+
+        Raises:
+            ContradictionError: no parameters explain the features.
+        """
+        ends = [f"{name.removeprefix('c_')} at {_shown(name, end)}" for name, end in self.bounds.items()]
+        refuse_contradiction(self.misfit, self.farthest.items(), ends)
+        return self
 
     @property
     def mean(self) -> Array:
@@ -59,10 +91,13 @@ class Posterior:
 
     @property
     def identifiable(self) -> Mapping[str, bool]:
-        """Whether the measurement told each parameter: it is known much better than before."""
+        """Whether the measurement told each parameter: it is known much better than before, and not at a bound.
+
+        A bound makes sharp what lies beyond it.
+        """
         before = (self.upper - self.lower) / np.sqrt(12)
         told = self.deviations <= _TOLD * before
-        return dict(zip(self.names, map(bool, told), strict=True))
+        return {name: bool(one) and name not in self.bounds for name, one in zip(self.names, told, strict=True)}
 
     def interval(self, level: float = 0.9) -> Array:
         """Return (k, 2) between which each parameter lies with a probability, as much left out on either side."""
@@ -91,39 +126,71 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
     measured = np.diag(spread**2) if spread.ndim == 1 else spread
     lower, upper = surrogate.lower, surrogate.upper
 
+    best, missing, covariance = _likeliest(surrogate, goal, measured)
+    square, freedom = float(missing @ np.linalg.solve(covariance, missing)), max(1, count - len(lower))
+    wider = float(widening(square, freedom))
+
     def log_density(points: Array) -> Array:
         mean, deviation = surrogate.predict(np.clip(points, lower, upper))
         covariance = measured + surrogate.correlation * deviation[..., :, None] * deviation[..., None, :]
-        missing = mean - goal
-        solved = np.linalg.solve(covariance, missing[..., None])[..., 0]
-        density = -0.5 * (missing * solved).sum(axis=-1) - 0.5 * np.linalg.slogdet(covariance)[1]
+        off = mean - goal
+        solved = np.linalg.solve(covariance, off[..., None])[..., 0]
+        density = -0.5 * (off * solved).sum(axis=-1) / wider**2 - 0.5 * np.linalg.slogdet(covariance)[1]
         inside = np.all((points >= lower) & (points <= upper), axis=-1)
         return np.where(inside, density, -np.inf)
 
-    centre = solve_features(
-        surrogate, goal, np.sqrt(np.diag(measured) + surrogate.predict((lower + upper)[None] / 2)[1][0] ** 2)
-    )
     with one_core():
-        samples, best = _walk(log_density, centre, lower, upper, seed)
-    mean, deviation = surrogate.predict(best[None])
-    covariance = measured + surrogate.correlation * np.outer(deviation[0], deviation[0])
-    missing = mean[0] - goal
-    freedom = max(1, count - len(lower))
-    misfit = float(chi2.sf(missing @ np.linalg.solve(covariance, missing), freedom))
-    return Posterior(names=surrogate.parameters, samples=samples, lower=lower, upper=upper, misfit=misfit)
+        samples = _walk(log_density, best, lower, upper, seed)
+    return Posterior(
+        names=surrogate.parameters,
+        samples=samples,
+        lower=lower,
+        upper=upper,
+        misfit=float(chance(square, freedom)),
+        best=best,
+        farthest=dict(zip(surrogate.features, (missing / np.sqrt(np.diag(covariance))).tolist(), strict=True)),
+        widening=wider,
+    )
 
 
-def _walk(
-    log_density: Callable[[Array], Array], centre: Array, lower: Array, upper: Array, seed: int
-) -> tuple[Array, Array]:
-    """Return samples of walkers that stretch towards and away from one another, and the likeliest place they saw."""
+def _likeliest(surrogate: Surrogate, goal: Array, measured: Array) -> tuple[Array, Array, Array]:
+    """Return the parameters (k,) whose features come nearest to those seen by the noise of all of them together.
+
+    Returns:
+        The parameters, what their features miss (f,), and its covariance (f, f).
+    """
+
+    def told(point: Array) -> tuple[Array, Array]:
+        mean, deviation = surrogate.predict(point[None])
+        return mean[0], measured + surrogate.correlation * np.outer(deviation[0], deviation[0])
+
+    _, covariance = told((surrogate.lower + surrogate.upper) / 2)
+    found: list[tuple[float, Array, Array, Array]] = []
+    # The doubt of the surface depends on where one is: twice.
+    for _ in range(2):
+        point = solve_features(surrogate, goal, covariance)
+        mean, covariance = told(point)
+        missing = goal - mean
+        square = float(missing @ np.linalg.solve(covariance, missing))
+        found.append((square + float(np.linalg.slogdet(covariance)[1]), point, missing, covariance))
+    _, point, missing, covariance = min(found, key=lambda one: one[0])
+    return point, missing, covariance
+
+
+def _shown(name: str, value: float) -> str:
+    """Return a parameter in words: clearances in mm."""
+    return f"{value * 1e3:g} mm" if name.startswith("c_") else f"{value:g}"
+
+
+def _walk(log_density: Callable[[Array], Array], centre: Array, lower: Array, upper: Array, seed: int) -> Array:
+    """Return samples of walkers that stretch towards and away from one another."""
     rng = np.random.default_rng(seed)
     k = len(centre)
     spread = 0.02 * (upper - lower)
     places = np.clip(centre + spread * rng.standard_normal((_WALKERS, k)), lower + 1e-3 * spread, upper - 1e-3 * spread)
     density = log_density(places)
     half = _WALKERS // 2
-    kept, heights = [], []
+    kept = []
     for step in range(_STEPS):
         for own, others in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
             z = ((_STRETCH - 1) * rng.random(half) + 1) ** 2 / _STRETCH
@@ -135,6 +202,4 @@ def _walk(
             density[own] = np.where(taken, found, density[own])
         if step >= _BURN:
             kept.append(places.copy())
-            heights.append(density.copy())
-    samples = np.concatenate(kept)
-    return samples, samples[np.concatenate(heights).argmax()]
+    return np.concatenate(kept)

@@ -12,8 +12,10 @@ from collections.abc import Iterable
 
 import attrs
 import numpy as np
+from scipy.optimize import nnls
 
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arrays import Array, ArrayLike, Flags, floats
+from armwright.clearance.estimating.misfit import chance, widening
 from armwright.clearance.ideal import closed, ideal_motion, sensitivity, tip_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.preparing import assembled
@@ -39,7 +41,8 @@ class Estimate:
         values: (..., p) clearances [m].
         covariance: (p, p) [m²].
         singular_values: of the equations, largest first; how the offset grows with the best and worst told mixture.
-        residual: (...) root mean square of what is left [m].
+        missing: (..., k, 2) what is left of the offset of each pose [m].
+        noise: standard deviation of one coordinate of an offset [m].
         freedom: of how many numbers the noise was estimated; infinite where it was known. Few make intervals wider.
     """
 
@@ -47,18 +50,46 @@ class Estimate:
     values: Array
     covariance: Array
     singular_values: Array
-    residual: Array
+    missing: Array
+    noise: float
     freedom: float = np.inf
 
     @property
+    def residual(self) -> Array:
+        """(...) root mean square of what is left [m]."""
+        return np.asarray(np.sqrt(np.mean(self.missing**2, axis=(-2, -1))), dtype=np.float64)
+
+    @property
+    def square(self) -> Array:
+        """(...) sum of squares of what is left, in standard deviations."""
+        return np.asarray(np.sum((self.missing / self.noise) ** 2, axis=(-2, -1)), dtype=np.float64)
+
+    @property
+    def spare(self) -> int:
+        """How many more numbers were measured than clearances are sought."""
+        return 2 * int(self.missing.shape[-2]) - len(self.names)
+
+    @property
+    def misfit(self) -> Array:
+        """(...) probability that so much is left where the model holds; small ones say that model or noise is wrong."""
+        return chance(self.square, self.spare, self.freedom)
+
+    @property
     def deviations(self) -> Array:
-        """(p,) standard deviations [m]."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
+        """(..., p) standard deviations, wider where more is left than the noise explains [m]."""
+        own = np.sqrt(np.diag(self.covariance))
+        return np.asarray(widening(self.square, self.spare)[..., None] * own, dtype=np.float64)
 
     @property
     def correlation(self) -> Array:
         """(p, p) correlation of the parameters."""
-        return np.asarray(self.covariance / np.outer(self.deviations, self.deviations), dtype=np.float64)
+        own = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(own, own), dtype=np.float64)
+
+    @property
+    def at_bound(self) -> Flags:
+        """(..., p) which clearances the data would have below nothing; they are told as next to none."""
+        return np.asarray(self.values <= 2 * _SMALLEST, dtype=np.bool_)
 
     def interval(self, level: float = 0.9) -> Array:
         """Return (..., p, 2) in which each clearance lies with a probability [m]."""
@@ -71,8 +102,9 @@ class Estimate:
         return np.stack([self.values - half, self.values + half], axis=-1)
 
     def identifiable(self, width: float) -> tuple[bool, ...]:
-        """Whether each clearance is told: its deviation is small beside the range in which it may lie [m]."""
-        return tuple(bool(one < _TOLD * width) for one in self.deviations)
+        """Whether each clearance is told: known well beside the range in which it may lie [m], and not at a bound."""
+        told = (self.deviations < _TOLD * width) & ~self.at_bound
+        return tuple(map(bool, told))
 
 
 def rest_matrix(linkage: Linkage, poses: ArrayLike) -> Array:
@@ -133,26 +165,38 @@ def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noi
         raise InvalidValueError(
             f"{len(places)} poses do not tell {len(names)} clearances from one another; take more, or others"
         )
-    solver = np.linalg.pinv(B)
-
-    def explained(offsets: Array) -> Array:
-        return np.asarray((offsets.reshape(*offsets.shape[:-2], 1, -1) * solver).sum(axis=-1), dtype=np.float64)
-
-    c = np.maximum(explained(seen), _SMALLEST)
-    for _ in range(_MOST_ROUNDS):
-        new = np.maximum(c + explained(seen - rest_offsets(linkage, places, c)), _SMALLEST)
-        done = np.abs(new - c).max() < _SETTLED
-        c = new
-        if done:
-            break
-    missing = seen - rest_offsets(linkage, places, c)
+    best, missing = _fitted(linkage, places, seen, B)
     return Estimate(
         names=names,
-        values=np.asarray(c, dtype=np.float64),
+        values=best,
         covariance=np.asarray(noise**2 * np.linalg.inv(B.T @ B), dtype=np.float64),
         singular_values=np.asarray(singular, dtype=np.float64),
-        residual=np.asarray(np.sqrt(np.mean(missing**2, axis=(-2, -1))), dtype=np.float64),
+        missing=missing,
+        noise=noise,
     )
+
+
+def _fitted(linkage: Linkage, places: Array, seen: Array, B: Array) -> tuple[Array, Array]:
+    """Return the clearances (..., p) that explain offsets (..., k, 2) best, and what is left (..., k, 2) [m]."""
+
+    def stepped(c: Array, missing: Array) -> Array:
+        """Least squares about c, none below the smallest: with one at its bound, the others make up for it."""
+        goal = missing.reshape(*missing.shape[:-2], -1) + (c - _SMALLEST) @ B.T
+        rows = [nnls(B, one)[0] for one in goal.reshape(-1, len(B))]
+        return np.reshape(rows, c.shape) + _SMALLEST
+
+    c = stepped(np.full((*seen.shape[:-2], B.shape[1]), _SMALLEST), seen)
+    best, left, settled = c, np.full_like(seen, np.inf), False
+    for _ in range(_MOST_ROUNDS):
+        missing = seen - rest_offsets(linkage, places, c)
+        # The rounds need not end with the best.
+        better = np.sum(missing**2, axis=(-2, -1)) < np.sum(left**2, axis=(-2, -1))
+        best, left = np.where(better[..., None], c, best), np.where(better[..., None, None], missing, left)
+        if settled:
+            break
+        new = stepped(c, missing)
+        settled, c = bool(np.abs(new - c).max() < _SETTLED), new
+    return np.asarray(best, dtype=np.float64), np.asarray(left, dtype=np.float64)
 
 
 def best_poses(linkage: Linkage, candidates: ArrayLike, count: int) -> list[int]:
