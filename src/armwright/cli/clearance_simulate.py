@@ -14,6 +14,7 @@ from armwright.cli.progress import waiting
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
     from armwright.clearance.paths import Path as TipPath
+    from armwright.clearance.predictability import Outlook
     from armwright.clearance.preparing import Task
     from armwright.clearance.settings import Settings
     from armwright.clearance.simulation import Simulation
@@ -67,8 +68,9 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Let a linkage with play follow a path: its drives do what it would need without play.
 
-    Prints what became of the path, of every pin and of the energy. With -o, report.html shows the linkage moving, its
-    journals rattling in their bearings, and error, forces and energy over time. The first run of a linkage compiles it.
+    Prints what became of the path, of every pin and of the energy, and until when all this is a prediction. With -o,
+    report.html shows the linkage moving, its journals rattling in their bearings, and error, forces and energy over
+    time. The first run of a linkage compiles it.
 
     **Example:** `armwright clearance simulate five-bar --path y1 --clearance J2=0.3 -o out/rattling`
 
@@ -92,7 +94,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         start=start,
         located=locate,
     )
-    run = Run.of(_simulated(model, way, settings, friction, watched=not (quiet or as_json)))
+    run = Run.of(*_simulated(model, way, settings, friction, watched=not (quiet or as_json)))
     told = {"command": command_line(), **summary(run)}
     text = json_text(told)
     if output is not None:
@@ -147,14 +149,16 @@ def _instead(drives: int, wanted: int) -> str:
 
 def _simulated(
     model: "Linkage", way: "TipPath", settings: "Settings", friction: float | None, *, watched: bool
-) -> "Simulation":
-    """Run it, with a word on the screen while a person waits for the compiler."""
+) -> "tuple[Simulation, Outlook]":
+    """Run it, and beside it runs that nobody could tell from it; a word is on the screen while it is compiled."""
+    import numpy as np
+
+    from armwright.clearance.predictability import with_outlook
     from armwright.clearance.preparing import prepare
-    from armwright.clearance.simulation import simulate as run
 
     with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
         task: Task = prepare(model, way, settings)
-        return run(task, frictions=friction)
+        return with_outlook(task, np.array(list(model.clearances.values())), friction=friction)
 
 
 def _files(run: "Run", text: str) -> dict[str, Any]:

@@ -11,11 +11,12 @@ from armwright.arrays import Array
 from armwright.clearance.contact import damping, restitution_of
 from armwright.clearance.features import spectrum
 from armwright.clearance.ledger import Ledger, ledger
+from armwright.clearance.predictability import APART, FINER, Outlook
 from armwright.clearance.simulation import Simulation, Status
 from armwright.errors import ShapeError
 from armwright.version import __version__
 
-# Energy that the books may lack before a reader is told, as a part of what went through them, or so little [J].
+# Energy that the balance may lack before a reader is told, as a part of what was lost, or so little [J].
 _UNEXPLAINED, _LITTLE = 0.02, 1e-4
 # A journal that is so deep in the wall is no longer what the law of contact means, as a part of its clearance.
 _DEEP = 0.1
@@ -28,6 +29,7 @@ class Run:
     Attributes:
         simulation: of one run, without leading axes.
         rows: how many samples are sound, counted from the start.
+        outlook: until when it is a prediction; None where that was not looked at.
         energy: where its energy was.
         gaps: (s, p, 2) from the middle of each bearing to that of its journal [m].
         depths: (s, p) how deep each journal is in the wall; below 0 where it flies [m].
@@ -35,12 +37,13 @@ class Run:
 
     simulation: Simulation
     rows: int
+    outlook: Outlook | None
     energy: Ledger
     gaps: Array
     depths: Array
 
     @classmethod
-    def of(cls, simulation: Simulation) -> "Run":
+    def of(cls, simulation: Simulation, outlook: Outlook | None = None) -> "Run":
         """Return a run with what reports tell of it.
 
         Raises:
@@ -54,7 +57,7 @@ class Run:
         # Forces and energies become infinite before places do.
         sound = np.isfinite(np.concatenate(told, axis=-1)).all(axis=-1)
         rows = len(simulation.time) if sound.all() else max(1, int(np.argmin(sound)))
-        return cls(simulation=simulation, rows=rows, energy=energy, gaps=gaps, depths=depths)
+        return cls(simulation=simulation, rows=rows, outlook=outlook, energy=energy, gaps=gaps, depths=depths)
 
     @property
     def finished(self) -> bool:
@@ -88,6 +91,7 @@ def summary(run: Run) -> dict[str, Any]:
         "duration": task.path.duration,
         "status": Status(int(simulation.status)).name.lower(),
         "sound_until": float(run.time[-1]),
+        "predictable_until": None if run.outlook is None else run.outlook.until,
         "pins": {pin.name: _pin(run, i) for i, pin in enumerate(task.linkage.pins)},
         "error": {
             "largest": float(run.distance.max()),
@@ -147,6 +151,13 @@ def targets(run: Run) -> list[dict[str, Any]]:
         if path.of == "tip":
             away = np.linalg.norm(run.simulation.tip[: run.rows] - path.at(t).at, axis=-1)
             one["nearest"] = float(away.min())
+        if run.outlook is not None:
+            one["mean_x"], one["mean_y"], one["spread_x"], one["spread_y"] = (
+                _finite(np.interp(t, run.simulation.time, values[:, i]))
+                for values in (run.outlook.mean, run.outlook.spread)
+                for i in range(2)
+            )
+            one["predictable"] = run.outlook.to_the_end or t <= run.outlook.until
         found.append(one)
     return found
 
@@ -187,12 +198,15 @@ def notes(run: Run) -> list[str]:
             f"the run diverged: a number became infinite or the tip left its path by a metre; "
             f"shown until {run.time[-1]:.4g} s"
         )
+    said.extend(_outlook_in_words(run))
     energy, rows = run.energy, slice(run.rows)
-    through = max(float(np.ptp(track[rows])) for track in (energy.driven, energy.kinetic, energy.potential))
+    # What the integration loses or makes is to be small beside what impacts and friction took, not beside what went by.
+    lost = float((energy.impact_loss + energy.friction_loss)[rows][-1])
     lacking = float(np.abs(energy.imbalance[rows]).max())
-    if lacking > max(_UNEXPLAINED * through, _LITTLE):
+    if lacking > max(_UNEXPLAINED * lost, _LITTLE):
+        part = f", {100 * lacking / lost:.2g} % of them" if lost > 0 else ""
         said.append(
-            f"the books lack {lacking:.3g} J of {through:.3g} J that went through them: "
+            f"the energy balance lacks {lacking:.3g} J beside {lost:.3g} J of losses{part}: "
             f"the step of {run.simulation.task.h:.3g} s is long for these impacts"
         )
     deep = (np.max(run.depths[rows], axis=0) / run.simulation.clearances) > _DEEP
@@ -200,6 +214,26 @@ def notes(run: Run) -> list[str]:
         names = [pin.name for pin, one in zip(run.simulation.task.linkage.pins, deep, strict=True) if one]
         said.append(f"{', '.join(names)}: deeper in the wall than a tenth of the clearance, where Hertz is a guess")
     return said
+
+
+def _outlook_in_words(run: Run) -> Iterator[str]:
+    """Say until when a run is a prediction, and what holds afterwards."""
+    one = run.outlook
+    if one is None:
+        return
+    what = f"clearances a nanometre away{' or half the step' if one.halved else ''}"
+    apart = f"{APART * 1e6:g} µm{f' ({APART / FINER * 1e6:g} µm for half the step)' if one.halved else ''}"
+    if one.to_the_end:
+        yield f"predictable to the end: runs with {what} stay within {apart}"
+        return
+    yield (
+        f"predictable until t = {one.until:.4g} s: then a run with {what} is more than {apart} away; "
+        f"what comes later is one of many runs that nobody can tell apart"
+    )
+    for target in targets(run):
+        if not target["predictable"] and target["spread_x"] is not None:
+            means = (f"{target[f'mean_{axis}'] * 1e3:z.4f} ± {target[f'spread_{axis}'] * 1e3:.4f}" for axis in "xy")
+            yield f"at {target['time']:.4g} s the error is x {' mm, y '.join(means)} mm over these runs (mean ± spread)"
 
 
 def samples_csv(run: Run) -> Iterator[str]:

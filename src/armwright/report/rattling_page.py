@@ -193,6 +193,8 @@ def _facts(told: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
     yield "Linkage", told["linkage"]
     yield "Path", f"{told['path']}, {told['duration']:.4g} s"
     yield "Clearance", ", ".join(f"{name} {pin['clearance'] * 1e3:.4g} mm" for name, pin in told["pins"].items())
+    if told["predictable_until"] is not None:
+        yield "Predictable until", f"{told['predictable_until']:.4g} s"
     yield "Command", command
 
 
