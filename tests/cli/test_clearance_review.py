@@ -45,7 +45,7 @@ def test_corrected_for_the_estimate(estimate: Path, tmp_path: Path) -> None:
 
 
 def test_no_path_for_a_contradiction(estimate: Path) -> None:
-    """What contradicts its model, or is not told, is nothing to correct a path for: the statuses are 3 and 1."""
+    """What contradicts its model, or is not told, is nothing to correct a path for: the statuses are 3 and 2."""
     estimate.write_text(json.dumps(ESTIMATE | {"misfit": 1e-9}))
     wrong = armwright("clearance", "correct", "five-bar", "--estimate", estimate)
     parameters = {**ESTIMATE["parameters"], "J3": {"mean": 2e-4, "deviation": 1e-4, "identifiable": False}}  # type: ignore[dict-item]
@@ -54,7 +54,7 @@ def test_no_path_for_a_contradiction(estimate: Path) -> None:
 
     assert wrong.returncode == 3
     assert "the data contradict the model" in wrong.stderr
-    assert unknown.returncode == 1
+    assert unknown.returncode == 2
     assert "the measurement does not tell J3" in unknown.stderr
 
 

@@ -140,7 +140,7 @@ def test_books_that_do_not_close(simulation: Simulation) -> None:
     said = notes(Run.of(attrs.evolve(simulation, works=works)))
 
     assert len(said) == 1
-    assert said[0].startswith("the books lack 1 J")
+    assert said[0].startswith("the energy balance lacks 1 J beside ")
     assert "1e-05 s" in said[0]
 
 
