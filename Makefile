@@ -57,6 +57,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/weld.rlo --cell examples/stanford_cell.toml -o out/weld
 	$(BIN)/armwright run examples/peg.rlo --cell examples/peg_cell.toml -o out/peg
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/two_arms.toml -o out/hand_over
+	$(BIN)/armwright run examples/hand_over_sideways.rlo --cell examples/two_arms.toml -o out/hand_over_sideways
 	$(BIN)/armwright move joint puma560 examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 	$(BIN)/python examples/measurements.py

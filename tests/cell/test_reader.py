@@ -380,6 +380,21 @@ FAULTS = {
     "a misspelt table below": (ARM + "[device]\nPRESS = {}\n", 4, "device: unknown key; did you mean 'devices'?"),
     "camera without a list": (ARM + "[camera]\npose = 1\n", 5, "camera, pose: expected a list of 12 numbers, got 1"),
     "camera that needs hours": (ARM + "[camera]\ntime_s = 3600\n", 5, "camera, time_s: expected 0 to 600, got 3600"),
+    "camera that goes on with something": (
+        ARM + "[camera]\nafter_last = 'first'\n",
+        5,
+        "camera, after_last: expected one of nothing, same, got the text 'first'",
+    ),
+    "contact that gives way too far": (
+        ARM + "[contact]\nz = 0\ndeepest_mm = 0\n",
+        6,
+        "contact, deepest_mm: expected 0.001 to 1000, got 0",
+    ),
+    "two arms on one base": (
+        ARM + ARM.replace("ARM_1", "ARM_2").replace("0,0,0]", "0,0,0.009]", 1),
+        None,
+        "arms, ARM_2, base: ARM_2 and ARM_1 stand on one base, 9 mm apart; two arms need 10 mm or more",
+    ),
     "contact that is no height": (
         ARM + "[contact]\nz = 'low'\n",
         5,

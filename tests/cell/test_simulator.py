@@ -13,6 +13,8 @@ from armwright.cell.simulator import Simulator
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import forward
 from armwright.motion.quintic import quintic
+from armwright.motion.trajectory import hold
+from armwright.spatial.poses import pose
 
 BENCH = """name = "bench"
 [arms.ARM_1]
@@ -20,6 +22,7 @@ posture = [0, 0, 0.3, 0, 0, 0]
 open_s = 0.2
 grasp_s = 0.5
 [arms.ARM_2]
+base = [-1,0,0, 0,-1,0, 0,0,1, 2,0,0]
 posture = [1, 0, 0.3, 0, 0, 0]
 [camera]
 pose = [0,1,0, -1,0,0, 0,0,1, 1,0,0]
@@ -37,14 +40,26 @@ def bench(tmp_path: Path, text: str = BENCH) -> Cell:
 
 
 def test_camera_answers_one_after_the_other(tmp_path: Path) -> None:
-    """The camera gives its answers in the order of the file, and the last one for ever after."""
-    hardware: Hardware = Simulator(bench(tmp_path))
+    """The camera gives its answers in the order of the file; where the cell says so, the last one for ever after."""
+    hardware: Hardware = Simulator(
+        bench(tmp_path, BENCH.replace("time_s = 0.25", 'time_s = 0.25\nafter_last = "same"'))
+    )
 
     places = [hardware.look("OBJ")[0][:3, 3] for _ in range(4)]
 
     # The camera stands at x = 1 and is turned a quarter to the left: 0.1 m along its x is 0.1 m along y of the world.
     np.testing.assert_allclose(places, [(1, 0.1, 0), (1, 0.2, 0), (1, 0.2, 0), (1, 0.2, 0)], atol=1e-12)
     assert hardware.look("OBJ")[1] == 0.25
+
+
+def test_camera_answers_run_out(tmp_path: Path) -> None:
+    """After its last answer the camera finds nothing more, and says how many there were."""
+    hardware = Simulator(bench(tmp_path))
+    hardware.look("OBJ")
+    hardware.look("OBJ")
+
+    with pytest.raises(DeviceError, match=r"the camera found nothing more for OBJ: cell 'bench' has 2 answers for it"):
+        hardware.look("OBJ")
 
 
 def test_two_simulators_of_one_cell(tmp_path: Path) -> None:
@@ -129,7 +144,7 @@ def test_a_trajectory_that_begins_elsewhere(tmp_path: Path) -> None:
 
 
 def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
-    """The hand stands still where it touches the plane, and the force grows with how deep it was sent."""
+    """The force of the plane grows with the depth of the hand in it, and stays while it stands there."""
     cell = bench(tmp_path)
     start = cell.arms["ARM_1"].start
     arm = cell.arms["ARM_1"].arm
@@ -144,11 +159,45 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
 
     hardware.begin("ARM_1", motion, 3.0, np.eye(4))
 
-    assert hardware.stopped_at("ARM_1") == pytest.approx(4.0, abs=1e-9)
+    assert hardware.touches_at("ARM_1") == pytest.approx(4.0, abs=1e-9)
     assert hardware.force("ARM_1", 4.0)[2] == pytest.approx(0, abs=1e-6)
-    np.testing.assert_allclose(hardware.posture("ARM_1", 4.5), motion(1.0), atol=1e-9)
-    sent = (X_WB @ forward(arm, motion(1.5)))[2, 3]
-    np.testing.assert_allclose(hardware.force("ARM_1", 4.5), (0, 0, 1000 * (plane - sent)), atol=1e-6)
+    for later, local in ((4.5, 1.5), (5.0, 2.0), (60.0, 2.0)):
+        np.testing.assert_array_equal(hardware.posture("ARM_1", later), motion(local))
+        depth = plane - (X_WB @ forward(arm, motion(local)))[2, 3]
+        np.testing.assert_allclose(hardware.force("ARM_1", later), (0, 0, 1000 * depth), atol=1e-6)
+        np.testing.assert_allclose(hardware.pressed("ARM_1", later), (depth, 1000 * depth), atol=1e-9)
+    # Deeper than 5 mm it has come on the first tick at which it is.
+    heights = np.array([(X_WB @ forward(arm, motion(k * 1e-3)))[2, 3] for k in range(2001)])
+    assert hardware.too_deep_at("ARM_1") == pytest.approx(3.0 + np.flatnonzero(heights < plane - 5e-3)[0] * 1e-3)
+
+    # On its way out it presses less and less; what is let go does not press at all.
+    hardware.begin("ARM_1", motion.reversed(), 60.0, np.eye(4))
+    assert hardware.touches_at("ARM_1") is None
+    assert hardware.too_deep_at("ARM_1") is None
+    depth = plane - (X_WB @ forward(arm, motion(1.5)))[2, 3]
+    np.testing.assert_allclose(hardware.force("ARM_1", 60.5), (0, 0, 1000 * depth), atol=1e-6)
+    assert not hardware.force("ARM_1", 61.001).any()
+
+
+def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
+    """A part that an arm has pressed on the plane presses on with any motion of the arm, until the fingers open."""
+    cell = bench(tmp_path)
+    arm, X_WB, start = (getattr(cell.arms["ARM_1"], name) for name in ("arm", "base", "start"))
+    X_HP = pose(np.eye(3), (0.0, 0.0, 0.05))
+    ends = [start, start + np.array([0, 0, 0.1, 0, 0, 0])]
+    ends.sort(key=lambda q: -(X_WB @ forward(arm, q) @ X_HP)[2, 3])
+    motion = quintic(*ends, 1.0)
+    plane = float((X_WB @ forward(arm, motion(0.9)) @ X_HP)[2, 3])
+    low = attrs.evolve(cell.arms["ARM_1"], start=ends[0])
+    hardware = Simulator(attrs.evolve(cell, arms={"ARM_1": low}, contact_height=plane))
+    hardware.begin("ARM_1", motion, 0.0, X_HP)
+    pressed = hardware.force("ARM_1", 1.0)[2]
+    assert pressed > 1
+
+    hardware.begin("ARM_1", hold(motion(1.0), 1.0), 1.0, np.eye(4))
+    assert hardware.force("ARM_1", 2.0)[2] == pytest.approx(pressed, rel=1e-9)
+    hardware.fingers("ARM_1", closed=False)
+    assert hardware.force("ARM_1", 2.0)[2] == 0
 
 
 def test_fingers_take_their_time(tmp_path: Path) -> None:

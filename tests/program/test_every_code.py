@@ -14,6 +14,7 @@ MANUAL = Path(__file__).parents[2] / "docs" / "language.md"
 RUNNING = {
     "acting.py",
     "asking.py",
+    "contact.py",
     "control.py",
     "evaluate.py",
     "interpret.py",

@@ -1,6 +1,6 @@
 """What the interpreter asks of a cell: the one small protocol that a simulated or a real cell answers."""
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from armwright.arrays import Array
 from armwright.errors import ArmwrightError
@@ -9,6 +9,18 @@ from armwright.motion.trajectory import Trajectory
 
 class DeviceError(ArmwrightError, RuntimeError):
     """A device could not do what it was asked."""
+
+
+class Press(NamedTuple):
+    """How hard an arm has pressed on something.
+
+    Attributes:
+        depth: how deep what it moves has come into it [m]; 0 where it has not touched it.
+        force: the force there [N].
+    """
+
+    depth: float
+    force: float
 
 
 class Hardware(Protocol):
@@ -27,11 +39,20 @@ class Hardware(Protocol):
             tip: (4, 4) what shall come to the goal, seen from the hand: the part that may touch something.
         """
 
-    def stopped_at(self, arm: str) -> float | None:
-        """Return when something in the way stops the motion that was begun last; None where nothing does."""
+    def touches_at(self, arm: str) -> float | None:
+        """Return when what the arm moves comes into contact by the motion begun last; None where it does not."""
+
+    def too_deep_at(self, arm: str) -> float | None:
+        """Return the tick from which the motion begun last presses deeper than the cell allows; None if it never does.
+
+        What stood deeper already when the motion began is too deep where it goes deeper still.
+        """
+
+    def pressed(self, arm: str, now: float) -> Press:
+        """Return how deep and how hard the arm has pressed at most since its last motion began, until now."""
 
     def force(self, arm: str, now: float) -> Array:
-        """Return the force (3,) on what the arm moves, along the axes of the world [N]."""
+        """Return the force (3,) on what the arm moves, or stands pressed with, along the axes of the world [N]."""
 
     def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:
         """Close or open the fingers of an arm, wholly or to a width [m]; return the time it takes.

@@ -60,10 +60,13 @@ class Cell:
         arms: by name, such as ``ARM_1``.
         frames: by name, in upper case.
         visions: by frame name, what the camera will report, one answer after the other, (4, 4) seen from the camera.
+        camera_repeats: whether the camera goes on with its last answer for a frame when there are no more; without it,
+            it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
         devices: names of the tools that can be operated; None when the cell does not say, and any will do.
-        contact_height: height of a plane that stops whatever comes down on it [m]; None where there is none.
-        contact_stiffness: how the force grows while an arm goes on pressing on that plane [N/m].
+        contact_height: height of a plane that gives way to whatever comes down on it [m]; None where there is none.
+        contact_stiffness: how the force of that plane grows with the depth to which it is pressed in [N/m].
+        contact_deepest: how deep an arm may press into it [m].
         vision_time: how long the camera takes for an answer [s].
         deviation: allowed distance from straight lines [m].
         period: of the servo [s].
@@ -75,9 +78,11 @@ class Cell:
     frames: Mapping[str, Node] = attrs.field(factory=dict)
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
+    camera_repeats: bool = False
     devices: frozenset[str] | None = None
     contact_height: float | None = None
     contact_stiffness: float = 2e4
+    contact_deepest: float = 5e-3
     vision_time: float = 0.1
     deviation: float = 1e-3
     period: float = 1e-3

@@ -25,6 +25,8 @@ from armwright.spatial.poses import inverse as inverse_pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # The arm of a cell that names none: the report's.
+# Two bases nearer than this are in one another [m].
+_APART = 0.01
 # Joints that it takes to bring the hand to any place in any orientation.
 _PLACE_AND_TURN = 6
 _REPORT_ARM = "stanford"
@@ -37,6 +39,8 @@ SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
 # How to go round what stops a straight line, as it is written.
 WAYS_ROUND: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
+# What the camera finds after its last answer, as it is written.
+_AFTER_LAST = ("nothing", "same")
 # Fingers and cameras that take longer are a slip of units [s].
 _LONGEST_WAIT = 600.0
 
@@ -63,10 +67,12 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         frames=_frames(top.table("frames"), arms),
         visions=_visions(top.table("visions")),
         camera=_pose(camera, "pose", default=np.eye(4)),
+        camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_LONGEST_WAIT),
         devices=_devices(top.table("devices")) if "devices" in top else None,
         contact_height=None if math.isnan(height) else height,
         contact_stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
+        contact_deepest=contact.number("deepest_mm", default=5.0, lower=1e-3, upper=1e3) * 1e-3,
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
         around=_around(motion),
@@ -93,6 +99,13 @@ def _arms(table: Table, folder: Path) -> dict[str, CellArm]:
         if name in arms:
             raise table.error(key, f"{name} is given twice; case, - or _ and leading zeros make no other arm")
         arms[name] = _arm(table.table(key), folder)
+        for other in arms:
+            apart = float(np.linalg.norm(arms[name].base[:3, 3] - arms[other].base[:3, 3]))
+            if other != name and apart < _APART:
+                text = (
+                    f"{name} and {other} stand on one base, {apart * 1e3:.3g} mm apart; two arms need {_APART * 1e3:g}"
+                )
+                raise table.table(key).error("base", f"{text} mm or more")
     if not arms:
         raise table.error(None, "expected at least one arm, such as [arms.ARM_1]")
     return arms

@@ -1,11 +1,13 @@
 """The kinematic simulator: a cell in which everything goes as the cell file says."""
 
+from collections.abc import Sequence
+
 import attrs
 import numpy as np
 from scipy.optimize import brentq
 
 from armwright.arrays import Array
-from armwright.cell.hardware import DeviceError
+from armwright.cell.hardware import DeviceError, Press
 from armwright.cell.model import Cell
 from armwright.errors import closest
 from armwright.kinematics.forward import forward
@@ -15,37 +17,62 @@ from armwright.motion.trajectory import Trajectory, hold
 _SAME_POSTURE = 1e-9
 # What is less deep in the plane than this only touches it, as after a motion that ended on it [m].
 _TOUCHES = 1e-9
+# Postures that are worked out together.
+_AT_ONCE = 16384
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Tip:
+    """What may press on the plane while an arm follows a trajectory.
+
+    Attributes:
+        pose: (4, 4) seen from the hand.
+        above: (k,) its heights above the plane on the servo ticks [m].
+        since: the first tick from which it counts; before, it stands below the plane without having come down on it.
+    """
+
+    pose: Array
+    above: Array
+    since: int
+
+    def depths(self) -> Array:
+        """Return how deep it presses on every tick [m]."""
+        return np.where(np.arange(len(self.above)) < self.since, 0.0, np.maximum(-self.above, 0.0))
+
+    def comes_down(self) -> int | None:
+        """Return the last tick before it comes down on the plane; None where it does not."""
+        into = (self.above[1:] < -_TOUCHES) & (self.above[:-1] >= -_TOUCHES)
+        return int(into.argmax()) if into.any() else None
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class _Run:
-    """What an arm does since some time: along a trajectory until something stops it."""
+    """What an arm does since some time: along a trajectory, with tips that may press on the plane."""
 
     t0: float
     trajectory: Trajectory
-    tip: Array
-    stopped: float | None
+    tips: tuple[_Tip, ...] = ()
 
     def local(self, now: float) -> float:
         """Return the time along the trajectory that the arm has come to."""
-        end = self.trajectory.duration if self.stopped is None else self.stopped
-        return min(max(0.0, now - self.t0), end)
+        return min(max(0.0, now - self.t0), self.trajectory.duration)
+
+    def depths(self) -> Array:
+        """Return how deep it presses on every servo tick [m]."""
+        return np.max([tip.depths() for tip in self.tips], axis=0) if self.tips else np.zeros(1)
 
 
 class Simulator:
     """Arms that go where they are sent, fingers that close, tools that switch, a camera that answers in order.
 
-    Where the cell has a plane of contact, what an arm moves cannot come below it: the arm stands still while its
-    trajectory goes on into the plane, and the force grows with the depth that it has been sent to.
+    Where the cell has a plane of contact, it gives way to what an arm brings down on it, with a force that grows with
+    the depth, for as long as the arm stands or moves in it.
     """
 
     def __init__(self, cell: Cell) -> None:
         """Set up the cell as it stands at the start."""
         self._cell = cell
-        self._runs = {
-            name: _Run(t0=0.0, trajectory=hold(arm.start, 0.0), tip=np.eye(4), stopped=None)
-            for name, arm in cell.arms.items()
-        }
+        self._runs = {name: _Run(t0=0.0, trajectory=hold(arm.start, 0.0)) for name, arm in cell.arms.items()}
         self._on: set[str] = set()
         self._answers = {name: list(answers) for name, answers in cell.visions.items()}
 
@@ -65,49 +92,88 @@ class Simulator:
         """Let an arm follow a trajectory that begins at its posture."""
         gap = np.abs(trajectory(0.0) - self.posture(arm, now)).max()
         assert gap <= _SAME_POSTURE, f"{arm} stands {gap:.3g} away from where its trajectory begins"  # noqa: S101
-        stopped = self._contact(arm, trajectory, tip)
-        self._runs[arm] = _Run(t0=now, trajectory=trajectory, tip=tip, stopped=stopped)
+        pressing = [one.pose for one in self._runs[arm].tips if self._depth(arm, one, now) > _TOUCHES]
+        self._runs[arm] = _Run(t0=now, trajectory=trajectory, tips=self._tips(arm, trajectory, tip, pressing))
 
-    def stopped_at(self, arm: str) -> float | None:
-        """Return when the plane stops the motion of an arm; None where it does not."""
+    def touches_at(self, arm: str) -> float | None:
+        """Return when what an arm moves comes down on the plane by the motion begun last; None where it does not."""
         run = self._runs[arm]
-        return None if run.stopped is None else run.t0 + run.stopped
+        ticks = ((tip, tip.comes_down()) for tip in run.tips)
+        times = [self._touch(arm, run.trajectory, tip.pose, tick) for tip, tick in ticks if tick is not None]
+        return run.t0 + min(times) if times else None
+
+    def too_deep_at(self, arm: str) -> float | None:
+        """Return the tick from which the motion begun last presses deeper than the cell allows; None where it does not.
+
+        What stood deeper already when the motion began is too deep where it goes deeper still.
+        """
+        run = self._runs[arm]
+        depths = run.depths()
+        deep = depths > max(self._cell.contact_deepest, depths[0]) + _TOUCHES
+        return run.t0 + int(deep.argmax()) * self._cell.period if deep.any() else None
+
+    def pressed(self, arm: str, now: float) -> Press:
+        """Return how deep and how hard an arm has pressed at most since its last motion began, until now."""
+        run = self._runs[arm]
+        passed = round(run.local(now) / self._cell.period) + 1
+        depth = float(run.depths()[:passed].max())
+        return Press(depth, depth * self._cell.contact_stiffness)
 
     def force(self, arm: str, now: float) -> Array:
-        """Return the force of the plane on what an arm moves [N]: upwards, as deep as it has been sent."""
-        run = self._runs[arm]
-        if run.stopped is None or now - run.t0 <= run.stopped:
-            return np.zeros(3)
-        sent = self._heights(arm, run.trajectory, run.tip, np.array([now - run.t0]))[0]
-        assert self._cell.contact_height is not None  # noqa: S101 - nothing else stops an arm
-        depth = max(0.0, self._cell.contact_height - sent)
+        """Return the force of the plane on what an arm moves or stands pressed with [N]: upwards, by its depth."""
+        depth = max((self._depth(arm, tip, now) for tip in self._runs[arm].tips), default=0.0)
         return np.array([0.0, 0.0, depth * self._cell.contact_stiffness])
 
-    def _contact(self, arm: str, trajectory: Trajectory, tip: Array) -> float | None:
-        """Return when what an arm moves comes down on the plane; None where it does not, or is below it already."""
+    def _depth(self, arm: str, tip: _Tip, now: float) -> float:
+        """Return how deep one tip presses on the plane [m]."""
+        run = self._runs[arm]
+        if self._cell.contact_height is None or run.local(now) < tip.since * self._cell.period - _TOUCHES:
+            return 0.0
+        height = self._heights(arm, run.trajectory, tip.pose, np.array([run.local(now)]))[0]
+        return max(0.0, self._cell.contact_height - float(height))
+
+    def _tips(self, arm: str, trajectory: Trajectory, tip: Array, pressing: Sequence[Array]) -> tuple[_Tip, ...]:
+        """Return what may press on the plane: what the arm shall bring to the goal, and what it is pressed with now."""
         plane = self._cell.contact_height
-        if plane is None or trajectory.duration == 0:
-            return None
-        looks = np.arange(max(2, round(trajectory.duration / self._cell.period) + 1)) * self._cell.period
-        above = self._heights(arm, trajectory, tip, np.minimum(looks, trajectory.duration)) - plane
-        into = np.flatnonzero((above[1:] < -_TOUCHES) & (above[:-1] >= -_TOUCHES))
-        if not len(into):
-            return None
-        at = int(into[0])
-        if above[at] <= 0:
-            return float(looks[at])
-        height = lambda t: float(self._heights(arm, trajectory, tip, np.array([t]))[0]) - plane  # noqa: E731
-        return float(brentq(height, looks[at], min(looks[at + 1], trajectory.duration), xtol=1e-14))
+        if plane is None:
+            return ()
+        ticks = np.arange(round(trajectory.duration / self._cell.period) + 1)
+        t = np.minimum(ticks * self._cell.period, trajectory.duration)
+        others = [pose for pose in pressing if not np.allclose(pose, tip, rtol=0, atol=_TOUCHES)]
+        tips = []
+        for pose, pressed in ((tip, len(others) < len(pressing)), *((other, True) for other in others)):
+            above = self._heights(arm, trajectory, pose, t) - plane
+            over = above >= -_TOUCHES
+            since = 0 if pressed else int(over.argmax()) if over.any() else len(over)
+            tips.append(_Tip(pose=pose, above=above, since=since))
+        return tuple(tips)
+
+    def _touch(self, arm: str, trajectory: Trajectory, tip: Array, tick: int) -> float:
+        """Return when a tip that is below the plane on the next tick comes to it."""
+        begin, end = tick * self._cell.period, min((tick + 1) * self._cell.period, trajectory.duration)
+        plane = self._cell.contact_height
+        assert plane is not None  # noqa: S101 - nothing else is touched
+
+        def above(t: float) -> float:
+            return float(self._heights(arm, trajectory, tip, np.array([t]))[0]) - plane
+
+        return begin if above(begin) <= 0 else float(brentq(above, begin, end, xtol=1e-14))
 
     def _heights(self, arm: str, trajectory: Trajectory, tip: Array, t: Array) -> Array:
         place = self._cell.arms[arm]
-        return np.asarray((place.base @ forward(place.arm, trajectory(t)) @ tip)[:, 2, 3])
+        pieces = np.array_split(t, -(-len(t) // _AT_ONCE))
+        return np.concatenate([(place.base @ forward(place.arm, trajectory(one)) @ tip)[:, 2, 3] for one in pieces])
 
     def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below
         """Close or open the fingers of an arm; return the time it takes [s].
 
-        The fingers of this simulator have one speed whatever the width: the file gives one time.
+        The fingers of this simulator have one speed whatever the width: the file gives one time. What they let go does
+        not press any more.
         """
+        if not closed:
+            run = self._runs[arm]
+            own = tuple(tip for tip in run.tips if np.allclose(tip.pose, np.eye(4), rtol=0, atol=_TOUCHES))
+            self._runs[arm] = attrs.evolve(run, tips=own)
         return self._cell.arms[arm].grasp_time if closed else self._cell.arms[arm].open_time
 
     def operate(self, device: str, *, on: bool) -> float:
@@ -127,16 +193,23 @@ class Simulator:
     def look(self, frame: str) -> tuple[Array, float]:
         """Return the next answer of the camera for a frame, in the world, and the time it takes.
 
-        The answers of the cell file come one after the other; the last one stays.
+        The answers of the cell file come one after the other; where it says so, the last one stays.
 
         Raises:
-            DeviceError: the cell file has no answer for this frame.
+            DeviceError: the cell file has no answer for this frame, or no more.
         """
         answers = self._answers.get(frame)
         if not answers:
+            if told := len(self._cell.visions.get(frame, ())):
+                count = "1 answer" if told == 1 else f"{told} answers"
+                raise DeviceError(
+                    f"the camera found nothing more for {frame}: cell '{self._cell.name}' has {count} for it; "
+                    'with `after_last = "same"` under [camera] the last one stays'
+                )
             known = ", ".join(sorted(self._answers)) or "nothing"
             raise DeviceError(f"the camera found nothing for {frame}; in cell '{self._cell.name}' it finds {known}")
-        seen = answers.pop(0) if len(answers) > 1 else answers[0]
+        last = self._cell.camera_repeats and len(answers) == 1
+        seen = answers[0] if last else answers.pop(0)
         return self._cell.camera @ seen, self._cell.vision_time
 
     def running(self) -> frozenset[str]:

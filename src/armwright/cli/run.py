@@ -234,7 +234,7 @@ def _stage_table(recording: "Recording", code: "Code") -> "Table":
         off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
         line = str(code.source.line(stage.span.start))
         what = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}"
-        duration, length = f"{stage.stage.trajectory.duration:.3f}", f"{stage.stage.length * 1e3:.0f}"
+        duration, length = f"{stage.duration:.3f}", f"{stage.length * 1e3:.0f}"
         rows.append((line, what, duration, length, off, *_peaks(stage, recording)))
     return table(("line", "stage", "s", "mm", "off mm", "peak speed", "peak effort"), rows, words=(1,))
 
@@ -244,7 +244,7 @@ def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
     from rich.text import Text
 
     arm = recording.cell.arms[stage.arm].arm
-    shares = stage.stage.trajectory.peaks(1) / arm.limit("speed"), stage.peak_effort / arm.limit("effort")
+    shares = stage.motion.peaks(1) / arm.limit("speed"), stage.peak_effort / arm.limit("effort")
     texts = []
     for share in shares:
         joint = int(share.argmax())

@@ -1,33 +1,52 @@
-"""A controlled stop: from any moment of a motion to rest, without a jump of position, speed or acceleration."""
+"""A controlled stop: from any moment of a motion to rest, along the path that was planned.
+
+A motion q(τ) is run by a clock τ(t), which goes at the rate 1 until the stop and comes to a standstill. The hand stays
+on its path, and with
+
+    qd = q' τ̇,    qdd = q'' τ̇² + q' τ̈
+
+a clock that only slows down never asks a joint for more speed than the motion does, nor, where τ̈ is 0, for more
+acceleration. So there is always a stop within the limits, however near to them the motion runs: at worst its own end.
+"""
 
 import math
+from itertools import pairwise
 
+import attrs
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from armwright.arrays import Array, ArrayLike, number, one_per_joint
 from armwright.errors import InvalidValueError
-from armwright.motion.trajectory import Trajectory
+from armwright.motion.polynomials import derivative, evaluate, shifted
+from armwright.motion.trajectory import Trajectory, hold
 
-# A joint that accelerates is not brought to rest sooner: its acceleration has to fade [s].
-_SETTLE = 0.02
-# No stop is shorter, so that it is no step [s].
-_SHORTEST = 1e-4
-# How finely the shortest stop is looked for, as a ratio of one time to the next.
-_FINER = 1.02
+# How long the clock takes to go from no deceleration to the largest, so that the acceleration does not jump [s].
+_RAMP = 0.01
+# The clock is worked out in steps of this length or less [s], and of this part of the shortest stop or less.
+_STEP = 2e-3
+_PART = 0.05
+# Between two steps an acceleration bends; so much of its limit is kept for that.
+_MARGIN = 5e-4
+# What a stop may exceed a limit by: rounding.
+_ROUNDING = 1e-6
+# A time this part of a period behind a tick is on it.
+_HAIR = 1e-9
+# Steps are halved so often before the motion is run to its own end instead.
+_HALVINGS = 6
+# Places on each step at which accelerations are looked at.
+_LOOKS = np.linspace(0.0, 1.0, 9)
 
 
 def brake(running: Trajectory, t: float, acceleration: ArrayLike, *, period: float | None = None) -> Trajectory:
-    """Return the motion that stops an arm.
+    """Return the motion that stops an arm along its path.
 
-    Every joint stops by itself, as soon as its limit allows: its acceleration goes from what it has to zero as a
-    parabola whose peak is the limit.
+    It goes on with the position, speed and acceleration of the motion, and its accelerations jump only where those of
+    the path do. A joint whose acceleration has no limit brakes no harder than the motion itself, or 1 rad/s² or m/s².
 
     Args:
-        running: the motion to be stopped.
+        running: the motion to be stopped, within its limits.
         t: when [s], within it.
-        acceleration: largest accelerations (n,) [rad/s²] or [m/s²]; a joint that accelerates more at ``t`` may go on
-            with as much.
+        acceleration: largest accelerations (n,) [rad/s²] or [m/s²].
         period: of the servo [s], to last a whole number of them; any duration when left out.
 
     Raises:
@@ -35,49 +54,168 @@ def brake(running: Trajectory, t: float, acceleration: ArrayLike, *, period: flo
     """
     if not 0 <= number(t, "t") <= running.duration:
         raise InvalidValueError(f"t: expected 0 to {running.duration:g} s, got {t:g}")
-    q, qd, qdd = (running(t, order) for order in range(3))
-    limit = one_per_joint(acceleration, len(q), "acceleration")
+    limit = np.asarray(acceleration, dtype=np.float64)
+    own = running.peaks(2)
+    limit = one_per_joint(np.where(np.isfinite(limit), limit, np.maximum(own, 1.0)), len(own), "acceleration")
     if not (limit > 0).all():
         raise InvalidValueError(f"acceleration: expected more than 0 for every joint, got {limit.min():g}")
-    stops = [_stop(*state) for state in zip(q.tolist(), qd.tolist(), qdd.tolist(), limit.tolist(), strict=True)]
-    knots = sorted({0.0, *(time for time, _ in stops)})
-    if period is not None or len(knots) == 1:
-        tick = period or _SETTLE
-        knots.append(max(1, math.ceil(knots[-1] / tick - 1e-9)) * tick)
-        if knots[-1] - knots[-2] < 1e-9:
-            knots[-2:] = [knots[-1]]
-    coefficients = np.zeros((len(knots) - 1, 5, len(q)))
-    for segment, start in enumerate(knots[:-1]):
-        for joint, (time, polynomial) in enumerate(stops):
-            coefficients[segment, :, joint] = _from(polynomial, start, time)
-    return Trajectory(times=np.array(knots), coefficients=coefficients)
+    if t == running.duration or not running(t, 1).any():
+        return hold(running(t), period or _STEP)
+    # What the motion exceeds its limits by, it cannot be held to.
+    allowed = np.maximum(limit, own) * (1 + _ROUNDING)
+    for halving in range(_HALVINGS):
+        stop = _run_by(running, _Clock(running, limit, t, period).cells(0.5**halving))
+        if (_peaks(stop) <= allowed).all():
+            return _until_a_tick(stop, period)
+    return _until_a_tick(_run_by(running, _to_its_end(running, t)), period)
 
 
-def _stop(q: float, qd: float, qdd: float, limit: float) -> tuple[float, Polynomial]:
-    """Return how long one joint takes to stop, and its position until then."""
-    if qd == 0 and qdd == 0:
-        return 0.0, Polynomial([q])
-    most = max(limit, abs(qdd))
-    time = max(0.5 * abs(qd) / most, _SETTLE if qdd else _SHORTEST)
-    while _peak(qd, qdd, time) > most * (1 + 1e-9):
-        time *= _FINER
-    c = -6 * qd / time - 2 * qdd
-    return time, Polynomial([q, qd, qdd / 2, (c - 2 * qdd) / (6 * time), (qdd - c) / (12 * time**2)])
+@attrs.frozen
+class _Cell:
+    """A stretch of time in which the second derivative of the clock goes straight from one value to another.
+
+    Attributes:
+        length: [s].
+        segment: of the motion, in which the whole stretch lies.
+        tau: the time of the motion at its start [s].
+        rate: of the clock at its start.
+        slowing: second derivative of the clock at its start [1/s].
+        fading: its rate [1/s²].
+    """
+
+    length: float
+    segment: int
+    tau: float
+    rate: float
+    slowing: float
+    fading: float
+
+    def at(self, t: float) -> tuple[float, float, float]:
+        """Return clock, rate and second derivative after a time [s]."""
+        slowing = self.slowing + self.fading * t
+        rate = self.rate + (self.slowing + self.fading * t / 2) * t
+        tau = self.tau + (self.rate + (self.slowing / 2 + self.fading * t / 6) * t) * t
+        return tau, rate, slowing
+
+    def until(self, tau: float) -> float:
+        """Return when the clock, which does not run backwards here, comes to a time of the motion."""
+        low, high = 0.0, self.length
+        while low < (middle := (low + high) / 2) < high:
+            low, high = (middle, high) if self.at(middle)[0] < tau else (low, middle)
+        return high
 
 
-def _peak(qd: float, qdd: float, time: float) -> float:
-    """Return the largest acceleration of a stop: a parabola from ``qdd`` to 0 whose integral is ``-qd``."""
-    c = -6 * qd / time - 2 * qdd
-    bend = qdd - c
-    at = (2 * qdd - c) / (2 * bend) if bend else 0.0
-    inside = qdd + (c - 2 * qdd) * at + bend * at**2 if 0 < at < 1 else 0.0
-    return max(abs(qdd), abs(inside))
+class _Clock:
+    """The clock of a stop: it slows down as fast as the accelerations of the joints allow."""
+
+    def __init__(self, running: Trajectory, limit: Array, t: float, period: float | None) -> None:
+        """Stand at the time of a motion at which the stop begins."""
+        self._times = running.times.tolist()
+        self._first, self._second = derivative(running.coefficients, 1), derivative(running.coefficients, 2)
+        self._limit = limit * (1 - _MARGIN)
+        self._tau, self._segment = t, 0
+        self._skip()
+        speed = np.abs(self._state(t)[0])
+        # How long the joint that takes longest needs to stop by itself; nothing is stopped sooner than in a tick.
+        alone = max(float((speed / limit).max()), period or _STEP)
+        self._fade = 1 / (alone * _RAMP)
+        self._step = min(_STEP, _PART * 2 / math.sqrt(self._fade))
+
+    def cells(self, finer: float) -> list[_Cell]:
+        """Return the stretches until the clock stands still, or the motion is at its end."""
+        cells: list[_Cell] = []
+        rate, slowing = 1.0, 0.0
+        while self._segment < len(self._first):
+            slowing = max(slowing, self._most(self._tau, rate))
+            cell, closing = self._next(rate, slowing, self._step * finer)
+            ends = self._times[self._segment + 1]
+            if cell.at(cell.length)[0] > ends:
+                cell = attrs.evolve(cell, length=cell.until(ends))
+                self._tau, closing = ends, False
+            else:
+                self._tau = cell.at(cell.length)[0]
+            cells.append(cell)
+            if closing:
+                break
+            _, rate, slowing = cell.at(cell.length)
+            self._skip()
+        return cells
+
+    def _next(self, rate: float, slowing: float, length: float) -> tuple[_Cell, bool]:
+        """Return the next stretch, and whether it is the last: there the slowing fades, and the clock comes to rest."""
+        here = (self._segment, self._tau, rate, slowing)
+        last = _Cell(-2 * rate / slowing, *here, slowing**2 / (2 * rate)) if slowing < 0 else None
+        if last is not None and rate <= slowing**2 / (2 * self._fade):
+            return last, True
+        most = slowing - self._fade * length
+        for _ in range(2):
+            cell = _Cell(length, *here, (most - slowing) / length)
+            tau, after, _ = cell.at(length)
+            most = max(most, self._most(tau, max(after, 0.0)))
+        cell = _Cell(length, *here, (most - slowing) / length)
+        if last is not None and cell.at(length)[1] < most**2 / (4 * self._fade):
+            return last, True
+        return cell, False
+
+    def _most(self, tau: float, rate: float) -> float:
+        """Return how fast the clock may slow down, a number of 0 or less."""
+        first, second = self._state(tau)
+        bend = second * rate**2 * np.sign(first)
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            most = np.where(first != 0, (-self._limit - bend) / np.abs(first), -np.inf)
+        return min(0.0, float(most.max()))
+
+    def _state(self, tau: float) -> tuple[Array, Array]:
+        """Return the first and second derivative of the motion; beyond its segment the polynomial goes on."""
+        at = self._segment
+        local = np.array([[tau - self._times[at]]])
+        return evaluate(self._first[at : at + 1], local)[0], evaluate(self._second[at : at + 1], local)[0]
+
+    def _skip(self) -> None:
+        """Go to the segment that begins or goes on at the present time."""
+        while self._segment < len(self._first) and self._times[self._segment + 1] <= self._tau:
+            self._segment += 1
 
 
-def _from(polynomial: Polynomial, start: float, end: float) -> Array:
-    """Return the five coefficients of a joint's position from some time on; behind its end it rests."""
-    if start >= end:
-        rest = polynomial(end)
-        return np.array([rest, 0.0, 0.0, 0.0, 0.0])
-    shifted = polynomial(Polynomial([start, 1.0])).coef
-    return np.concatenate([shifted, np.zeros(5 - len(shifted))])
+def _to_its_end(running: Trajectory, t: float) -> list[_Cell]:
+    """Return the clock that does not slow down, from ``t`` on."""
+    times = running.times.tolist()
+    parts = ((at, max(t, start), end) for at, (start, end) in enumerate(pairwise(times)))
+    return [_Cell(end - start, at, start, 1.0, 0.0, 0.0) for at, start, end in parts if end > start]
+
+
+def _run_by(running: Trajectory, cells: list[_Cell]) -> Trajectory:
+    """Return a motion run by a clock: the polynomials of the one with those of the other put in for the time."""
+    segments = [cell.segment for cell in cells]
+    starts = np.array([cell.tau for cell in cells]) - running.times[segments]
+    path = shifted(running.coefficients[segments], starts)
+    clock = np.array([[cell.rate, cell.slowing / 2, cell.fading / 6] for cell in cells])
+    count, joints = path.shape[1:]
+    terms = np.zeros((len(cells), 3 * (count - 1) + 1, joints))
+    for power in reversed(range(count)):
+        longer = np.zeros_like(terms)
+        for order in range(3):
+            longer[:, order + 1 :] += terms[:, : -order - 1] * clock[:, None, None, order]
+        terms = longer
+        terms[:, 0] += path[:, power]
+    times = np.concatenate([[0.0], np.cumsum([cell.length for cell in cells])])
+    return Trajectory(times=times, coefficients=terms)
+
+
+def _peaks(motion: Trajectory) -> Array:
+    """Return the largest accelerations (n,) at places close to one another."""
+    steps = np.diff(motion.times)
+    looks = motion.coefficients[:, None].repeat(len(_LOOKS), axis=1).reshape(-1, *motion.coefficients.shape[1:])
+    places = (steps[:, None] * _LOOKS).reshape(-1, 1)
+    return np.asarray(np.abs(evaluate(derivative(looks, 2), places)).max(axis=0))
+
+
+def _until_a_tick(stop: Trajectory, period: float | None) -> Trajectory:
+    """Return a stop with rest behind it until the next tick of the servo."""
+    if period is None:
+        return stop
+    end = math.ceil(stop.duration / period - _HAIR) * period
+    rest = np.zeros_like(stop.coefficients[:1])
+    rest[0, 0] = stop(stop.duration)
+    times = np.append(stop.times, max(end, stop.duration))
+    return Trajectory(times=times, coefficients=np.concatenate([stop.coefficients, rest]))

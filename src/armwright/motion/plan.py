@@ -281,7 +281,7 @@ def _way_round(arm: Arm, q: Array, goal: StageGoal, manner: Manner, obstacle: Ob
     return Stage(
         kind="LINE",
         trajectory=trajectory,
-        length=_length(np.stack(corners)) if legs else _hand_length(arm, trajectory),
+        length=_length(np.stack(corners)) if legs else hand_length(arm, trajectory),
         knots=sum(leg.knots for leg in legs) or len(trajectory.times),
         # The via pose is as far from the line as any place of the legs that meet in it.
         deviation=detour.price.distance + (max(leg.deviation for leg in legs) if taken and legs else 0.0),
@@ -300,7 +300,7 @@ def _length(poses: Array) -> float:
     return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1).sum())
 
 
-def _hand_length(arm: Arm, trajectory: Trajectory) -> float:
+def hand_length(arm: Arm, trajectory: Trajectory) -> float:
     """Return the length of the way of the hand, looked at often enough for a smooth one [m]."""
     return _length(forward(arm, trajectory(np.linspace(0.0, trajectory.duration, _LOOKS))))
 
@@ -319,7 +319,7 @@ def _direct(arm: Arm, q: Array, goal: Array, manner: Manner) -> Stage:
     return Stage(
         kind="PTP",
         trajectory=whole_ticks(trajectory, manner.period),
-        length=_hand_length(arm, trajectory),
+        length=hand_length(arm, trajectory),
         knots=2,
         deviation=None,
         slowed="",

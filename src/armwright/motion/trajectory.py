@@ -180,6 +180,21 @@ class Trajectory:
         back = shifted(self.coefficients, np.diff(self.times))[::-1] * signs[:, None]
         return Trajectory(times=self.duration - self.times[::-1], coefficients=back)
 
+    def until(self, t: float) -> "Trajectory":
+        """Return the first ``t`` seconds of the motion, all of it where it is not longer.
+
+        Raises:
+            KindError: the time is no number.
+            InvalidValueError: it is below 0.
+        """
+        t = number(t, "t")
+        if not 0 <= t <= LARGEST:
+            raise InvalidValueError(f"t: expected 0 s or more, got {t}")
+        if t >= self.duration:
+            return self
+        segments = int(np.searchsorted(self.times, t, side="right"))
+        return Trajectory(times=np.append(self.times[:segments], t), coefficients=self.coefficients[:segments])
+
     def sampled(self, period: float) -> Samples:
         """Return the motion at every tick of a servo, from the start on, and at its very end.
 

@@ -99,7 +99,7 @@ def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic])
 
 def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
     arm = recording.cell.arms[run.arm].arm
-    motion = run.stage.trajectory
+    motion = run.motion
     return {
         "line": code.source.line(run.span.start),
         "arm": run.arm,
@@ -108,7 +108,8 @@ def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
         "speed": run.speed,
         "start": run.t0,
         "duration": motion.duration,
-        "length": run.stage.length,
+        "length": run.length,
+        "stopped": run.stopped,
         "knots": run.stage.knots,
         "deviation": run.stage.deviation,
         "slowed": run.stage.slowed,

@@ -73,9 +73,9 @@ def _stage(run: RunStage, line: int) -> Stage:
         kind=run.stage.kind,
         to=run.to,
         speed=run.speed,
-        peak_speed=run.stage.trajectory.peaks(1).tolist(),
+        peak_speed=run.motion.peaks(1).tolist(),
         peak_effort=run.peak_effort.tolist(),
-        hand_length=run.stage.length,
+        hand_length=run.length,
         deviation=run.stage.deviation,
         note=note_of(run),
     )

@@ -110,7 +110,7 @@ class Going:
             yield
             process = self.timeline.ready
             if process is not None:
-                stop = yield from self._wait(process.wake, until, tick=tick)
+                stop = yield from self._wait(process.due or 0, until, tick=tick)
                 if stop is not None:
                     return stop
                 if until is not None and self.position >= until:
@@ -280,7 +280,7 @@ class Going:
                     own = process.path == path and (len(process.stack) <= depth or now is None)
                     # A branch comes out of the process that began it.
                     if own or (len(process.path) < len(path) and path[: len(process.path)] == process.path):
-                        at = max(process.wake, self.machine.ticks)
+                        at = max(process.due or 0, self.machine.ticks)
                         found = (self.timeline.done, at), process.path
                 self.timeline.advance()
             if found is not None:
@@ -300,7 +300,11 @@ class Going:
             self.timeline.seek(done)
             if done and self.machine.ticks >= tick:
                 continue
-            while self.timeline.done < limit and (process := self.timeline.ready) is not None and process.wake < tick:
+            while (
+                self.timeline.done < limit
+                and (process := self.timeline.ready) is not None
+                and (process.due or 0) < tick
+            ):
                 self.timeline.advance()
                 yield
             break

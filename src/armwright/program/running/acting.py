@@ -9,6 +9,7 @@ from armwright.cell.hardware import DeviceError
 from armwright.program.following.hanging import is_arm
 from armwright.program.intermediate.code import Constant, Instruction, Op, Place, Text
 from armwright.program.messages.diagnostics import Label
+from armwright.program.running.contact import look_out, note_contact
 from armwright.program.running.evaluate import IN_UNITS, PLAIN, ValueFault
 from armwright.program.running.machine import Machine
 from armwright.program.running.process import Element, Pending, Process, Value
@@ -134,7 +135,13 @@ def _fingers(run: Machine, process: Process, step: Instruction) -> None:
         run.fail(process, "E231", text, step.span, "expected 0 to 1 m")
     hand = run.hands[arm]
     hand.holds = hand.at if closed else None
+    motions = [one.motion for one in run.processes if one.motion and one.motion.arm == arm]
+    for motion in motions:
+        note_contact(run, motion)
     time = run.hardware.fingers(arm, closed=closed, width=metres)
+    for motion in motions:
+        # What is let go does not press any more.
+        look_out(run, motion)
     text = f"{arm} {step.op}" + (f" TO {width:g}" if width is not None else "")
     run.take_time(
         process, time, Pending(kind="GRASP" if closed else "OPEN", text=text, since=run.ticks, span=step.span, arm=arm)

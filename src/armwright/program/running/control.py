@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping
 from armwright.program.intermediate.code import Instruction, Kind, Op, Place
 from armwright.program.messages.diagnostics import Label
 from armwright.program.running.acting import HANDLERS as ACTIONS
+from armwright.program.running.contact import contact_of, note_contact, stop
 from armwright.program.running.machine import Machine, RunError
-from armwright.program.running.moving import halt, move, release, stop
+from armwright.program.running.moving import halt, move, release
 from armwright.program.running.process import Activation, Attempt, Pending, Process, Waiting
 from armwright.program.text.source import Span
 
@@ -267,9 +268,11 @@ def _still(run: Machine, process: Process, span: Span) -> int:
     """Give up the motion of a process, if it makes one; return when its arm is at rest."""
     if process.motion is None:
         return run.ticks
-    arm, end_of_motion = process.motion.arm, stop(run, process, span)
+    motion, end_of_motion = process.motion, stop(run, process, span)
+    note_contact(run, motion, end_of_motion)
+    words, contact = contact_of(motion)
     process.motion = None
-    run.effect("STOP", f"{arm} stops", span, arm=arm)
+    run.effect("STOP", f"{motion.arm} stops{words}", span, arm=motion.arm, data=contact)
     return end_of_motion
 
 

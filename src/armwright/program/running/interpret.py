@@ -15,6 +15,7 @@ from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic, Severity
+from armwright.program.running.contact import too_deep
 from armwright.program.running.control import HANDLERS, deadlock, recover, rest
 from armwright.program.running.machine import Limits, Machine, RunError
 from armwright.program.running.moving import go_on
@@ -86,8 +87,8 @@ def ready(machine: Machine) -> Process | None:
     """Return the process that is served next; None where all wait for one another."""
     best = None
     for process in machine.processes:
-        if process.waiting is None:
-            rank = (process.wake, -process.priority, process.path)
+        if (due := process.due) is not None:
+            rank = (due, -process.priority, process.path)
             if best is None or rank < best[0]:
                 best = (rank, process)
     return None if best is None else best[1]
@@ -107,15 +108,17 @@ def advance(machine: Machine, process: Process) -> None:
 
 
 def _advance(machine: Machine, process: Process) -> None:
-    if process.wake > machine.ticks:
+    if process.due is not None and process.due > machine.ticks:
         last = machine.limits.time / machine.cell.period
-        machine.ticks, machine.idle = process.wake, 0
-        if process.wake > last:
+        machine.ticks, machine.idle = process.due, 0
+        if machine.ticks > last:
             # The clock stops there, and arms that are on their way have come as far as that.
             machine.ticks = max(0, math.floor(last))
             under_way = process.pending or process.motion or machine.code.instructions[process.at]
             text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
             machine.fail(process, "E506", text, under_way.span, "it has come to here")
+    if process.motion is not None and process.motion.alarm is not None and process.motion.alarm <= machine.ticks:
+        too_deep(machine, process, process.motion)
     if (pending := process.pending) is not None:
         process.pending = None
         if pending.place is not None:
@@ -151,7 +154,7 @@ def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
         over = stage.peak_effort / arm.limit("effort")
         if (over <= 1).all():
             continue
-        t, tau = efforts(arm, stage.stage.trajectory, recording.cell.period)
+        t, tau = efforts(arm, stage.motion, recording.cell.period)
         found += [_effort_warning(stage, arm, joint, t, tau[:, joint]) for joint in np.flatnonzero(over > 1).tolist()]
     return tuple(found)
 

@@ -1,4 +1,4 @@
-"""MOVE at work: planning its stages, following them tick by tick, guards, contact, and stopping on the way."""
+"""MOVE at work: planning its stages, following them tick by tick, and its guards."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,6 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.model import base_name
 from armwright.kinematics.forward import forward
-from armwright.motion.braking import brake
 from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
 from armwright.motion.trajectory import hold, whole_ticks
 from armwright.program.following.hanging import is_arm
@@ -23,6 +22,7 @@ from armwright.program.intermediate.code import (
 from armwright.program.messages.diagnostics import Label
 from armwright.program.running.acting import work_out
 from armwright.program.running.asking import Asked, Goal, asked_of
+from armwright.program.running.contact import comes_down, contact_of, look_out, note_contact, stop
 from armwright.program.running.machine import Machine
 from armwright.program.running.obstacles import CODES, stopped, ways_round, where_and_why
 from armwright.program.running.process import Activation, Guard, Motion, Process
@@ -38,8 +38,6 @@ _SAME_PLACE = 1e-6
 _GUARDED = 0.05
 # Planning a MOVE takes as long as so many steps of other kinds, whether it can be made or not.
 _STEPS_OF_A_MOVE = 1000
-# A duration so little too short is rounding.
-_ROUNDING = 1e-9
 
 
 def move(run: Machine, process: Process, step: Instruction) -> None:
@@ -98,9 +96,6 @@ def go_on(run: Machine, process: Process) -> None:
             return
     if run.ticks < motion.until:
         process.wake = run.ticks + 1 if any(not guard.done for guard in motion.guards) else motion.until
-    elif run.hardware.stopped_at(motion.arm) is not None and not motion.data.get("halted"):
-        run.set_hand(motion.arm, motion.span)
-        _blocked(run, process, motion, "and nothing in the program ends the motion there")
     elif motion.stages:
         _start(run, process, motion)
     else:
@@ -135,35 +130,6 @@ def _made_way(run: Machine, process: Process, motion: Motion, span: Span) -> boo
     # When the arm is at rest the same instruction is looked at again.
     process.at -= 1
     return False
-
-
-def stop(run: Machine, process: Process, span: Span) -> int:
-    """Stop the arm of a process in a controlled way; return when it is at rest [ticks].
-
-    The frame table holds the place where it comes to rest from now on.
-    """
-    motion, period = process.motion, run.cell.period
-    assert motion is not None  # noqa: S101 - asked for only then
-    arm, runs = motion.arm, run.runs[motion.arm]
-    end, last = run.ticks, runs[-1] if runs else None
-    local = run.now - last.t0 if last else 0.0
-    if last and local < last.duration - _ROUNDING:
-        limit = run.cell.arms[arm].arm.limit("acceleration")
-        limit = np.where(np.isfinite(limit), limit, np.maximum(np.abs(last.trajectory(local, 2)), 1.0))
-        braking = brake(last.trajectory, local, limit, period=period)
-        runs[-1] = attrs.evolve(last, duration=local)
-        run.hardware.begin(arm, braking, run.now, motion.tip)
-        blocked = run.hardware.stopped_at(arm)
-        duration = braking.duration if blocked is None else blocked - run.now
-        runs.append(Run(t0=run.now, trajectory=braking, duration=duration))
-        end += math.ceil(duration / period - _ROUNDING)
-    else:
-        run.hardware.begin(arm, hold(run.hardware.posture(arm, run.now), period), run.now, motion.tip)
-    if motion.record >= 0:
-        record = run.stages[motion.record]
-        run.stages[motion.record] = attrs.evolve(record, duration=max(0.0, end * period - record.t0))
-    run.set_hand(arm, span, at=end)
-    return end
 
 
 def release(run: Machine, process: Process, keep: int) -> None:
@@ -320,11 +286,17 @@ def _start(run: Machine, process: Process, motion: Motion) -> None:
     # A run that lasts longer comes to its end before.
     counted = min(ticks, math.ceil(max(0.0, run.limits.time - run.now) / period))
     _, tau = efforts(arm, trajectory, period, counted)
+    if motion.record >= 0:
+        note_contact(run, motion)
     run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
-    blocked = run.hardware.stopped_at(motion.arm)
-    if blocked is not None and not motion.guards:
+    look_out(run, motion)
+    touch = run.hardware.touches_at(motion.arm)
+    if not motion.guards and (touch is not None or motion.alarm is not None):
         run.hardware.begin(motion.arm, hold(trajectory(0.0), period), run.now, motion.tip)
-        _blocked(run, process, motion, "and no ON of this MOVE looks out for it", to=to[-1])
+        motion.alarm = None
+        comes_down(run, process, motion, to[-1])
+    if touch is not None:
+        motion.touch = (trajectory, touch - run.now)
     motion.record = len(run.stages)
     run.stages.append(
         RunStage(
@@ -334,15 +306,15 @@ def _start(run: Machine, process: Process, motion: Motion) -> None:
             to=to,
             speed=motion.speed,
             stage=stage,
+            motion=trajectory,
+            length=stage.length,
             peak_effort=np.abs(tau).max(axis=0),
-            duration=trajectory.duration,
         )
     )
-    duration = trajectory.duration if blocked is None else blocked - run.now
-    run.runs[motion.arm].append(Run(t0=run.now, trajectory=trajectory, duration=duration, tau=tau))
+    run.runs[motion.arm].append(Run(t0=run.now, trajectory=trajectory, duration=trajectory.duration, tau=tau))
     motion.since, motion.until = run.ticks, run.ticks + ticks
     if any(guard.looks for guard in motion.guards):
-        looks = np.minimum(np.arange(counted + 1) * period, duration)
+        looks = np.arange(counted + 1) * period
         X_WB = run.tree.world(base_name(motion.arm))
         motion.hands = X_WB @ forward(arm, trajectory(looks))
     process.wake = run.ticks if motion.guards else motion.until
@@ -361,20 +333,6 @@ def _holds(run: Machine, process: Process, motion: Motion, guard: Guard) -> bool
     return bool(now.passing[guard.truth])
 
 
-def _blocked(run: Machine, process: Process, motion: Motion, why: str, to: str = "") -> NoReturn:
-    plane = run.cell.contact_height
-    height = "" if plane is None else f" at z = {plane * 1e3:g} mm"
-    way = f" on its way to `{to}`" if to else ""
-    run.fail(
-        process,
-        "E404",
-        f"`{run.spelled(motion.moved)}` comes down on the plane{height}{way}",
-        motion.span,
-        f"this MOVE is stopped there, {why}",
-        helps=["look out for the contact: `ON FORCE(Z) > 10 DO HALT`"],
-    )
-
-
 def _finish(run: Machine, process: Process, motion: Motion) -> None:
     """The MOVE is over: the frame table and the trace know where the arm is."""
     arm = motion.arm
@@ -385,5 +343,8 @@ def _finish(run: Machine, process: Process, motion: Motion) -> None:
     hand.at = motion.moved if motion.moved != arm else goal if reached else None
     if hand.holds and hand.holds != hand.at and arm not in run.tree.ancestors(hand.holds):
         hand.holds = None
-    run.effect("MOVE", motion.text, motion.span, since=motion.begun, arm=arm, data=motion.data)
+    note_contact(run, motion)
+    words, contact = contact_of(motion)
+    data = {**motion.data, **contact}
+    run.effect("MOVE", motion.text + words, motion.span, since=motion.begun, arm=arm, data=data)
     process.motion = None

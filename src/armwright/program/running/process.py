@@ -6,7 +6,9 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.cell.hardware import Press
 from armwright.motion.plan import Stage
+from armwright.motion.trajectory import Trajectory
 from armwright.program.text.source import Span
 
 
@@ -106,6 +108,10 @@ class Motion:
         guards: to be looked at on every tick.
         hands: (k, 4, 4) poses of the hand in the world on the ticks of the present stage, for guards that look.
         record: number of the present stage among those recorded.
+        rest: when the arm is at rest [ticks], once it is being stopped; None before.
+        alarm: when the arm presses deeper than the cell allows [ticks], if it goes on as it does; None if it does not.
+        touch: the trajectory of a stage that comes into contact, and when on it [s]; None before.
+        pressed: the deepest contact so far.
     """
 
     arm: str
@@ -123,6 +129,10 @@ class Motion:
     guards: list[Guard]
     hands: Array = attrs.field(factory=lambda: np.empty((0, 4, 4)))
     record: int = -1
+    rest: int | None = None
+    alarm: int | None = None
+    touch: tuple[Trajectory, float] | None = None
+    pressed: Press = attrs.field(factory=lambda: Press(0.0, 0.0))
 
 
 @attrs.frozen
@@ -199,6 +209,13 @@ class Process:
     def now(self) -> Activation:
         """The present activation."""
         return self.stack[-1]
+
+    @property
+    def due(self) -> int | None:
+        """When it is served next [ticks], or its arm has to be stopped; None where it waits for others."""
+        alarm = None if self.motion is None else self.motion.alarm
+        wake = None if self.waiting is not None else self.wake
+        return min((tick for tick in (alarm, wake) if tick is not None), default=None)
 
     @property
     def title(self) -> str:

@@ -76,9 +76,12 @@ class RunStage:
         span: the MOVE in the program.
         to: the frames it went to, as the program spells them.
         speed: that was asked for, 100 being normal.
-        stage: its motion.
-        peak_effort: (n,) largest efforts on its servo ticks [N m] or [N].
-        duration: how long it ran [s]; less than its motion takes where it was stopped.
+        stage: as it was planned, with what was found about its path.
+        motion: of the joints as it was run: all of the plan, or as far as it came before it was stopped, and its stop.
+            A stop keeps to the path of the plan, so the path deviation of the plan holds for it too.
+        length: of the way that the hand went [m].
+        peak_effort: (n,) largest efforts on the servo ticks of that motion [N m] or [N].
+        stopped: whether it was stopped on its way.
     """
 
     t0: float
@@ -87,8 +90,15 @@ class RunStage:
     to: tuple[str, ...]
     speed: float
     stage: Stage
+    motion: Trajectory
+    length: float
     peak_effort: Array
-    duration: float
+    stopped: bool = False
+
+    @property
+    def duration(self) -> float:
+        """How long it ran [s]."""
+        return self.motion.duration
 
     @property
     def t1(self) -> float:
