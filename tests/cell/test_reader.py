@@ -392,7 +392,7 @@ FAULTS = {
     ),
     "two arms on one base": (
         ARM + ARM.replace("ARM_1", "ARM_2").replace("0,0,0]", "0,0,0.009]", 1),
-        None,
+        5,
         "arms, ARM_2, base: ARM_2 and ARM_1 stand on one base, 9 mm apart; two arms need 10 mm or more",
     ),
     "contact that is no height": (
