@@ -99,7 +99,9 @@ edges: $(VENV)/bench  ## Measure inverse kinematics at its edges, beside the pee
 editor:           ## Build, check and package the VS Code extension (needs npm)
 	cd editors/vscode && npm ci && npm run check && npm run build && npm test && npm run package
 
-fuzz: $(VENV)/test  ## Fuzz everything that reads what a user types, a million inputs each (hours; TARGET=cell RUNS=1000)
+fuzz: $(VENV)/test  ## Fuzz everything that reads: changed files, then bytes under watch (hours; TARGET=cell RUNS=1000)
+	for target in $(or $(FILES),arm linkage urdf cell poses iso9283 calibration clearance); do \
+	    $(BIN)/python -W ignore fuzz/files.py $$target $(or $(RUNS),100000) || exit 1; done
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check atheris
 	for target in $(or $(TARGET),tokens tree cell code program format); do \
 	    $(BIN)/python fuzz/fuzz.py $$target -runs=$(or $(RUNS),1000000) || exit 1; done

@@ -10,13 +10,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO, NamedTuple, TypeVar
 
 from armwright.errors import ArmwrightError
+from armwright.files.limits import MEGABYTE, beyond, limit
 
 T = TypeVar("T")
 
-# No request is longer; what claims to be is noise.
-_LONGEST = 16 << 20
-_LONGEST_HEADER = 8192
-_LENGTH = re.compile(rb"(?i)^content-length[ \t]*:[ \t]*([0-9]{1,9})[ \t]*$", re.MULTILINE)
+_LENGTH = re.compile(rb"(?i)^content-length[ \t]*:[ \t]*([0-9]+)[ \t]*$", re.MULTILINE)
 _CHUNK = 65536
 
 
@@ -31,16 +29,16 @@ class Noise(NamedTuple):
 
 
 def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
-    """Give what comes in, one after the other, until the stream ends."""
+    """Give what comes in, one after the other, until the stream ends or a message is larger than its limit."""
     waiting = b""
     while True:
         # An empty line ends a header; blank lines in front of one are nobody's.
         waiting = waiting.lstrip(b"\r\n")
         end = re.search(rb"\r?\n\r?\n", waiting)
         if end is None:
-            if len(waiting) > _LONGEST_HEADER:
-                yield Noise("a header without an end")
-                waiting = b""
+            if len(waiting) > limit("header_bytes"):
+                yield Noise(f"the header of a message is too large: {beyond('header_bytes')}; the connection ends")
+                return
             more = stream.read(_CHUNK)
             if not more:
                 return
@@ -48,9 +46,14 @@ def messages(stream: BinaryIO) -> Iterator[dict[str, Any] | Noise]:
             continue
         header, waiting = waiting[: end.start()], waiting[end.end() :]
         length = _LENGTH.search(header.replace(b"\r\n", b"\n"))
-        if length is None or int(length[1]) > _LONGEST:
+        if length is None:
             yield Noise("a header without a Content-Length that makes sense")
             continue
+        most = limit("message_mb") * MEGABYTE
+        # Of a length with more digits than the largest has, the number is of no interest.
+        if len(length[1].lstrip(b"0")) > len(str(most)) or int(length[1]) > most:
+            yield Noise(f"a message is too large: {beyond('message_mb')}; the connection ends")
+            return
         size = int(length[1])
         while len(waiting) < size:
             more = stream.read(_CHUNK)

@@ -4,7 +4,7 @@ import logging
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
@@ -12,10 +12,12 @@ from pygls.lsp.server import LanguageServer
 from pygls.protocol import LanguageServerProtocol, lsp_method
 from pygls.uris import to_fs_path
 
+from armwright.errors import InvalidValueError
 from armwright.program.editing import replies
 from armwright.program.editing.analysing import Settings
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.documents import Changed, Document, Known, Office
+from armwright.program.editing.incoming import Incoming
 from armwright.program.editing.places import Ruler
 from armwright.program.text.words import Standard
 from armwright.version import __version__
@@ -170,10 +172,17 @@ def make_server() -> RloServer:
 
 
 def serve() -> None:
-    """Talk to an editor over standard input and output until it says goodbye."""
+    """Talk to an editor over standard input and output until it says goodbye.
+
+    Raises:
+        InvalidValueError: it sent a message that is larger than the limit; the connection is over.
+    """
     # Questions are answered while a program is looked at beside them: they get their turn soon.
     sys.setswitchinterval(_TURN)
-    make_server().start_io()
+    incoming = Incoming(sys.stdin.buffer)
+    make_server().start_io(cast("BinaryIO", incoming))
+    if incoming.refused:
+        raise InvalidValueError(f"{incoming.refused}; the connection has ended")
 
 
 def _conversation(server: RloServer) -> None:

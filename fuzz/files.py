@@ -1,0 +1,235 @@
+"""Fuzzing of what reads files, by changing valid ones: `python fuzz/files.py TARGET [INPUTS] [SEED]`.
+
+Targets are `arm`, `linkage`, `urdf`, `cell`, `poses`, `iso9283`, `calibration` and `clearance` (measured tables). It
+needs nothing beside armwright. An input is a valid file in which keys, numbers, types, lines and cells were changed,
+lost, doubled, nested or put elsewhere. It fails when anything but the reader's own error is raised, when it takes more
+than five seconds, or when memory grows beyond 1 GB. The seed and the number of an input make it again.
+"""
+
+import random
+import re
+import resource
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+from armwright.accuracy.measurements import read_measurements as read_accuracy
+from armwright.arm.load import load_arm, load_urdf, read_arm
+from armwright.calibration.measurements import read_measurements
+from armwright.cell.reader import read_cell
+from armwright.clearance.estimating.measured import read_measured
+from armwright.clearance.reader import read_linkage
+from armwright.errors import ArmwrightError
+from armwright.motion.poses_file import read_poses
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "armwright"
+EXAMPLES = ROOT / "examples"
+# What stands for a value: of other kinds, of other sizes, and what a careless reader stumbles over.
+VALUES = (
+    *("0", "-0.0", "1", "-1", "1e-300", "1e99", "1e308", "-1e308", "1e400", "nan", "inf", "-inf", "1" * 30, "0x1f"),
+    *(
+        '""',
+        '"x"',
+        '"WORLD"',
+        '"../x"',
+        "[]",
+        "[[]]",
+        "[1, 2, 3]",
+        "{}",
+        "{a = 1}",
+        "true",
+        "1979-05-27",
+        "''",
+        ",",
+        "",
+    ),
+    *("9" * 400, '"' + "y" * 300 + '"', "[[1,0,0],[0,1,0],[0,0,1]]", "\u202e", "\x00", "é", "1_000", "+5", ".5", "5."),
+)
+_NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
+_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+LONGEST_S, LARGEST_MB = 5, 1000
+
+
+def _some(text: str, pattern: re.Pattern[str], rng: random.Random) -> tuple[int, int]:
+    found = [match.span() for match in pattern.finditer(text)]
+    return rng.choice(found) if found else (0, 0)
+
+
+def _number(text: str, rng: random.Random) -> str:
+    start, end = _some(text, _NUMBER, rng)
+    try:
+        near = repr(float(text[start:end]) * rng.choice((-1, 0, 1e-12, 1 + 1e-9, 10, 57.3, 1000, 1e9)))
+    except ValueError:
+        near = "0"
+    return text[:start] + (near if rng.random() < 0.5 else rng.choice(VALUES)) + text[end:]
+
+
+def _word(text: str, rng: random.Random) -> str:
+    start, end = _some(text, _WORD, rng)
+    other = _some(text, _WORD, rng)
+    near = text[start:end].swapcase() if rng.random() < 0.2 else text[other[0] : other[1]]
+    return text[:start] + near + text[end:]
+
+
+def _value(text: str, rng: random.Random) -> str:
+    lines = text.split("\n")
+    at = rng.randrange(len(lines))
+    key, equals, _ = lines[at].partition("=")
+    lines[at] = f"{key}{equals} {rng.choice(VALUES)}" if equals else rng.choice(VALUES)
+    return "\n".join(lines)
+
+
+def _lines(text: str, rng: random.Random) -> str:
+    lines = text.split("\n")
+    start = rng.randrange(len(lines))
+    end = min(len(lines), start + rng.choice((1, 1, 1, 2, 5, 20)))
+    block = lines[start:end]
+    match rng.randrange(4):
+        case 0:
+            del lines[start:end]
+        case 1:
+            lines[start:start] = block * rng.choice((1, 1, 2, 30))
+        case 2:
+            del lines[start:end]
+            at = rng.randrange(len(lines) + 1)
+            lines[at:at] = block
+        case _:
+            rng.shuffle(block)
+            lines[start:end] = block
+    return "\n".join(lines)
+
+
+def _cell(text: str, rng: random.Random) -> str:
+    lines = text.split("\n")
+    at = rng.randrange(len(lines))
+    cells = lines[at].split(",")
+    place = rng.randrange(len(cells))
+    match rng.randrange(3):
+        case 0:
+            cells[place] = rng.choice(VALUES)
+        case 1:
+            del cells[place]
+        case _:
+            cells.insert(place, cells[rng.randrange(len(cells))])
+    lines[at] = ",".join(cells)
+    return "\n".join(lines)
+
+
+def _letters(text: str, rng: random.Random) -> str:
+    at = rng.randrange(len(text) + 1)
+    what = rng.choice(("", "[", "]", "{", "}", '"', "=", ".", ",", "\n", "<", ">", "/", "&", "#", "'", "-", "e"))
+    return text[:at] + what + text[at + rng.randrange(2) :]
+
+
+def _nested(text: str, rng: random.Random) -> str:
+    start, end = _some(text, _NUMBER, rng)
+    depth = rng.choice((1, 2, 70, 2000))
+    return text[:start] + "[" * depth + text[start:end] + "]" * depth + text[end:]
+
+
+def _cut(text: str, rng: random.Random) -> str:
+    return text[: rng.randrange(len(text) + 1)]
+
+
+CHANGES = (_number, _number, _number, _value, _value, _word, _lines, _lines, _cell, _letters, _nested, _cut)
+
+
+def changed(texts: list[str], rng: random.Random) -> str:
+    """Return a valid text with one to four changes; now and then two texts in one."""
+    text = rng.choice(texts)
+    for _ in range(rng.choice((1, 1, 1, 2, 2, 3, 4))):
+        # One change in twelve cuts a file, which leaves little for the others.
+        text = rng.choice(CHANGES)(text, rng)
+    return text
+
+
+def _texts(*paths: Path, lines: int = 400) -> list[str]:
+    return ["\n".join(path.read_text(encoding="utf-8").split("\n")[:lines]) for path in paths]
+
+
+TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]] = {
+    "arm": (".toml", read_arm, lambda: _texts(*(SOURCE / "arm" / "catalogue").glob("*.toml"))),
+    "linkage": (".toml", read_linkage, lambda: _texts(*(SOURCE / "clearance" / "catalogue").glob("*.toml"))),
+    "urdf": (".urdf", load_urdf, lambda: _texts(EXAMPLES / "seven_joints.urdf")),
+    "cell": (".toml", read_cell, lambda: _texts(*EXAMPLES.glob("*cell*.toml"))),
+    "poses": (".toml", read_poses, lambda: _texts(EXAMPLES / "puma_poses.toml", EXAMPLES / "round_the_post.toml")),
+    "iso9283": (
+        ".csv",
+        lambda path: read_accuracy([path]),
+        lambda: _texts(EXAMPLES / "measured_poses.csv", EXAMPLES / "measured_paths.csv", lines=80),
+    ),
+    "calibration": (
+        ".csv",
+        lambda path: read_measurements(path, load_arm("puma560")),
+        lambda: _texts(EXAMPLES / "puma_points.csv", lines=40),
+    ),
+    "clearance": (
+        ".csv",
+        read_measured,
+        lambda: _texts(EXAMPLES / "five_bar_rest.csv", EXAMPLES / "five_bar_paths.csv", lines=300),
+    ),
+}
+
+
+class SlowError(Exception):
+    """An input takes too long."""
+
+
+def _too_slow(_signal: int, _frame: object) -> None:
+    raise SlowError
+
+
+def fails(target: str, path: Path, text: str) -> str:
+    """Read a text from a file; return what went wrong, nothing where it was read or refused as it should be."""
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    try:
+        TARGETS[target][1](path)
+    except ArmwrightError:
+        return ""
+    except Exception:  # noqa: BLE001 - whatever it is, it is what is looked for
+        return traceback.format_exc()
+    return ""
+
+
+def main() -> None:
+    """Read changed files of one kind until one fails."""
+    target = sys.argv[1]
+    count, seed = (int(word) for word in (*sys.argv[2:4], *("100000", "1")[len(sys.argv) - 2 :]))
+    suffix, _, texts = TARGETS[target]
+    valid, slowest, failures = texts(), 0.0, 0
+    signal.signal(signal.SIGALRM, _too_slow)
+    begin = time.monotonic()
+    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:  # noqa: S108
+        path = Path(folder) / f"input{suffix}"
+        for number in range(count):
+            text = changed(valid, random.Random(f"{seed} {number}"))  # noqa: S311 - chance, not secrets
+            start = time.process_time()
+            signal.setitimer(signal.ITIMER_REAL, 4 * LONGEST_S)
+            said = fails(target, path, text)
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            taken = time.process_time() - start
+            slowest = max(slowest, taken)
+            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            if said or taken > LONGEST_S or memory > LARGEST_MB:
+                failures += 1
+                kept = ROOT / "out" / "fuzz" / f"{target}-{seed}-{number}{suffix}"
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                kept.write_text(text, encoding="utf-8", errors="surrogatepass")
+                print(f"{kept}: {taken:.1f} s, {memory:.0f} MB\n{said}", flush=True)
+                if failures > 20:
+                    break
+    print(
+        f"{target}: {number + 1} inputs, seed {seed}, {failures} failures, slowest {slowest:.2f} s, {memory:.0f} MB at "
+        f"most, {time.monotonic() - begin:.0f} s in all",
+        flush=True,
+    )
+    sys.exit(bool(failures))
+
+
+if __name__ == "__main__":
+    main()

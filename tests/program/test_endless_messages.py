@@ -1,0 +1,53 @@
+"""Messages to the language server and the debug adapter are read up to a limit; beyond it the connection ends."""
+
+import io
+import subprocess
+import sys
+
+import pytest
+
+from armwright.program.debugging.protocol import Noise, messages
+from armwright.program.editing.incoming import Incoming
+
+TOO_LARGE = "a message is too large: more, and at most 16 MB are read; `armwright --raise message_mb=NUMBER ...`"
+TOO_LONG = "the header of a message is too large: more, and at most 8,192 bytes are read"
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        (b"Content-Length: 99999999999999\r\n\r\n", TOO_LARGE),
+        (b"Content-Length: 16000001\r\n\r\n", TOO_LARGE),
+        (b"Content-Length: " + b"9" * 6000 + b"\r\n\r\n", TOO_LARGE),
+        (b"X" * 10_000_000, TOO_LONG),
+        (b"X: y\r\n" * 10_000, TOO_LONG),
+    ],
+    ids=["a huge number", "a byte too many", "a number of a page", "a line without an end", "many lines"],
+)
+def test_too_large(header: bytes, said: str) -> None:
+    """A message or a header that claims to be larger than the limit is refused before it is read."""
+    incoming = Incoming(io.BytesIO(header))
+    while incoming.readline():
+        pass
+    assert incoming.refused.startswith(said)
+    assert incoming.readline() == b""
+
+    *_, last = messages(io.BytesIO(header))
+    assert isinstance(last, Noise)
+    assert last.text.startswith(said)
+    assert last.text.endswith("the connection ends")
+
+
+@pytest.mark.parametrize("command", ["lsp", "debug"])
+def test_the_commands_end(command: str) -> None:
+    """The commands say what was too large and end, without a traceback."""
+    done = subprocess.run(
+        [sys.executable, "-m", "armwright", command],
+        input=b"Content-Length: 99999999999999\r\n\r\n{}",
+        capture_output=True,
+        check=False,
+        timeout=60,
+    )
+
+    assert TOO_LARGE.encode() in done.stdout + done.stderr
+    assert b"Traceback" not in done.stderr
