@@ -23,8 +23,9 @@ from armwright.calibration.readings import Readings
 from armwright.calibration.validation import HeldOut, cross_validated, dealt
 from armwright.errors import InvalidValueError, MissingExtraError
 
-# A gain that is so many times as large as chance makes it is one, if it is such a part of what there was.
-_SURE, _WORTH = 2.0, 0.01
+# A gain that is so many times as large as chance makes it is one, if it is such a part of what there was. Four things
+# are tried, and chance is to be taken for any of them as rarely as two deviations are for one (Bonferroni).
+_SURE, _WORTH = 2.53, 0.01
 # From so many points the lengths are learnt over which what is left changes; more cost time with their cube.
 _MOST = 300
 # Lengths in sines and cosines of the joints, and noise as a part of the variance of what is left.

@@ -38,7 +38,7 @@ _STEPS = 100
 # What is off by more than this is not believed unless the readings say so clearly [m], [rad]. It binds what they
 # hardly tell: two such errors can otherwise run away together. What is told to a tenth of it is moved by a hundredth
 # of its deviation at most.
-_BELIEVED_LENGTH, _BELIEVED_ANGLE = 0.02, 0.05
+BELIEVED_LENGTH, BELIEVED_ANGLE = 0.02, 0.05
 # Bends of joints are a twentieth of that: gears run true to an arc minute or a few.
 _BENDS = 0.05
 
@@ -300,7 +300,7 @@ def _fitted(
 
 def _believed(model: Model) -> Array:
     """Return (k,) how far errors may be off without a question [m], [rad]."""
-    return np.where(model.is_length, _BELIEVED_LENGTH, _BELIEVED_ANGLE) * _parts(model)
+    return np.where(model.is_length, BELIEVED_LENGTH, BELIEVED_ANGLE) * _parts(model)
 
 
 def _parts(model: Model) -> Array:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
-from armwright.calibration.chain import Bend
+from armwright.calibration.chain import Bend, chain_of
 from armwright.calibration.fitting import calibrate_to
 from armwright.calibration.readings import Numbers, Readings, refuse_not_fitted
 from armwright.errors import InvalidValueError
@@ -42,6 +42,7 @@ def cross_validated(
     base: Array | None = None,
     bends: tuple[Bend, ...] = (),
     without: Sequence[str] = (),
+    regions: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> HeldOut:
     """Return by how much each reading misses an arm that was calibrated without it.
@@ -56,6 +57,7 @@ def cross_validated(
         base: see ``calibrate_to``.
         bends: see ``calibrate_to``.
         without: see ``calibrate_to``.
+        regions: whether each part is a region of the workspace, so that the arm is judged where it was not measured.
         progress: told how many folds are done.
 
     Raises:
@@ -63,7 +65,8 @@ def cross_validated(
             of a frame, a plane or an anchor are in one fold.
     """
     held = HeldOut(np.zeros(len(seen)), np.zeros(len(seen)), np.zeros((len(seen), 3)))
-    for fold, away in enumerate(dealt(seen.q, folds, seed), 1):
+    parts = regions_of(arm, seen.q, folds) if regions else dealt(seen.q, folds, seed)
+    for fold, away in enumerate(parts, 1):
         try:
             refuse_not_fitted(seen.take(~away), seen.take(away))
             found = calibrate_to(arm, seen.take(~away), base=base, bends=bends, without=without)
@@ -92,6 +95,34 @@ def dealt(q: Array, folds: int, seed: int) -> list[Flags]:
         raise InvalidValueError(f"folds: expected 2 to {count}, one posture in each or more, got {folds}")
     number = (np.random.default_rng(seed).permutation(count) % folds)[posture]
     return [number == fold for fold in range(folds)]
+
+
+def regions_of(arm: Arm, q: Array, folds: int) -> list[Flags]:
+    """Return by region of the workspace which of some postures (m, n) are in it, (m,) truth values.
+
+    Where the arm as said has its tool is cut across its longest side, again and again, into parts of about as many
+    postures each; one and the same posture is in one part.
+
+    Raises:
+        InvalidValueError: there are not as many postures as parts, or fewer than two parts.
+    """
+    posture = postures(q)
+    count = int(posture.max()) + 1
+    if not 2 <= folds <= count:
+        raise InvalidValueError(f"folds: expected 2 to {count}, one posture in each or more, got {folds}")
+    _, first = np.unique(posture, return_index=True)
+    places = chain_of(arm).reach(q[first]).position
+
+    def cut(members: Numbers, parts: int) -> list[Numbers]:
+        if parts == 1:
+            return [members]
+        along = places[members, np.argmax(np.ptp(places[members], axis=0))]
+        order = members[np.argsort(along, kind="stable")]
+        half = parts // 2
+        middle = len(order) * half // parts
+        return [*cut(order[:middle], half), *cut(order[middle:], parts - half)]
+
+    return [np.isin(posture, members) for members in cut(np.arange(count), folds)]
 
 
 def postures(q: Array) -> Numbers:

@@ -12,12 +12,14 @@ from armwright.arrays import Array
 from armwright.calibration.bending import largest_efforts
 from armwright.calibration.beyond import Beyond, calibrate_beyond
 from armwright.calibration.chain import chain_of
+from armwright.calibration.doubts import doubts
 from armwright.calibration.fitting import Calibration, calibrate_to
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
 from armwright.calibration.measurements import Measurements
 from armwright.calibration.model import Off
 from armwright.calibration.readings import refuse_not_fitted
 from armwright.calibration.validation import HeldOut, cross_validated
+from armwright.errors import InvalidValueError
 
 # Turns about y, which a Denavit-Hartenberg table has no number for.
 _TILTS = ("beta",)
@@ -39,6 +41,8 @@ class Calibrated:
         raw: (p,) distances of the points from the arm as said, where it stands in the measuring frame; none where it
             stands elsewhere [m].
         held_out: from arms calibrated without the reading, all errors.
+        held_out_region: from arms calibrated without the region of the workspace in which the reading lies; None where
+            a region cannot be left out.
         held_out_table: likewise, without turns about y.
         checked: by how much readings that the file keeps for checking miss the corrected arm.
         accuracy: AP and AD of the arm as said, with its base moved, and calibrated (held out); None without points.
@@ -53,6 +57,7 @@ class Calibrated:
     table: Calibration
     raw: Array
     held_out: HeldOut
+    held_out_region: HeldOut | None
     held_out_table: HeldOut
     checked: Off
     accuracy: dict[str, Accuracy] | None
@@ -98,6 +103,12 @@ def calibrated(
     tried = calibrate_beyond(arm, seen, folds=folds, seed=seed, progress=progress) if beyond else None
     told("holding points out: all errors")
     held_out = tried.geometry if tried else cross_validated(arm, seen, folds=folds, seed=seed)
+    told("holding regions out")
+    try:
+        held_out_region = cross_validated(arm, seen, folds=folds, regions=True)
+    except InvalidValueError:
+        # A frame, a plane or an anchor lies in one region, or too few readings are left.
+        held_out_region = None
     held_out_table = held_out
     if any(name.endswith(_TILTS) for name in full.chain.names):
         told("holding points out: for the arm file")
@@ -122,12 +133,13 @@ def calibrated(
         table=table,
         raw=np.asarray(raw, dtype=np.float64),
         held_out=held_out,
+        held_out_region=held_out_region,
         held_out_table=held_out_table,
         checked=full.model.off(measurements.readings.take(~fit), full.errors),
         accuracy={name: one for name, one in words.items() if one is not None} or None,
         repeatability=repeatability(seen),
         beyond=tried,
-        notes=tuple(_notes(full, measurements)),
+        notes=(*doubts(full, seen), *_notes(full, measurements), *_which_to_believe(held_out, held_out_region)),
     )
 
 
@@ -144,12 +156,25 @@ def _notes(full: Calibration, measurements: Measurements) -> Iterator[str]:
         yield f"readings that are farther off than they should be, and do not count: {shown}{more}"
 
 
+def _which_to_believe(held_out: HeldOut, region: HeldOut | None) -> Iterator[str]:
+    """Say what the figures of readings that were held out are good for."""
+    if region is None:
+        yield "held out by posture only: no region of the workspace can be left out of these readings"
+        return
+    yield (
+        f"held out by posture ({held_out.distance.mean() * 1e3:.4g} mm) is for poses like those measured, by region "
+        f"({region.distance.mean() * 1e3:.4g} mm) for poses where nothing was measured: believe the second wherever "
+        f"the arm works elsewhere"
+    )
+
+
 def distances(found: Calibrated) -> dict[str, Array]:
     """Return by name the distances by which readings miss the arm [m]."""
     kinds = {
         "arm and base as said": found.raw,
         "base moved to fit": found.full.before.distance,
         "calibrated, held out": found.held_out.distance,
+        "calibrated, region held out": found.held_out_region.distance if found.held_out_region else np.zeros(0),
         "calibrated, all readings": found.full.after.distance,
         "arm file, held out": found.held_out_table.distance,
         "beyond geometry, held out": found.beyond.held_out.distance if found.beyond else np.zeros(0),
