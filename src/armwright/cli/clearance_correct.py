@@ -69,6 +69,7 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     else:
         found = correct_path(model, named_path(path), clearances, settings, knots=knots, rounds=rounds, progress=told)
     summary = _summary(model, path, found, clearances)
+    summary["predictable_until"] = _predictable_until(model, found, summary, settings)
     if output is not None:
         write_folder(output, _files(model, path, found, summary, settings))
     if as_json:
@@ -94,6 +95,17 @@ def _summary(model: "Linkage", path: str, found: "Correction", clearances: "Arra
         "mean errors": list(found.history),
         "round": found.best,
     }
+
+
+def _predictable_until(model: "Linkage", found: "Correction", summary: dict[str, Any], settings: "Settings") -> float:
+    """Return until when the run on the corrected path is a prediction [s]."""
+    import numpy as np
+
+    from armwright.clearance.predictability import with_outlook
+    from armwright.clearance.preparing import prepare
+
+    _, outlook = with_outlook(prepare(model, found.path, settings), np.array(list(summary["clearances"].values())))
+    return outlook.until
 
 
 def _drawn(model: "Linkage", estimate: Path) -> "Array":
@@ -171,3 +183,9 @@ def _print(summary: dict[str, Any]) -> None:
         for t, node, before, after in nodes
     )
     print_table(plain_console(), table(("at s", "told x mm", "y mm", "error before mm", "after mm"), rows, words=()))
+    late = [t for t in summary["times"] if t > summary["predictable_until"] + 1e-9]
+    if late:
+        print(
+            f"predictable until t = {summary['predictable_until']:.4g} s: what the path comes to at the {len(late)} "
+            f"later times is one of many runs that nobody can tell apart, and no correction can be relied on there"
+        )

@@ -20,6 +20,7 @@ from armwright.calibration.model import Off
 from armwright.calibration.readings import refuse_not_fitted
 from armwright.calibration.validation import HeldOut, cross_validated
 from armwright.errors import InvalidValueError
+from armwright.spatial.euler import to_rpy
 
 # Turns about y, which a Denavit-Hartenberg table has no number for.
 _TILTS = ("beta",)
@@ -149,6 +150,14 @@ def _notes(full: Calibration, measurements: Measurements) -> Iterator[str]:
     if measurements.readings.with_rotation.any():
         left += f" and of {math.degrees(full.noise.turn):.3g} deg per axis"
     yield f"{len(full.names)} errors fitted to {len(fit)} readings; {left}"
+    if any(name.startswith("base.") for name in full.names):
+        start = full.chain.base
+        x, y, z = start[:3, 3] * 1e3
+        turns = ", ".join(f"{angle:z.4f}" for angle in np.degrees(to_rpy(start[:3, :3])))
+        yield (
+            f"the errors base.* count from where the arm as said fits best: its base at {x:z.4f}, {y:z.4f}, {z:z.4f} "
+            f"mm, roll, pitch, yaw {turns} deg in the frame of the measurements"
+        )
     yield from measurements.warnings
     if full.outliers:
         shown = ", ".join(measurements.names[fit[i]] for i in full.outliers[:_SHOWN])
@@ -226,6 +235,7 @@ def as_data(found: Calibrated) -> dict[str, Any]:
         "arm": found.arm.name,
         "readings": int((~found.measurements.check).sum()),
         "errors": _errors(full),
+        "base_before": full.chain.base.tolist(),
         "covariance": full.covariance.tolist(),
         "held": {one.name: one.why for one in full.held},
         "singular_values": full.identified.singular_values.tolist(),
