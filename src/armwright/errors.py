@@ -115,6 +115,10 @@ class OutputError(ArmwrightError, OSError):
     exit_status = ExitStatus.FILE
 
 
+class GravityWarning(UserWarning):
+    """An arm states a gravity of its own, and stands in a cell, whose gravity counts."""
+
+
 class RotationWarning(UserWarning):
     """A matrix typed as a rotation is nearly one; the nearest rotation has been taken."""
 

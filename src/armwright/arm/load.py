@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from armwright.arm.dh import about_com, from_modified
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
 from armwright.arm.quantities import ANGLE, LENGTH, given, number_in, per, pose_in, vector_in
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
@@ -73,6 +73,7 @@ def read_arm(path: Path | str) -> Arm:
         base = base @ before
     hand = top.table("hand")
     gravity = top.table("gravity")
+    stated = "m_per_s2" in gravity
     arm = Arm(
         name=top.text("name", default=path.stem),
         title=top.text("title", default=""),
@@ -81,7 +82,8 @@ def read_arm(path: Path | str) -> Arm:
         motors=motors,
         base=base,
         tool=tool,
-        gravity=gravity.vector("m_per_s2", 3, default=(0.0, 0.0, -STANDARD_GRAVITY)),
+        gravity=gravity.vector("m_per_s2", 3, default=UPRIGHT_GRAVITY),
+        gravity_from="stated" if stated else "standard",
         reach=number_in(hand, "reach", LENGTH, default=math.inf, positive=True),
         tool_speed=number_in(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
         source=top.text("source", default=""),

@@ -20,6 +20,9 @@ from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.spatial.poses import one_pose
 
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
+# Who says which way an arm's gravity points: nobody, its file or its maker, the root of a URDF file, or the cell it
+# stands in.
+GravityFrom: TypeAlias = Literal["standard", "stated", "root", "world"]
 _Part = TypeVar("_Part")
 
 # Inertia tensors are computed from typed numbers; this much is rounding, more is a mistake.
@@ -29,6 +32,8 @@ _ROUNDING = 1e-9
 _TENSOR_ROUNDING = 0.05
 # Standard gravity [m/s²], ISO 80000-3.
 STANDARD_GRAVITY = 9.80665
+# What an arm that stands upright feels of it, along the axes of its base, or the world [m/s²].
+UPRIGHT_GRAVITY = read_only(np.array((0.0, 0.0, -STANDARD_GRAVITY)))
 
 
 def _com(value: ArrayLike) -> Array:
@@ -291,6 +296,8 @@ class Arm:
         base: (4, 4) pose of Denavit-Hartenberg frame 0 in the base frame of the arm.
         tool: (4, 4) pose of the tool in the frame of the last link.
         gravity: (3,) acceleration of free fall in the base frame [m/s²].
+        gravity_from: who says so: ``standard`` where nobody does, ``stated`` by its file or whoever built it, ``root``
+            where it points down in the root link of a URDF file, ``world`` in a cell.
         reach: greatest distance of the hand from the base axis that the report's speed rule divides by [m].
         tool_speed: speed of the hand at full reach [m/s].
         source: where the numbers come from.
@@ -312,9 +319,8 @@ class Arm:
     )
     base: Array = attrs.field(factory=lambda: np.eye(4), converter=_base, eq=content)
     tool: Array = attrs.field(factory=lambda: np.eye(4), converter=_tool, eq=content)
-    gravity: Array = attrs.field(
-        factory=lambda: np.array((0.0, 0.0, -STANDARD_GRAVITY)), converter=_gravity, eq=content
-    )
+    gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_gravity, eq=content)
+    gravity_from: GravityFrom = attrs.field(default="standard", eq=False)
     reach: float = math.inf
     tool_speed: float = math.inf
     source: str = ""
@@ -330,6 +336,13 @@ class Arm:
         for name in ("reach", "tool_speed"):
             if not getattr(self, name) > 0:
                 raise InvalidValueError(f"arm '{self.name}': {name} must be above 0, got {getattr(self, name):g}")
+        if self.gravity_from not in get_args(GravityFrom):
+            known = ", ".join(get_args(GravityFrom))
+            raise InvalidValueError(
+                f"arm '{self.name}': expected gravity_from to be one of {known}, got {shown(self.gravity_from)}"
+            )
+        if self.gravity_from == "standard" and not np.array_equal(self.gravity, UPRIGHT_GRAVITY):
+            object.__setattr__(self, "gravity_from", "stated")
 
     def __repr__(self) -> str:
         """Say which arm it is; its tables are in its attributes, and in ``armwright show``."""

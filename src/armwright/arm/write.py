@@ -10,12 +10,10 @@ from collections.abc import Iterator, Mapping
 import attrs
 import numpy as np
 
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
-
-_UPRIGHT = (0.0, 0.0, -STANDARD_GRAVITY)
 
 
 def toml_text(arm: Arm) -> str:
@@ -39,7 +37,7 @@ def _lines(arm: Arm) -> Iterator[str]:
     yield from _table("hand", {key: value for key, value in hand.items() if math.isfinite(value)})
     yield from _pose("base", arm.base)
     yield from _pose("tool", arm.tool)
-    if not np.array_equal(arm.gravity, _UPRIGHT):
+    if arm.gravity_from == "stated" or not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         yield from _table("gravity", {"m_per_s2": arm.gravity})
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         yield f"[[joint]]  # {i}"

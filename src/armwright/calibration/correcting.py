@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.dh import to_modified
+from armwright.arm.gravity import felt_gravity
 from armwright.arm.model import Arm, Joint
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.writer import urdf_text
@@ -17,7 +18,7 @@ from armwright.calibration.chain import Chain, Element, chain_of
 from armwright.calibration.fitting import Calibration
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.spatial.euler import to_rpy
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import inverse, pose
 from armwright.spatial.rotations import rotation_from_vector
 
 # The numbers of a link in the Denavit-Hartenberg convention.
@@ -114,7 +115,7 @@ def _corrected(calibration: Calibration) -> Arm:
         arm,
         joints=tuple(joints),
         base=base @ arm.base,
-        gravity=base[:3, :3] @ arm.gravity,
+        gravity=felt_gravity(inverse(base), arm.gravity),
         tool=arm.tool @ pose(chain.hand, np.zeros(3)) @ _pose_of(chain, by_name, "tool"),
         title=f"{arm.title or arm.name}, calibrated",
     )

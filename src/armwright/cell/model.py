@@ -6,8 +6,9 @@ from typing import Literal, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, floats
+from armwright.arm.gravity import in_world
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm
+from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import forward
@@ -20,6 +21,10 @@ def _posture(value: ArrayLike) -> Array:
     q = floats(value, "start")
     q.setflags(write=False)
     return q
+
+
+def _gravity(value: ArrayLike) -> Array:
+    return exactly(value, (3,), "gravity", LARGEST)
 
 
 def base_name(arm: str) -> str:
@@ -53,11 +58,12 @@ class CellArm:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Cell:
-    """A cell.
+    """A cell. Its arms feel its gravity, whatever they feel outside of it.
 
     Attributes:
         name: as shown to people.
-        arms: by name, such as ``ARM_1``.
+        arms: by name, such as ``ARM_1``; the gravity of each model is that of the cell, along the axes of its base.
+        gravity: (3,) acceleration of free fall along the axes of the world [m/s²].
         frames: by name, in upper case.
         visions: by frame name, what the camera will report, one answer after the other, (4, 4) seen from the camera.
         camera_repeats: whether the camera goes on with its last answer for a frame when there are no more; without it,
@@ -75,6 +81,7 @@ class Cell:
 
     name: str
     arms: Mapping[str, CellArm]
+    gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_gravity)
     frames: Mapping[str, Node] = attrs.field(factory=dict)
     visions: Mapping[str, tuple[Array, ...]] = attrs.field(factory=dict)
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
@@ -87,6 +94,14 @@ class Cell:
     deviation: float = 1e-3
     period: float = 1e-3
     around: Around | None = None
+
+    def __attrs_post_init__(self) -> None:
+        """Let every arm feel the gravity of the cell, and warn of one that states another."""
+        stand = {
+            name: attrs.evolve(one, arm=in_world(one.arm, one.base, self.gravity, name=f"cell '{self.name}', {name}"))
+            for name, one in self.arms.items()
+        }
+        object.__setattr__(self, "arms", stand)
 
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.load import is_path, load_arm
-from armwright.arm.model import Arm
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm
@@ -24,11 +24,11 @@ from armwright.spatial.poses import from_noap, pose
 from armwright.spatial.poses import inverse as inverse_pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
-# The arm of a cell that names none: the report's.
 # Two bases nearer than this are in one another [m].
 _APART = 0.01
 # Joints that it takes to bring the hand to any place in any orientation.
 _PLACE_AND_TURN = 6
+# The arm of a cell that names none: the report's.
 _REPORT_ARM = "stanford"
 _ARM_NAME = re.compile(r"ARM[-_]([0-9]+)", re.IGNORECASE | re.ASCII)
 _NAME = re.compile(r"[A-Z][A-Z0-9_]*", re.IGNORECASE | re.ASCII)
@@ -41,6 +41,8 @@ DEVIATION_MM = (1e-3, 1e3)
 WAYS_ROUND: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # What the camera finds after its last answer, as it is written.
 _AFTER_LAST = ("nothing", "same")
+# A hundred times that of the earth: more is a slip of units [m/s²].
+_STRONGEST_GRAVITY = 1000.0
 # Fingers and cameras that take longer are a slip of units [s].
 _LONGEST_WAIT = 600.0
 
@@ -64,6 +66,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     cell = Cell(
         name=top.text("name", default=path.name),
         arms=arms,
+        gravity=_gravity(top),
         frames=_frames(top.table("frames"), arms),
         visions=_visions(top.table("visions")),
         camera=_pose(camera, "pose", default=np.eye(4)),
@@ -81,6 +84,17 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
     for table in (camera, motion, contact, top):
         table.finish()
     return cell
+
+
+def _gravity(top: Table) -> Array:
+    """Read the gravity of the world, along its axes."""
+    gravity = top.vector("gravity_m_per_s2", 3, default=UPRIGHT_GRAVITY)
+    if np.linalg.norm(gravity) > _STRONGEST_GRAVITY:
+        raise top.error(
+            "gravity_m_per_s2",
+            f"expected no more than {_STRONGEST_GRAVITY:g} m/s² in all; that of the earth is [0, 0, -9.80665]",
+        )
+    return gravity
 
 
 def _around(motion: Table) -> Around | None:

@@ -1,5 +1,7 @@
 """The command ``armwright``: its commands, and what becomes of errors."""
 
+import sys
+import warnings
 from typing import Annotated
 
 import typer
@@ -117,4 +119,11 @@ def root(
 def main() -> None:
     """Run the command line; an error ends it with one message and the exit status of its kind."""
     clean_output()
+    warnings.showwarning = _warn
     run_and_exit(app)
+
+
+def _warn(message: Warning | str, category: type[Warning], *where: object, **_more: object) -> None:
+    """Tell a warning in one line, without the place in our own code that it comes from."""
+    about = "" if issubclass(category, UserWarning) else f"{category.__name__} in {where[0]}:{where[1]}: "
+    print(f"armwright: warning: {about}{message}", file=sys.stderr)

@@ -17,6 +17,13 @@ if TYPE_CHECKING:
 
 # Room for the widest table there can be, in characters.
 _WIDEST = 200
+# Who says which way gravity points.
+_GRAVITY_FROM = {
+    "standard": "as nothing else is stated; in a cell, that of the cell",
+    "stated": "stated by the arm; in a cell, that of the cell",
+    "root": "down in the root link of the file; in a cell, that of the cell",
+    "world": "that of the cell",
+}
 # What a drive has that can be felt.
 _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
 
@@ -133,6 +140,7 @@ def _motors(model: "Arm") -> "Table":
 def _facts(model: "Arm") -> "Table":
     from rich.table import Table
 
+    from armwright.arm.gravity import vector_text
     from armwright.spatial.poses import to_noap
 
     def noap(X: "Any") -> str:
@@ -142,7 +150,7 @@ def _facts(model: "Arm") -> "Table":
         return f"n ({columns[0]})  o ({columns[1]})  a ({columns[2]})  p ({place}) mm"
 
     facts = [("base", noap(model.base)), ("tool", noap(model.tool))]
-    facts.append(("gravity", f"({', '.join(f'{x:g}' for x in model.gravity)}) m/s²"))
+    facts.append(("gravity", f"{vector_text(model.gravity)}, {_GRAVITY_FROM[model.gravity_from]}"))
     if math.isfinite(model.reach):
         facts.append(("reach", _length(model.reach)))
     if math.isfinite(model.tool_speed):

@@ -169,6 +169,7 @@ def _run(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], or
             "cell": None if origin.cell is None else _file(origin.cell),
             "imports": [_file(path) for path in origin.imports],
             "arms": arms,
+            "gravity_m_per_s2": recording.cell.gravity.tolist(),
         },
         "options": dict(origin.options),
         "seed": origin.seed,

@@ -7,7 +7,8 @@ import attrs
 import numpy as np
 
 from armwright.arm.dh import carry
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, impossible_moments
+from armwright.arm.gravity import felt_gravity, vector_text
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link, impossible_moments
 from armwright.arm.urdf.axes import Frames, cleared, cleared_pose, frames_of
 from armwright.arm.urdf.chain import Chain, chain_of
 from armwright.arm.urdf.robot import limits_of, motor_of, read_robot
@@ -77,7 +78,6 @@ def read_urdf(
         links.append(_link(moving.bodies, X, size))
         motors.append(motor_of(moving.joint))
         notes += unknown
-    down = chain.X_RB[:3, :3].T @ (0.0, 0.0, -STANDARD_GRAVITY)
     arm = Arm(
         name=robot.name,
         joints=joints,
@@ -85,9 +85,13 @@ def read_urdf(
         motors=motors,
         base=cleared_pose(frames.first, size),
         tool=cleared_pose(inverse(frames.poses[-1]) @ chain.X_BT, size),
-        gravity=cleared(down, STANDARD_GRAVITY),
+        gravity=felt_gravity(chain.X_RB, UPRIGHT_GRAVITY),
+        gravity_from="root",
         source=f"{path.name}, link '{chain.base}' to link '{chain.tip}'",
     )
+    if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
+        down = vector_text(arm.gravity)
+        notes.append(f"gravity points down in the root link of the file: {down} along the axes of '{chain.base}'")
     return Reading(arm=arm, notes=tuple(notes))
 
 

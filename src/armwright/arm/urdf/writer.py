@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from armwright.arm.dh import turn, twist
-from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Motor
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Motor
 from armwright.arm.urdf.robot import NO_LIMIT
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError
@@ -64,7 +64,7 @@ def lost_in_urdf(arm: Arm) -> list[str]:
             lost.append(
                 f"joint {i}: the largest acceleration, {joint.limits.acceleration:g} {unit}, is not in the file"
             )
-    if not np.array_equal(arm.gravity, (0.0, 0.0, -STANDARD_GRAVITY)):
+    if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
         x, y, z = arm.gravity
         lost.append(f"gravity of ({x:g}, {y:g}, {z:g}) m/s² is not in the file: URDF has it pointing down the z axis")
     for name, value, unit in (("reach", arm.reach, "m"), ("hand speed", arm.tool_speed, "m/s")):
