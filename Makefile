@@ -58,7 +58,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/peg.rlo --cell examples/peg_cell.toml -o out/peg
 	$(BIN)/armwright run examples/hand_over.rlo --cell examples/two_arms.toml -o out/hand_over
 	$(BIN)/armwright run examples/hand_over_sideways.rlo --cell examples/two_arms.toml -o out/hand_over_sideways
-	$(BIN)/armwright move joint puma560 examples/puma_poses.toml -o out/joint
+	$(BIN)/armwright move joint puma560-seed examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
 	$(BIN)/python examples/measurements.py
 	$(BIN)/armwright iso9283 examples/measured_poses.csv examples/measured_paths.csv -o out/iso9283
@@ -71,7 +71,7 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483 -o out/corrected
 	$(BIN)/armwright plan-poses puma560 -n 30 -o out/poses.csv
 	$(BIN)/python examples/tracked_points.py
-	$(BIN)/armwright calibrate puma560 examples/puma_points.csv --beyond -o out/calibrated
+	$(BIN)/armwright calibrate puma560-seed examples/puma_points.csv --beyond -o out/calibrated
 	$(BIN)/armwright study dh-calibration -o out/dh
 
 docs: gallery     ## Build the site of the documentation into site/ (the first time 4 minutes)

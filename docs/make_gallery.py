@@ -110,7 +110,7 @@ EXHIBITS = (
         title="A joint move",
         says="Every joint goes straight from posture to posture, blended at the middle pose; the hand swings out.",
         alt="A film of a PUMA that moves through three poses, with the path of its hand",
-        command="move joint puma560 examples/puma_poses.toml",
+        command="move joint puma560-seed examples/puma_poses.toml",
         shown="move.gif",
     ),
     Exhibit(
@@ -182,7 +182,7 @@ EXHIBITS = (
         "its geometry calibrated, and as near as the arm comes back with the joints that give under gravity, which "
         "held-out points confirm. Errors that the points do not tell are named.",
         alt="How many of the readings are nearer than a distance: before, calibrated, and with joints that give",
-        command="calibrate puma560 examples/puma_points.csv --beyond",
+        command="calibrate puma560-seed examples/puma_points.csv --beyond",
         shown="distances.svg",
     ),
     Exhibit(

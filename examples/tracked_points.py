@@ -1,4 +1,4 @@
-"""Writes puma_points.csv beside it: what a laser tracker would measure of an imaginary PUMA 560.
+"""Writes puma_points.csv beside it: what a laser tracker would measure of an imaginary PUMA 560 (puma560-seed).
 
 Its dimensions are off by tenths of a millimetre and of a degree, its shoulder and elbow give under gravity, and it
 comes back to some hundredths of a millimetre. The tracker stands somewhere in the hall. Run it to see how such files
@@ -28,7 +28,7 @@ HALL = pose(rotation_from_vector((0.02, -0.01, 2.2)), (2.8, 1.1, -0.4))
 def rows() -> Iterator[str]:
     """Give the rows: poses to fit, some of them several times, and poses by chance to check with."""
     rng = np.random.default_rng(1984)
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     chain = chain_of(arm, base=HALL, bends=springs(arm))
     errors = rng.standard_normal(len(chain.names)) * np.where(chain.is_length, LENGTH, ANGLE)
     for i, name in enumerate(chain.names):

@@ -284,14 +284,14 @@ def test_names_of_the_translation() -> None:
 def test_postures_of_the_picture() -> None:
     """The pose on the page on kinematics has eight postures; of each pair of wrists joint 4 allows one."""
     text = (DOCS / "physics" / "kinematics.md").read_text(encoding="utf-8")
-    found = re.search(r"inverse puma560 --xyz (\S+) --rpy ([^`]+)`", text)
+    found = re.search(r"inverse puma560-seed --xyz (\S+) --rpy ([^`]+)`", text)
     assert found is not None
     place, turn = (np.array([float(x) for x in numbers.split(",")]) for numbers in found.groups())
     roll, pitch, yaw = (
         rotation_from_vector(angle * axis) for angle, axis in zip(np.radians(turn), np.eye(3), strict=True)
     )
 
-    solution = armwright.inverse(armwright.load_arm("puma560"), pose(yaw @ pitch @ roll, place / 1e3))
+    solution = armwright.inverse(armwright.load_arm("puma560-seed"), pose(yaw @ pitch @ roll, place / 1e3))
 
     assert len(solution.branches) == 8
     assert len({branch.label.rpartition(",")[0] for branch in solution.allowed}) == len(solution.allowed) == 4
@@ -302,7 +302,7 @@ def test_energy_of_the_picture() -> None:
     """The numbers below the picture of the released arm are those of the motion, and the account balances."""
     text = (DOCS / "physics" / "dynamics.md").read_text(encoding="utf-8")
     found = armwright.simulate(
-        armwright.load_arm("puma560"),
+        armwright.load_arm("puma560-seed"),
         np.radians((0, -60, 60, 0, 30, 0)),
         duration=6.0,
         integrator=Adaptive(rtol=1e-9, atol=1e-11),

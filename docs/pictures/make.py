@@ -144,7 +144,7 @@ def write_angles(axes: Axes, branch: Branch) -> None:
 
 def postures() -> Figure:
     """Draw all postures in which the PUMA holds its hand in one pose."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     roll, pitch, yaw = (
         rotation_from_vector(angle * axis) for angle, axis in zip(np.radians(TURN), np.eye(3), strict=True)
     )
@@ -225,7 +225,7 @@ def draw_joints(axes: Axes, found: Simulation) -> None:
 def released() -> Figure:
     """Draw where the energy of a PUMA goes whose drives are switched off."""
     how = Adaptive(rtol=1e-9, atol=1e-11)
-    found = simulate(load_arm("puma560"), RELEASED, duration=DURATION, integrator=how, period=0.0125)
+    found = simulate(load_arm("puma560-seed"), RELEASED, duration=DURATION, integrator=how, period=0.0125)
     figure = Figure(figsize=(7.2, 5.0), layout="constrained")
     energies, joints = figure.subplots(2, 1, sharex=True, height_ratios=(2.3, 1))
     draw_energies(energies, found)
@@ -272,7 +272,7 @@ def draw_ways(axes: Axes) -> None:
 def draw_wrist(axes: Axes, joint: int) -> None:
     """Draw the position of one joint of the wrist in both moves, and its limits."""
     t = puma_moves.sample_times()
-    limit = np.degrees(load_arm("puma560").joints[joint].limits.upper)
+    limit = np.degrees(load_arm("puma560-seed").joints[joint].limits.upper)
     for way, colour in (("joint", BY_JOINTS), ("geodesic", BY_HAND)):
         axes.plot(t, np.degrees(puma_moves.joints_along(way)(t)[:, joint]), color=colour, linewidth=1.8)  # type: ignore[arg-type]
     for bound in (-limit, limit):
@@ -356,7 +356,7 @@ def rattling() -> Figure:
 
 def before_and_after() -> Figure:
     """Draw how far points of the imaginary PUMA are from it as said, calibrated, and with what its joints give."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     measured = read_measurements(HERE.parents[1] / "examples" / "puma_points.csv", arm)
     return distances_figure(calibrated(arm, measured, beyond=True))
 

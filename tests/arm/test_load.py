@@ -311,7 +311,7 @@ def test_unknown_arm() -> None:
     with pytest.raises(UnknownNameError) as caught:
         load_arm("pumma560")
 
-    known = "Known: ntu-3r, puma560, stanford, stanford-jpl, ur5."
+    known = "Known: ntu-3r, puma560, puma560-seed, stanford, stanford-jpl, ur5."
     assert str(caught.value) == f"no arm 'pumma560'. Did you mean 'puma560'? {known}"
     with pytest.raises(LookupError, match=r"^no arm 'kuka'\. Known: "):
         load_arm("kuka")

@@ -19,7 +19,7 @@ FILES = {"motion.csv", "move.json", "report.html", "joints.svg", "hand.svg", "pa
 
 def test_joint_move(tmp_path: Path) -> None:
     """A joint move writes its files; the motion starts and ends at rest at the first and the last pose."""
-    done = armwright("move", "joint", "puma560", POSES, "-o", tmp_path / "out", "--no-film")
+    done = armwright("move", "joint", "puma560-seed", POSES, "-o", tmp_path / "out", "--no-film")
 
     assert done.returncode == 0, done.stderr
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
@@ -28,7 +28,7 @@ def test_joint_move(tmp_path: Path) -> None:
     assert "the limits would hold 5.81 times slower, for the acceleration of joint 2: --keep-limits" in done.stderr
     rows = np.loadtxt(tmp_path / "out" / "motion.csv", delimiter=",", skiprows=1)
     assert rows.shape == (501, 25)
-    hand = forward(load_arm("puma560"), rows[[0, -1], 1:7])[:, :3, 3]
+    hand = forward(load_arm("puma560-seed"), rows[[0, -1], 1:7])[:, :3, 3]
     np.testing.assert_allclose(hand, [[0.05, -0.55, -0.6], [0.6, 0.15, -0.3]], atol=1e-9)
     np.testing.assert_allclose(rows[[0, -1], 7:13], 0, atol=1e-9)
     summary = json.loads((tmp_path / "out" / "move.json").read_text())
@@ -38,7 +38,7 @@ def test_joint_move(tmp_path: Path) -> None:
 
 def test_limits_kept() -> None:
     """With --keep-limits the move runs just so much slower that no limit is passed."""
-    done = armwright("move", "joint", "puma560", POSES, "--keep-limits", "--json")
+    done = armwright("move", "joint", "puma560-seed", POSES, "--keep-limits", "--json")
 
     found = json.loads(done.stdout)
     largest = max(max(parts) for parts in found["of_limits"].values())
@@ -48,7 +48,7 @@ def test_limits_kept() -> None:
 
 def test_cartesian_move(tmp_path: Path) -> None:
     """A Cartesian move keeps the hand where it says, on one branch, and inside the limits without times."""
-    done = armwright("move", "cartesian", "puma560", POST, "-o", tmp_path, "--no-film", "--deviation-mm", "0.05")
+    done = armwright("move", "cartesian", "puma560-seed", POST, "-o", tmp_path, "--no-film", "--deviation-mm", "0.05")
 
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -65,7 +65,7 @@ def test_film(tmp_path: Path) -> None:
     """The film is a GIF of many pictures."""
     image = pytest.importorskip("PIL.Image")
 
-    done = armwright("move", "joint", "puma560", POSES, "-o", tmp_path, "-q")
+    done = armwright("move", "joint", "puma560-seed", POSES, "-o", tmp_path, "-q")
 
     assert done.returncode == 0, done.stderr
     with image.open(tmp_path / "move.gif") as film:
@@ -74,7 +74,7 @@ def test_film(tmp_path: Path) -> None:
 
 def test_no_branch(tmp_path: Path) -> None:
     """Where no branch carries through it is said why, in one line and with a way out, and nothing is written."""
-    done = armwright("move", "cartesian", "puma560", POSES, "-o", tmp_path / "out")
+    done = armwright("move", "cartesian", "puma560-seed", POSES, "-o", tmp_path / "out")
 
     assert done.returncode == 3
     assert done.stdout == ""
@@ -86,7 +86,7 @@ def test_no_branch(tmp_path: Path) -> None:
 
 def test_the_other_way_round_is_named() -> None:
     """Where no pose beside the line helps, damped rates are named: they do, as the next test finds."""
-    done = armwright("move", "cartesian", "puma560", POSES, "--around", "via")
+    done = armwright("move", "cartesian", "puma560-seed", POSES, "--around", "via")
 
     assert done.returncode == 3
     assert "from pose 2 to pose 3: on the line near (" in done.stderr
@@ -95,7 +95,7 @@ def test_the_other_way_round_is_named() -> None:
 
 def test_way_round() -> None:
     """Damped rates lead past it; price and reason are told."""
-    done = armwright("move", "cartesian", "puma560", POSES, "--around", "damped")
+    done = armwright("move", "cartesian", "puma560-seed", POSES, "--around", "damped")
 
     assert done.returncode == 0, done.stderr
     assert "A to B: a line: " in done.stdout
@@ -107,7 +107,7 @@ def test_way_round() -> None:
 
 def test_a_servo_slower_than_the_move(tmp_path: Path) -> None:
     """With a servo period as long as the move, start and end are written, and figures drawn from the two of them."""
-    done = armwright("move", "joint", "puma560", POSES, "-o", tmp_path, "--no-film", "--servo-ms", "1000")
+    done = armwright("move", "joint", "puma560-seed", POSES, "-o", tmp_path, "--no-film", "--servo-ms", "1000")
 
     assert done.returncode == 0, done.stderr
     assert np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1).shape == (2, 25)
@@ -117,13 +117,13 @@ def test_a_servo_slower_than_the_move(tmp_path: Path) -> None:
     ("arguments", "status", "said"),
     [
         (("joint", "puma56", POSES), 2, "no arm 'puma56'. Did you mean 'puma560'?"),
-        (("joint", "puma560", EXAMPLES / "puma_pose.toml"), 4, "no such file; did you mean "),
-        (("slide", "puma560", POSES), 2, "'slide' is not one of 'joint', 'cartesian'"),
-        (("joint", "puma560", POSES, "--orientation", "zyz"), 2, "only a cartesian move has one"),
-        (("joint", "puma560", POSES, "--near", "1,2"), 2, "expected 6 finite numbers, got 2"),
-        (("joint", "puma560", POSES, "--servo-ms", "0"), 2, "expected 0.01 to 1000, got 0"),
-        (("cartesian", "puma560", POST, "--deviation-mm", "-1"), 2, "expected 0.0001 to 100, got -1"),
-        (("cartesian", "puma560", POST, "--around", "via", "--orientation", "zyz"), 2, "turn about one axis"),
+        (("joint", "puma560-seed", EXAMPLES / "puma_pose.toml"), 4, "no such file; did you mean "),
+        (("slide", "puma560-seed", POSES), 2, "'slide' is not one of 'joint', 'cartesian'"),
+        (("joint", "puma560-seed", POSES, "--orientation", "zyz"), 2, "only a cartesian move has one"),
+        (("joint", "puma560-seed", POSES, "--near", "1,2"), 2, "expected 6 finite numbers, got 2"),
+        (("joint", "puma560-seed", POSES, "--servo-ms", "0"), 2, "expected 0.01 to 1000, got 0"),
+        (("cartesian", "puma560-seed", POST, "--deviation-mm", "-1"), 2, "expected 0.0001 to 100, got -1"),
+        (("cartesian", "puma560-seed", POST, "--around", "via", "--orientation", "zyz"), 2, "turn about one axis"),
     ],
 )
 def test_mistakes(arguments: tuple[Any, ...], status: int, said: str) -> None:

@@ -59,7 +59,7 @@ def test_poses_of_the_seed(name: str) -> None:
     """The PUMA stands where the seed's tables say, to the printed digits."""
     q, R, p = SEED_POSES[name]
 
-    X = forward(load_arm("puma560"), np.radians(q))
+    X = forward(load_arm("puma560-seed"), np.radians(q))
 
     np.testing.assert_allclose(X[:3, :3], R, atol=SEED_DIGITS)
     np.testing.assert_allclose(X[:3, 3] * 100, p, atol=100 * SEED_PLACE)
@@ -71,7 +71,7 @@ def test_angles_of_the_seed(name: str) -> None:
     q, R, p = SEED_POSES[name]
     X = pose(nearest_rotation(R), np.array(p) / 100)
 
-    best = inverse(load_arm("puma560"), X, near=np.radians(q)).best
+    best = inverse(load_arm("puma560-seed"), X, near=np.radians(q)).best
 
     np.testing.assert_allclose(np.degrees(best.q), q, atol=1.0)
 

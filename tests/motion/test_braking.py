@@ -20,7 +20,7 @@ ROUNDING = 1e-9
 
 @pytest.fixture(scope="module")
 def running() -> Trajectory:
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     return point_to_point(arm, np.zeros(6), np.array([1.2, -0.4, 0.3, 0.0, 0.9, -2.0]), 100.0)
 
 
@@ -28,7 +28,7 @@ def running() -> Trajectory:
 def test_a_stop_goes_on_from_the_motion(running: Trajectory, share: float) -> None:
     """Position, speed and acceleration have no jump where the stop begins, and the arm rests at its end."""
     t = share * running.duration
-    stop = brake(running, t, load_arm("puma560").limit("acceleration"))
+    stop = brake(running, t, load_arm("puma560-seed").limit("acceleration"))
 
     for order in range(3):
         np.testing.assert_allclose(stop(0.0, order), running(t, order), atol=ROUNDING)
@@ -40,7 +40,7 @@ def test_a_stop_goes_on_from_the_motion(running: Trajectory, share: float) -> No
 def test_a_stop_keeps_the_limit(running: Trajectory, share: float) -> None:
     """No joint brakes harder than it may, nor harder than it was accelerating already."""
     t = share * running.duration
-    limit = np.maximum(load_arm("puma560").limit("acceleration"), np.abs(running(t, 2)))
+    limit = np.maximum(load_arm("puma560-seed").limit("acceleration"), np.abs(running(t, 2)))
 
     assert (brake(running, t, np.full(6, limit)).peaks(2) <= limit * (1 + 1e-6)).all()
 
@@ -90,7 +90,7 @@ def test_stops_of_random_motions(sample: Sample) -> None:
 def test_joints_stop_together(running: Trajectory) -> None:
     """The whole stop has no jump inside either, and lasts a whole number of servo periods when one is given."""
     t = 0.4 * running.duration
-    stop = brake(running, t, load_arm("puma560").limit("acceleration"), period=1e-3)
+    stop = brake(running, t, load_arm("puma560-seed").limit("acceleration"), period=1e-3)
 
     assert stop.duration / 1e-3 == pytest.approx(round(stop.duration / 1e-3), abs=1e-6)
     assert max(continuity(stop).largest(order).max() for order in range(3)) < ROUNDING

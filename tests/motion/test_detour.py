@@ -21,7 +21,7 @@ from armwright.spatial.rotations import rotation_from_vector
 @pytest.fixture(scope="module")
 def through_the_wrist() -> tuple[Array, Array]:
     """A line of the PUMA on which the hand turns about the axis that its nearly straight wrist cannot turn about."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     q = np.array([0.3, 1.0, 2.2, 0.4, 0.001, -0.3])
     J = jacobian(arm, q)
     axis = np.cross(J[3:, 3], J[3:, 4])
@@ -39,7 +39,7 @@ def test_the_line_names_the_cause(through_the_wrist: tuple[Array, Array]) -> Non
     q, X = through_the_wrist
 
     with pytest.raises(PathError, match=r"singular there \(wrist\), joint [46] would have to move") as stopped:
-        straight_line(load_arm("puma560"), q, X)
+        straight_line(load_arm("puma560-seed"), q, X)
 
     assert stopped.value.cause == "singular"
     assert 0 < stopped.value.fraction < 1
@@ -48,7 +48,7 @@ def test_the_line_names_the_cause(through_the_wrist: tuple[Array, Array]) -> Non
 @pytest.mark.parametrize("by", ["via", "damped"])
 def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
     """By a via pose and by damped rates the hand gets there, inside all limits, at a price that is told."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     q, X = through_the_wrist
 
     way = line_or_detour(arm, q, X, by=by)  # type: ignore[arg-type]
@@ -78,7 +78,7 @@ def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
 def test_damped_rates_keep_efforts(through_the_wrist: tuple[Array, Array]) -> None:
     """Where the motors are weak and nothing else binds, the way by damped rates is run as slowly as they ask for."""
     q, X = through_the_wrist
-    strong = load_arm("puma560")
+    strong = load_arm("puma560-seed")
     limits = [attrs.evolve(j.limits, acceleration=1e3, effort=0.15 * j.limits.effort) for j in strong.joints]
     joints = [attrs.evolve(j, limits=limit) for j, limit in zip(strong.joints, limits, strict=True)]
     weak = attrs.evolve(strong, joints=joints)
@@ -92,7 +92,7 @@ def test_damped_rates_keep_efforts(through_the_wrist: tuple[Array, Array]) -> No
 
 def test_a_line_that_needs_none() -> None:
     """Where the line can be run it is, at no price but its own deviation."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     q = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
     X = forward(arm, q).copy()
     X[:3, 3] += (0.1, -0.2, -0.1)
@@ -107,7 +107,7 @@ def test_a_line_that_needs_none() -> None:
 
 def test_no_way_round() -> None:
     """Where the goal itself cannot be reached there is no way round, and the reason is that of the line."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     q = np.array([0.0, 0.3, 0.2, 0.0, 0.8, 0.0])
     far = forward(arm, q).copy()
     far[:3, 3] *= 3
@@ -120,12 +120,12 @@ def test_no_way_round() -> None:
 def test_unknown_way() -> None:
     """A misspelt way gets the nearest one."""
     with pytest.raises(UnknownNameError, match="Did you mean 'damped'"):
-        line_or_detour(load_arm("puma560"), np.zeros(6), np.eye(4), by="dampd")  # type: ignore[arg-type]
+        line_or_detour(load_arm("puma560-seed"), np.zeros(6), np.eye(4), by="dampd")  # type: ignore[arg-type]
 
 
 def test_no_crawling() -> None:
     """Lines past the wrist's singularity that would take a minute and more are gone round in seconds."""
-    arm = attrs.evolve(load_arm("puma560"), tool=pose(np.eye(3), (0, 0, 0.12)))
+    arm = attrs.evolve(load_arm("puma560-seed"), tool=pose(np.eye(3), (0, 0, 0.12)))
     level = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     crawls = 0
     for aside in (0.003, 0.004, 0.006):  # metres below the line is the place where forearm and hand are in line

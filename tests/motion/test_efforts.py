@@ -14,7 +14,7 @@ from armwright.motion.quintic import PEAK_ACCELERATION, quintic
 from armwright.motion.trajectory import Trajectory, hold
 from armwright.motion.xspline import xspline
 
-PUMA = load_arm("puma560")
+PUMA = load_arm("puma560-seed")
 # Looks are so close that a peak between them is missed by no more than this part of it.
 SEEN = 1e-3
 ROUNDING = 1e-9
@@ -165,8 +165,8 @@ def test_bad_input() -> None:
     """An arm by its name, a motion that is none, a motion of other joints: each is refused by name."""
     move = quintic([0.0], [1.0], 1.0)
     with pytest.raises(KindError, match="arm: expected an Arm"):
-        effort_peaks("puma560", move)  # type: ignore[arg-type]
+        effort_peaks("puma560-seed", move)  # type: ignore[arg-type]
     with pytest.raises(KindError, match="trajectory: expected a Trajectory, got 3"):
         slowing_for_efforts(PUMA, 3)  # type: ignore[arg-type]
-    with pytest.raises(ShapeError, match="trajectory: expected one of 6 joints, as 'puma560' has, got one of 1"):
+    with pytest.raises(ShapeError, match="trajectory: expected one of 6 joints, as 'puma560-seed' has, got one of 1"):
         effort_peaks(PUMA, move)

@@ -46,7 +46,7 @@ SEED_TIMES, SEED_BLEND = (0.0, 0.5, 1.0), 0.2
 @pytest.fixture(scope="module")
 def puma() -> CompiledArm:
     """The PUMA, compiled."""
-    return compile_arm(load_arm("puma560"))
+    return compile_arm(load_arm("puma560-seed"))
 
 
 def some_poses(arm: Arm, rng: np.random.Generator, count: int = 4) -> tuple[Array, Array]:
@@ -123,7 +123,7 @@ def test_slowed_until_the_limits_hold(puma: CompiledArm) -> None:
 
 @pytest.mark.parametrize("orientation", ["geodesic", "zyz"])
 @pytest.mark.parametrize("ends", ["rest", "running"])
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str, rng: np.random.Generator) -> None:
     """On random moves no sample, far denser than the looks, is beyond the bounds; the branch stays what it is."""
     arm = compile_arm(load_arm(name))
@@ -254,7 +254,7 @@ def test_no_way_round(puma: CompiledArm) -> None:
 @given(st.integers(0, 2**32 - 1))
 def test_one_branch_where_there_is_one(seed: int) -> None:
     """A joint move through poses of one branch keeps to one branch, or finds a shorter one that also does."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     rng = np.random.default_rng(seed)
     lower, upper = arm.limit("lower"), arm.limit("upper")
     Q = rng.uniform(0.6 * lower + 0.4 * upper, 0.4 * lower + 0.6 * upper, (3, 6))

@@ -18,7 +18,7 @@ from armwright.motion.trajectory import Trajectory, join
 
 ruckig = pytest.importorskip("ruckig")
 
-PUMA = load_arm("puma560")
+PUMA = load_arm("puma560-seed")
 # The same arm, whose joints may turn as far as they like.
 FREE = attrs.evolve(
     PUMA,
@@ -252,7 +252,7 @@ def test_from_beyond_a_limit_back() -> None:
         ({"jerk": [1, 2]}, ShapeError, "jerk: expected 6 numbers"),
         ({"period": -1.0}, InvalidValueError, "period: expected more than 0 s, got -1"),
         ({"period": 0.01, "synchronised": False}, InvalidValueError, "synchronised=False: joints that arrive"),
-        ({"arm": "puma560"}, KindError, "arm: expected an Arm"),
+        ({"arm": "puma560-seed"}, KindError, "arm: expected an Arm"),
         ({"arm": load_arm("ntu-3r"), **{name: [0] * 3 for name in ("q", "qd", "qdd", "q_goal")}}, InvalidValueError,
          "arm 'ntu-3r': joint 1 has no limit of acceleration"),
     ],
@@ -272,7 +272,7 @@ def test_when_a_goal_can_change() -> None:
         replace_goal(PUMA, move, -1.0, REST)
     with pytest.raises(InvalidValueError, match="ends at 1 s and not at rest, so there is no state at 2 s"):
         replace_goal(PUMA, running, 2.0, REST)
-    with pytest.raises(ShapeError, match="running: expected one of 6 joints, as 'puma560' has, got one of 1"):
+    with pytest.raises(ShapeError, match="running: expected one of 6 joints, as 'puma560-seed' has, got one of 1"):
         replace_goal(PUMA, quintic([0], [1], 1.0), 0.5, REST)
     with pytest.raises(KindError, match="running: expected a Trajectory, got None"):
         replace_goal(PUMA, None, 0.5, REST)  # type: ignore[arg-type]

@@ -69,7 +69,7 @@ def test_half_steps_at_both_ends(stanford: Arm) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["stanford", "puma560"])
+@pytest.mark.parametrize("name", ["stanford", "puma560-seed"])
 @pytest.mark.parametrize("deviation", [2e-3, 1e-4])
 def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.random.Generator) -> None:
     """On random lines 20 times denser looks find nothing worse than the planner says, or than was asked."""
@@ -191,7 +191,7 @@ def test_line_past_a_singularity() -> None:
     Joint 4 would have to turn half round within millimetres; its limits are taken away here so that the singularity
     alone stands in the way. With the wrist flipped beforehand, or well beside the singularity, the line is easy.
     """
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     free = attrs.evolve(
         arm, joints=[attrs.evolve(j, limits=attrs.evolve(j.limits, lower=-7, upper=7)) for j in arm.joints]
     )
@@ -237,7 +237,7 @@ def test_another_posture_is_tried(rng: np.random.Generator) -> None:
 
     The case is searched for: a posture whose line fails, with another posture of the same pose whose line works.
     """
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     for q in random_postures(arm, rng, 400):
         A = forward(arm, q)
         B = A @ pose(np.eye(3), (0.0, 0.0, -0.25))
@@ -298,7 +298,7 @@ def test_the_first_obstacle_of_the_nearest_posture(stanford: Arm) -> None:
 
 def test_a_posture_with_a_free_line_comes_before_a_way_round(rng: np.random.Generator) -> None:
     """Where another posture has the line free, it is run, and nothing is gone round although that was asked for."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     tried = 0
     for q in random_postures(arm, rng, 400):
         A = forward(arm, q)

@@ -136,7 +136,7 @@ def lifted(fast: CompiledArm, q_start: Array, A: Array, B: Array) -> Array:
     ("name", "factor"),
     [
         (name, factor)
-        for name in ("puma560", "ur5", "stanford")
+        for name in ("puma560-seed", "ur5", "stanford")
         for factor in FACTORS
         if (name, factor[0]) != ("stanford", "e")
     ],
@@ -169,7 +169,7 @@ def test_the_singularity_and_a_joint_to_blame_are_named(name: str, factor: str, 
 @pytest.mark.parametrize("deviation", [1e-3, 1e-4, 1e-5])
 def test_the_wrist_is_to_blame_and_not_the_elbow(deviation: float) -> None:
     """Beside a straight wrist joints 4 and 6 have to turn over; that the other elbow would be nearer is no way out."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     q, A, B = upright(puma)
     manner = Manner(deviation=deviation)
 
@@ -189,7 +189,7 @@ def test_the_postures_of_a_close_look_belong_together() -> None:
 
     Elbow up is where tan q3 is above d4 / a3.
     """
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     q, A, B = upright(puma)
     room, straight = Room(1e-3, 5e-3), np.arctan2(0.433, -0.02)
     X = between(A, B, np.linspace(0, 1, 9))
@@ -210,7 +210,7 @@ def test_the_postures_of_a_close_look_belong_together() -> None:
 
 def test_an_arm_without_a_closed_form_is_looked_at_as_well() -> None:
     """Moved out of its closed form by a hair, the PUMA is stopped by the same joints, at the same place."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     q, _, B = upright(puma)
     joints = [attrs.evolve(joint, a=joint.a + 1e-7 * (i == 4)) for i, joint in enumerate(puma.joints)]
     bent = attrs.evolve(puma, joints=joints)

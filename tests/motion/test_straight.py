@@ -16,7 +16,7 @@ from armwright.motion.follow import PathError
 from armwright.motion.straight import CertifiedLine, straight_line
 from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector
 
-ARMS = ("puma560", "stanford", "ur5")
+ARMS = ("puma560-seed", "stanford", "ur5")
 LINES = 1000  # on each arm; about half of them can be run
 ROUNDING = 1e-9
 
@@ -98,7 +98,7 @@ def test_limits_hold_between_samples(fast: CompiledArm) -> None:
 
 def test_the_ends() -> None:
     """A line begins and ends at rest, at the posture and the pose asked for."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     line = plain_line(puma, deviation=1e-4)
 
     T = line.trajectory.duration
@@ -110,14 +110,14 @@ def test_the_ends() -> None:
 
 def test_closer_takes_more_knots() -> None:
     """Ten thousand times closer takes about ten times the knots: the deviation falls with the step's fourth power."""
-    coarse, fine = (plain_line(load_arm("puma560"), deviation=d).certificate.knots for d in (1e-5, 1e-9))
+    coarse, fine = (plain_line(load_arm("puma560-seed"), deviation=d).certificate.knots for d in (1e-5, 1e-9))
 
     assert 5 < fine / coarse < 20
 
 
 def test_compiled_and_plain_plan_the_same() -> None:
     """A compiled arm plans the line that the plain one plans."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     q = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
     X = forward(puma, q).copy()
     X[:3, 3] += (0.1, -0.4, -0.28)
@@ -130,7 +130,7 @@ def test_compiled_and_plain_plan_the_same() -> None:
 
 def test_an_effort_that_binds() -> None:
     """With drives that hardly hold the arm a line is slowed until gravity and motion together keep their limits."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     slow = plain_line(puma, speed=1)
     joints = [
         attrs.evolve(j, limits=attrs.evolve(j.limits, effort=1.02 * e, speed=np.inf, acceleration=np.inf))
@@ -148,7 +148,7 @@ def test_an_effort_that_binds() -> None:
 
 def test_no_way() -> None:
     """A line to the same pose takes no time."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     q = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
 
     line = straight_line(puma, q, forward(puma, q))
@@ -159,7 +159,7 @@ def test_no_way() -> None:
 
 def test_whole_ticks() -> None:
     """With a servo period the line lasts a whole number of periods."""
-    T = plain_line(load_arm("puma560"), period=2e-3).trajectory.duration
+    T = plain_line(load_arm("puma560-seed"), period=2e-3).trajectory.duration
 
     ticks = T / 2e-3
     assert abs(ticks - round(ticks)) < 1e-9
@@ -167,12 +167,12 @@ def test_whole_ticks() -> None:
 
 def test_what_stops_a_line() -> None:
     """Out of reach, beyond a limit and through a singularity are told apart, with the place on the line."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     q = np.array([0.0, 0.3, 0.2, 0.0, 0.8, 0.0])
     far = forward(puma, q).copy()
     far[:3, 3] *= 3
 
-    with pytest.raises(PathError, match="mm out of reach of 'puma560'") as reach:
+    with pytest.raises(PathError, match="mm out of reach of 'puma560-seed'") as reach:
         straight_line(puma, q, far)
     assert reach.value.cause == "reach"
     assert 0 < reach.value.fraction <= 1
@@ -185,7 +185,7 @@ def test_what_stops_a_line() -> None:
 
 def test_bad_manner() -> None:
     """A deviation, a turn and a speed that are none are refused with what came."""
-    puma = load_arm("puma560")
+    puma = load_arm("puma560-seed")
     for manner, words in (
         ({"deviation": 0.0}, "deviation: expected more than 0 m, got 0"),
         ({"deviation": float("nan")}, "deviation: expected more than 0 m, got nan"),

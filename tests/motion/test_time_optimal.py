@@ -27,7 +27,7 @@ from armwright.motion.time_optimal import time_optimal
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.motion.xspline import xspline
 
-PUMA = load_arm("puma560")
+PUMA = load_arm("puma560-seed")
 SPEED, ACCELERATION, EFFORT = (PUMA.limit(name) for name in ("speed", "acceleration", "effort"))
 ROUNDING = 1e-9
 # The part of the time that a grid of 300 intervals costs.
@@ -308,7 +308,7 @@ FAST = Arm(name="fast", joints=[Joint(kind="revolute", limits=Limits(speed=1.0))
         (WEAK, quintic([DOWN], [ALOFT], 1.0), {}, InvalidValueError, r"at 0\.\d{3} s of the motion as it was given"),
         (PUMA, Trajectory(times=(0, 1, 2), coefficients=[[[0] * 6, [1] * 6], [[0] * 6, [1] * 6]]), {},
          InvalidValueError, "path: joint 1 jumps by 1 at 1 s"),
-        ("puma560", [np.zeros(6), np.ones(6)], {}, KindError, "arm: expected an Arm"),
+        ("puma560-seed", [np.zeros(6), np.ones(6)], {}, KindError, "arm: expected an Arm"),
     ],
 )  # fmt: skip
 def test_bad_input(arm: Any, path: Any, options: dict[str, Any], kind: type[ArmwrightError], said: str) -> None:

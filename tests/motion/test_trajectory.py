@@ -37,7 +37,7 @@ def test_quintic_peaks() -> None:
 
 def test_point_to_point_uses_its_limits() -> None:
     """At speed 120 some joint meets a limit exactly and none passes one; at 60 it takes twice as long."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     for goal in ([1, 0.5, -1, 1, 1, 2], [0.01, 0, 0, 0, 0, 0.002]):
         fast, slow = (point_to_point(arm, np.zeros(6), goal, speed) for speed in (120, 60))
         use = max((fast.peaks(1) / arm.limit("speed")).max(), (fast.peaks(2) / arm.limit("acceleration")).max())
@@ -48,7 +48,7 @@ def test_point_to_point_uses_its_limits() -> None:
 
 def test_moving_nowhere_takes_no_time() -> None:
     """A move to where the arm stands has no duration and stays there."""
-    move = point_to_point(load_arm("puma560"), np.ones(6), np.ones(6))
+    move = point_to_point(load_arm("puma560-seed"), np.ones(6), np.ones(6))
 
     assert move.duration == 0
     np.testing.assert_array_equal(move([0.0, 1.0]), np.ones((2, 6)))
@@ -58,7 +58,7 @@ def test_moving_nowhere_takes_no_time() -> None:
 def test_speed_out_of_range(speed: float) -> None:
     """Speeds run from 1 to 120."""
     with pytest.raises(InvalidValueError, match=r"outside 1\.\.120"):
-        point_to_point(load_arm("puma560"), np.zeros(6), np.ones(6), speed)
+        point_to_point(load_arm("puma560-seed"), np.zeros(6), np.ones(6), speed)
 
 
 def test_what_has_no_meaning() -> None:

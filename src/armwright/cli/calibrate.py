@@ -42,7 +42,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     Points, poses, touched planes and distances, alone or together. Prints which errors were found and how well, which
     cannot be told and why, and how far held-out readings are off before and after.
 
-    **Example:** `armwright calibrate puma560 examples/puma_points.csv -o out/calibrated`
+    **Example:** `armwright calibrate puma560-seed examples/puma_points.csv -o out/calibrated`
     """
     from armwright.arm.load import load_arm
     from armwright.arrays import one_core

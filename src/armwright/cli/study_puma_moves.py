@@ -59,7 +59,7 @@ def _films() -> dict[str, bytes]:
 
     motion = puma_moves.joint_trajectory()
     move = Move(
-        arm=load_arm("puma560"),
+        arm=load_arm("puma560-seed"),
         poses=puma_moves.study_poses(),
         times=np.array(puma_moves.TIMES),
         postures=np.radians(puma_moves.PRINTED_Q),

@@ -88,7 +88,7 @@ def path_of(way: Way) -> HandPath:
 def poses_along(way: Way, t: Array) -> Array:
     """Return where the hand is planned to be (k, 4, 4) at times (k,)."""
     if way == "joint":
-        return forward(load_arm("puma560"), joint_trajectory()(t))
+        return forward(load_arm("puma560-seed"), joint_trajectory()(t))
     return path_of(way)(t)
 
 
@@ -98,8 +98,8 @@ def joints_along(way: Way) -> Trajectory:
         return joint_trajectory()
     t = sample_times()
     X = path_of(way)(t)
-    solver = solver_of(_wide(load_arm("puma560")))
-    start = inverse(load_arm("puma560"), X[0], np.radians(PRINTED_Q[0])).best.q
+    solver = solver_of(_wide(load_arm("puma560-seed")))
+    start = inverse(load_arm("puma560-seed"), X[0], np.radians(PRINTED_Q[0])).best.q
     q, _ = chain(solver, X, start)
     # The rates at both ends are those of the parabola through three samples.
     first, last = (sign * (-3 * p[0] + 4 * p[1] - p[2]) / (2 * PERIOD) for sign, p in ((1, q[:3]), (-1, q[:-4:-1])))
@@ -136,7 +136,7 @@ class PostureRow:
 
 def posture_table() -> list[PostureRow]:
     """Return printed and computed postures: the printed rotations have two digits, which near the wrist is a degree."""
-    arm, rows = load_arm("puma560"), []
+    arm, rows = load_arm("puma560-seed"), []
     for name, printed, X in zip(NAMES, PRINTED_Q, study_poses(), strict=True):
         found = inverse(arm, X, np.radians(printed))
         computed = np.degrees(found.best.q)
@@ -218,7 +218,7 @@ class MoveRow:
 
 def move_table() -> list[MoveRow]:
     """Return the two kinds of move as measured numbers, the Cartesian one in three ways to turn."""
-    arm, t = load_arm("puma560"), sample_times()
+    arm, t = load_arm("puma560-seed"), sample_times()
     rows = []
     for way, name in WAYS.items():
         X, joints = poses_along(way, t), joints_along(way)
@@ -283,7 +283,7 @@ def way_round_table() -> list[WayRoundRow]:
     ways: tuple[By, ...] = ("via", "damped")
     for by in ways:
         try:
-            move = stopping_move(load_arm("puma560"), study_poses(), by=by)
+            move = stopping_move(load_arm("puma560-seed"), study_poses(), by=by)
         except PathError as error:
             rows.append(WayRoundRow(by=by, found=False, said=str(error)))
         else:
