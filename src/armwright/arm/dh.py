@@ -59,7 +59,7 @@ def to_modified(joints: Sequence[Joint]) -> tuple[list[Joint], Array]:
 
     Returns:
         n modified rows, ``a`` and ``alpha`` of which stand in front of their joints, and the pose (4, 4) to put before
-        the tool.
+        the tool. Fixed transforms stay behind the shift along z.
 
     Source:
         Craig (1986) ch. 3.
@@ -72,7 +72,7 @@ def to_modified(joints: Sequence[Joint]) -> tuple[list[Joint], Array]:
 def carry(link: Link, X_NM: Array) -> Link:
     """Describe a link of frame M in frame N instead, X_NM (4, 4) being the pose of M seen from N."""
     R, p = X_NM[:3, :3], X_NM[:3, 3]
-    return Link(mass=link.mass, com=R @ link.com + p, inertia=R @ link.inertia @ R.T, complete=link.complete)
+    return attrs.evolve(link, com=R @ link.com + p, inertia=R @ link.inertia @ R.T)
 
 
 def about_com(inertia: Array, mass: float, com: Array) -> Array:

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from armwright.arm.dh import about_com, from_modified
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.arm.quantities import ANGLE, LENGTH, given, number_in, per, pose_in, vector_in
+from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError, shown
@@ -86,6 +87,8 @@ def read_arm(path: Path | str) -> Arm:
         gravity_from="stated" if stated else "standard",
         reach=number_in(hand, "reach", LENGTH, default=math.inf, positive=True),
         tool_speed=number_in(hand, "speed", {"m_per_s": 1.0, "mm_per_s": 1e-3}, default=math.inf, positive=True),
+        base_link=top.text("base_link", default=""),
+        tool_link=top.text("tool_link", default=""),
         source=top.text("source", default=""),
         uncertainty=_uncertainty(top.table("uncertainty")),
     )
@@ -124,6 +127,7 @@ def _uncertainty(table: Table) -> Uncertainty | None:
 def _joint(table: Table) -> Joint:
     kind = table.choice("kind", ("revolute", "prismatic"))
     limits = table.table("limits")
+    table.allow("fixed")
     units = ANGLE if kind == "revolute" else LENGTH
     effort = {"Nm": 1.0} if kind == "revolute" else {"N": 1.0}
     values = {
@@ -151,11 +155,20 @@ def _joint(table: Table) -> Joint:
         d=number_in(table, "d", LENGTH, default=0.0),
         a=number_in(table, "a", LENGTH, default=0.0),
         alpha=number_in(table, "alpha", ANGLE, default=0.0),
+        fixed=pose_in(table.table("fixed")) if "fixed" in table else None,
         limits=Limits(**values),
+        name=table.text("name", default=""),
     )
 
 
 def _link(table: Table) -> Link:
+    name, unknown = table.text("name", default=""), table.text("unknown", default="")
+    if unknown:
+        for key in ("mass_kg", "com_m", "inertia_kgm2"):
+            if key in table:
+                raise table.error(key, "mass and inertia are said to be unknown; give them, or why they are unknown")
+        table.finish()
+        return Link(unknown=unknown, name=name)
     mass = table.number("mass_kg", default=0.0, lower=0.0)
     com = vector_in(table, "com", LENGTH, default=np.zeros(3))
     numbers = table.vector("inertia_kgm2", (3, 6), default=np.zeros(3))
@@ -173,7 +186,7 @@ def _link(table: Table) -> Link:
             f"no body has the principal moments {said} kg m² about its centre of mass: none may be negative, or larger "
             "than the other two together; check inertia_about and com",
         )
-    return Link(mass=mass, com=com, inertia=inertia)
+    return Link(mass=mass, com=com, inertia=inertia, name=name)
 
 
 def _motor(table: Table, revolute: bool) -> Motor:  # noqa: FBT001

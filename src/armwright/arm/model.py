@@ -4,7 +4,9 @@ Link i is moved by joint i about or along the axis z of frame i-1:
 
     A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha)
 
-A revolute joint adds its position to ``theta``, a prismatic one to ``d``. All quantities are SI and radians.
+A revolute joint adds its position to ``theta``, a prismatic one to ``d``. Where the four numbers would put a frame far
+away, as for axes that are nearly parallel, a fixed transform F stands among them: Rz(theta) Tz(d) F Tx(a) Rx(alpha).
+All quantities are SI and radians.
 """
 
 import math
@@ -14,6 +16,7 @@ from typing import Any, Literal, TypeAlias, TypeVar, get_args
 import attrs
 import numpy as np
 
+from armwright.arm.tensors import ROUNDING, impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, content, exactly, number, read_only
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
@@ -25,11 +28,6 @@ JointKind: TypeAlias = Literal["revolute", "prismatic"]
 GravityFrom: TypeAlias = Literal["standard", "stated", "root", "world"]
 _Part = TypeVar("_Part")
 
-# Inertia tensors are computed from typed numbers; this much is rounding, more is a mistake.
-_ROUNDING = 1e-9
-# Published tensors are measured and rounded: the triangle inequality may be broken by this part of the trace. The worst
-# of the catalogue is link 3 of the PUMA 560, 0.066 + 0.0125 against 0.086 kg m², which is 0.046 of its trace.
-_TENSOR_ROUNDING = 0.05
 # Standard gravity [m/s²], ISO 80000-3.
 STANDARD_GRAVITY = 9.80665
 # What an arm that stands upright feels of it, along the axes of its base, or the world [m/s²].
@@ -52,32 +50,19 @@ def _tool(value: ArrayLike) -> Array:
     return one_pose(value, "tool")
 
 
+def _fixed(value: ArrayLike | None) -> Array | None:
+    return None if value is None else one_pose(value, "fixed")
+
+
+def _content(value: Array | None) -> object:
+    return None if value is None else content(value)
+
+
 def _inertia(value: ArrayLike) -> Array:
     tensor = exactly(value, (3, 3), "inertia", LARGEST)
-    if not np.allclose(tensor, tensor.T, rtol=0, atol=_ROUNDING * max(1.0, np.abs(tensor).max())):
+    if not np.allclose(tensor, tensor.T, rtol=0, atol=ROUNDING * max(1.0, np.abs(tensor).max())):
         raise InvalidValueError(f"inertia: expected a symmetric tensor, got {tensor.tolist()}")
     return read_only((tensor + tensor.T) / 2)  # to the last bit, so that six numbers tell it
-
-
-def impossible_moments(mass: float, com: Array, inertia: Array) -> Array | None:
-    """Return the principal moments of a tensor that no body has, or None where a body can have it.
-
-    A body has no negative moment, and none larger than the other two together. A tensor with a single moment is let
-    pass: the other two are not known, and left 0.
-
-    Args:
-        mass: [kg].
-        com: (3,) centre of mass [m].
-        inertia: (3, 3) tensor about it [kg m²].
-
-    Returns:
-        (3,) moments, smallest first [kg m²], or None.
-    """
-    moments = np.asarray(np.linalg.eigvalsh(inertia), dtype=np.float64)
-    slack = _TENSOR_ROUNDING * np.abs(moments).sum() + _ROUNDING * mass * float(com @ com)
-    single = np.count_nonzero(np.abs(moments) > slack) == 1
-    negative, exceeds = moments[0] < -slack, moments[2] > moments[0] + moments[1] + slack
-    return moments if negative or (exceeds and not single) else None
 
 
 def _as_floats(value: Any, what: str, names: Iterable[str]) -> None:
@@ -157,7 +142,9 @@ class Joint:
         d: fixed part of the shift along z [m]; the offset of a prismatic joint.
         a: shift along x [m].
         alpha: twist about x [rad].
+        fixed: (4, 4) transform behind the shift along z and before that along x; None for a row of four numbers.
         limits: what the joint may do.
+        name: as its file calls it; empty where it has none.
     """
 
     kind: JointKind
@@ -165,7 +152,11 @@ class Joint:
     d: float = 0.0
     a: float = 0.0
     alpha: float = 0.0
+    fixed: Array | None = attrs.field(default=None, converter=_fixed, eq=_content)
     limits: Limits = Limits()
+    name: str = ""
+
+    __reduce__ = by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse a kind of joint that there is not, and geometry that is no number."""
@@ -183,6 +174,18 @@ class Joint:
     def revolute(self) -> bool:
         """Whether the joint turns."""
         return self.kind == "revolute"
+
+    @property
+    def behind(self) -> Array:
+        """Pose (4, 4) of frame i behind the turn about z and the shift along it: F Tx(a) Rx(alpha)."""
+        c, s = self.cos_alpha, self.sin_alpha
+        X = np.array(((1.0, 0.0, 0.0, self.a), (0.0, c, -s, 0.0), (0.0, s, c, 0.0), (0.0, 0.0, 0.0, 1.0)))
+        return X if self.fixed is None else np.asarray(self.fixed @ X)
+
+    def span(self, slide: float = 0.0) -> float:
+        """Return how far apart the frames before and behind may be, the joint so far out [m]."""
+        along = abs(self.d) + slide
+        return math.hypot(self.a, along) if self.fixed is None else along + float(np.linalg.norm(self.behind[:3, 3]))
 
     @property
     def cos_theta(self) -> float:
@@ -214,12 +217,17 @@ class Link:
         com: (3,) centre of mass [m].
         inertia: (3, 3) tensor about the centre of mass, axes of the link frame [kg m²].
         complete: whether all moments are known; then the tensor must be one that a body can have.
+        unknown: why nothing is known of mass and inertia, which are 0 then; empty where they are known. Dynamics of
+            an arm with such a link is refused.
+        name: as its file calls it; empty where it has none.
     """
 
     mass: float = 0.0
     com: Array = attrs.field(factory=lambda: np.zeros(3), converter=_com, eq=content)
     inertia: Array = attrs.field(factory=lambda: np.zeros((3, 3)), converter=_inertia, eq=content)
     complete: bool = attrs.field(default=True, eq=False)
+    unknown: str = ""
+    name: str = ""
 
     __reduce__ = by_fields
 
@@ -300,6 +308,8 @@ class Arm:
             where it points down in the root link of a URDF file, ``world`` in a cell.
         reach: greatest distance of the hand from the base axis that the report's speed rule divides by [m].
         tool_speed: speed of the hand at full reach [m/s].
+        base_link: what the base frame is called in its file; empty where it has no name.
+        tool_link: what the tool is called.
         source: where the numbers come from.
         uncertainty: how well they are known, if they were measured.
     """
@@ -323,6 +333,8 @@ class Arm:
     gravity_from: GravityFrom = attrs.field(default="standard", eq=False)
     reach: float = math.inf
     tool_speed: float = math.inf
+    base_link: str = ""
+    tool_link: str = ""
     source: str = ""
     uncertainty: Uncertainty | None = None
 
@@ -353,6 +365,11 @@ class Arm:
     def n(self) -> int:
         """Number of joints."""
         return len(self.joints)
+
+    def called(self, joint: int) -> str:
+        """Return how messages call a joint, from 0: by its number, and its name where it has one."""
+        name = self.joints[joint].name
+        return f"joint {joint + 1} ('{name}')" if name else f"joint {joint + 1}"
 
     def limit(self, name: str) -> Array:
         """Return one limit of every joint, (n,), such as ``limit('speed')``."""

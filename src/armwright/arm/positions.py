@@ -91,8 +91,8 @@ def degrees_by_mistake(arm: Arm, q: Array) -> str:
     i = int(suspects[0])
     value = float(q.reshape(-1, arm.n)[rows[:, i].argmax(), i])
     return (
-        f"joint {i + 1} of '{arm.name}' stands at {value:g} rad, {abs(value) / _TURN:.1f} turns. If degrees are meant, "
-        f"{value:g} degrees are {math.radians(value):.6g} rad"
+        f"{arm.called(i)} of '{arm.name}' stands at {value:g} rad, {abs(value) / _TURN:.1f} turns. If degrees are "
+        f"meant, {value:g} degrees are {math.radians(value):.6g} rad"
     )
 
 

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping
 import attrs
 import numpy as np
 
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor, impossible_moments
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Limits, Link, Motor
+from armwright.arm.tensors import impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
@@ -29,7 +30,7 @@ def toml_text(arm: Arm) -> str:
 
 def _lines(arm: Arm) -> Iterator[str]:
     yield f"name = {_text(arm.name)}"
-    for key in ("title", "source"):
+    for key in ("title", "source", "base_link", "tool_link"):
         if getattr(arm, key):
             yield f"{key} = {_text(getattr(arm, key))}"
     yield ""
@@ -42,11 +43,15 @@ def _lines(arm: Arm) -> Iterator[str]:
     for i, (joint, link, motor) in enumerate(zip(arm.joints, arm.links, arm.motors, strict=True), 1):
         yield f"[[joint]]  # {i}"
         yield f'kind = "{joint.kind}"'
+        if joint.name:
+            yield f"name = {_text(joint.name)}"
         geometry = {"theta_rad": joint.theta, "d_m": joint.d, "a_m": joint.a, "alpha_rad": joint.alpha}
         yield from _numbers({key: value for key, value in geometry.items() if value})
         yield ""
+        if joint.fixed is not None:
+            yield from _pose("joint.fixed", joint.fixed) if not np.array_equal(joint.fixed, np.eye(4)) else ()
         yield from _table("joint.limits", _limits(joint))
-        yield from _table("joint.link", _link(arm, i, link))
+        yield from _body(arm, i, link)
         yield from _table("joint.motor", _motor(arm, i, motor, joint))
     if arm.uncertainty is not None:
         yield from _uncertainty(arm.uncertainty)
@@ -74,6 +79,17 @@ def _limits(joint: Joint) -> dict[str, float]:
     return {keys[field.name]: values[field.name] for field in attrs.fields(Limits) if math.isfinite(values[field.name])}
 
 
+def _body(arm: Arm, i: int, link: Link) -> Iterator[str]:
+    """Write the table of a link: its name, and its mass or why that is not known."""
+    texts = {key: value for key, value in (("name", link.name), ("unknown", link.unknown)) if value}
+    numbers = {} if link.unknown else _link(arm, i, link)
+    if texts or numbers:
+        yield "[joint.link]"
+        yield from (f"{key} = {_text(value)}" for key, value in texts.items())
+        yield from _numbers(numbers)
+        yield ""
+
+
 def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:
     if impossible_moments(link.mass, link.com, link.inertia) is not None:
         raise InvalidValueError(
@@ -95,7 +111,8 @@ def _link(arm: Arm, i: int, link: Link) -> dict[str, float | Array]:
 def _motor(arm: Arm, i: int, motor: Motor, joint: Joint) -> dict[str, float]:
     if not motor.gear_ratio > 0:
         raise InvalidValueError(
-            f"arm '{arm.name}': joint {i} has the gear ratio {motor.gear_ratio:g}; in an arm file it is above 0"
+            f"arm '{arm.name}': {arm.called(i - 1)} has the gear ratio {motor.gear_ratio:g}; "
+            "in an arm file it is above 0"
         )
     inertia, viscous, dry = ("kgm2", "Nms", "Nm") if joint.revolute else ("kg", "Ns_per_m", "N")
     values = {

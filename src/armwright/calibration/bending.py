@@ -22,11 +22,13 @@ def springs(arm: Arm) -> tuple[Bend, ...]:
     """Return a bend for each joint that gravity loads: how far it gives under the largest effort that gravity makes.
 
     That effort by the bend is the stiffness of the joint: ``largest_efforts``. There are none where the arm has no
-    masses.
+    masses, or not all are known.
 
     Source:
         Judd & Knasinski (1990); Dumas et al. (2011).
     """
+    if any(link.unknown for link in arm.links):
+        return ()
     largest = largest_efforts(arm)
 
     # A fit asks for the same postures again and again, and every joint for the efforts of all.

@@ -179,9 +179,11 @@ def _elements(arm: Arm, hand: Array) -> Iterator[Element]:
         name = f"joint{i + 1}"
         yield Element("turn", 2, joint.theta, f"{name}.theta", i if joint.revolute else None)
         yield Element("shift", 2, joint.d, f"{name}.d", None if joint.revolute else i)
+        if joint.fixed is not None:
+            yield from _fixed(joint.fixed)
         yield Element("shift", 0, joint.a, f"{name}.a")
         yield Element("turn", 0, joint.alpha, f"{name}.alpha")
-        if i + 1 < arm.n and abs(np.sin(joint.alpha)) < PARALLEL:
+        if i + 1 < arm.n and np.linalg.norm(joint.behind[:2, 2]) < PARALLEL:
             yield Element("turn", 1, 0.0, f"{name}.beta")
     yield from _fixed(arm.tool)
     yield from _fixed(pose(hand, np.zeros(3)))

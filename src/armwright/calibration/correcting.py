@@ -176,7 +176,8 @@ def _table(base: Array, joints: Sequence[Joint], tool: Array, tilts: Iterable[fl
     for i, (joint, tilt) in enumerate(zip(joints, tilts or [0.0] * len(joints), strict=True), 1):
         numbers = [math.degrees(joint.theta), joint.d * 1e3, joint.a * 1e3, math.degrees(joint.alpha)]
         more = [math.degrees(tilt)] if tilts is not None else []
-        writer.writerow([f"joint_{i}", joint.kind, *numbers, *more, *[""] * 6])
+        fixed = [""] * 6 if joint.fixed is None else _six(joint.fixed)
+        writer.writerow([f"joint_{i}", joint.kind, *numbers, *more, *fixed])
     writer.writerow(["tool", "", *none, *_six(tool)])
     return text.getvalue()
 

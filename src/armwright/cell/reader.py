@@ -14,6 +14,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm
 from armwright.cell.names import arm_name
+from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
 from armwright.files.limits import beyond, limit
@@ -137,6 +138,10 @@ def _arm(table: Table, folder: Path) -> CellArm:
             "model",
             f"'{arm.name}' has {arm.n} joints; moves ask for a place and an orientation, which takes six or more",
         )
+    try:
+        weighed(arm)
+    except ArmwrightError as error:
+        raise table.error("model", f"{error}, but a program's motions come with efforts") from error
     if "tool" in table:
         arm = attrs.evolve(arm, tool=_pose(table, "tool"))
     table.allow("tool")

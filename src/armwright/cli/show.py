@@ -62,8 +62,15 @@ def show(
 
 def _tables(model: "Arm") -> "Iterator[tuple[str, Table | None]]":
     """Name every table, or say that there is nothing to put into it."""
+    if any(joint.name or link.name for joint, link in zip(model.joints, model.links, strict=True)):
+        yield "Names", _names(model)
     yield "Denavit-Hartenberg, standard", _geometry(model)
+    if any(joint.fixed is not None for joint in model.joints):
+        yield "Fixed transforms, behind theta and d and before a and alpha", _fixed(model)
     yield "Limits", _limits(model)
+    unknown = [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]
+    if unknown:
+        yield f"Mass and inertia are unknown, so there is no dynamics. {'; '.join(unknown)}", None
     if any(link.mass or link.inertia.any() for link in model.links):
         yield "Links: mass, and centre of mass in the frame of the link", _links(model)
         yield "Inertia about the centre of mass, kg m²", _inertia(model)
@@ -85,6 +92,23 @@ def _table(columns: "Sequence[str]", rows: "Iterable[Sequence[str]]") -> "Table"
     for row in rows:
         table.add_row(*row)
     return table
+
+
+def _fixed(model: "Arm") -> "Table":
+    from armwright.spatial.euler import to_rpy
+
+    rows = []
+    for i, joint in enumerate(model.joints, 1):
+        if joint.fixed is not None:
+            place = (f"{x * 1e3:z.6g}" for x in joint.fixed[:3, 3])
+            turn = (f"{math.degrees(x):z.6g}°" for x in to_rpy(joint.fixed[:3, :3]))
+            rows.append((str(i), *place, *turn))
+    return _table(("joint", "x mm", "y mm", "z mm", "roll", "pitch", "yaw"), rows)
+
+
+def _names(model: "Arm") -> "Table":
+    rows = [(str(i), j.name, k.name) for i, (j, k) in enumerate(zip(model.joints, model.links, strict=True), 1)]
+    return _table(("number", "joint", "link"), rows)
 
 
 def _geometry(model: "Arm") -> "Table":

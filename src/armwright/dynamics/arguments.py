@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
 from armwright.arrays import LARGEST, Array, ArrayLike, joint_array, of_shape
-from armwright.errors import ShapeError
+from armwright.errors import ShapeError, UnsupportedArmError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.tracing.scalar import Scalar
 
@@ -40,11 +40,12 @@ def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> 
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
         InvalidValueError: a number is NaN or infinite.
+        UnsupportedArmError: nothing is known of the mass of some link.
 
     Warns:
         UnitWarning: the positions look like degrees.
     """
-    n = known_arm(arm).n
+    n = weighed(arm).n
     checked: list[Array] = []
     for name, value in arrays.items():
         checked.append(positions(arm, value, callers=2) if name == "q" else joint_array(value, n, name))
@@ -61,6 +62,23 @@ def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> 
         scalars=[per_joint(np.broadcast_to(array, (*lead, arm.n))) for array in checked],
         wrench=NO_WRENCH if outside is None else per_joint(np.broadcast_to(outside, (*lead, 6))),
     )
+
+
+def weighed(arm: Arm) -> Arm:
+    """Return ``arm`` if it is one whose masses and inertias are known, or given as none.
+
+    Raises:
+        KindError: it is no arm.
+        UnsupportedArmError: nothing is known of some link; it is named.
+    """
+    for i, link in enumerate(known_arm(arm).links, 1):
+        if link.unknown:
+            name = f" ('{link.name}')" if link.name else ""
+            raise UnsupportedArmError(
+                f"arm '{arm.name}': no dynamics, for mass and inertia of link {i}{name} are unknown: {link.unknown}. "
+                "Kinematics does without them"
+            )
+    return arm
 
 
 def stack_matrix(rows: Sequence[Sequence[Scalar]], lead: tuple[int, ...]) -> Array:

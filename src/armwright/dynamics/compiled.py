@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 import attrs
 
 from armwright.arm.model import Arm
+from armwright.dynamics.arguments import weighed
 from armwright.dynamics.articulated_body import articulated_body
 from armwright.dynamics.forward_dynamics import NEGLIGIBLE, forward_dynamics, less_friction
 from armwright.dynamics.mass_matrix import composite_rigid_body
@@ -145,6 +146,8 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
     if name not in _QUANTITIES:
         raise UnknownNameError("quantity", name, _QUANTITIES)
     quantity = _QUANTITIES[name]
+    if name in _WEIGH:
+        weighed(arm)
     outputs = [tuple(_size(arm, x) for x in shape) for shape in quantity.outputs]
     inputs = {key: tuple(_size(arm, x) for x in shape) for key, shape in quantity.inputs.items()}
 
@@ -241,6 +244,8 @@ def _size(arm: Arm, letter: str | int) -> int:
 _STATE: dict[str, tuple[str | int, ...]] = {"q": ("n",), "qd": ("n",)}
 _MOTION = {**_STATE, "qdd": ("n",)}
 _Q = {"q": ("n",)}
+# Those that ask for masses and inertias.
+_WEIGH = ("inverse_dynamics", "inverse_dynamics_with_wrench", "forward_dynamics", "mass_matrix", "mass_and_bias")
 _QUANTITIES = {
     "forward": _Quantity(_forward, _Q, ((4, 4),)),
     "link_poses": _Quantity(_link_poses, _Q, (("f", 4, 4),)),

@@ -8,6 +8,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, joint_array
+from armwright.dynamics.arguments import weighed
 from armwright.dynamics.newton_euler import dry_friction, newton_euler
 from armwright.dynamics.shares import gravity_shares
 from armwright.errors import InvalidValueError, ShapeError
@@ -47,7 +48,7 @@ def no_effort(arm: Arm) -> Controller:
 
 def gravity_compensation(arm: Arm) -> Controller:
     """Return a controller that carries the weight of the arm and does nothing else."""
-    known_arm(arm)
+    weighed(arm)
     return lambda _t, q, _qd: np.array(gravity_shares(arm, q.tolist()))
 
 

@@ -151,7 +151,7 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
         if not np.all(np.asarray(pivots[i].inertia) > NEGLIGIBLE * np.asarray(pivots[i].size)):
             what, amount = ("about", "moment of inertia") if arm.joints[i].revolute else ("along", "mass")
             raise UnsupportedArmError(
-                f"arm '{arm.name}': no acceleration can be found for joint {i + 1}: nothing it moves resists {what} "
+                f"arm '{arm.name}': no acceleration can be found for {arm.called(i)}: nothing it moves resists {what} "
                 f"its axis while the joints beyond it are free. Give its link a {amount} or its motor an inertia."
             )
 

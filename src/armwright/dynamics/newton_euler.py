@@ -83,6 +83,9 @@ def lever_of(joint: Joint, q: Scalar) -> Vector:
     It is Rᵀp of the link transform, in which the angle about z cancels.
     """
     d = joint.d if joint.revolute else joint.d + q
+    if joint.fixed is not None:
+        X = joint.behind
+        return apply(X[:3, :3].T.tolist(), add(X[:3, 3].tolist(), [0.0, 0.0, d]))
     return [joint.a, joint.sin_alpha * d, joint.cos_alpha * d]
 
 

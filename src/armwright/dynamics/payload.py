@@ -4,8 +4,8 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm, Link
-from armwright.arm.positions import known_arm
 from armwright.arrays import ArrayLike
+from armwright.dynamics.arguments import weighed
 from armwright.dynamics.bodies import as_link, body_of, seen_from_before, welded
 
 _NO_TENSOR = np.zeros((3, 3))
@@ -32,6 +32,7 @@ def payload(arm: Arm, mass: float, com: ArrayLike = (0.0, 0.0, 0.0), inertia: Ar
         TR-83-008, appendix II (4).
     """
     load = Link(mass=mass, com=com, inertia=inertia)
-    R, p = known_arm(arm).tool[:3, :3].tolist(), arm.tool[:3, 3].tolist()
+    R, p = weighed(arm).tool[:3, :3].tolist(), arm.tool[:3, 3].tolist()
     last = welded(body_of(arm.links[-1]), seen_from_before(body_of(load), R, p))
-    return attrs.evolve(arm, links=(*arm.links[:-1], as_link(last)))
+    carried = attrs.evolve(as_link(last), name=arm.links[-1].name)
+    return attrs.evolve(arm, links=(*arm.links[:-1], carried))

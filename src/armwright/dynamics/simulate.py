@@ -144,7 +144,7 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
         scale, unit = (180 / np.pi, "deg") if arm.joints[i].revolute else (1e3, "mm")
         at, lower, upper = (float(x[i]) * scale for x in (q, plant.lower, plant.upper))
         raise InvalidValueError(
-            f"joint {i + 1} starts at {at:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
+            f"{arm.called(int(i))} starts at {at:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
             "start inside, or simulate without stops"
         )
     for brake in plant.brakes:

@@ -22,6 +22,10 @@ def link_transform(joint: Joint, q: Scalar) -> tuple[Matrix, Vector]:
         c, s, d = cos(joint.theta + q), sin(joint.theta + q), joint.d
     else:
         c, s, d = joint.cos_theta, joint.sin_theta, joint.d + q
+    if joint.fixed is not None:
+        x, y, z, _ = joint.behind.tolist()
+        rows = [[c * a - s * b for a, b in zip(x, y, strict=True)], [s * a + c * b for a, b in zip(x, y, strict=True)]]
+        return [*(row[:3] for row in rows), z[:3]], [rows[0][3], rows[1][3], d + z[3]]
     ca, sa = joint.cos_alpha, joint.sin_alpha
     R = [
         [c, -s * ca, s * sa],

@@ -235,9 +235,6 @@ def _levers(arm: Arm, joints: Array, lengths: Array) -> Array:
     h = lengths[:, None]
     c = np.abs(joints)
     farthest = (((c[:, 3] * h + c[:, 2]) * h + c[:, 1]) * h + c[:, 0]).max(axis=0)
-    parts = [
-        math.hypot(joint.a, abs(joint.d) + (0.0 if joint.revolute else farthest[i]))
-        for i, joint in enumerate(arm.joints)
-    ]
+    parts = [joint.span(0.0 if joint.revolute else farthest[i]) for i, joint in enumerate(arm.joints)]
     tool = float(np.linalg.norm(arm.tool[:3, 3]))
     return np.asarray(np.cumsum([tool, *parts[::-1]])[:0:-1])

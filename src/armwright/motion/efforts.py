@@ -162,7 +162,7 @@ def refuse_lasting(arm: Arm, joint: int, effort: float, place: str) -> InvalidVa
     """Return the error for a place where holding the arm takes more than a joint, from 0, may give."""
     unit = "N m" if arm.joints[joint].revolute else "N"
     return InvalidValueError(
-        f"{place} gravity and dry friction alone ask joint {joint + 1} for {abs(effort):.4g} {unit}, "
+        f"{place} gravity and dry friction alone ask {arm.called(joint)} for {abs(effort):.4g} {unit}, "
         f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: no slowing helps"
     )
 

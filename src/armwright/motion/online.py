@@ -190,12 +190,13 @@ def _check_goal(arm: Arm, task: _Task) -> None:
         raise InvalidValueError(f"q_goal: {fault}")
     for j in np.flatnonzero(np.abs(task.qd_goal) > task.speed * (1 + _AT_LIMIT)).tolist():
         raise InvalidValueError(
-            f"qd_goal: joint {j + 1} would move at {task.qd_goal[j]:.6g} {_unit(arm, j)}/s, its limit is "
+            f"qd_goal: {arm.called(j)} would move at {task.qd_goal[j]:.6g} {_unit(arm, j)}/s, its limit is "
             f"{task.speed[j]:.6g} {_unit(arm, j)}/s"
         )
     for j in np.flatnonzero(~np.isfinite(task.acceleration)).tolist():
         raise InvalidValueError(
-            f"arm '{arm.name}': joint {j + 1} has no limit of acceleration, so the motion to a new goal has no duration"
+            f"arm '{arm.name}': {arm.called(j)} has no limit of acceleration, so the motion to a new goal has no "
+            "duration"
         )
 
 
@@ -211,7 +212,7 @@ def _jerk(arm: Arm, task: _Task, asked: ArrayLike | None, *, brake: bool) -> Arr
             raise InvalidValueError(f"jerk: expected more than 0, got {jerk.min():g}")
         for j in np.flatnonzero(jerk * _SHORTEST_RISE > task.acceleration).tolist():
             raise InvalidValueError(
-                f"jerk: joint {j + 1} would have its full acceleration in less than a microsecond; expected "
+                f"jerk: {arm.called(j)} would have its full acceleration in less than a microsecond; expected "
                 f"{task.acceleration[j] / _SHORTEST_RISE:.3g} {_unit(arm, j)}/s³ at most, got {jerk[j]:.3g}"
             )
     speed, acceleration = (limit * (1 + _AT_LIMIT) for limit in (task.speed, task.acceleration))
@@ -226,18 +227,18 @@ def _jerk(arm: Arm, task: _Task, asked: ArrayLike | None, *, brake: bool) -> Arr
     allowed = "; brake=True accepts it and brings it back inside first"
     for j in np.flatnonzero(np.abs(task.qdd) > acceleration).tolist():
         raise OnlineError(
-            f"joint {j + 1} of '{arm.name}' accelerates by {task.qdd[j]:.6g} {_unit(arm, j)}/s², its limit is "
+            f"{arm.called(j)} of '{arm.name}' accelerates by {task.qdd[j]:.6g} {_unit(arm, j)}/s², its limit is "
             f"{task.acceleration[j]:.6g} {_unit(arm, j)}/s²{allowed}"
         )
     for j in np.flatnonzero(np.abs(task.qd) > speed).tolist():
         raise OnlineError(
-            f"joint {j + 1} of '{arm.name}' moves at {task.qd[j]:.6g} {_unit(arm, j)}/s, its limit is "
+            f"{arm.called(j)} of '{arm.name}' moves at {task.qd[j]:.6g} {_unit(arm, j)}/s, its limit is "
             f"{task.speed[j]:.6g} {_unit(arm, j)}/s{allowed}"
         )
     for j in np.flatnonzero(least > jerk * (1 + _AT_LIMIT)).tolist():
         top = task.qd[j] + task.qdd[j] * abs(task.qdd[j]) / (2 * jerk[j])
         raise OnlineError(
-            f"joint {j + 1} of '{arm.name}' would come to {top:.6g} {_unit(arm, j)}/s while its acceleration of "
+            f"{arm.called(j)} of '{arm.name}' would come to {top:.6g} {_unit(arm, j)}/s while its acceleration of "
             f"{task.qdd[j]:.6g} {_unit(arm, j)}/s² dies away, its limit is {task.speed[j]:.6g} {_unit(arm, j)}/s: a "
             f"jerk of {least[j]:.3g} {_unit(arm, j)}/s³ instead of {jerk[j]:.3g} keeps it{allowed}"
         )

@@ -182,8 +182,8 @@ def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
     limited = np.any([np.isfinite(arm.limit(name)) for name in counting if name != "speed"], axis=0)
     for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
         raise InvalidValueError(
-            f"arm '{arm.name}': joint {j + 1} moves and has no limit of {' or '.join(counting[1:])}, so there is no "
-            "fastest run"
+            f"arm '{arm.name}': {arm.called(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so there "
+            "is no fastest run"
         )
 
 

@@ -4,8 +4,9 @@ Frame i stands on the axis of joint i+1, where the common normal of the axes of 
 parallel axes have any number of common normals: that through the place the file gives to joint i+1 is taken.
 
 Axes that are nearly parallel are the hard case. Their common normal is far away, 100 km for an angle of 1e-5 rad and
-axes 1 m apart, and dynamics seen from there lose twice as many digits as the distance has. Such axes are meant to be
-parallel: a half turn typed as 3.1416 is 0.7e-5 rad off. So they are made parallel.
+axes 1 m apart, and dynamics seen from there lose twice as many digits as the distance has. Where the convention would
+put a frame farther from its joint than the arm is long, it stands at the joint instead, and the row has a fixed
+transform in place of the four numbers. Nothing is bent.
 """
 
 import math
@@ -16,24 +17,25 @@ import numpy as np
 
 from armwright.arm.dh import turn, twist
 from armwright.arrays import Array
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import inverse, pose
 
-# Axes that differ less from parallel are made so [rad]: what is left out is as small as what far frames would lose.
-PARALLEL = 1e-5
 # Angles this close to a right one, and lengths this close to 0 beside the size of the arm, are so: typed numbers of
 # twelve digits, multiplied a few times.
 ROUNDING = 1e-11
+# What a few products of rotations leave in place of a zero.
+_NOISE = 1e-14
 _RIGHT_ANGLE = math.pi / 2
 
 
 @attrs.frozen(kw_only=True)
 class Row:
-    """A row of the table: the four numbers of one joint, at joint position 0."""
+    """A row of the table: the four numbers of one joint, at joint position 0, or a fixed transform (4, 4)."""
 
-    theta: float
-    d: float
-    a: float
-    alpha: float
+    theta: float = 0.0
+    d: float = 0.0
+    a: float = 0.0
+    alpha: float = 0.0
+    fixed: Array | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -44,13 +46,13 @@ class Frames:
         first: (4, 4) frame 0.
         rows: n rows.
         poses: n poses (4, 4) of the frames 1 to n.
-        bent: (n - 1) angle by which the axis of joint i+1 was turned to make it parallel to that of joint i [rad].
+        leaning: (n - 1) sine of the angle between the axes of the joints i and i+1; 0 where they are parallel.
     """
 
     first: Array
     rows: tuple[Row, ...]
     poses: tuple[Array, ...]
-    bent: tuple[float, ...]
+    leaning: tuple[float, ...]
 
 
 def frames_of(joints: Sequence[Array], axes: Sequence[Array], size: float) -> Frames:
@@ -68,26 +70,50 @@ def frames_of(joints: Sequence[Array], axes: Sequence[Array], size: float) -> Fr
         Denavit & Hartenberg (1955).
     """
     first = X = pose(_first_turn(joints[0][:3, :3], axes[0]), joints[0][:3, 3])
-    rows, poses, bent = [], [], []
+    rows, poses, leaning = [], [], []
     for joint, axis in zip(joints[1:], axes[1:], strict=True):
-        row, angle = _row(X, joint[:3, 3], axis, size * ROUNDING)
-        X = X @ pose(turn(2, row.theta), (0.0, 0.0, row.d)) @ twist(row.alpha, row.a)
+        row = _row(X, joint[:3, 3], axis, size * ROUNDING)
+        behind = X @ pose(turn(2, row.theta), (0.0, 0.0, row.d)) @ twist(row.alpha, row.a)
+        if np.linalg.norm(behind[:3, 3] - joint[:3, 3]) > size:
+            behind = pose(_turn_on(axis, X[:3, 2], joint[:3, :3]), joint[:3, 3])
+            row = Row(fixed=cleared_pose(inverse(X) @ behind, size, _NOISE))
+        lean = float(np.linalg.norm(np.cross(X[:3, 2], axis)))
+        leaning.append(lean if lean > ROUNDING else 0.0)
+        X = behind
         rows.append(row)
         poses.append(X)
-        bent.append(angle)
-    last = Row(theta=0.0, d=0.0, a=0.0, alpha=0.0)
-    return Frames(first=first, rows=(*rows, last), poses=(*poses, X), bent=tuple(bent))
+    return Frames(first=first, rows=(*rows, Row()), poses=(*poses, X), leaning=tuple(leaning))
 
 
-def cleared(array: Array, size: float) -> Array:
+def cleared(array: Array, size: float, rounding: float = ROUNDING) -> Array:
     """Return an array without the rounding that stands in place of zeros, beside numbers of some size."""
-    return np.where(np.abs(array) <= size * ROUNDING, 0.0, array)
+    return np.where(np.abs(array) <= size * rounding, 0.0, array)
 
 
-def cleared_pose(X: Array, size: float) -> Array:
-    """Return a pose (4, 4) in which the zeros and ones of right angles, and lengths of 0, are exact."""
-    R, whole = X[:3, :3], np.round(X[:3, :3])
-    return pose(np.where(np.abs(R - whole) <= ROUNDING, whole + 0.0, R), cleared(X[:3, 3], size))
+def cleared_pose(X: Array, size: float, rounding: float = ROUNDING) -> Array:
+    """Return a pose (4, 4) in which the zeros and ones of right angles, and lengths of 0, are exact.
+
+    A cosine is one where nothing stands beside it: one near it says little, 1e-11 is that of 4e-6 rad.
+    """
+    R = cleared(X[:3, :3], 1.0, rounding)
+    alone = np.count_nonzero(R, axis=1) == 1
+    R[alone] = np.sign(R[alone])
+    return pose(R, cleared(X[:3, 3], size, rounding))
+
+
+def _turn_on(axis: Array, before: Array, R: Array) -> Array:
+    """Return the turn (3, 3) of a frame on an axis, its x along the common normal with the axis before it.
+
+    So errors of the four numbers, which calibration looks for, are there as in a row of the table.
+    """
+    normal = np.cross(before, axis)
+    length = float(np.linalg.norm(normal))
+    if length <= ROUNDING:
+        return _first_turn(R, axis)
+    x = normal / length
+    x = x - (x @ axis) * axis
+    x = x / np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=-1)
 
 
 def _first_turn(R: Array, z: Array) -> Array:
@@ -100,28 +126,26 @@ def _first_turn(R: Array, z: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-def _row(X: Array, p: Array, u: Array, tiny: float) -> tuple[Row, float]:
-    """Return the row that leads from frame X to a frame on the line through p along u, and how far u was turned."""
+def _row(X: Array, p: Array, u: Array, tiny: float) -> Row:
+    """Return the row that leads from frame X to a frame on the line through p along u."""
     x, z, way = X[:3, 0], X[:3, 2], p - X[:3, 3]
     across, c = np.cross(z, u), float(z @ u)
     s = float(np.linalg.norm(across))
-    if s <= PARALLEL:
+    if s <= ROUNDING:
         aside = way - (way @ z) * z
         a = float(np.linalg.norm(aside))
         normal = aside / a if a > tiny else x
         alpha, d = 0.0 if c > 0 else math.pi, float(way @ z)
-        bent = s
     else:
         normal = across / s
         a, alpha, d = float(way @ normal), math.atan2(s, c), float(np.cross(way, u) @ across) / s**2
-        bent = 0.0
     # The normal has two directions. The nearer one to the x axis before it keeps theta small; failing that, a > 0.
     nearer = float(x @ normal)
     if nearer < -ROUNDING or (nearer <= ROUNDING and a < -tiny):
-        normal, a, alpha = -normal, -a, -alpha if s > PARALLEL else alpha
+        normal, a, alpha = -normal, -a, -alpha if s > ROUNDING else alpha
     theta = math.atan2(float(np.cross(x, normal) @ z), float(x @ normal))
     a, d = (0.0 if abs(length) <= tiny else length for length in (a, d))
-    return Row(theta=_squared(theta), d=d, a=a, alpha=_squared(alpha)), bent
+    return Row(theta=_squared(theta), d=d, a=a, alpha=_squared(alpha))
 
 
 def _squared(angle: float) -> float:

@@ -43,6 +43,7 @@ class Chain:
         moving: the joints that move, from the base to the tip.
         X_BT: (4, 4) the tip seen from the base.
         X_RB: (4, 4) the base seen from the root of the tree.
+        notes: sentences on what was chosen.
     """
 
     base: str
@@ -50,6 +51,7 @@ class Chain:
     moving: tuple[Moving, ...]
     X_BT: Array
     X_RB: Array
+    notes: tuple[str, ...] = ()
 
 
 def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> Chain:
@@ -58,14 +60,18 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
     Args:
         robot: the file.
         base: name of the first link; the one that hangs on nothing when left out.
-        tip: name of the last link; the only one at the end of moving joints when left out.
+        tip: name of the last link; when left out the only one at the end of moving joints, or the link that carries
+            all of them.
 
     Raises:
         UnknownNameError: there is no link of that name.
         FileFormatError: it is not clear which link is meant, nothing moves between them, or a joint is none of an arm.
     """
     base = _root(robot) if base is None else one_of("link", base, robot.links)
-    tip = _only_end(robot, base) if tip is None else one_of("link", tip, robot.links)
+    notes: tuple[str, ...] = ()
+    if tip is None:
+        tip, notes = _only_end(robot, base)
+    one_of("link", tip, robot.links)
     route = _route(robot, base, tip)
     for joint in route:
         joint.require_serial()
@@ -85,7 +91,7 @@ def chain_of(robot: Robot, base: str | None = None, tip: str | None = None) -> C
     X_RB = np.eye(4)
     for joint in _route(robot, _top(robot, base), base):
         X_RB = X_RB @ joint.origin
-    return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB)
+    return Chain(base=base, tip=tip, moving=tuple(moving), X_BT=X, X_RB=X_RB, notes=notes)
 
 
 def _root(robot: Robot) -> str:
@@ -101,8 +107,11 @@ def _top(robot: Robot, link: str) -> str:
     return link
 
 
-def _only_end(robot: Robot, base: str) -> str:
-    """Return the only link that ends a chain; one that is fixed to the base ends none."""
+def _only_end(robot: Robot, base: str) -> tuple[str, tuple[str, ...]]:
+    """Return the only link that ends a chain, and notes; one that is fixed to the base ends none.
+
+    Where several ends are fixed to one another, the link that carries all of them is the end: it moves as they do.
+    """
     ends = []
     pending = [(base, False)]
     while pending:
@@ -112,12 +121,25 @@ def _only_end(robot: Robot, base: str) -> str:
             ends.append(link)
     if not ends:
         raise robot.error(f"no joint moves a link that hangs on '{base}'")
-    if len(ends) > 1:
+    if len(ends) == 1:
+        return ends[0], ()
+    carrier = _carrier(robot, base, ends)
+    if carrier is None:
         raise robot.error(
             f"the arm could end at any of the links {_listed(ends)}; name one as tip: "
             f"load_urdf(path, tip='{ends[0]}'), or armwright convert {robot.path} --tip {ends[0]} -o arm.toml"
         )
-    return ends[0]
+    return carrier, (
+        f"the tool is '{carrier}', which carries {_listed(ends)}; each moves as it does and may be the tip (--tip)",
+    )
+
+
+def _carrier(robot: Robot, base: str, ends: list[str]) -> str | None:
+    """Return the last link that all ends hang on, if no joint moves between it and them, else None."""
+    routes = [_route(robot, base, end) for end in ends]
+    common = [row[0] for row in zip(*routes, strict=False) if all(joint is row[0] for joint in row)]
+    rigid = all(joint.fixed for route in routes for joint in route[len(common) :])
+    return common[-1].child if common and rigid else None
 
 
 def _route(robot: Robot, base: str, tip: str) -> list[UrdfJoint]:
@@ -157,7 +179,7 @@ def _refuse_loads(robot: Robot, beside: list[UrdfJoint]) -> None:
         raise loaded[0].element.error(
             "",
             f"{len(loaded)} {does} mass to carry: {_listed(names)}. An arm has no branches: choose another tip, or "
-            f"lock {'it' if one else 'them'} at 0: lock={names} (--lock {','.join(names)})",
+            f"lock {'it' if one else 'them'}, at 0 or elsewhere: lock={names} (--lock {','.join(names)})",
         )
 
 
@@ -166,7 +188,7 @@ def _carries(robot: Robot, joint: UrdfJoint) -> bool:
     while pending:
         name = pending.pop()
         body = body_of(robot.links[name])
-        if body.mass or body.inertia.any():
+        if body.mass or body.inertia.any() or body.unknown:
             return True
         pending += [below.child for below in robot.below[name]]
     return False

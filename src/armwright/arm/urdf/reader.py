@@ -1,23 +1,29 @@
 """Arms from URDF files."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 import attrs
 import numpy as np
 
 from armwright.arm.dh import carry
 from armwright.arm.gravity import felt_gravity, vector_text
-from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, Link, impossible_moments
+from armwright.arm.model import UPRIGHT_GRAVITY, Arm, Joint, JointKind, Link
+from armwright.arm.tensors import impossible_moments
 from armwright.arm.urdf.axes import Frames, cleared, cleared_pose, frames_of
 from armwright.arm.urdf.chain import Chain, chain_of
 from armwright.arm.urdf.robot import limits_of, motor_of, read_robot
-from armwright.arrays import Array
+from armwright.arrays import Array, number
 from armwright.errors import KindError, shown
 from armwright.spatial.poses import inverse
 
-# An axis that is made parallel by less than this was parallel but for rounding [rad].
-_TOLD = 1e-9
+# Axes that are this near to parallel were meant to be [rad]: a half turn typed as 3.1416 is 0.7e-5 rad off.
+_MEANT_PARALLEL = 1e-4
+
+
+# Joints that are held: their names, or their positions by their names [rad] or [m].
+Lock: TypeAlias = Collection[str] | Mapping[str, float]
 
 
 @attrs.frozen(kw_only=True)
@@ -33,7 +39,7 @@ class Reading:
     notes: tuple[str, ...]
 
 
-def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Collection[str] = ()) -> Arm:
+def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Arm:
     """Return the serial arm between two links of a URDF file.
 
     Positions of the arm are those of the joints in the file; the base is the frame of the base link, the tool that of
@@ -42,11 +48,14 @@ def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
     Args:
         path: the file; what is read of it is in docs/arms.md.
         base: name of the link that stands still; the one that hangs on nothing when left out.
-        tip: name of the link that is the tool; the only one at the end of moving joints when left out.
-        lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper.
+        tip: name of the link that is the tool; when left out the only one at the end of moving joints, or the link
+            that carries all of them.
+        lock: names of joints that are held at 0, as if they were fixed, such as those of a gripper; or where joints
+            are held by their names [rad] or [m].
 
     Raises:
-        KindError: ``path`` is no path, or ``lock`` one text.
+        KindError: ``path`` is no path, ``lock`` one text, or a position no number.
+        InvalidValueError: a joint is to be held where its limits do not let it.
         MissingExtraError: lxml is not installed.
         UnknownNameError: there is no link, or no joint, of that name.
         FileFormatError: the file is missing, broken, or has no such arm; the text has file, line and key.
@@ -54,9 +63,7 @@ def load_urdf(path: Path | str, *, base: str | None = None, tip: str | None = No
     return read_urdf(path, base=base, tip=tip, lock=lock).arm
 
 
-def read_urdf(
-    path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Collection[str] = ()
-) -> Reading:
+def read_urdf(path: Path | str, *, base: str | None = None, tip: str | None = None, lock: Lock = ()) -> Reading:
     """Return the serial arm between two links of a URDF file, and what was not taken as it stands.
 
     Arguments and errors are those of ``load_urdf``.
@@ -64,18 +71,20 @@ def read_urdf(
     if not isinstance(path, str | Path):
         raise KindError(f"path: expected the path of a URDF file, got {shown(path)}")
     if isinstance(lock, str):
-        raise KindError(f"lock: expected a list of names of joints, got {shown(lock)}")
+        raise KindError(f"lock: expected a list of names of joints, or positions by names, got {shown(lock)}")
     path = Path(path)
-    robot = read_robot(path, tuple(lock))
+    held = lock if isinstance(lock, Mapping) else dict.fromkeys(lock, 0.0)
+    robot = read_robot(path, {name: number(at, f"lock, '{name}'") for name, at in held.items()})
     chain = chain_of(robot, base, tip)
     size = _size(chain)
     frames = frames_of([one.X_BJ for one in chain.moving], [one.axis for one in chain.moving], size)
-    joints, links, motors, notes = [], [], [], _bent(chain, frames)
+    joints, links, motors, notes = [], [], [], [*chain.notes, *_leaning(chain, frames)]
     for moving, row, X in zip(chain.moving, frames.rows, frames.poses, strict=True):
         limits, unknown = limits_of(moving.joint)
         slides = moving.joint.kind == "prismatic"
-        joints.append(Joint(kind="prismatic" if slides else "revolute", **attrs.asdict(row), limits=limits))
-        links.append(_link(moving.bodies, X, size))
+        kind: JointKind = "prismatic" if slides else "revolute"
+        joints.append(Joint(kind=kind, **attrs.asdict(row), limits=limits, name=moving.joint.name))
+        links.append(attrs.evolve(_link(moving.bodies, X, size), name=moving.joint.child))
         motors.append(motor_of(moving.joint))
         notes += unknown
     arm = Arm(
@@ -87,6 +96,8 @@ def read_urdf(
         tool=cleared_pose(inverse(frames.poses[-1]) @ chain.X_BT, size),
         gravity=felt_gravity(chain.X_RB, UPRIGHT_GRAVITY),
         gravity_from="root",
+        base_link=chain.base,
+        tool_link=chain.tip,
         source=f"{path.name}, link '{chain.base}' to link '{chain.tip}'",
     )
     if not np.array_equal(arm.gravity, UPRIGHT_GRAVITY):
@@ -103,6 +114,9 @@ def _size(chain: Chain) -> float:
 
 def _link(bodies: Sequence[Link], X_BL: Array, size: float) -> Link:
     """Weld bodies that are given in the frame of the base, and see them from the frame of a link."""
+    unknown = [body for body in bodies if body.unknown]
+    if unknown:
+        return unknown[0]
     whole = _welded([body for body in bodies if body.mass or body.inertia.any()])
     seen = carry(whole, inverse(X_BL))
     # What has no mass has no centre of mass either; it is put at the origin.
@@ -125,11 +139,11 @@ def _welded(bodies: Sequence[Link]) -> Link:
     return Link(mass=mass, com=com, inertia=inertia, complete=False)
 
 
-def _bent(chain: Chain, frames: Frames) -> list[str]:
-    """Say which axes were made parallel."""
+def _leaning(chain: Chain, frames: Frames) -> list[str]:
+    """Say which axes are nearly parallel, and so were probably meant to be."""
     return [
-        f"joints '{one.joint.name}' and '{other.joint.name}': their axes are {angle:.1e} rad from parallel and are "
-        "taken to be parallel"
-        for one, other, angle in zip(chain.moving, chain.moving[1:], frames.bent, strict=False)
-        if angle > _TOLD
+        f"joints '{one.joint.name}' and '{other.joint.name}': their axes are {angle:.1e} rad from parallel and kept "
+        "so; if they are meant to be parallel, write their angles with more digits"
+        for one, other, angle in zip(chain.moving, chain.moving[1:], frames.leaning, strict=False)
+        if 0 < angle < _MEANT_PARALLEL
     ]

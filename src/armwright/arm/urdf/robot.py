@@ -1,19 +1,21 @@
 """What stands in a URDF file: links and joints that make a tree, poses, bodies, limits and friction."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Mapping
 from pathlib import Path
 
 import attrs
 import numpy as np
 
 from armwright.arm.dh import turn
-from armwright.arm.model import Limits, Link, Motor, impossible_moments
+from armwright.arm.model import Limits, Link, Motor
+from armwright.arm.tensors import impossible_moments
 from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
-from armwright.errors import FileFormatError, closest, one_of
+from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
 from armwright.files.limits import beyond, limit
 from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
 NO_LIMIT = 1e30
@@ -28,6 +30,7 @@ class UrdfJoint:
     Attributes:
         name: as in the file.
         kind: one of those URDF has; ``fixed`` also of one that is locked.
+        locked: where it is held, of one that is locked [rad] or [m].
         parent: link it hangs on.
         child: link it carries.
         element: where it stands in the file.
@@ -38,6 +41,7 @@ class UrdfJoint:
     parent: str
     child: str
     element: Element
+    locked: float = 0.0
 
     @property
     def fixed(self) -> bool:
@@ -46,8 +50,14 @@ class UrdfJoint:
 
     @property
     def origin(self) -> Array:
-        """Pose (4, 4) of the child in the frame of the parent, the joint at 0."""
-        return origin_of(self.element)
+        """Pose (4, 4) of the child in the frame of the parent, the joint at 0, or where it is locked."""
+        X = origin_of(self.element)
+        if not self.locked:
+            return X
+        axis = axis_of(self) * self.locked
+        if self.element.text("type") == "prismatic":
+            return X @ pose(np.eye(3), axis)
+        return X @ pose(rotation_from_vector(axis), np.zeros(3))
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -88,19 +98,20 @@ class Robot:
         return FileFormatError(self.path, None, "", message)
 
 
-def read_robot(path: Path, lock: Collection[str] = ()) -> Robot:
+def read_robot(path: Path, lock: Mapping[str, float] | None = None) -> Robot:
     """Read a URDF file.
 
     Args:
         path: the file.
-        lock: names of joints that are held at 0, as if they were fixed.
+        lock: where joints are held by their names [rad] or [m], as if they were fixed.
 
     Raises:
         MissingExtraError: the library that parses it is not installed.
         UnknownNameError: a joint to lock is not there.
+        InvalidValueError: a joint is to be held where its limits do not let it.
         FileFormatError: the file is missing, broken, or its links and joints make no tree.
     """
-    root = read_elements(path)
+    root, lock = read_elements(path), lock or {}
     links: dict[str, Element] = {}
     for element in root.all("link"):
         if element.name in links:
@@ -126,7 +137,7 @@ def read_robot(path: Path, lock: Collection[str] = ()) -> Robot:
     return robot
 
 
-def _joint(element: Element, links: dict[str, Element], lock: Collection[str]) -> UrdfJoint:
+def _joint(element: Element, links: dict[str, Element], lock: Mapping[str, float]) -> UrdfJoint:
     kind = element.text("type")
     if kind not in _KINDS:
         near = closest(kind, _KINDS)
@@ -141,8 +152,20 @@ def _joint(element: Element, links: dict[str, Element], lock: Collection[str]) -
             hint = f"; did you mean '{near}'?" if near else ""
             raise end.error("link", f"there is no link '{link}'{hint}")
         ends.append(link)
-    kind = "fixed" if element.name in lock else kind
-    return UrdfJoint(name=element.name, kind=kind, parent=ends[0], child=ends[1], element=element)
+    joint = UrdfJoint(name=element.name, kind=kind, parent=ends[0], child=ends[1], element=element)
+    return _locked(joint, lock[joint.name]) if joint.name in lock else joint
+
+
+def _locked(joint: UrdfJoint, position: float) -> UrdfJoint:
+    """Return a joint as one that is held at a position."""
+    if position:
+        joint.require_serial()
+        limits = Limits() if joint.fixed else limits_of(joint)[0]
+        inside = math.isfinite(position) and limits.lower <= position <= limits.upper
+        if joint.fixed or not inside:
+            ends = "it does not move" if joint.fixed else f"it goes from {limits.lower:g} to {limits.upper:g}"
+            raise InvalidValueError(f"lock: joint '{joint.name}' cannot be held at {position:g} (rad or m): {ends}")
+    return attrs.evolve(joint, kind="fixed", locked=position)
 
 
 def _refuse_rings(robot: Robot) -> None:
@@ -195,8 +218,10 @@ def axis_of(joint: UrdfJoint) -> Array:
 def body_of(link: Element) -> Link:
     """Return the body of a link in the frame of the link; one without mass where the file gives none.
 
+    Where the moments are those of no body, nothing is known of it but its name and why.
+
     Raises:
-        FileFormatError: mass or inertia are missing, or those of no body.
+        FileFormatError: mass or inertia are missing, or no numbers.
     """
     inertial = link.one("inertial")
     if inertial is None:
@@ -209,11 +234,12 @@ def body_of(link: Element) -> Link:
     moments = impossible_moments(mass, X[:3, 3], tensor)
     if moments is not None:
         said = ", ".join(f"{moment:.3g}" for moment in moments)
-        raise element.error(
+        why = element.error(
             "",
             f"no body has the principal moments {said} kg m² about its centre of mass: none may be negative, or larger "
             "than the other two together",
         )
+        return Link(unknown=str(why))
     R = X[:3, :3]
     return Link(mass=mass, com=X[:3, 3], inertia=R @ tensor @ R.T, complete=False)
 

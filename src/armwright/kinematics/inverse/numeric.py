@@ -261,5 +261,5 @@ def _size(arm: Arm) -> float:
     for joint in arm.joints:
         way = joint.limits.upper - joint.limits.lower
         slide = way if not joint.revolute and math.isfinite(way) else 0.0
-        total += math.hypot(joint.a, joint.d) + slide
+        total += joint.span() + slide
     return total or 1.0

@@ -38,12 +38,14 @@ class Violation:
         value: where it would stand [rad] or [m].
         limit: the limit it passes.
         revolute: whether ``value`` is an angle.
+        name: of the joint; empty where it has none.
     """
 
     joint: int
     value: float
     limit: float
     revolute: bool
+    name: str = ""
 
     @property
     def excess(self) -> float:
@@ -53,8 +55,9 @@ class Violation:
     def __str__(self) -> str:
         """Say it in degrees or millimetres."""
         unit, scale = ("deg", math.degrees(1.0)) if self.revolute else ("mm", 1e3)
+        name = f" ('{self.name}')" if self.name else ""
         return (
-            f"joint {self.joint} would stand at {self.value * scale:.1f} {unit}, "
+            f"joint {self.joint}{name} would stand at {self.value * scale:.1f} {unit}, "
             f"{self.excess * scale:.1f} {unit} beyond its limit {self.limit * scale:.1f} {unit}"
         )
 
@@ -162,7 +165,7 @@ def violations(arm: Arm, q: ArrayLike) -> tuple[Violation, ...]:
     for i, (joint, value) in enumerate(zip(arm.joints, q.tolist(), strict=True), 1):
         limit = min(max(value, joint.limits.lower), joint.limits.upper)
         if abs(value - limit) > _AT_LIMIT * max(1.0, abs(limit)):
-            found.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute))
+            found.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute, name=joint.name))
     return tuple(found)
 
 

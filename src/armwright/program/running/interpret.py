@@ -166,7 +166,7 @@ def _effort_warning(stage: RunStage, arm: Arm, joint: int, t: Array, tau: Array)
     return Diagnostic(
         code="W401",
         severity=Severity.WARNING,
-        message=f"joint {joint + 1} of {stage.arm} would need {abs(tau[worst]):.1f} {unit}, "
+        message=f"{arm.called(joint)} of {stage.arm} would need {abs(tau[worst]):.1f} {unit}, "
         f"{(abs(tau[worst]) / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
         span=stage.span,
         label=f"at {stage.t0 + t[worst]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
