@@ -41,12 +41,13 @@ if TYPE_CHECKING:
     from armwright.clearance.reader import load_linkage
     from armwright.dynamics.compiled import compile_arm
     from armwright.dynamics.forward_dynamics import forward_dynamics
+    from armwright.dynamics.lagrange_euler import coriolis_matrix, coriolis_tensor, pose_derivative_matrices
     from armwright.dynamics.mass_matrix import mass_matrix
-    from armwright.dynamics.newton_euler import inverse_dynamics
+    from armwright.dynamics.newton_euler import inverse_dynamics, link_forces
     from armwright.dynamics.payload import payload
     from armwright.dynamics.simulate import simulate
     from armwright.dynamics.terms import terms
-    from armwright.errors import ArmwrightError, UnitWarning
+    from armwright.errors import ArmwrightError, GravityWarning, UnitWarning
     from armwright.kinematics.damping import damped_rates
     from armwright.kinematics.differential import differential_inverse
     from armwright.kinematics.forward import forward, link_poses
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from armwright.kinematics.jacobian import jacobian
     from armwright.kinematics.manipulability import manipulability
     from armwright.kinematics.singularities import singularities
+    from armwright.kinematics.wrist_partitioned import wrist_partitioned_inverse, wrist_partitioned_jacobian
     from armwright.motion.blends import blend_timing, blended, via_deviations, via_distances
     from armwright.motion.continuity import continuity
     from armwright.motion.cubic import cubic, cubic_through
@@ -64,6 +66,7 @@ if TYPE_CHECKING:
     from armwright.motion.online import replace_goal, retarget
     from armwright.motion.quintic import point_to_point, quintic
     from armwright.motion.straight import straight_line
+    from armwright.motion.through import through_frames
     from armwright.motion.time_optimal import time_optimal
     from armwright.motion.trajectory import Trajectory, hold, join
     from armwright.motion.trapezoid import trapezoid
@@ -73,6 +76,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Arm": "arm.model",
     "ArmwrightError": "errors",
+    "GravityWarning": "errors",
     "Trace": "accuracy.measured",
     "Trajectory": "motion.trajectory",
     "UnitWarning": "errors",
@@ -87,6 +91,8 @@ _HOME = {
     "compensated": "calibration.compensating",
     "compile_arm": "dynamics.compiled",
     "continuity": "motion.continuity",
+    "coriolis_matrix": "dynamics.lagrange_euler",
+    "coriolis_tensor": "dynamics.lagrange_euler",
     "corner_deviations": "accuracy.corner",
     "correct_nodes": "clearance.correcting",
     "correct_path": "clearance.correcting",
@@ -111,6 +117,7 @@ _HOME = {
     "joint_move": "motion.moves",
     "limit_use": "motion.limit_use",
     "line_or_detour": "motion.detour",
+    "link_forces": "dynamics.newton_euler",
     "link_poses": "kinematics.forward",
     "load_arm": "arm.load",
     "load_linkage": "clearance.reader",
@@ -125,6 +132,7 @@ _HOME = {
     "plan_poses": "calibration.planning",
     "point_to_point": "motion.quintic",
     "pose_accuracy": "accuracy.pose",
+    "pose_derivative_matrices": "dynamics.lagrange_euler",
     "pose_drift": "accuracy.variation",
     "pose_repeatability": "accuracy.pose",
     "posing_time": "accuracy.settling",
@@ -141,11 +149,14 @@ _HOME = {
     "stopping_move": "motion.moves",
     "straight_line": "motion.straight",
     "terms": "dynamics.terms",
+    "through_frames": "motion.through",
     "time_optimal": "motion.time_optimal",
     "trapezoid": "motion.trapezoid",
     "via_deviations": "motion.blends",
     "via_distances": "motion.blends",
     "weaving_deviation": "accuracy.weaving",
+    "wrist_partitioned_inverse": "kinematics.wrist_partitioned",
+    "wrist_partitioned_jacobian": "kinematics.wrist_partitioned",
     "xspline": "motion.xspline",
     "xspline_along": "motion.xspline",
     "xspline_kernel": "motion.xspline_online",
@@ -154,6 +165,7 @@ _HOME = {
 __all__ = [
     "Arm",
     "ArmwrightError",
+    "GravityWarning",
     "Trace",
     "Trajectory",
     "UnitWarning",
@@ -169,6 +181,8 @@ __all__ = [
     "compensated",
     "compile_arm",
     "continuity",
+    "coriolis_matrix",
+    "coriolis_tensor",
     "corner_deviations",
     "correct_nodes",
     "correct_path",
@@ -193,6 +207,7 @@ __all__ = [
     "joint_move",
     "limit_use",
     "line_or_detour",
+    "link_forces",
     "link_poses",
     "load_arm",
     "load_linkage",
@@ -207,6 +222,7 @@ __all__ = [
     "plan_poses",
     "point_to_point",
     "pose_accuracy",
+    "pose_derivative_matrices",
     "pose_drift",
     "pose_repeatability",
     "posing_time",
@@ -223,11 +239,14 @@ __all__ = [
     "stopping_move",
     "straight_line",
     "terms",
+    "through_frames",
     "time_optimal",
     "trapezoid",
     "via_deviations",
     "via_distances",
     "weaving_deviation",
+    "wrist_partitioned_inverse",
+    "wrist_partitioned_jacobian",
     "xspline",
     "xspline_along",
     "xspline_kernel",

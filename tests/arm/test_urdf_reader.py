@@ -7,13 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.arm.load import load_arm
+from armwright.arm.load import load_arm, read_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Limits, Motor
 from armwright.arm.urdf.reader import load_urdf, read_urdf
-from armwright.arm.urdf.writer import urdf_text
+from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
+from armwright.arm.write import toml_text
 from armwright.cell.reader import read_cell
+from armwright.dynamics.compiled import compile_arm
+from armwright.dynamics.controllers import gravity_compensation
+from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.dynamics.payload import payload
+from armwright.dynamics.shares import gravity_efforts
+from armwright.dynamics.simulate import simulate
+from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward import forward
+from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.recognise import shoulder_of
 from urdf_texts import ARM_WITH_GRIPPER, LIMIT, MASS, joint, link, one, robot
 
@@ -203,6 +212,90 @@ def test_locked_joints_are_fixed(read: Callable[..., Arm]) -> None:
 
     assert (arm.n, arm.links[0].mass) == (1, 8)
     np.testing.assert_allclose(forward(arm, [0.0])[:3, 3], (0.5, 0, 0.1), atol=ROUNDING)
+
+
+def test_locked_where_it_is_wanted(read: Callable[..., Arm], rng: np.random.Generator) -> None:
+    """A joint held at a position is where it would be if it had moved there."""
+    held = {"left_slide": 0.02, "right_slide": -0.01}
+    arm, free = read(ARM_WITH_GRIPPER, tip="left", lock=held), read(ARM_WITH_GRIPPER, tip="left", lock=["right_slide"])
+    q = rng.uniform(-3, 3)
+
+    np.testing.assert_allclose(forward(arm, [q]), forward(free, [q, 0.02]), atol=ROUNDING)
+    np.testing.assert_allclose(arm.links[0].com[1] * 8, 2 * 0.02 - 2 * 0.01, atol=ROUNDING)
+    wrist = robot(
+        *(link(name, MASS) for name in ("base", "arm", "hand")),
+        joint("turn", "continuous", "base", "arm", '<axis xyz="0 0 1"/>'),
+        joint("bend", "revolute", "arm", "hand", f'<origin xyz="0.5 0 0" rpy="0.3 0 1"/><axis xyz="0 1 1"/>{LIMIT}'),
+    )
+    bent = read(wrist, lock={"bend": 0.7})
+    np.testing.assert_allclose(forward(bent, [q]), forward(read(wrist), [q, 0.7]), atol=ROUNDING)
+
+
+def test_several_ends_on_one_link(tmp_path: Path) -> None:
+    """Where a flange carries a tool point and a sensor, the flange is the tool: it moves as much as they do."""
+    text = robot(
+        *(link(name) for name in ("base", "arm", "flange", "tool0", "sensor")),
+        joint("turn", "continuous", "base", "arm", '<axis xyz="0 0 1"/>'),
+        joint("screws", "fixed", "arm", "flange", '<origin xyz="0.5 0 0"/>'),
+        joint("to_tool", "fixed", "flange", "tool0", '<origin xyz="0 0 0.1"/>'),
+        joint("to_sensor", "fixed", "flange", "sensor"),
+    )
+    (tmp_path / "arm.urdf").write_text(text)
+
+    reading = read_urdf(tmp_path / "arm.urdf")
+
+    assert reading.notes == (
+        "the tool is 'flange', which carries 'tool0', 'sensor'; each moves as it does and may be the tip (--tip)",
+    )
+    assert reading.arm.tool_link == "flange"
+    np.testing.assert_allclose(forward(reading.arm, [0.0])[:3, 3], (0.5, 0, 0), atol=ROUNDING)
+
+
+@pytest.mark.parametrize(("moment", "said"), [("-1", "-1, 1, 1"), ("3", "1, 1, 3")])
+def test_a_tensor_that_no_body_has(read: Callable[..., Arm], moment: str, said: str, tmp_path: Path) -> None:
+    """A link with such a tensor has kinematics; dynamics says what is missing, of which link, and where it stands."""
+    body = MASS.replace('ixx="1"', f'ixx="{moment}"')
+    arm = read(one().replace('<link name="hand">', f'<link name="hand">{body}'))
+
+    np.testing.assert_allclose(forward(arm, [0.5])[:2, 0], (np.cos(0.5), np.sin(0.5)))
+    message = (
+        f"arm 'test': no dynamics, for mass and inertia of link 1 ('hand') are unknown: {tmp_path / 'arm.urdf'}:3: "
+        f"link 'hand', inertial, inertia: no body has the principal moments {said} kg m² about its centre of mass"
+    )
+    asked = (
+        lambda: inverse_dynamics(arm, [0.0], [0.0], [0.0]),
+        lambda: gravity_efforts(arm, [0.0]),
+        lambda: mass_matrix(arm, [0.0]),
+        lambda: payload(arm, 1.0),
+        lambda: compile_arm(arm).inverse_dynamics,
+        lambda: gravity_compensation(arm),
+        lambda: simulate(arm, [0.0], duration=0.1),
+    )
+    for ask in asked:
+        with pytest.raises(UnsupportedArmError) as caught:
+            ask()
+        assert message in str(caught.value)
+    assert str(caught.value).endswith("Kinematics does without them")
+    # It is kept in files of our own, and told by those that cannot hold it.
+    (tmp_path / "arm.toml").write_text(toml_text(arm), encoding="utf-8")
+    assert read_arm(tmp_path / "arm.toml") == arm
+    assert any("its mass and inertia are unknown" in sentence for sentence in lost_in_urdf(arm))
+
+
+def test_names_are_kept(read: Callable[..., Arm], tmp_path: Path) -> None:
+    """Joints and links keep their names on the way through an arm file and URDF, and messages use them."""
+    arm = read(one())
+    assert (arm.joints[0].name, arm.links[0].name, arm.base_link, arm.tool_link) == ("turn", "hand", "base", "hand")
+
+    (tmp_path / "arm.toml").write_text(toml_text(arm), encoding="utf-8")
+    again = read_arm(tmp_path / "arm.toml")
+    assert again == arm
+    written = urdf_text(again)
+    assert '<joint name="turn" type="revolute">' in written
+    assert '<link name="hand"/>' in written
+    assert '<link name="tool"/>' in written  # the hand is the tool; two links cannot have one name
+    solution = inverse(arm, forward(arm, [2.5]))
+    assert "joint 1 ('turn') would stand at 143.2 deg, 28.6 deg beyond its limit 114.6 deg" in solution.explain()
 
 
 def test_links_without_mass_may_move_beside_the_chain(read: Callable[..., Arm]) -> None:

@@ -37,10 +37,10 @@ def _upright(arm: Arm, q: tuple[float, ...]) -> float:
 LEANING = (0.3, 0.0, 0.8, 0.6, 0.5, 0.7)
 # Postures in which one factor of the determinant vanishes, and the joint that leads away from there.
 SINGULAR = {
-    "PUMA wrist": ("puma560", (0.3, 0.4, 0.5, 0.6, 0.0, 0.7), 5),
-    "PUMA elbow stretched": ("puma560", (0.3, 0.4, ELBOW, 0.6, 0.5, 0.7), 3),
-    "PUMA elbow folded": ("puma560", (0.3, 0.4, ELBOW - math.pi, 0.6, 0.5, 0.7), 3),
-    "PUMA shoulder": ("puma560", (0.3, UPRIGHT, math.pi / 2, 0.6, 0.5, 0.7), 2),
+    "PUMA wrist": ("puma560-seed", (0.3, 0.4, 0.5, 0.6, 0.0, 0.7), 5),
+    "PUMA elbow stretched": ("puma560-seed", (0.3, 0.4, ELBOW, 0.6, 0.5, 0.7), 3),
+    "PUMA elbow folded": ("puma560-seed", (0.3, 0.4, ELBOW - math.pi, 0.6, 0.5, 0.7), 3),
+    "PUMA shoulder": ("puma560-seed", (0.3, UPRIGHT, math.pi / 2, 0.6, 0.5, 0.7), 2),
     "Stanford wrist": ("stanford", (0.3, 0.4, 0.5, 0.6, 0.0, 0.7), 5),
     "Stanford shoulder": ("stanford", (0.3, 0.0, 0.5, 0.6, 0.5, 0.7), 2),
     "Stanford boom drawn in": ("stanford", (0.3, 0.4, 0.0, 0.6, 0.5, 0.7), 3),
@@ -86,7 +86,7 @@ def _honest(solution: InverseSolution, X: Array) -> None:
         assert branch.rotation_error == pytest.approx(turn, abs=1e-7)  # its logarithm loses half the digits at 0
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_every_well_conditioned_pose_of_the_grid(name: str) -> None:
     """On the whole 45 degree grid each well-conditioned posture, q2 = 90 degrees and all, is a branch of its own pose.
 
@@ -108,7 +108,7 @@ def test_every_well_conditioned_pose_of_the_grid(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_verdict_on_the_grid(name: str) -> None:
     """Judged one by one, grid poses are solved or singular, none has more than eight branches, and none comes twice."""
     arm = load_arm(name) if name != "ur5" else _wide("ur5")
@@ -169,7 +169,7 @@ def test_next_to_a_singularity(case: str, distance: float, way: int) -> None:
     assert found < max(1e-14 / least, min(2e-7, 2 * least)) / min(second, 0.3)
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_at_every_limit(name: str, rng: np.random.Generator) -> None:
     """A posture with a joint exactly at its limit is inside the limits, and found."""
     arm = load_arm(name)
@@ -187,7 +187,7 @@ def test_at_every_limit(name: str, rng: np.random.Generator) -> None:
             assert solution.best.allowed
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford"])
 def test_just_beyond_a_limit(name: str, rng: np.random.Generator) -> None:
     """A millionth beyond its limit the same branch is not allowed, and the joint is named."""
     arm = load_arm(name)
@@ -203,7 +203,7 @@ def test_just_beyond_a_limit(name: str, rng: np.random.Generator) -> None:
             assert branch.violations[0].excess == pytest.approx(1e-6, rel=1e-2)
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 @pytest.mark.parametrize(("digits", "off"), [(6, 2e-6), (4, 2e-4)])
 def test_typed_poses(name: str, digits: int, off: float, rng: np.random.Generator) -> None:
     """Poses typed with six or four digits of a metre solve; the posture is off by what the rounding asks of it.
@@ -234,7 +234,7 @@ def test_typed_poses_at_the_edge_of_the_reach(digits: int, beyond: float) -> Non
 
     With four the answer is out of reach, by less than a tenth of a millimetre, and the nearest pose is given.
     """
-    arm = _wide("puma560")
+    arm = _wide("puma560-seed")
     answers = set()
     for q1 in np.linspace(-3, 3, 30):
         X = np.round(forward(arm, (q1, 0.4, ELBOW, 0.6, 0.5, 0.7)), digits)
@@ -254,7 +254,7 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
 
     Its radii are those of the two links, 432 and |(20, 433)| mm, at d3 = 149 mm beside the shoulder.
     """
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     fore, side = math.hypot(0.02, 0.433), 0.149
     counts = dict.fromkeys(Answer, 0)
     for _ in range(300):
@@ -278,7 +278,7 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
     assert counts[Answer.OUT_OF_LIMITS] > 2
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_right_angle_of_joint_2(name: str, rng: np.random.Generator) -> None:
     """With joint 2 at 90 degrees exactly and all others anywhere the posture is found again, and none comes twice."""
     arm = load_arm(name)
@@ -293,7 +293,7 @@ def test_right_angle_of_joint_2(name: str, rng: np.random.Generator) -> None:
         assert _apart(solution) > 1e-6
 
 
-@pytest.mark.parametrize("name", ["puma560", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "ur5"])
 def test_whole_turns(name: str, rng: np.random.Generator) -> None:
     """An arm that stands beyond half a turn, where its limits have room for it, is told to stay there."""
     arm = load_arm(name)
@@ -304,7 +304,7 @@ def test_whole_turns(name: str, rng: np.random.Generator) -> None:
             assert np.abs(inverse(arm, forward(arm, q), q).best.q - q).max() < POSTURE
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford"])
 def test_made_outside_the_limits(name: str, rng: np.random.Generator) -> None:
     """A pose made outside the limits has that posture among its branches, not allowed unless a turn brings it inside.
 
@@ -326,7 +326,7 @@ def test_made_outside_the_limits(name: str, rng: np.random.Generator) -> None:
     assert min(answers[Answer.SOLVED], answers[Answer.OUT_OF_LIMITS]) > 5
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 @pytest.mark.parametrize("short", [1e-5, 1e-3, 0.05])
 def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Generator) -> None:
     """A wrist that would be nearer to the axis than the plane of the arm is out of reach by just what it is nearer.
@@ -334,7 +334,7 @@ def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Gene
     The nearest pose has the same orientation, and is reached.
     """
     side, height, hand = {
-        "puma560": (0.149, 0.0, 0.0),
+        "puma560-seed": (0.149, 0.0, 0.0),
         "stanford": (0.15367, 0.4125, 0.26289),
         "ur5": (0.10915, 0.089159, 0.0823),
     }[name]
@@ -355,7 +355,7 @@ def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Gene
         assert inverse(arm, solution.nearest_pose).answer is not Answer.OUT_OF_REACH
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 @pytest.mark.parametrize("room", [0.1, 1e-2, 1e-4, 1e-6])
 def test_free_joint_with_little_room(name: str, room: float, rng: np.random.Generator) -> None:
     """With joint 5 straight and joint 6 held to a hair's breadth, the one posture in a free family is found.

@@ -17,7 +17,7 @@ from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
 from oracles.arms import random_postures
 
-ARMS = ("puma560", "stanford", "stanford-jpl")
+ARMS = ("puma560-seed", "stanford", "stanford-jpl")
 POSTURE = 1e-9  # a posture found again
 RESIDUAL = 1e-12  # a pose met, in m and rad
 DOWN = np.diag((1.0, -1.0, -1.0))
@@ -71,7 +71,7 @@ def test_judged_solution(name: str, rng: np.random.Generator) -> None:
         assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford"])
+@pytest.mark.parametrize("name", ["puma560-seed", "stanford"])
 def test_grid_of_right_angles(name: str) -> None:
     """On a 45 degree grid of joint angles, full of aligned axes, every pose inside the limits is solved.
 
@@ -97,7 +97,7 @@ def test_grid_of_right_angles(name: str) -> None:
 
 def test_labels_say_how_the_arm_stands() -> None:
     """The PUMA reaching forward with the elbow above the line from shoulder to wrist is called up, below down."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     X = forward(arm, [0.3, -0.2, 0.4, 0.5, 0.6, 0.7])
 
     for branch in inverse(arm, X):
@@ -116,7 +116,7 @@ def forward_of(arm: object, q: Array, frame: int) -> Array:
 
 def test_wrist_singularity_keeps_joint_4() -> None:
     """With joint 5 straight, joints 4 and 6 are free together: joint 4 stays where it was, joint 6 makes up for it."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     X = forward(arm, np.radians([10, 20, 30, 40, 0, 50]))
 
     solution = inverse(arm, X, near=np.radians([10, 20, 30, 70, 0, 0]))
@@ -129,7 +129,7 @@ def test_wrist_singularity_keeps_joint_4() -> None:
 @pytest.mark.parametrize("q5", [1e-7, 1e-9, 1e-12])
 def test_near_the_wrist_singularity(q5: float) -> None:
     """A hair's breadth from the singularity the branches still meet the pose and none comes twice."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     X = forward(arm, [0.1, 0.2, 0.3, 0.4, q5, 0.5])
 
     solution = inverse(arm, X)
@@ -150,7 +150,7 @@ def test_typed_poses_solve(rng: np.random.Generator) -> None:
 
 def test_out_of_reach_says_how_far() -> None:
     """The wrist of the PUMA reaches sqrt((a2 + |a3, d4|)² + d3²) from its shoulder; a metre farther is a metre out."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     farthest = shoulder_of(arm).farthest  # type: ignore[union-attr]
     assert farthest == pytest.approx(math.hypot(0.432 + math.hypot(0.02, 0.433), 0.149))
 
@@ -160,13 +160,13 @@ def test_out_of_reach_says_how_far() -> None:
     assert solution.distance == pytest.approx(1.0, abs=1e-9)
     assert solution.allowed == ()
     np.testing.assert_allclose(solution.nearest_pose[:3, 3], (farthest, 0, 0), atol=1e-9)
-    with pytest.raises(NoPostureError, match=r"1000\.0 mm out of reach of 'puma560'"):
+    with pytest.raises(NoPostureError, match=r"1000\.0 mm out of reach of 'puma560-seed'"):
         _ = solution.best
 
 
 def test_nearest_pose_is_nearest(rng: np.random.Generator) -> None:
     """No wrist place that random postures reach is nearer to the asked one than the nearest pose said to be."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     reached = forward(arm, rng.uniform(-np.pi, np.pi, size=(20000, 6)))[:, :3, 3]  # no hand: the wrist centre
     for target in [(0.0, 0.05, 0.3), (0.01, 0.0, 0.0), (0.9, 0.9, 0.9), (0.05, 0.05, 1.2)]:
         solution = inverse(arm, _at(*target))
@@ -189,7 +189,7 @@ def test_out_of_limits_says_which_joint() -> None:
 
 def test_images_by_whole_turns() -> None:
     """Joint 6 of the PUMA turns through 520 degrees: 150 and -210 degrees are one pose and two positions."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
 
     q = images(arm, np.radians([0, 0, 0, 0, 30, 150]))
 
@@ -198,7 +198,7 @@ def test_images_by_whole_turns() -> None:
 
 def test_nearest_image_is_taken() -> None:
     """From -200 degrees joint 6 goes to -210 and not to 150."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     X = forward(arm, np.radians([0, 0, 0, 0, 30, 150]))
 
     best = inverse(arm, X, near=np.radians([0, 0, 0, 0, 30, -200])).best
@@ -212,7 +212,7 @@ def test_base_and_tool_count(rng: np.random.Generator) -> None:
 
     from oracles.arms import random_pose
 
-    arm = attrs.evolve(load_arm("puma560"), base=random_pose(rng), tool=random_pose(rng))
+    arm = attrs.evolve(load_arm("puma560-seed"), base=random_pose(rng), tool=random_pose(rng))
     q = random_postures(arm, rng, 50)
 
     found, _ = inverse_branches(arm, forward(arm, q), q)
@@ -228,7 +228,7 @@ def test_other_arms_are_refused() -> None:
 
 def test_shapes_that_do_not_fit() -> None:
     """Two poses and three starting points are refused, and so are two starting points for one judged pose."""
-    arm = load_arm("puma560")
+    arm = load_arm("puma560-seed")
     with pytest.raises(
         ShapeError, match=r"pose, near: leading axes must fit together, got shapes \(2, 4, 4\) and \(3, 6"
     ):
@@ -240,4 +240,4 @@ def test_shapes_that_do_not_fit() -> None:
 def test_not_a_rotation() -> None:
     """A pose whose rotation part is no rotation is refused."""
     with pytest.raises(InvalidValueError, match="orthonormal"):
-        inverse(load_arm("puma560"), np.diag((1.0, 2.0, 1.0, 1.0)))
+        inverse(load_arm("puma560-seed"), np.diag((1.0, 2.0, 1.0, 1.0)))

@@ -17,9 +17,10 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm, Joint, Link
+from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
-from armwright.kinematics.forward import link_transform, stack
+from armwright.kinematics.forward import link_transform, per_joint, stack
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, add, apply, dot, product
 
@@ -232,3 +233,33 @@ def coriolis_matrix(arm: Arm, q: ArrayLike, qd: ArrayLike) -> Array:
     lead, (q_, qd_), _ = batch(arm, q=q, qd=qd)
     h = speed_coefficients(pose_derivatives(arm, q_))
     return stack_matrix([apply(h_i, qd_) for h_i in h], lead)
+
+
+def pose_derivative_matrices(arm: Arm, q: ArrayLike) -> Array:
+    """Return how the pose of every link changes with every joint: the matrices U_ij of Lagrange-Euler.
+
+    U_ij is the derivative of the homogeneous pose of frame i, seen from the base, by joint position j; 0 for j > i.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+
+    Returns:
+        U: (..., n, n, 4, 4), link i first, then joint j; columns 0-2 [1/rad or 1/m], column 3 [m/rad] or none.
+
+    Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
+        ShapeError: the last axis of ``q`` is not n long.
+        InvalidValueError: a number is NaN or infinite.
+
+    Source:
+        TR-83-008 eq. (5)-(7).
+    """
+    q = positions(arm, q)
+    lead = q.shape[:-1]
+    first = pose_derivatives(arm, per_joint(q)).first
+    U = np.zeros((*lead, arm.n, arm.n, 4, 4))
+    for i, of_link in enumerate(first):
+        for j, matrix in enumerate(of_link):
+            U[..., i, j, :, :] = stack_matrix(matrix, lead)
+    return U

@@ -1,10 +1,11 @@
 """Newton-Euler inverse dynamics: the joint efforts that a motion takes."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from armwright.arm.model import Arm, Joint, Motor
 from armwright.arrays import LARGEST, Array, ArrayLike, exactly
-from armwright.dynamics.arguments import NO_WRENCH, batch
+from armwright.dynamics.arguments import NO_WRENCH, batch, stack_matrix
 from armwright.kinematics.forward import link_frames, link_transform, stack
 from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
@@ -22,6 +23,40 @@ def newton_euler(
     base_acceleration: Sequence[Scalar] = _STILL,
 ) -> list[Scalar]:
     """Return the efforts that the links alone ask of the joints, over abstract scalars.
+
+    Arguments and sources are those of ``joint_wrenches``, of which the efforts are the part along or about each joint.
+    """
+    wrenches = joint_wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
+    return [
+        dot(one.moment if joint.revolute else one.force, one.axis)
+        for joint, one in zip(arm.joints, wrenches, strict=True)
+    ]
+
+
+class JointWrench(NamedTuple):
+    """What link i-1 does to link i, over abstract scalars, along the axes of frame i.
+
+    Attributes:
+        force: f_i [N].
+        moment: n_i, about the origin of frame i-1, on the axis of joint i [N m].
+        axis: of joint i, z of frame i-1.
+    """
+
+    force: Vector
+    moment: Vector
+    axis: Vector
+
+
+def joint_wrenches(
+    arm: Arm,
+    q: Sequence[Scalar],
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    wrench: Sequence[Scalar] = NO_WRENCH,
+    *,
+    base_acceleration: Sequence[Scalar] = _STILL,
+) -> list[JointWrench]:
+    """Return what each link does to the next, over abstract scalars.
 
     Outward, from the base: speeds and accelerations of the links, each in its own frame. Gravity enters as an
     acceleration of the base the other way. Inward, from the hand: forces and moments, and of them the part
@@ -61,15 +96,14 @@ def newton_euler(
         spin = add(apply(inertia, w_dot), cross(w, apply(inertia, w)))
         moments.append(add(spin, cross(add(lever, com), force)))
     f, n = reaction_at_hand(arm, q, wrench)
-    efforts: list[Scalar] = []
+    found: list[JointWrench] = []
     for i in reversed(range(arm.n)):
         # f and n act from link i on what comes after it, at the origin of frame i, seen from frame i.
         n = add(n, cross(levers[i], f), moments[i])
         f = add(f, forces[i])
-        axis = turns[i][2]  # z of frame i-1 seen from frame i
-        efforts.append(dot(n if arm.joints[i].revolute else f, axis))
+        found.append(JointWrench(f, n, turns[i][2]))
         f, n = apply(turns[i], f), apply(turns[i], n)
-    return efforts[::-1]
+    return found[::-1]
 
 
 def felt_acceleration(arm: Arm, base_acceleration: Sequence[Scalar] = _STILL) -> Vector:
@@ -178,3 +212,58 @@ def inverse_dynamics(
             for effort, motor, speed, acceleration in zip(efforts, arm.motors, qd_, qdd_, strict=True)
         ]
     return stack(efforts, lead)
+
+
+class LinkForces(NamedTuple):
+    """What each link bears of the one before it.
+
+    Attributes:
+        force: (..., n, 3) f_i, of link i-1 on link i, along the axes of frame i [N].
+        moment: (..., n, 3) n_i, of link i-1 on link i about the origin of frame i-1, along the axes of frame i [N m].
+    """
+
+    force: Array
+    moment: Array
+
+
+def link_forces(
+    arm: Arm,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+    base_acceleration: ArrayLike = _STILL,
+) -> LinkForces:
+    """Return the forces and moments between the links of an arm in motion: what bearings carry.
+
+    The part of them along (a slide) or about (a turn) the axis of the joint is the effort that ``inverse_dynamics``
+    gives without the drives.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions [rad] or [m].
+        qd: (..., n) joint velocities.
+        qdd: (..., n) joint accelerations.
+        wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along base
+            axes; none when left out.
+        base_acceleration: (3,) acceleration of the base along its own axes [m/s²], as on a vehicle.
+
+    Returns:
+        Forces and moments, (..., n, 3) each.
+
+    Raises:
+        KindError: ``arm`` is no arm, or an array is something else than real numbers.
+        ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
+        InvalidValueError: a number is NaN or infinite.
+        UnsupportedArmError: nothing is known of the mass of some link.
+
+    Source:
+        Luh, Walker & Paul (1980); TR-83-008 eq. (22)-(24).
+    """
+    lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
+    moved = exactly(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
+    found = joint_wrenches(arm, q_, qd_, qdd_, push, base_acceleration=moved)
+    return LinkForces(
+        stack_matrix([one.force for one in found], lead), stack_matrix([one.moment for one in found], lead)
+    )

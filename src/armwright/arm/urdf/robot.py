@@ -159,11 +159,10 @@ def _joint(element: Element, links: dict[str, Element], lock: Mapping[str, float
 def _locked(joint: UrdfJoint, position: float) -> UrdfJoint:
     """Return a joint as one that is held at a position."""
     if position:
-        joint.require_serial()
-        limits = Limits() if joint.fixed else limits_of(joint)[0]
-        inside = math.isfinite(position) and limits.lower <= position <= limits.upper
-        if joint.fixed or not inside:
-            ends = "it does not move" if joint.fixed else f"it goes from {limits.lower:g} to {limits.upper:g}"
+        moves = joint.kind in _MOVING
+        limits = limits_of(joint)[0] if moves else Limits()
+        if not (moves and math.isfinite(position) and limits.lower <= position <= limits.upper):
+            ends = f"it goes from {limits.lower:g} to {limits.upper:g}" if moves else f"it is {joint.kind}"
             raise InvalidValueError(f"lock: joint '{joint.name}' cannot be held at {position:g} (rad or m): {ends}")
     return attrs.evolve(joint, kind="fixed", locked=position)
 

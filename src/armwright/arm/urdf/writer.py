@@ -42,7 +42,9 @@ def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
     parts = [*(joint.name for joint in arm.joints), *(link.name for link in arm.links)]
     for name in (arm.name, arm.base_link, arm.tool_link, *parts):
         if not all(_in_xml(character) for character in name):
-            raise InvalidValueError(f"arm {arm.name!r}: XML cannot hold every character of {name!r}; rename it")
+            raise InvalidValueError(
+                f"arm {arm.name!r}: XML cannot hold every character of this name: {name!r}; give another"
+            )
     return "\n".join(["<?xml version='1.0' encoding='utf-8'?>", *_robot(arm, tilts), ""])
 
 

@@ -1,0 +1,129 @@
+"""The Jacobian of a PUMA in blocks: seen from its forearm, at the centre of its wrist, six of its entries are 0.
+
+    [v]   [A 0] [q1 q2 q3]'
+    [w] = [B C] [q4 q5 q6]'
+
+The first three joints move the wrist centre and the last three do not, so the inverse is that of two blocks of three.
+"""
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arm.positions import known_arm, positions
+from armwright.arrays import Array, ArrayLike
+from armwright.errors import UnsupportedArmError
+from armwright.kinematics.differential import SINGULAR_FACTOR, SingularPostureError
+from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.shoulder import Shoulder
+from armwright.kinematics.singularities import determinant_factors
+
+_FACTORS = ("shoulder", "elbow", "wrist")
+
+
+def wrist_partitioned_jacobian(arm: Arm, q: ArrayLike) -> Array:
+    """Return the Jacobian of the wrist centre along the axes of the forearm.
+
+    The axes are those of frame 3 of a PUMA: z along the axis of joint 4, y along that of joint 3.
+
+    Args:
+        arm: an arm built like the PUMA: its axis of joint 4 in the plane of the arm.
+        q: (..., 6) joint positions [rad].
+
+    Returns:
+        (..., 6, 6): rows 0-2 velocity of the wrist centre [m/s per joint velocity], rows 3-5 angular velocity of the
+        hand. The upper right block is 0.
+
+    Raises:
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
+        UnsupportedArmError: the arm is not built like the PUMA.
+        ShapeError: the last axis of ``q`` is not 6 long.
+        InvalidValueError: a number is NaN or infinite.
+
+    Source:
+        The seed on the differential kinematics of the PUMA, way (b); its J21 has the shoulder's ahead added here.
+    """
+    shoulder = _puma(arm)
+    return np.asarray(_blocks(shoulder, positions(arm, q)) * np.array(shoulder.signs))
+
+
+def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
+    """Return the inverse of the wrist-partitioned Jacobian, block by block; no matrix is inverted.
+
+        [  A^-1           0   ]
+        [ -C^-1 B A^-1   C^-1 ]
+
+    Args:
+        arm: an arm built like the PUMA.
+        q: (..., 6) joint positions [rad].
+
+    Returns:
+        (..., 6, 6): joint velocities per velocity of the wrist centre and angular velocity of the hand, both along
+        the axes of the forearm.
+
+    Raises:
+        SingularPostureError: a factor of the determinant vanishes; it is named.
+        KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
+        UnsupportedArmError: the arm is not built like the PUMA.
+        ShapeError: the last axis of ``q`` is not 6 long.
+        InvalidValueError: a number is NaN or infinite.
+
+    Source:
+        The seed on the differential kinematics of the PUMA, way (b); its inverse is partly illegible and derived anew.
+    """
+    shoulder = _puma(arm)
+    q = positions(arm, q)
+    factors = np.stack(np.broadcast_arrays(*determinant_factors(shoulder, _angles(shoulder, q))), axis=-1)
+    for place in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
+        *which, factor = place
+        raise SingularPostureError(_FACTORS[factor], float(factors[*place]), tuple(which))
+    J = _blocks(shoulder, q)
+    out, plane, bend = factors[..., 0], shoulder.upper * factors[..., 1], factors[..., 2]
+    inverse = np.zeros_like(J)
+    # Joint 1 alone moves the wrist centre out of the plane of the arm, joints 2 and 3 move it in the plane.
+    inverse[..., 0, 1] = 1 / out
+    inverse[..., 1, 0], inverse[..., 1, 2] = J[..., 2, 2] / plane, -J[..., 0, 2] / plane
+    inverse[..., 2, 0], inverse[..., 2, 2] = -J[..., 2, 1] / plane, J[..., 0, 1] / plane
+    in_plane = inverse[..., 1:3, 0:3:2] @ J[..., 0:3:2, :1]
+    inverse[..., 1:3, 1:2] = -in_plane / out[..., None, None]
+    # Joint 4 turns the hand about z, and joints 5 and 6 about what is left.
+    inverse[..., 4, 3], inverse[..., 4, 4] = J[..., 3, 4], J[..., 4, 4]
+    inverse[..., 5, 3], inverse[..., 5, 4] = J[..., 4, 4] / bend, -J[..., 3, 4] / bend
+    inverse[..., 3, 3:5] = -J[..., 5, 5, None] * inverse[..., 5, 3:5]
+    inverse[..., 3, 5] = 1.0
+    inverse[..., 3:, :3] = -inverse[..., 3:, 3:] @ J[..., 3:, :3] @ inverse[..., :3, :3]
+    return np.asarray(inverse * np.array(shoulder.signs)[:, None])
+
+
+def _puma(arm: Arm) -> Shoulder:
+    """Return the build of an arm like the PUMA.
+
+    Raises:
+        UnsupportedArmError: it is another.
+    """
+    shoulder = shoulder_of(known_arm(arm))
+    if shoulder is None or shoulder.family != "puma" or not np.array_equal(shoulder.R_3W, np.eye(3)):
+        raise UnsupportedArmError(
+            f"arm '{arm.name}': no wrist-partitioned Jacobian; expected an arm built like puma560 "
+            "(jacobian takes any arm)"
+        )
+    return shoulder
+
+
+def _angles(shoulder: Shoulder, q: Array) -> list[Array]:
+    return [np.asarray(angle) for angle in shoulder.angles(list(np.moveaxis(q, -1, 0)))]
+
+
+def _blocks(shoulder: Shoulder, q: Array) -> Array:
+    """Return the Jacobian (..., 6, 6) for rates of the angles of the build."""
+    a2, (a3, d4) = shoulder.upper, shoulder.fore
+    _, t2, t3, t4, t5, _ = _angles(shoulder, q)
+    c23, s23 = np.cos(t2 + t3), np.sin(t2 + t3)
+    c4, s4, c5, s5 = np.cos(t4), np.sin(t4), np.cos(t5), np.sin(t5)
+    J = np.zeros((*q.shape[:-1], 6, 6))
+    J[..., 0, 0], J[..., 0, 1], J[..., 0, 2] = -c23 * shoulder.side, a2 * np.sin(t3) + d4, d4
+    J[..., 1, 0] = shoulder.ahead + a2 * np.cos(t2) + a3 * c23 + d4 * s23
+    J[..., 2, 0], J[..., 2, 1], J[..., 2, 2] = -s23 * shoulder.side, -a2 * np.cos(t3) - a3, -a3
+    J[..., 3, 0], J[..., 3, 4], J[..., 3, 5] = -s23, -s4, c4 * s5
+    J[..., 4, 1], J[..., 4, 2], J[..., 4, 4], J[..., 4, 5] = 1.0, 1.0, c4, s4 * s5
+    J[..., 5, 0], J[..., 5, 3], J[..., 5, 5] = c23, 1.0, c5
+    return J
