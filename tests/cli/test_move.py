@@ -23,7 +23,7 @@ def test_joint_move(tmp_path: Path) -> None:
 
     assert done.returncode == 0, done.stderr
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
-    assert "left, down, no-flip -> left, down, no-flip -> left, down, flip" in done.stdout
+    assert "left, down, no-flip -> left, down, no-flip -> left, down, flip" in " ".join(done.stdout.split())
     assert "line 10: the rotation of pose A is none, by 0.00096; the nearest is taken" in done.stderr
     assert "the limits would hold 5.81 times slower, for the acceleration of joint 2: --keep-limits" in done.stderr
     rows = np.loadtxt(tmp_path / "out" / "motion.csv", delimiter=",", skiprows=1)
