@@ -49,7 +49,16 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
     assert "it does just what base.rz does" in done.stdout
     files = {path.name for path in (tmp_path / "out").iterdir()}
     tables = {"dh_standard.csv", "dh_modified.csv", "dh_hayati.csv"}
-    assert files == {"arm.toml", "arm.urdf", "errors.json", "report.html", "residuals.svg", "distances.svg", *tables}
+    assert files == {
+        "arm.toml",
+        "arm.urdf",
+        "errors.json",
+        "report.html",
+        "residuals.svg",
+        "distances.svg",
+        "run.json",
+        *tables,
+    }
     rows = np.loadtxt(measured, delimiter=",", skiprows=1)
     better = load_arm(tmp_path / "out" / "arm.toml")
     off = np.linalg.norm(forward(better, np.radians(rows[:, :6]))[:, :3, 3] * 1e3 - rows[:, 6:], axis=1)

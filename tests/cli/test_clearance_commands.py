@@ -157,7 +157,7 @@ def test_correct(tmp_path: Path) -> None:
     assert np.mean(found["before"]) == pytest.approx(0.559e-3, rel=0.01)
     assert np.mean(found["after"]) < 1e-6
     assert len(found["mean errors"]) == 3
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"path.csv", "summary.json", "paths.svg"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"path.csv", "summary.json", "paths.svg", "run.json"}
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == found
     table = np.genfromtxt(tmp_path / "out" / "path.csv", delimiter=",", names=True)
     np.testing.assert_allclose([table["x_mm"][0], table["y_mm"][0]], np.array(found["nodes"][0]) * 1e3, rtol=1e-8)

@@ -41,7 +41,7 @@ def test_corrected_for_the_estimate(estimate: Path, tmp_path: Path) -> None:
     told = json.loads(done.stdout)
     means = {name: one["mean"] for name, one in ESTIMATE["parameters"].items()}  # type: ignore[attr-defined]
     assert told["clearances"] == pytest.approx(means, abs=DRAWN)
-    assert {file.name for file in folder.iterdir()} == {"path.csv", "summary.json", "paths.svg"}
+    assert {file.name for file in folder.iterdir()} == {"path.csv", "summary.json", "paths.svg", "run.json"}
 
 
 def test_no_path_for_a_contradiction(estimate: Path) -> None:

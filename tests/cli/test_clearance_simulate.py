@@ -10,7 +10,7 @@ from cli_calls import armwright
 
 FILES = {
     "report.html", "samples.csv", "summary.json", "path.svg", "bearings.svg", "error.svg", "spectrum.svg", "forces.svg",
-    "energy.svg", "workspace.svg",
+    "energy.svg", "workspace.svg", "run.json",
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from cli_calls import armwright
 EXAMPLES = Path(__file__).parents[2] / "examples"
 POSES = EXAMPLES / "puma_poses.toml"
 POST = EXAMPLES / "round_the_post.toml"
-FILES = {"motion.csv", "move.json", "report.html", "joints.svg", "hand.svg", "path.svg"}
+FILES = {"motion.csv", "move.json", "report.html", "joints.svg", "hand.svg", "path.svg", "run.json"}
 
 
 def test_joint_move(tmp_path: Path) -> None:

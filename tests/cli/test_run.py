@@ -18,6 +18,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.files.output import strays
 from cli_calls import armwright
 
 ROOT = Path(__file__).parents[2]
@@ -94,7 +95,7 @@ def test_run_file(stacked: Path) -> None:
     assert run["inputs"]["program"]["sha256"] == hashlib.sha256(STACKING.read_bytes()).hexdigest()
     assert run["inputs"]["cell"]["sha256"] == hashlib.sha256(STANFORD.read_bytes()).hexdigest()
     assert run["options"] == {"servo_ms": 1.0, "deviation_mm": 1.0, "around": "none", "std": "2", "strict": False}
-    assert run["seed"] == 0
+    assert (run["ended"], run["exit_status"], run["left_out"]) == ("finished", 0, [])
     assert run["command"].startswith("armwright run ")
     assert [stage["kind"] for stage in run["stages"]] == ["PTP"] * 3
     assert run["diagnostics"][0]["code"] == "L301"
@@ -224,7 +225,7 @@ def test_wrong_program(tmp_path: Path) -> None:
 
 
 def test_unreachable_goal(tmp_path: Path) -> None:
-    """A goal too far away: which frame, how far out in mm, where the frames were; nothing is written."""
+    """A goal too far away: which frame, how far out in mm, where the frames were, and the page up to there."""
     program = tmp_path / "far.rlo"
     lines = ["VAR far : FRAME ;", "BEGIN", "  far = (1,0,0,0,-1,0,0,0,-1,3,0,0.2) ;", "  MOVE ARM_1 TO far ;", "END."]
     program.write_text("\n".join(lines))
@@ -235,7 +236,8 @@ def test_unreachable_goal(tmp_path: Path) -> None:
     assert "--> far.rlo:4:" in said
     assert "joint 3 would stand at 2996.5 mm, 1878.9 mm beyond its limit 1117.6 mm" in said
     assert "frames at 0.000 s" in said
-    assert not (tmp_path / "out").exists()
+    assert f"report up to the failure: {tmp_path / 'out' / 'report.html'}\n" in said
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
 
 
 def test_effort_over_the_limit(tmp_path: Path) -> None:
@@ -389,3 +391,101 @@ def test_report_in_a_browser(stacked: Path, browser: Any) -> None:
     with (stacked / "motion.csv").open(newline="") as file:
         rows = list(csv.reader(file))[1:]
     np.testing.assert_allclose(later["q"], [float(x) for x in rows[2200][2:8]], atol=0.02)
+
+
+ENDS = {
+    "E402": ("MOVE ARM_1 TO far", "MOVE ARM_1 TO far", ()),
+    "E506": ("PAUSE 100", "PAUSE 100", ("--max-time", "3")),
+    "E504": ("WHILE n > 0 DO n = 1", "n > 0", ("--max-steps", "1000")),
+    "E501": ("IF n < 0 THEN SIGNAL never ; WAIT never", "WAIT never", ()),
+}
+
+
+@pytest.mark.parametrize("code", ENDS)
+def test_a_failed_run_shows_itself(code: str, tmp_path: Path) -> None:
+    """A run that fails leaves all up to the failure in place of older results: page, events, motion, and why."""
+    statement, at, options = ENDS[code]
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    places = "near = (1,0,0,0,-1,0,0,0,-1,0.45,0.1,0.25) ; far = (1,0,0,0,-1,0,0,0,-1,3,0,0.2) ;"
+    names = "VAR near, far : FRAME ; n : SCALAR ; never : EVENT ;"
+    call = ("run", program, "--cell", STANFORD, "-o", out)
+    program.write_text(f"{names} BEGIN {places} n = 1 ; MOVE ARM_1 TO near ; PAUSE 3 ; END.")
+    assert armwright(*call).returncode == 0
+    (out / "mine.txt").write_text("mine")
+    old = (out / "motion.csv").read_text()
+
+    program.write_text(f"{names}\nBEGIN {places} n = 1 ;\nMOVE ARM_1 TO near ;\n{statement} ;\nEND.")
+    said = fails(*call, *options, status=3)
+
+    run = json.loads((out / "run.json").read_text())
+    assert (run["ended"], run["exit_status"], run["error"]["code"], run["error"]["line"]) == ("failed", 3, code, 4)
+    assert run["error"]["statement"] == at
+    assert run["error"]["arm"] == (None if code == "E501" else "ARM_1")
+    last = json.loads((out / "events.jsonl").read_text().splitlines()[-1])
+    assert (last["kind"], last["code"], last["line"]) == ("ERROR", code, 4)
+    rows = (out / "motion.csv").read_text().splitlines()
+    assert rows[:300] == old.splitlines()[:300]
+    assert float(rows[-1].split(",")[0]) == pytest.approx(run["duration"])
+    page = (out / "report.html").read_text()
+    assert ": failed</title>" in page
+    assert f"failed: {code} at " in page
+    assert f"report up to the failure: {out / 'report.html'}\n" in said
+    assert (out / "mine.txt").exists()
+    assert not strays(out)
+
+
+def test_a_program_with_errors_leaves_old_results(tmp_path: Path) -> None:
+    """A program that is not translated does not run, and the results of the last one stay."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text("BEGIN PAUSE 0.1 ; END.")
+    assert armwright("run", program, "--cell", STANFORD, "-o", out).returncode == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    program.write_text("BEGIN PAUSE")
+    fails("run", program, "--cell", STANFORD, "-o", out, status=1)
+
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_a_long_stream(tmp_path: Path) -> None:
+    """A stream that is too long is cut, and terminal, page and record say where and what keeps it all."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text("BEGIN PAUSE 2 ; END.")
+
+    done = armwright("run", program, "--cell", STANFORD, "-o", out, "--motion-rows", "500", "-q")
+
+    said = "motion.csv holds the first 0.500 s of 2.000 s: 500 of 2001 rows; `--motion-rows 2001` keeps all"
+    assert done.returncode == 0
+    assert done.stderr == f"armwright: {said}\n"
+    assert json.loads((out / "run.json").read_text())["left_out"] == [said]
+    assert said in (out / "report.html").read_text()
+    assert len((out / "motion.csv").read_text().splitlines()) == 501
+    armwright("run", program, "--cell", STANFORD, "-o", out, "--motion-rows", "2001")
+    assert len((out / "motion.csv").read_text().splitlines()) == 2002
+
+
+def test_a_long_stream_of_a_failure(tmp_path: Path) -> None:
+    """Of a run that failed the stream is kept up to the failure."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text(
+        "VAR never : EVENT ; n : SCALAR ; BEGIN n = 1 ; PAUSE 2 ; IF n < 0 THEN SIGNAL never ; WAIT never ; END."
+    )
+
+    fails("run", program, "--cell", STANFORD, "-o", out, "--motion-rows", "500", status=3)
+
+    rows = (out / "motion.csv").read_text().splitlines()
+    assert (len(rows), float(rows[1].split(",")[0]), float(rows[-1].split(",")[0])) == (501, 1.501, 2.0)
+
+
+def test_a_page_of_many_lines(tmp_path: Path) -> None:
+    """A page shows the first and the last of very many lines, and says so; the events are all there."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text('VAR i : SCALAR ; BEGIN FOR i = 1 TO 20000 DO PRINT ("again") ; END.')
+
+    done = armwright("run", program, "--cell", STANFORD, "-o", out, "-q")
+
+    assert done.returncode == 0, done
+    assert len((out / "events.jsonl").read_text().splitlines()) > 20000
+    page = (out / "report.html").read_text()
+    assert "this page shows the first and the last 2000 of " in page
+    assert len(page) < 1_500_000

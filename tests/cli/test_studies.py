@@ -20,7 +20,7 @@ def test_study_writes_its_figures(tmp_path: Path) -> None:
     assert first.returncode == 0
     assert "6.47" in first.stdout
     names = {f"figure{number:02d}.svg" for number in range(3, 12)}
-    assert {path.name for path in (tmp_path / "a").iterdir()} == names | {"tables.json"}
+    assert {path.name for path in (tmp_path / "a").iterdir()} == names | {"tables.json", "run.json"}
     for name in names:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
         assert ET.parse(tmp_path / "a" / name).getroot().tag.endswith("svg")
@@ -41,7 +41,11 @@ def test_moves_of_the_puma(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     numbers = (5, 6, 7, 10, 16, 17, 18, 19, 22, 23)
     names = {f"figure{number:02d}.svg" for number in numbers}
-    assert {path.name for path in tmp_path.iterdir()} - {"figure25.mp4"} == names | {"figure25.gif", "tables.json"}
+    assert {path.name for path in tmp_path.iterdir()} - {"figure25.mp4"} == names | {
+        "figure25.gif",
+        "tables.json",
+        "run.json",
+    }
     for name in names:
         assert ET.parse(tmp_path / name).getroot().tag.endswith("svg")
     tables = json.loads((tmp_path / "tables.json").read_text())

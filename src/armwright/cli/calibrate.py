@@ -10,6 +10,7 @@ from armwright.cli.numbers import units_of
 from armwright.cli.options import Json, Quiet
 from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
+from armwright.cli.results import write_results
 
 if TYPE_CHECKING:
     from armwright.report.calibrated import Calibrated
@@ -47,7 +48,6 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.arm.load import load_arm
     from armwright.arrays import one_core
     from armwright.calibration.measurements import read_measurements
-    from armwright.files.output import write_folder
     from armwright.report.calibrated import as_data, calibrated
     from armwright.report.calibrated_files import calibrated_files
 
@@ -57,7 +57,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
         found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, progress=told)
     if output is not None:
         title = f"{model.name}, {measured.name}"
-        write_folder(output, calibrated_files(found, title=title, command=command_line()))
+        write_results(output, calibrated_files(found, title=title, command=command_line()))
     if as_json:
         print_json(as_data(found))
     elif not quiet:

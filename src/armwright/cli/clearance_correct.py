@@ -8,6 +8,7 @@ import typer
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
 from armwright.cli.printing import json_text, plain_console, print_json, print_table, table
+from armwright.cli.results import write_results
 
 if TYPE_CHECKING:
     from armwright.arrays import Array
@@ -52,7 +53,6 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.clearance.correcting import correct_nodes, correct_path
     from armwright.clearance.paths import PICK_AND_PLACE, PickAndPlace, named_path
     from armwright.clearance.reader import load_linkage
-    from armwright.files.output import write_folder
 
     model = with_clearances(load_linkage(linkage), clearance or [])
     settings = settings_of(friction_velocity, threshold_mm_s)
@@ -71,7 +71,7 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     summary = _summary(model, path, found, clearances)
     summary["predictable_until"] = _predictable_until(model, found, summary, settings)
     if output is not None:
-        write_folder(output, _files(model, path, found, summary, settings))
+        write_results(output, _files(model, path, found, summary, settings))
     if as_json:
         print_json(summary)
     elif not quiet:

@@ -10,6 +10,7 @@ from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, set
 from armwright.cli.options import JsonSummary, Quiet
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
+from armwright.cli.results import write_results
 
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
@@ -77,7 +78,6 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --turns 2 --start centred --step 2e-6`
     """
     from armwright.clearance.reader import load_linkage
-    from armwright.files.output import write_folder
     from armwright.report.rattling import Run, summary
 
     model = with_clearances(load_linkage(linkage), clearance or [], clearance_mm)
@@ -98,7 +98,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     told = {"command": command_line(), **summary(run)}
     text = json_text(told)
     if output is not None:
-        write_folder(output, _files(run, text))
+        write_results(output, _files(run, text))
     if as_json:
         print_json(told)
     elif not quiet:

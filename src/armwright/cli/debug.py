@@ -100,7 +100,7 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
     """
     from armwright.files.output import write_folder
     from armwright.program.running.interpret import warnings
-    from armwright.report.files import Origin, result_files
+    from armwright.report.files import Origin, result_files, run_record
 
     assert launch.output is not None  # noqa: S101 - asked for only then
     origin = Origin(
@@ -108,9 +108,9 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
         cell=launch.cell,
         imports=loaded.imports,
         command="armwright debug",
-        seed=0,
         options={"std": launch.std.value},
     )
     diagnostics = (*loaded.diagnostics, *warnings(recording))
-    write_folder(launch.output, result_files(recording, loaded.code, diagnostics, origin))
+    made = (recording, loaded.code, diagnostics, origin)
+    write_folder(launch.output, result_files(*made), run_record(*made))
     return f"report: {launch.output / 'report.html'}"

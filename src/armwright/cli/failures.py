@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from armwright.cli.printing import print_json
+from armwright.cli.results import WRITTEN
 from armwright.cli.terminal import cleaned
 from armwright.errors import ArmwrightError, CheckFailedError, ExitStatus, FileFormatError
 
@@ -130,7 +131,9 @@ def _judged(error: BaseException) -> tuple[int, str]:
             return ExitStatus.USAGE, error.format_message()  # type: ignore[attr-defined]
         case Interrupted():
             # A command that leaves something behind says so in a note.
-            notes = getattr(error, "__notes__", ["nothing was written"])
+            written = ", ".join(f"'{folder}'" for folder in WRITTEN)
+            said = f"the results are written: {written}" if written else "nothing was written"
+            notes = getattr(error, "__notes__", [said])
             return 128 + error.number, "; ".join(["interrupted", *notes])
         case OSError():
             return ExitStatus.FILE, f"cannot read or write '{error.filename}': {error.strerror or error}"

@@ -8,6 +8,7 @@ import typer
 from armwright.cli.numbers import Named, named_number
 from armwright.cli.options import Json, Quiet
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table
+from armwright.cli.results import write_results
 from armwright.errors import CheckFailedError
 
 if TYPE_CHECKING:
@@ -48,12 +49,10 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
-    from armwright.files.output import write_folder
-
     found = _assessed(files, few=few, band_mm=band_mm, corners_mm=corners_mm, limits=limit or [])
     plain = _plain(found)
     if output is not None:
-        write_folder(output, _files(found, files, plain))
+        write_results(output, _files(found, files, plain))
     if as_json:
         print_json(plain)
     elif not quiet:

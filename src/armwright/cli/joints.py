@@ -44,9 +44,11 @@ def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
 
     import numpy as np
 
+    from armwright.cli.results import warn_of_stray
     from armwright.errors import FileFormatError
     from armwright.files.rows import number_in_cell, of_one_width, read_rows
 
+    warn_of_stray(path)
     head, below = read_rows(path)
     header = head.cells
     wanted = [f"{quantity}{i + 1}" for quantity in quantities for i in range(arm.n)]

@@ -11,6 +11,7 @@ from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, QuietButWarnings
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
 from armwright.cli.progress import counting
+from armwright.cli.results import write_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -92,7 +93,6 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright move joint puma560 examples/puma_poses.toml -o out/joint`
     """
-    from armwright.files.output import write_folder
     from armwright.motion.limit_use import limit_use, slowing_for_limits
 
     _check_options(kind, orientation=orientation, deviation_mm=deviation_mm, around=around, servo_ms=servo_ms)
@@ -109,7 +109,9 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
         print(f"armwright: {poses}: {note}", file=sys.stderr)
     uses = limit_use(planned.arm, planned.trajectory)
     if output is not None:
-        write_folder(output, _files(_moved(planned, file, poses, servo_ms * 1e-3, notes), uses, film=film, quiet=quiet))
+        write_results(
+            output, _files(_moved(planned, file, poses, servo_ms * 1e-3, notes), uses, film=film, quiet=quiet)
+        )
     if as_json:
         print_json(_summary(planned, file, uses))
     elif not quiet:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
+from armwright.errors import ExitStatus
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -121,12 +122,28 @@ def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, 
         print(render(diagnostics, source), end="", file=sys.stderr if to_errors else sys.stdout)
 
 
+def error_data(diagnostics: "Iterable[Diagnostic]", source: "Source") -> dict[str, Any]:
+    """Return the first error of a program, with its exit status, as errors are told under ``--json``."""
+    first = next((one for one in diagnostics if one.is_error), None)
+    if first is None:
+        return {"exit_status": int(ExitStatus.DONE)}
+    error = {
+        "class": "ProgramError",
+        "code": first.code,
+        "message": first.message,
+        "file": source.name,
+        "line": source.line(first.span.start),
+    }
+    return {"exit_status": int(ExitStatus.PROGRAM_ERRORS), "error": error}
+
+
 def diagnostics_data(compiled: "Compilation") -> dict[str, Any]:
     """Return what is wrong with a program as plain data."""
     from armwright.program.messages.diagnostics import to_json
 
     errors = sum(one.is_error for one in compiled.diagnostics)
     return {
+        **error_data(compiled.diagnostics, compiled.source),
         "program": compiled.source.name,
         "errors": errors,
         "warnings": len(compiled.diagnostics) - errors,

@@ -167,7 +167,7 @@ class Commands:
         from armwright.cli.programs import imported_files, in_its_cell
         from armwright.files.output import write_folder
         from armwright.program.running.interpret import interpret, warnings
-        from armwright.report.files import Origin, result_files
+        from armwright.report.files import Origin, result_files, run_record
 
         folder, session = _path(argument), self._session
         program = folder / _PROGRAM
@@ -183,10 +183,11 @@ class Commands:
             cell=self._cell,
             imports=imported_files(program, compiled),
             command=shlex.join(command),
-            seed=0,
             options={"std": session.std.value},
         )
-        write_folder(folder, result_files(recording, compiled.code, diagnostics, origin))
+        made = (recording, compiled.code, diagnostics, origin)
+        text = program.read_text(encoding="utf-8")
+        write_folder(folder, {_PROGRAM: text, **result_files(*made)}, run_record(*made))
         return Reply(lines=(f"report: {folder / 'report.html'}",))
 
 

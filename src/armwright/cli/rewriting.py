@@ -52,7 +52,4 @@ def write_back(path: Path, text: str) -> None:
     """
     from armwright.files.output import write_file
 
-    file = path.resolve()
-    mode = file.stat().st_mode
-    write_file(file, text)
-    file.chmod(mode)
+    write_file(path, text)

@@ -1,6 +1,7 @@
 """``armwright run``: a program moves an arm, and the user sees what happened."""
 
 import enum
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from armwright.program.messages.diagnostics import Diagnostic
     from armwright.program.running.interpret import Limits, RunError
     from armwright.program.running.recording import Recording, RunStage
+    from armwright.report.files import Origin
 
 
 class Around(enum.StrEnum):
@@ -64,7 +66,9 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     max_time: Annotated[
         float, typer.Option(min=0.0, help="End a program that runs so long on the cell's clock, in s.")
     ] = 3600.0,
-    seed: Annotated[int, typer.Option(help="Recorded in run.json; this simulator draws no random numbers.")] = 0,
+    most_rows: Annotated[
+        int, typer.Option("--motion-rows", min=2, help="Rows that motion.csv may have; what is left out is said.")
+    ] = 1_000_000,
     as_json: JsonSummary = False,
     quiet: QuietButWarnings = False,
 ) -> None:
@@ -77,43 +81,87 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
-    from armwright.cli.programs import print_diagnostics
     from armwright.errors import FileFormatError
-    from armwright.files.output import write_folder
-    from armwright.program.running.interpret import Limits, RunError, warnings
-    from armwright.report.files import Origin, result_files, summary
+    from armwright.program.running.interpret import Limits, RunError
+    from armwright.report.files import Origin
 
     given = given_cell(cell)
     code, place, said, imports = _translated(program, given, strict=strict, std=std, as_json=as_json)
     place = _adjusted(place, servo_ms, deviation_mm, around)
     limits = Limits(steps=max_steps, time=max_time)
+    error: RunError | None = None
     try:
         recording = _interpret(code, place, limits, watched=not (quiet or as_json))
-    except RunError as error:
-        _fail(code.source, [*said, error.diagnostic], error, code, as_json=as_json)
-    except (AssertionError, LookupError, TypeError, ValueError) as error:
+    except RunError as stopped:
+        if stopped.recording is None:
+            raise
+        error, recording = stopped, stopped.recording()
+    except (AssertionError, LookupError, TypeError, ValueError) as wrong:
         if program.suffix != CODE_SUFFIX:
             raise
         text = "its instructions do not fit together: no program is translated to such code"
-        raise FileFormatError(program, None, "", text) from error
-    diagnostics = (*said, *warnings(recording))
+        raise FileFormatError(program, None, "", text) from wrong
+    options = {
+        "servo_ms": place.period * 1e3,
+        "deviation_mm": place.deviation * 1e3,
+        "around": place.around or Around.NONE.value,
+        "std": std.value,
+        "strict": strict,
+    }
+    origin = Origin(
+        program=program,
+        cell=cell,
+        imports=imports,
+        command=command_line(),
+        options=options,
+        motion_rows=most_rows,
+    )
+    _finish(recording, code, said, origin, output, error, as_json=as_json, quiet=quiet)
+
+
+def _finish(  # noqa: PLR0917 - what there is to say, and how
+    recording: "Recording",
+    code: "Code",
+    said: "Sequence[Diagnostic]",
+    origin: "Origin",
+    output: Path | None,
+    error: "RunError | None",
+    *,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Write what a run has left, also one that failed, and say how it went."""
+    from armwright.cli.programs import print_diagnostics
+    from armwright.cli.results import write_results
+    from armwright.program.running.interpret import warnings
+    from armwright.report.files import ending, left_out, result_files, run_record, summary
+
+    failed = () if error is None else (error.diagnostic,)
+    diagnostics = (*said, *warnings(recording), *failed)
+    notes = left_out(recording, origin.motion_rows) if output is not None else ()
     if output is not None:
-        options = {
-            "servo_ms": place.period * 1e3,
-            "deviation_mm": place.deviation * 1e3,
-            "around": place.around or Around.NONE.value,
-            "std": std.value,
-            "strict": strict,
-        }
-        origin = Origin(program=program, cell=cell, imports=imports, command=command_line(), seed=seed, options=options)
-        write_folder(output, result_files(recording, code, diagnostics, origin))
-    if diagnostics and not as_json:
-        print_diagnostics(diagnostics, code.source)
+        made = (recording, code, diagnostics, origin)
+        write_results(output, result_files(*made), run_record(*made))
     if as_json:
         where = {"output": str(output)} if output else {}
-        print_json({**summary(recording, code, diagnostics), **where})
-    elif not quiet:
-        _print_summary(recording, code, output)
+        frames = {"time": error.time, "frames": _places(error)} if error else {}
+        print_json(
+            {**ending(recording, code), **summary(recording, code, diagnostics), **where, "left_out": notes, **frames}
+        )
+    else:
+        if diagnostics:
+            print_diagnostics(diagnostics, code.source)
+        for note in notes:
+            print(f"armwright: {note}", file=sys.stderr)
+        if error is not None:
+            _print_moment(error, code)
+        elif not quiet:
+            _print_summary(recording, code)
+        if output is not None and (error is not None or not quiet):
+            # On a line of its own and never wrapped, so that it can be clicked or copied.
+            print(f"report{' up to the failure' if error else ''}: {output / 'report.html'}")
+    if error is not None:
+        raise typer.Exit(error.exit_status)
 
 
 def _translated(
@@ -130,7 +178,7 @@ def _translated(
         return assemble(read_program(program), str(program)), given, (), ()
     compiled, place = in_its_cell(program, given, strict=strict, std=std)
     if compiled.code is None:
-        _fail(compiled.source, compiled.diagnostics, as_json=as_json)
+        _refuse(compiled.source, compiled.diagnostics, as_json=as_json)
     if place is None:
         _no_cell(program)
     return compiled.code, place, compiled.diagnostics, imported_files(program, compiled)
@@ -172,27 +220,17 @@ def _interpret(code: "Code", place: "Cell", limits: "Limits", *, watched: bool) 
         return interpret(code, place, simulator, show, limits=limits)
 
 
-def _fail(
-    source: "Source",
-    diagnostics: "Sequence[Diagnostic]",
-    error: "RunError | None" = None,
-    code: "Code | None" = None,
-    *,
-    as_json: bool,
-) -> NoReturn:
-    """Say why a program did not run, or did not run to its end, and stop."""
-    from armwright.cli.programs import print_diagnostics
+def _refuse(source: "Source", diagnostics: "Sequence[Diagnostic]", *, as_json: bool) -> NoReturn:
+    """Say why a program cannot run, and stop."""
+    from armwright.cli.programs import error_data, print_diagnostics
     from armwright.program.messages.diagnostics import to_json
 
     if as_json:
-        data = {"program": source.name, "diagnostics": [to_json(one, source) for one in diagnostics]}
-        moment = {"time": error.time, "frames": _places(error)} if error else {}
-        print_json({**data, **moment})
+        said = {"program": source.name, "diagnostics": [to_json(one, source) for one in diagnostics]}
+        print_json({**error_data(diagnostics, source), **said})
     else:
         print_diagnostics(diagnostics, source)
-        if error and code:
-            _print_moment(error, code)
-    raise typer.Exit(ExitStatus.PROGRAM_ERRORS if error is None else error.exit_status)
+    raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
 
 
 def _places(error: "RunError") -> dict[str, list[float] | None]:
@@ -201,7 +239,7 @@ def _places(error: "RunError") -> dict[str, list[float] | None]:
     return {name: tree.world(name)[:3, 3].tolist() if tree.has_value(name) else None for name in tree}
 
 
-def _print_summary(recording: "Recording", code: "Code", output: Path | None) -> None:
+def _print_summary(recording: "Recording", code: "Code") -> None:
     console = plain_console()
     print_table(console, _trace_table(recording, code))
     if recording.stages:
@@ -215,9 +253,6 @@ def _print_summary(recording: "Recording", code: "Code", output: Path | None) ->
         f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {moves} moves, "
         f"{len(recording.stages)} stages, {len(recording.streams[0].t) if recording.streams else 0} servo ticks"
     )
-    if output is not None:
-        # On a line of its own and never wrapped, so that it can be clicked or copied.
-        print(f"report: {output / 'report.html'}")
 
 
 def _trace_table(recording: "Recording", code: "Code") -> "Table":

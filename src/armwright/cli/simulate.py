@@ -10,6 +10,7 @@ from armwright.cli.load import Load
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json
 from armwright.cli.printing import print_json
+from armwright.cli.results import write_results
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -57,7 +58,6 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.dynamics.integrators import Adaptive, Gill
     from armwright.dynamics.payload import payload
     from armwright.dynamics.simulate import simulate as run
-    from armwright.files.output import write_folder
     from armwright.report.motion_table import motion_csv
 
     model = load_arm(arm)
@@ -75,7 +75,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         period=step_ms * 1e-3,
     )
     if output is not None:
-        write_folder(output, {"motion.csv": motion_csv(found.t, found.q, found.qd, found.qdd, found.tau)})
+        write_results(output, {"motion.csv": motion_csv(found.t, found.q, found.qd, found.qdd, found.tau)})
     if as_json:
         print_json({"status": found.status.name.lower(), "t": float(found.t[-1]), **_account(found)})
     else:

@@ -8,6 +8,7 @@ import typer
 
 from armwright.cli.printing import json_text, plain_console, print_json, print_table
 from armwright.cli.progress import waiting
+from armwright.cli.results import write_results
 
 # By name: the module next to this one that runs, prints and draws it.
 _STUDIES = {
@@ -49,7 +50,6 @@ def study(
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """
     from armwright.errors import UnknownNameError
-    from armwright.files.output import write_folder
 
     if name not in _STUDIES:
         raise UnknownNameError("study", name, _STUDIES)
@@ -57,7 +57,7 @@ def study(
     with waiting(name, quiet=name in _WITH_BARS):
         tables = chosen.tables()
     if output is not None:
-        write_folder(output, {"tables.json": json_text(tables) + "\n", **chosen.figures()})
+        write_results(output, {"tables.json": json_text(tables) + "\n", **chosen.figures()})
     if as_json:
         print_json(tables)
         return

@@ -1,67 +1,118 @@
-"""Writing results: a folder gets all of its files or none, a file all of its text or none."""
+"""Writing results: a folder gets all of its files or none, a file all of its text or none.
+
+The files are made in a staging folder and moved in when all are whole. What a folder of results holds stands in its
+``run.json``, with the SHA-256 hash of every file. It is moved in last: where a process was killed between two moves,
+the hashes tell which files are not of the run that the folder speaks of.
+"""
 
 import contextlib
+import fcntl
+import hashlib
+import json
 import os
-import tempfile
-from collections.abc import Iterable, Mapping
+import stat
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any, TypeAlias
 
 from armwright.errors import OutputError
+from armwright.files.staging import PREFIX, signals_held, staging
+
+Content: TypeAlias = str | bytes | Iterable[str]
+
+# What a folder holds, and the word by which it is known for one of armwright's.
+RECORD = "run.json"
+FORMAT = "armwright results 1"
+# A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
+_LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20
 
 
-def write_folder(folder: Path, files: Mapping[str, str | bytes | Iterable[str]]) -> None:
-    """Write files into a folder, all of them or none.
+def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str, Any] | None = None) -> None:
+    """Write files into a folder, all of them or none, in place of the results that were there.
 
-    They are written beside the folder first and moved in when all are whole, so an error, a full disk or an
-    interruption leaves what was there before. Other files in the folder stay.
+    They are made beside the folder, or in it where it is a mount point or where nothing can be made beside it, and
+    moved in when all are whole; signals wait meanwhile. An error, a full disk or an interruption leaves what was there
+    before. Files of older results that are not written anew go; other files in the folder stay.
 
     Args:
         folder: made where it is missing, with its parents.
         files: by name: the text, or pieces of it that are written as they come; or bytes.
+        record: what ``run.json`` says beside the hashes of the files.
 
     Raises:
         OutputError: the folder or a file cannot be written; the text says which and why.
     """
-    folder = folder.absolute()
+    folder = _resolved(folder)
     made = _make_parents(folder)
+    left: dict[str, str] = {}
+    moved = False
     try:
-        with tempfile.TemporaryDirectory(prefix=".armwright-", dir=folder.parent) as beside:
-            for name, text in files.items():
-                _write(Path(beside) / name, text)
-            folder.mkdir(exist_ok=True)
-            _refuse_what_cannot_be_replaced(folder, files)
-            for name in files:
-                (Path(beside) / name).replace(folder / name)
+        with staging(_staged_in(folder), folder, lambda dead: left.update(_recorded(dead))) as new:
+            hashes = {name: _write(new / name, content) for name, content in files.items()}
+            said = {"format": FORMAT, **(record or {}), "files": hashes}
+            _write(new / RECORD, json.dumps(said, indent=2, ensure_ascii=False) + "\n")
+            with signals_held():
+                _replace(folder, new, [*files, RECORD], left)
+                moved = True
     except OSError as error:
         _remove(made)
         raise OutputError(f"cannot write to '{folder}': {reason(error, folder)}; nothing was written") from error
-    except BaseException:
-        _remove(made)
+    except BaseException as error:
+        if moved:
+            error.add_note(f"the results are written: '{folder}'")
+        else:
+            _remove(made)
         raise
 
 
 def write_file(path: Path, text: str | Iterable[str]) -> None:
-    """Write one file, or leave what was there before.
+    """Write one file, or leave what was there before. A link stays one, and so does who may read the file.
 
     Args:
-        path: its folder is made where it is missing, with its parents.
+        path: its folder is made where it is missing, with its parents. A device or a pipe is written to as it is.
         text: or pieces of it that are written as they come.
 
     Raises:
         OutputError: it cannot be written; the text says why.
     """
-    path = path.absolute()
+    path = _resolved(path)
     made = _make_parents(path)
     try:
-        with tempfile.TemporaryDirectory(prefix=".armwright-", dir=path.parent) as beside:
-            _write(Path(beside) / path.name, text)
-            (Path(beside) / path.name).replace(path)
+        mode = path.stat().st_mode if path.exists() else None
+        if mode is not None and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as stream:
+                stream.writelines([text] if isinstance(text, str) else text)
+            return
+        with staging(path.parent, path) as new:
+            _write(new / path.name, text)
+            if mode is not None:
+                (new / path.name).chmod(stat.S_IMODE(mode))
+            with signals_held():
+                (new / path.name).replace(path)
     except OSError as error:
         _remove(made)
         raise OutputError(f"cannot write '{path}': {error.strerror or error}; nothing was written") from error
     except BaseException:
         _remove(made)
         raise
+
+
+def strays(folder: Path) -> tuple[str, ...]:
+    """Return the files that do not belong to the results of a folder: changed, missing, or of another run.
+
+    Args:
+        folder: of results.
+
+    Returns:
+        Their names, sorted; empty where all is as it was written, or where the folder holds no results of armwright.
+    """
+    return tuple(sorted(name for name, digest in _recorded(folder).items() if _hash(folder / name) != digest))
+
+
+def is_stray(path: Path) -> bool:
+    """Whether a file stands in a folder of results, and is not what the run of that folder has written."""
+    digest = _recorded(path.parent).get(path.name)
+    return digest is not None and _hash(path) != digest
 
 
 def reason(error: OSError, folder: Path) -> str:
@@ -72,17 +123,114 @@ def reason(error: OSError, folder: Path) -> str:
     return error.strerror or str(error)
 
 
-def _write(path: Path, text: str | bytes | Iterable[str]) -> None:
-    if isinstance(text, bytes):
-        with path.open("wb") as binary:
-            binary.write(text)
-            binary.flush()
-            os.fsync(binary.fileno())
+def _staged_in(folder: Path) -> Path:
+    """Return where results are staged: beside their folder, or in it where they could not be moved from there."""
+    parent = folder.parent
+    if not folder.is_dir():
+        return parent
+    movable = not folder.is_mount() and folder.stat().st_dev == parent.stat().st_dev
+    return parent if movable and os.access(parent, os.W_OK | os.X_OK) else folder
+
+
+def _resolved(path: Path) -> Path:
+    """Return where a path leads: links stay, and what they lead to is replaced."""
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError) as error:
+        raise OutputError(f"cannot write '{path}': {error}; nothing was written") from error
+
+
+def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str]) -> None:
+    """Move results in; a folder that is not there yet comes as a whole.
+
+    Args:
+        folder: of the results.
+        new: where they were made.
+        names: of the files, in the order in which they are moved.
+        left: hashes of files that a process was about to move in when it was killed.
+    """
+    if not folder.exists():
+        new.replace(folder)
         return
-    with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
-        file.writelines([text] if isinstance(text, str) else text)
+    with _alone(folder):
+        _refuse_what_cannot_be_replaced(folder, names)
+        for name, digest in (*_recorded(folder).items(), *left.items()):
+            # What somebody has changed since is theirs.
+            if name not in names and _hash(folder / name) == digest:
+                (folder / name).unlink()
+        for name in names:
+            (new / name).replace(folder / name)
+        _sync(folder)
+
+
+@contextlib.contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Let no other process move results into a folder meanwhile."""
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with contextlib.suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
+
+
+def _sync(folder: Path) -> None:
+    """Let the moves outlive a power cut."""
+    with contextlib.suppress(OSError):
+        place = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(place)
+        finally:
+            os.close(place)
+
+
+def _recorded(folder: Path) -> dict[str, str]:
+    """Return the hashes of the files that the record of a folder names; none where it is no record of ours."""
+    path = folder / RECORD
+    try:
+        state = path.lstat()
+        if not stat.S_ISREG(state.st_mode) or state.st_size > _LARGEST_RECORD:
+            return {}
+        said = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    files = said.get("files") if isinstance(said, dict) and said.get("format") == FORMAT else None
+    if not isinstance(files, dict):
+        return {}
+    # A record is data: it names files of its own folder, and nothing else.
+    return {
+        name: digest
+        for name, digest in files.items()
+        if isinstance(digest, str) and name == Path(name).name and not name.startswith(PREFIX)
+    }
+
+
+def _hash(path: Path) -> str | None:
+    """Return the SHA-256 hash of a file; None where there is no such file."""
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            return None
+        digest = hashlib.sha256()
+        with path.open("rb") as file:
+            while piece := file.read(_PIECE):
+                digest.update(piece)
+    except OSError:
+        return None
+    return digest.hexdigest()
+
+
+def _write(path: Path, content: Content) -> str:
+    """Write a file to the disk and return its SHA-256 hash."""
+    digest = hashlib.sha256()
+    with path.open("wb") as file:
+        for piece in [content] if isinstance(content, str | bytes) else content:
+            data = piece if isinstance(piece, bytes) else piece.encode("utf-8", errors="backslashreplace")
+            digest.update(data)
+            file.write(data)
         file.flush()
         os.fsync(file.fileno())
+    return digest.hexdigest()
 
 
 def _make_parents(folder: Path) -> list[Path]:
@@ -100,6 +248,8 @@ def _make_parents(folder: Path) -> list[Path]:
 
 def _refuse_what_cannot_be_replaced(folder: Path, files: Iterable[str]) -> None:
     """Fail before the first file is moved in, not between two."""
+    if not folder.is_dir():
+        raise NotADirectoryError(0, "it is a file, and a folder is needed")
     if not os.access(folder, os.W_OK):
         raise PermissionError(0, "permission denied")
     for name in files:

@@ -12,9 +12,11 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
+from armwright.errors import ExitStatus
 from armwright.motion.plan import Stage
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic, to_json
+from armwright.program.running.machine import RunError
 from armwright.program.running.recording import Recording, RunStage, motion_rows
 from armwright.report.page import run_page
 from armwright.report.recorded import page_of
@@ -23,6 +25,8 @@ from armwright.version import __version__
 
 # Digits of the numbers in the JSON files: micrometres and microradians to a millionth.
 _DIGITS = 12
+# Rows of motion.csv unless more are asked for: some 220 MB, or one arm for a quarter of an hour at 1 ms.
+MOTION_ROWS = 1_000_000
 
 
 @attrs.frozen(kw_only=True)
@@ -34,22 +38,22 @@ class Origin:
         cell: path of the cell file; None where the program imports its cell.
         imports: paths of the files that the program imports.
         command: the command line.
-        seed: as given.
         options: those that shape the result, by name.
+        motion_rows: how many rows ``motion.csv`` may have.
     """
 
     program: Path
     cell: Path | None
     imports: Sequence[Path] = ()
     command: str
-    seed: int
     options: Mapping[str, Any]
+    motion_rows: int = MOTION_ROWS
 
 
 def result_files(
     recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin
 ) -> dict[str, str | Iterable[str]]:
-    """Return the files of a run by name, the same text for the same run.
+    """Return the files of a run by name, the same text for the same run; of one that failed, up to the failure.
 
     Args:
         recording: what happened.
@@ -58,11 +62,12 @@ def result_files(
         origin: what made it.
     """
     return {
-        "motion.csv": motion_rows(recording.streams),
+        "motion.csv": motion_rows(recording.streams, _kept(recording, origin.motion_rows)),
         "events.jsonl": _events(recording, code),
         "frames.json": _json(frames(recording, code)),
-        "run.json": _json(_run(recording, code, diagnostics, origin)),
-        "report.html": run_page(page_of(recording, code, diagnostics, origin.command)),
+        "report.html": run_page(
+            page_of(recording, code, diagnostics, origin.command, left_out(recording, origin.motion_rows))
+        ),
     }
 
 
@@ -83,6 +88,23 @@ def frames(recording: Recording, code: Code) -> dict[str, Any]:
         }
     postures = {name: _numbers(q) for name, q in recording.postures.items()}
     return {"units": "m, rad", "pose": "columns n, o, a, p", "frames": table, "postures": postures}
+
+
+def ending(recording: Recording, code: Code) -> dict[str, Any]:
+    """Return how a run ended: its exit status, and of one that failed why, where and when."""
+    failure = recording.failure
+    if failure is None:
+        return {"ended": "finished", "exit_status": int(ExitStatus.DONE)}
+    source, span = code.source, failure.diagnostic.span
+    error = {
+        "class": RunError.__name__,
+        **to_json(failure.diagnostic, source),
+        "file": source.name,
+        "statement": " ".join(source.slice(span).split()),
+        "time": failure.time,
+        "arm": failure.arm,
+    }
+    return {"ended": "failed", "exit_status": int(RunError.exit_status), "error": error}
 
 
 def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic]) -> dict[str, Any]:
@@ -160,9 +182,44 @@ def _events(recording: Recording, code: Code) -> Iterator[str]:
         yield json.dumps(event, ensure_ascii=False) + "\n"
 
 
-def _run(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
+def left_out(recording: Recording, most_rows: int) -> tuple[str, ...]:
+    """Say what the files of a run leave out, since there is too much of it; empty where they have all.
+
+    Args:
+        recording: what happened.
+        most_rows: of ``motion.csv``.
+    """
+    rows, kept = sum(len(one.t) for one in recording.streams), _kept(recording, most_rows)
+    if rows <= most_rows:
+        return ()
+    ticks = len(recording.streams[0].t)
+    first, end, _ = kept.indices(ticks)
+    part = "last" if first else "first"
+    text = (
+        f"motion.csv holds the {part} {(end - first) * recording.cell.period:.3f} s of {recording.duration:.3f} s: "
+        f"{(end - first) * len(recording.streams)} of {rows} rows; `--motion-rows {rows}` keeps all"
+    )
+    return (text,)
+
+
+def _kept(recording: Recording, most_rows: int) -> slice:
+    """Return the ticks that ``motion.csv`` holds: the first ones, or the last ones before a failure."""
+    ticks = most_rows // max(len(recording.streams), 1)
+    return slice(0, ticks) if recording.failure is None else slice(-ticks, None)
+
+
+def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
+    """Return what ``run.json`` says of a run: how it ended, what made it, what was left out, and the summary.
+
+    Args:
+        recording: what happened.
+        code: the program that ran.
+        diagnostics: warnings of translation and run, and what ended it.
+        origin: what made it.
+    """
     arms = {name: place.arm.name for name, place in recording.cell.arms.items()}
     return {
+        **ending(recording, code),
         "command": origin.command,
         "inputs": {
             "program": _file(origin.program),
@@ -172,7 +229,7 @@ def _run(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], or
             "gravity_m_per_s2": recording.cell.gravity.tolist(),
         },
         "options": dict(origin.options),
-        "seed": origin.seed,
+        "left_out": list(left_out(recording, origin.motion_rows)),
         "versions": {"armwright": __version__, "python": platform.python_version(), "numpy": np.__version__},
         **summary(recording, code, diagnostics),
     }

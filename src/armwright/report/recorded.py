@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,20 +32,36 @@ from armwright.version import __version__
 # Enough for a screen: instants of the animation.
 _FRAMES_PER_SECOND = 30.0
 _MOST_INSTANTS = 1200
+# What a browser can list without delay.
+_MOST_ITEMS = 4000
+_T = TypeVar("_T")
 
 
-def page_of(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], command: str) -> RunPage:
-    """Return the page of a run.
+def page_of(
+    recording: Recording,
+    code: Code,
+    diagnostics: Sequence[Diagnostic],
+    command: str,
+    left_out: Sequence[str] = (),
+) -> RunPage:
+    """Return the page of a run; of one that failed it says so first.
 
     Args:
         recording: what happened.
         code: the program that ran.
         diagnostics: warnings of translation and run.
         command: the command line, as shown on the page.
+        left_out: what other files leave out, as it is said there.
     """
-    source, cell = code.source, recording.cell
+    source, cell, failure = code.source, recording.cell, recording.failure
+    effects, fewer = _fewer(recording.effects, "lines of what happened")
+    stages, fewer_stages = _fewer(recording.stages, "stages")
+    status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
+    why = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
+    said = sorted(diagnostics, key=lambda one: not one.is_error)
     return RunPage(
-        title=f"{source.name} in {cell.name}",
+        title=f"{source.name} in {cell.name}" + ("" if failure is None else ": failed"),
+        status=status,
         program_name=source.name,
         program_text=source.text,
         cell_name=cell.name,
@@ -53,15 +70,23 @@ def page_of(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic],
         duration=recording.duration,
         messages=[
             Message(severity=one.severity.value, code=one.code, line=source.line(one.span.start), text=one.message)
-            for one in diagnostics
-        ],
-        effects=[
-            Effect(t0=one.t0, t1=one.t1, line=source.line(one.span.start), text=one.text) for one in recording.effects
-        ],
-        stages=[_stage(one, source.line(one.span.start)) for one in recording.stages],
+            for one in said
+        ]
+        + [Message(severity="note", text=text) for text in (*why, *left_out, *fewer, *fewer_stages)],
+        effects=[Effect(t0=one.t0, t1=one.t1, line=source.line(one.span.start), text=one.text) for one in effects],
+        stages=[_stage(one, source.line(one.span.start)) for one in stages],
         arms=[_record(one, cell) for one in recording.streams],
         animation=_animation(recording, code),
     )
+
+
+def _fewer(items: Sequence[_T], what: str) -> tuple[Sequence[_T], list[str]]:
+    """Return as many as a page can hold, the first and the last, and a note where that is not all."""
+    if len(items) <= _MOST_ITEMS:
+        return items, []
+    half = _MOST_ITEMS // 2
+    text = f"this page shows the first and the last {half} of {len(items)} {what}; events.jsonl and run.json have all"
+    return (*items[:half], *items[-half:]), [text]
 
 
 def _stage(run: RunStage, line: int) -> Stage:

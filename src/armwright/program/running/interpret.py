@@ -7,6 +7,7 @@ served first, then the one that comes first in the text; so a run is the same on
 import math
 from collections.abc import Callable
 
+import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
@@ -21,7 +22,7 @@ from armwright.program.running.machine import Limits, Machine, RunError
 from armwright.program.running.moving import go_on
 from armwright.program.running.obstacles import detour_warning
 from armwright.program.running.process import Process
-from armwright.program.running.recording import Recording, RunStage, efforts
+from armwright.program.running.recording import Effect, Failure, Recording, RunStage, efforts
 
 # No TRY helps a program that runs for ever: what is tried again would run for ever again.
 _FINAL = ("E504", "E506")
@@ -79,7 +80,7 @@ def due(machine: Machine) -> Process:
     """
     process = ready(machine)
     if process is None:
-        raise _stopped(machine, deadlock(machine))
+        raise _stopped(machine, deadlock(machine), None)
     return process
 
 
@@ -104,7 +105,7 @@ def advance(machine: Machine, process: Process) -> None:
         _advance(machine, process)
     except RunError as error:
         if error.diagnostic.code in _FINAL or not recover(machine, process, error):
-            raise _stopped(machine, error) from None
+            raise _stopped(machine, error, process.last_arm) from None
 
 
 def _advance(machine: Machine, process: Process) -> None:
@@ -138,10 +139,20 @@ def _advance(machine: Machine, process: Process) -> None:
     HANDLERS[step.op](machine, process, step)
 
 
-def _stopped(machine: Machine, error: RunError) -> RunError:
+def _stopped(machine: Machine, error: RunError, arm: str | None) -> RunError:
     """Return the error with the frames as they are when all arms are at rest and all devices off."""
     rest(machine, error.diagnostic.span)
-    return RunError(error.diagnostic, machine.tree, machine.now)
+    failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm)
+    return RunError(error.diagnostic, machine.tree, machine.now, lambda: _failed(machine, failure))
+
+
+def _failed(machine: Machine, failure: Failure) -> Recording:
+    """Return all that happened up to a failure, and the failure as the last thing that did."""
+    found, recording = failure.diagnostic, machine.recording()
+    text = f"{found.code} in line {machine.code.source.line(found.span.start)}: {found.message}"
+    data = {"code": found.code, "failed_at": failure.time}
+    end = Effect(t0=failure.time, t1=machine.now, kind="ERROR", span=found.span, text=text, arm=failure.arm, data=data)
+    return attrs.evolve(recording, effects=(*recording.effects, end), failure=failure)
 
 
 def warnings(recording: Recording) -> tuple[Diagnostic, ...]:

@@ -1,7 +1,7 @@
 """The state of a running program: clock, frames, values, processes, and what it has left so far."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 import attrs
@@ -32,11 +32,18 @@ class RunError(ArmwrightError, RuntimeError):
         diagnostic: what happened, where.
         tree: the frame tree at that moment.
         time: of the cell's clock [s].
+        recording: returns all that happened up to it; None before the arms are at rest.
     """
 
-    def __init__(self, diagnostic: Diagnostic, tree: FrameTree, time: float) -> None:
+    def __init__(
+        self,
+        diagnostic: Diagnostic,
+        tree: FrameTree,
+        time: float,
+        recording: Callable[[], Recording] | None = None,
+    ) -> None:
         """Keep the circumstances; the text is the diagnostic's message."""
-        self.diagnostic, self.tree, self.time = diagnostic, tree, time
+        self.diagnostic, self.tree, self.time, self.recording = diagnostic, tree, time, recording
         super().__init__(diagnostic.message)
 
 

@@ -14,6 +14,7 @@ from armwright.cell.model import Cell
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.motion.plan import Stage
 from armwright.motion.trajectory import Trajectory
+from armwright.program.messages.diagnostics import Diagnostic
 from armwright.program.text.source import Span
 
 # Rows that are computed and written together.
@@ -144,6 +145,21 @@ class Stream:
     tau: Array
 
 
+@attrs.frozen(kw_only=True)
+class Failure:
+    """Why a run did not come to its end.
+
+    Attributes:
+        diagnostic: what happened, at which statement.
+        time: when [s]; the arms came to rest after it.
+        arm: the arm that was to move; None where none was.
+    """
+
+    diagnostic: Diagnostic
+    time: float
+    arm: str | None = None
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Recording:
     """A run.
@@ -156,6 +172,7 @@ class Recording:
         streams: one per arm.
         trees: the frame tree at the start and after each change, with the time of the change [s].
         postures: by arm, the posture (n,) at the end.
+        failure: why it did not come to its end; None where it did.
     """
 
     cell: Cell
@@ -165,6 +182,7 @@ class Recording:
     streams: tuple[Stream, ...]
     trees: tuple[tuple[float, FrameTree], ...]
     postures: Mapping[str, Array]
+    failure: Failure | None = None
 
     @property
     def tree(self) -> FrameTree:
@@ -231,8 +249,13 @@ def efforts(arm: Arm, trajectory: Trajectory, period: float, ticks: int | None =
     return t, tau
 
 
-def motion_rows(streams: Iterable[Stream]) -> Iterable[str]:
-    """Give the lines of motion.csv: time, arm, and per joint position, speed, acceleration and effort, in SI."""
+def motion_rows(streams: Iterable[Stream], kept: slice = slice(None)) -> Iterable[str]:
+    """Give the lines of motion.csv: time, arm, and per joint position, speed, acceleration and effort, in SI.
+
+    Args:
+        streams: one per arm.
+        kept: which ticks of each.
+    """
     streams = tuple(streams)
     joints = max((s.q.shape[1] for s in streams), default=0)
     columns = [f"{quantity}{i + 1}" for quantity in ("q", "qd", "qdd", "tau") for i in range(joints)]
@@ -243,7 +266,9 @@ def motion_rows(streams: Iterable[Stream]) -> Iterable[str]:
         blank = "," * (joints - n)
         cell = ",".join(["%.12g"] * n) + blank
         line = f"%.12g,{s.arm},{cell},{cell},{cell},{cell}\n"
-        for rows in _chunks(len(s.t)):
+        first, end, _ = kept.indices(len(s.t))
+        for part in _chunks(end - first):
+            rows = slice(first + part.start, min(first + part.stop, end))
             block = np.concatenate([s.t[rows, None], s.q[rows], s.qd[rows], s.qdd[rows], s.tau[rows]], axis=1)
             # Adding 0 turns -0 into 0, which reads better.
             yield from (line % tuple(row) for row in (block + 0.0).tolist())
