@@ -21,6 +21,8 @@ INDICES: tuple[Index, ...] = ("O1", "O2", "O3", "O4", "O5")
 
 # As many candidates, and so many for each pose that is asked for.
 _CANDIDATES, _EACH = 400, 4
+# More poses than anybody measures.
+_MOST_POSES = 10_000
 # Poses are exchanged for better ones so often at most.
 _MOST_EXCHANGES = 200
 # Noise at which one asks what can be told at all [m], [rad].
@@ -98,8 +100,9 @@ def plan_poses(
         UnknownNameError: there is no such index.
     """
     one_of("index", index, INDICES)
-    if count < 1:
-        raise InvalidValueError(f"count: expected 1 pose or more, got {count}")
+    if not 1 <= count <= _MOST_POSES:
+        expected = "1 pose or more" if count < 1 else f"{_MOST_POSES:,} poses or fewer"
+        raise InvalidValueError(f"count: expected {expected}, got {count}")
     chain = chain_of(arm)
     rng = np.random.default_rng(seed)
     if candidates is None:

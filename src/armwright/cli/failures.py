@@ -1,5 +1,6 @@
 """How a command ends that could not do what was asked: one message, or one JSON document, and its exit status."""
 
+import itertools
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 DEBUG = "ARMWRIGHT_DEBUG"
 # What a wrong call raises: a base of all such errors of Typer, whose place depends on its version.
 _CallError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
+_OUTPUTS = ("-o", "--output")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -48,6 +50,7 @@ class Commands(TyperGroup):
     def make_context(self, *arguments: Any, **settings: Any) -> Any:
         """Read the options before the command."""
         try:
+            _refuse_nameless_output(sys.argv[1:])
             return super().make_context(*arguments, **settings)
         except _CallError as error:
             raise _harmless(error) from None
@@ -60,6 +63,13 @@ class Commands(TyperGroup):
             raise _harmless(error) from None
         except (EOFError, OSError) as error:
             raise _Raised(error) from error
+
+
+def _refuse_nameless_output(words: list[str]) -> None:
+    """Refuse an output without a name, which a path would take for the current folder: a variable was not set."""
+    for word, after in itertools.pairwise([*words, "-"]):
+        if (word in _OUTPUTS and not after) or word in {f"{option}=" for option in _OUTPUTS}:
+            raise typer.BadParameter("expected a path, got an empty text", param_hint=word.rstrip("="))
 
 
 def _harmless(error: Exception) -> Exception:

@@ -64,7 +64,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         int, typer.Option(min=1, help="End a program that does so many steps without any time going by.")
     ] = 1_000_000,
     max_time: Annotated[
-        float, typer.Option(min=0.0, help="End a program that runs so long on the cell's clock, in s.")
+        float, typer.Option(min=0.0, max=1e9, help="End a program that runs so long on the cell's clock, in s.")
     ] = 3600.0,
     most_rows: Annotated[
         int, typer.Option("--motion-rows", min=2, help="Rows that motion.csv may have; what is left out is said.")
