@@ -66,7 +66,7 @@ _SNIPPETS = {
     "REPEAT": (("REPEAT ... UNTIL", "REPEAT\n  $0\nUNTIL ${1:condition} ;"),),
     "COBEGIN": (("COBEGIN ... COEND", "COBEGIN\n  BEGIN\n    $1\n  END ;\n  BEGIN\n    $0\n  END\nCOEND ;"),),
     "TRY": (("TRY ... RECOVER", "TRY\n  $1\nRECOVER\n  $0\nEND ;"),),
-    "LOCK": (("LOCK ... DO", "LOCK (${1:frame}) DO\nBEGIN\n  $0\nEND ;"),),
+    "LOCK": (("LOCK ... DO", "LOCK (${1:name}) DO\nBEGIN\n  $0\nEND ;"),),
     "BEGIN": (("BEGIN ... END", "BEGIN\n  $0\nEND ;"),),
     "PROCEDURE": (("PROCEDURE ...", "PROCEDURE ${1:name} (${2:part : FRAME}) ;\nBEGIN\n  $0\nEND ;"),),
     "VAR": (("VAR ...", "VAR ${1:part} : ${2|FRAME,TRANS,SCALAR,EVENT|} ;"),),

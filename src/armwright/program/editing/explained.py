@@ -105,7 +105,7 @@ WORDS: Mapping[str, Word] = {
     "SIGNAL": Word("SIGNAL event", "Adds one to an event."),
     "WAIT": Word("WAIT event", "Waits until an event has been signalled, and takes one from it."),
     "LOCK": Word(
-        "LOCK (frames) DO statement", "Keeps other LOCKs of these frames waiting until the statement is done."
+        "LOCK (variables) DO statement", "Keeps other LOCKs of these variables waiting until the statement is done."
     ),
     # recovery
     "TRY": Word(_TRY, "Runs statements; when one of them fails, those behind RECOVER run instead of the rest."),

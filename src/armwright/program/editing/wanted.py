@@ -97,7 +97,7 @@ _AFTER: Mapping[tuple[str, str], tuple[Wanted, tuple[str, ...]]] = {
 # What stands in the parentheses behind a word.
 _INSIDE: Mapping[str, Wanted] = {
     "VIA": _PLACE,
-    "LOCK": _FRAME,
+    "LOCK": Wanted(kinds=frozenset(Kind)),
     "PRINT": _ANYTHING,
     "VISIONS": _FRAME,
     "SYSTEM": _ARM,

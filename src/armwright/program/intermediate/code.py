@@ -77,8 +77,8 @@ class Op(enum.StrEnum):
     SIG = "SIG"  # event
     WAIT = "WAIT"  # event
     PAUSE = "PAUSE"  # seconds
-    LOCK = "LOCK"  # frames
-    UNLK = "UNLK"  # frames
+    LOCK = "LOCK"  # variables or elements
+    UNLK = "UNLK"  # the same
     TRY = "TRY"  # place of the recovery
     ENDT = "ENDT"  # place behind the recovery; nothing went wrong
     ENDR = "ENDR"  # end of a recovery

@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 
-from armwright.program.intermediate.code import Kind
 from armwright.program.meaning import actions, headers, moves
 from armwright.program.meaning.amounts import in_range, measure
 from armwright.program.meaning.calls import Calls
-from armwright.program.meaning.kinds import condition, need, quantity
+from armwright.program.meaning.kinds import condition, need, quantity, sort
 from armwright.program.meaning.known import Imported, KnownCell, ReadImport
 from armwright.program.meaning.names import Symbols
 from armwright.program.meaning.naming import Names, Procedure
@@ -158,7 +157,11 @@ class _Statements:
 
     def _lock(self, node: tree.Lock) -> None:
         for target in node.targets:
-            need(self._names, target, Sort.FRAME, "E215", f"LOCK needs a {Kind.FRAME}")
+            # What is shared may be of any kind, and a whole array too.
+            if isinstance(target, tree.Name):
+                self._names.type(target)
+            else:
+                sort(self._names, target)
         self.one(node.body)
 
     def _try(self, node: tree.Try) -> None:

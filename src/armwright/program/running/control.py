@@ -201,7 +201,7 @@ def _pause(run: Machine, process: Process, step: Instruction) -> None:
 
 def _lock(run: Machine, process: Process, step: Instruction) -> None:
     names = sorted({run.name(process, operand) for operand in step.operands})
-    if any(run.locks.get(name, process) is not process for name in names):
+    if any(_locked_by(run, name) - {process} for name in names):
         process.at -= 1
         process.waiting = Waiting("locks", tuple(names), step.span)
         return
@@ -209,6 +209,16 @@ def _lock(run: Machine, process: Process, step: Instruction) -> None:
         run.locks[name] = process
     process.locks += names
     run.effect("LOCK", f"LOCK {', '.join(map(run.spelled, names))}", step.span)
+
+
+def _locked_by(run: Machine, name: str) -> set[Process]:
+    """Return the processes that hold a variable; a whole array and its elements keep one another waiting."""
+    array, bracket, _ = name.partition("[")
+    return {
+        holder
+        for held, holder in run.locks.items()
+        if held == name or (bracket and held == array) or (not bracket and held.startswith(f"{name}["))
+    }
 
 
 def _unlock(run: Machine, process: Process, step: Instruction) -> None:
@@ -344,7 +354,8 @@ def deadlock(run: Machine) -> RunError:
         assert one.waiting is not None  # noqa: S101 - chosen so
         names = ", ".join(map(run.spelled, one.waiting.names))
         what = f"waits for {names}" if one.waiting.what == "event" else f"waits for the lock of {names}"
-        holders = {run.locks[name] for name in one.waiting.names if name in run.locks} - {one}
+        locks = one.waiting.what == "locks"
+        holders = {holder for name in one.waiting.names if locks for holder in _locked_by(run, name)} - {one}
         held = ", ".join(holder.title for holder in sorted(holders, key=lambda holder: holder.path))
         says.append((one.waiting.span, f"{one.title} {what}{f', held by {held}' if held else ''}"))
     (span, label), *others = says

@@ -141,7 +141,7 @@ class Waiting:
 
     Attributes:
         what: for an event, for locks, or for the processes that it has begun.
-        names: of the event or the frames.
+        names: of the event or the locked variables.
         span: the statement.
     """
 
@@ -186,7 +186,7 @@ class Process:
         motion: the MOVE under way.
         pending: what takes effect at ``wake``.
         last_arm: named or moved last.
-        locks: the frames it has locked, in the order of taking.
+        locks: the variables it has locked, in the order of taking.
         branches: processes begun and not yet joined.
         done: whether it has ended.
     """

@@ -305,9 +305,9 @@ def _between(tokens: Tokens) -> None:
 def lock(tokens: Tokens) -> tree.Lock:
     """Read one LOCK."""
     start = tokens.take()
-    targets = listed(tokens, variable, "the name of a FRAME", "after LOCK")
+    targets = listed(tokens, variable, "the name of a variable", "after LOCK")
     head = tokens.since(start)
-    tokens.expect("DO", "after the frames", statement=True)
+    tokens.expect("DO", "after the names", statement=True)
     body = nested(tokens, "DO")
     return tree.Lock(tokens.since(start), head, targets, body)
 

@@ -262,7 +262,7 @@ class Pause:
 
 @attrs.frozen
 class Lock:
-    """``LOCK (frames) DO statement``; ``head`` reaches up to DO."""
+    """``LOCK (variables) DO statement``; ``head`` reaches up to DO."""
 
     span: Span
     head: Span
