@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armwright.kinematics.forward import forward
-from program.running import EXACT, cell_of, down, failure, run
+from program.running import EXACT, cell_of, down, expect, failure, printed, run
 
 F, G = down(0.45, 0.15, 0.06), down(0.45, -0.15, 0.06)
 HEAD = (
@@ -106,3 +106,44 @@ def test_a_grasped_frame_of_a_procedure_is_forgotten_with_it() -> None:
     recording = run(program("take() ; MOVE ARM_1 TO g"))
 
     np.testing.assert_allclose(recording.tree.world("ARM_1"), G, atol=EXACT)
+
+
+HALTING = (
+    "VAR f, g : FRAME ; n, m : SCALAR ;\n"
+    "PROCEDURE enough ; BEGIN n = n + 1 ; LOCK (m) DO HALT ; n = 100 END ;\n"
+    "PROCEDURE deep (k : SCALAR) ; VAR q : FRAME ;\n"
+    "BEGIN q = f ; TRY IF k > 0 THEN deep(k - 1) ELSE enough() RECOVER n = 100 END ; n = 100 END ;\n"
+    "BEGIN f = (1,0,0, 0,-1,0, 0,0,-1, 0.45,0.15,0.06) ; g = f * XYZ(0, 0.1, 0) ; n = 0 ; m = 0 ;\n"
+)
+
+
+@pytest.mark.parametrize("action", ["enough()", "deep(3)", "BEGIN deep(0) ; n = 100 END"])
+def test_halt_in_a_procedure_that_an_action_calls(action: str) -> None:
+    """HALT ends the MOVE whether it stands in the action or in a procedure that the action calls, at any depth."""
+    behind = " ; LOCK (m) DO PRINT(n) ; MOVE ARM_1 TO g END."
+    called = run(f"{HALTING}{NEAR}{action}{behind}")
+    within = run(f"{HALTING}{NEAR}BEGIN n = n + 1 ; HALT END{behind}")
+
+    assert printed(called) == printed(within) == ["1"]
+    np.testing.assert_array_equal(called.streams[0].q, within.streams[0].q)
+    assert not any("'" in name for name in called.tree)
+    expect(called, ARM_1=called.tree.world("G"))
+
+
+def test_halt_in_the_same_procedure_outside_of_actions() -> None:
+    """A procedure that no action calls ends the program by HALT."""
+    recording = run(f"{HALTING}deep(2) ; PRINT(n) END.")
+
+    assert printed(recording) == []
+    assert recording.effects[-1].text == "HALT"
+
+
+def test_frames_behind_a_call_that_may_halt() -> None:
+    """Where HALT in a procedure may have ended the motion, nobody knows at which frame the hand stands."""
+    text = (
+        "VAR f : FRAME ;\nPROCEDURE enough ; BEGIN HALT END ;\n"
+        "BEGIN f = (1,0,0, 0,-1,0, 0,0,-1, 0.45,0.15,0.06) ; OPEN ARM_1 ;\n"
+        "MOVE ARM_1 TO f STRAIGHTLY, ON DIST(ARM_1, f) < 0.1 DO enough() ; GRASP ; MOVE f TO f * XYZ(0, 0, -0.1) END."
+    )
+
+    assert failure(text).diagnostic.code == "E301"

@@ -95,7 +95,7 @@ WORDS: Mapping[str, Word] = {
     "AND": Word("condition AND condition", "Holds when both hold."),
     "OR": Word("condition OR condition", "Holds when one of them holds, or both."),
     "NOT": Word("NOT condition", "Holds when the condition does not."),
-    "HALT": Word("HALT", "Ends the program; in the action of ON it ends that motion alone."),
+    "HALT": Word("HALT", "Ends the program; in an action of ON, or a procedure that it calls, that motion alone."),
     "PRINT": Word('PRINT ("text", value, ...)', "Prints texts and values on one line."),
     "PAUSE": Word("PAUSE seconds", "Waits that long."),
     # processes

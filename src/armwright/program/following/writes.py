@@ -317,6 +317,7 @@ def _seen_from_outside(writes: Writes, procedure: str, given: Mapping[str, tree.
         arms=frozenset(seen for name in writes.arms if (seen := outside(name)) and may_be_arm(seen)),
         grasps=writes.grasps,
         everything=writes.everything,
+        halts=writes.halts,
     )
 
 

@@ -252,8 +252,14 @@ def _retry(run: Machine, process: Process, step: Instruction) -> None:  # noqa: 
     process.at = attempts.pop().start
 
 
-def _halt(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
-    finish(run, step.span, "HALT")
+def _halt(run: Machine, process: Process, step: Instruction) -> None:
+    """End the program; in a procedure that an action calls, the MOVE of that action, as in the action itself."""
+    if not any(one.kind == "action" for one in process.stack):
+        finish(run, step.span, "HALT")
+        return
+    while process.now.kind != "action":
+        _leave(run, process, step.span)
+    halt(run, process, step)
 
 
 def _stop(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler

@@ -105,7 +105,7 @@ def go_on(run: Machine, process: Process) -> None:
 def halt(run: Machine, process: Process, step: Instruction) -> None:
     """End the motion from inside an action: the arm stops in a controlled way, and the MOVE is over."""
     motion, action = process.motion, process.stack.pop()
-    assert action.kind == "action"  # noqa: S101 - HALT in a procedure is another instruction
+    assert action.kind == "action"  # noqa: S101 - procedures that it called have been left
     release(run, process, action.locks)
     process.at = action.back
     if motion is None:
