@@ -14,6 +14,7 @@ from armwright.program.syntax.clauses import move
 from armwright.program.syntax.cursor import Rule, Tokens
 from armwright.program.syntax.prologue import head, late
 from armwright.program.syntax.statements import statements
+from armwright.program.syntax.torn import joined
 from armwright.program.text.source import Source, Span
 from armwright.program.text.tokens import Token, TokenKind
 from armwright.program.text.words import Standard
@@ -70,7 +71,9 @@ def parse(
         declared: names of variables that were declared before this text.
         procedures: names of procedures that were.
     """
+    tokens, torn = joined(source, tokens, declared)
     cursor = Tokens(source, tokens, standard, _RULES[standard])
+    cursor.found += torn
     cursor.declared.update(declared)
     cursor.procedures.update(procedures)
     return program(cursor), cursor.found
