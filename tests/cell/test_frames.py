@@ -10,6 +10,7 @@ from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.spatial.poses import pose
 from oracles.arms import random_pose
+from samples import Sample
 
 ROUNDING = 1e-9  # products of a dozen poses some metres long
 
@@ -131,3 +132,50 @@ def test_any_history(history: list[tuple[str, str, str, int]]) -> None:
         assert len(chain) == len(set(chain))
         assert chain[-1] == WORLD
         np.testing.assert_allclose(tree.relation(frame, WORLD), tree.world(frame), atol=ROUNDING)
+
+
+def test_worlds_that_were_asked_for_before(sample: Sample) -> None:
+    """Where a frame stands depends on the tree alone, to the last bit, and not on what was asked of it before."""
+    names = [f"F{number}" for number in range(8)]
+    for rng in sample.cases(200):
+        tree = FrameTree()
+        for name in names[:2]:
+            tree = tree.place(name, random_pose(rng))
+        for _ in range(60):
+            one, other = (str(name) for name in rng.choice(names, 2, replace=False))
+            match rng.integers(5):
+                case 0:
+                    tree = tree.place(one, random_pose(rng))
+                case 1 if tree.has_value(one := names[0]) and not tree.would_ring(other, one):
+                    tree = tree.affix(other, one, random_pose(rng), rigid=bool(rng.integers(2)))
+                case 2 if one in tree and other in tree and not tree.would_ring(one, other):
+                    tree = tree.affix(one, other)
+                case 3 if one in tree:
+                    tree = tree.unfix(one)
+                case 4 if one in tree:
+                    tree = tree.without(one)
+                case _:
+                    continue
+            for name in rng.permutation([*tree])[:3]:
+                tree.world(str(name))
+        anew = FrameTree(dict(tree.nodes))
+        for name in tree:
+            np.testing.assert_array_equal(tree.world(name), anew.world(name))
+            np.testing.assert_allclose(tree.world(name), tree.relation(name, WORLD), atol=ROUNDING)
+            assert name == WORLD or [*tree].index(tree.nodes[name].parent) < [*tree].index(name)
+            for child in tree.nodes:
+                assert tree.would_ring(child, name) == (child == name or child in tree.ancestors(name))
+    sample.record("frame trees after 60 changes: poses as of a tree made anew, to the bit", sample.count(200), 0)
+
+
+def test_a_chain_is_not_gone_through_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A frame at the end of a chain that hangs another one on itself is found without the chain below it."""
+    looked: list[str] = []
+    node = FrameTree._node
+    monkeypatch.setattr(FrameTree, "_node", lambda tree, name: looked.append(name) or node(tree, name))
+    tree = FrameTree().place("F0", step(1))
+    for number in range(1, 500):
+        tree = tree.declare(f"F{number}").place(f"F{number}", step(number)).affix(f"F{number}", f"F{number - 1}")
+
+    np.testing.assert_allclose(tree.world("F499"), step(499), atol=ROUNDING)
+    assert len(looked) < 3000

@@ -8,6 +8,8 @@ import textwrap
 import numpy as np
 import pytest
 
+from armwright.program import Source
+from armwright.program import compile as translate
 from armwright.program.running.interpret import Limits
 from program.running import cell_of, corpus_text, down, expect, failure, printed, run
 
@@ -148,6 +150,28 @@ def test_deadlock() -> None:
     assert error.code == "E501"
     assert error.message == "2 processes wait for ever"
     assert [error.label, *(label.text for label in error.secondary)] == ["branch 1 waits for e", "branch 2 waits for g"]
+
+
+def test_arm_of_a_frame_in_two_branches() -> None:
+    """Who moves what hangs on the arm of another branch is told which line hung it there, checked or running."""
+    text = HOME + "AFFIX a TO ARM_1 ; COBEGIN BEGIN MOVE ARM_1 TO b END ; BEGIN MOVE a TO b END COEND END."
+    (error,) = [one for one in translate(Source("test.rlo", text)).diagnostics if one.is_error]
+
+    assert (error.code, [label.text for label in error.secondary]) == (
+        "E503",
+        ["first branch", "a was affixed to ARM_1 here"],
+    )
+    assert text[error.secondary[1].span.start :].startswith("AFFIX a TO ARM_1")
+
+    hidden = (
+        "VAR x : ARRAY [2] OF FRAME ; c : FRAME ; n : SCALAR ; BEGIN n = DIST(WORLD, WORLD) + 1 ; c = WORLD ;"
+        "x[1] = ARM_1 ; AFFIX x[n] TO ARM_1 ; AFFIX x[2] TO x[1] AT XYZ(0, 0, 0.1) ; COBEGIN BEGIN OPEN ARM_1 END ;"
+        "BEGIN MOVE x[n + 1] TO ARM_1 END COEND END."
+    )
+    late = failure(hidden).diagnostic
+
+    assert (late.code, [label.text for label in late.secondary]) == ("E503", ["x[1] was affixed to ARM_1 here"])
+    assert hidden[late.secondary[0].span.start :].startswith("AFFIX x[n] TO ARM_1")
 
 
 def test_arm_of_two_branches() -> None:

@@ -1,5 +1,6 @@
 """The frame tree: where everything is, and what hangs on what. A tree never changes; a change gives a new one."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 
 import attrs
@@ -49,6 +50,14 @@ class FrameTree:
     """
 
     nodes: Mapping[str, Node] = attrs.field(factory=dict)
+    # Poses in the world that have been worked out, and how many frames hang on each: what a tree knows of itself. A
+    # changed tree takes over what still holds, so that a chain costs its length and not the square of it.
+    _worlds: dict[str, Array] = attrs.field(factory=dict, repr=False)
+    _children: Mapping[str, int] = attrs.field(repr=False)
+
+    @_children.default
+    def _counted(self) -> Mapping[str, int]:
+        return Counter(node.parent for node in self.nodes.values())
 
     def __contains__(self, name: str) -> bool:
         """Whether a frame of that name is known."""
@@ -56,18 +65,20 @@ class FrameTree:
 
     def __iter__(self) -> Iterator[str]:
         """Walk through the names, parents before children."""
-        done = {WORLD}
         yield WORLD
-        waiting = list(self.nodes)
-        while waiting:
-            ready = [name for name in waiting if self.nodes[name].parent in done]
-            yield from ready
-            done.update(ready)
-            waiting = [name for name in waiting if name not in done]
+        depths = {WORLD: 0}
+        for name in self.nodes:
+            way = []
+            while name not in depths:
+                way.append(name)
+                name = self.nodes[name].parent  # noqa: PLW2901 - the way up
+            depth = depths[name]
+            depths |= {below: depth + number for number, below in enumerate(reversed(way), 1)}
+        yield from sorted(self.nodes, key=depths.__getitem__)
 
     def has_value(self, name: str) -> bool:
         """Whether the frame stands somewhere."""
-        while name != WORLD:
+        while name != WORLD and name not in self._worlds:
             node = self._node(name)
             if node.relation is None:
                 return False
@@ -100,7 +111,17 @@ class FrameTree:
             UnknownNameError: no such frame.
             InvalidValueError: the frame, or one it hangs on, has no value yet.
         """
-        return self.relation(name, WORLD)
+        way = []
+        while name != WORLD and (X_WF := self._worlds.get(name)) is None:
+            node = self._node(name)
+            if node.relation is None:
+                raise InvalidValueError(f"frame {name} has no value yet")
+            way.append((name, node.relation))
+            name = node.parent
+        X = None if name == WORLD else X_WF
+        for below, relation in reversed(way):
+            self._worlds[below] = X = relation if X is None else _kept(X @ relation)
+        return np.eye(4) if X is None else X
 
     def relation(self, child: str, ancestor: str) -> Array:
         """Return the pose (4, 4) of ``child`` seen from ``ancestor``, one of the frames it hangs on.
@@ -153,6 +174,11 @@ class FrameTree:
         nodes.pop(name, None)
         return FrameTree(nodes)
 
+    def would_ring(self, child: str, parent: str) -> bool:
+        """Whether a frame cannot hang on another because that one hangs on it, or is the same."""
+        # What nothing hangs on can hang anywhere: no long way up for the common case.
+        return child == parent or (self._children.get(child, 0) > 0 and child in self.ancestors(parent))
+
     def affix(self, child: str, parent: str, relation: ArrayLike | None = None, *, rigid: bool = False) -> "FrameTree":
         """Return the tree with ``child`` hanging on ``parent``.
 
@@ -166,7 +192,7 @@ class FrameTree:
             UnknownNameError: no such frame.
             InvalidValueError: a ring would close, or a pose that is needed has no value.
         """
-        if child == parent or child in self.ancestors(parent):
+        if self.would_ring(child, parent):
             raise InvalidValueError(f"{child} cannot hang on {parent}, which hangs on {child}")
         if relation is None:
             relation = _kept(turned_over(self.world(parent)) @ self.world(child))
@@ -185,4 +211,11 @@ class FrameTree:
             raise UnknownNameError("frame", name, [WORLD, *self.nodes]) from None
 
     def _with(self, name: str, node: Node) -> "FrameTree":
-        return FrameTree({**self.nodes, name: node})
+        # Only what hangs on a changed frame stands elsewhere.
+        worlds = {} if self._children.get(name, 0) else {**self._worlds}
+        worlds.pop(name, None)
+        children = {**self._children}
+        if (old := self.nodes.get(name)) is not None:
+            children[old.parent] -= 1
+        children[node.parent] = children.get(node.parent, 0) + 1
+        return FrameTree({**self.nodes, name: node}, worlds, children)

@@ -37,10 +37,17 @@ class Activation:
 
 @attrs.frozen
 class Use:
-    """Where a branch uses an arm, and whether it moves it there."""
+    """Where a branch uses an arm.
+
+    Attributes:
+        span: the statement.
+        moves: whether it moves the arm.
+        hung: where the frame was hung on the arm that the statement moves in place of it.
+    """
 
     span: Span
     moves: bool
+    hung: tuple[Label, ...] = ()
 
 
 @attrs.frozen
@@ -277,13 +284,13 @@ class Course:
                 self.last.put(LAST, arm)
                 self.look_up(arm, node.span)
 
-    def use(self, arm: str, span: Span, *, moves: bool = False) -> None:
-        """Take note that an arm is set to work."""
+    def use(self, arm: str, span: Span, *, moves: bool = False, hung: tuple[Label, ...] = ()) -> None:
+        """Take note that an arm is set to work; ``hung`` tells why it is this one."""
         self.last.put(LAST, arm)
         for branch in self.branches:
             place = self.calls[branch.depth].span if len(self.calls) > branch.depth else span
             if arm not in branch.arms or (moves and not branch.arms[arm].moves):
-                branch.arms[arm] = Use(place, moves)
+                branch.arms[arm] = Use(place, moves, hung)
 
     def look_up(self, arm: str, span: Span) -> None:
         """Say once that the cell does not have an arm."""

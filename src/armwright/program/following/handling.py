@@ -145,7 +145,7 @@ def begin(course: Course, node: tree.Move) -> str | None:
             course.need(clause.value)
     if arm is None:
         return None
-    course.use(arm, node.span.to(node.moved.span), moves=True)
+    course.use(arm, node.span.to(node.moved.span), moves=True, hung=_hung(course, moved, arm))
     goal = course.frame(node.goal)
     if goal is not None and not course.table.unknown(goal) and course.table.carrier(goal) == arm:
         _relative(course, node, arm)
@@ -177,6 +177,17 @@ def end(course: Course, node: tree.Move, arm: str | None, *, halted: bool) -> No
             # Something was reported of the goal, or it is given to a procedure in a way that is not followed.
             at = UNKNOWN
     course.table.arrive(arm, at, node.span if moved == arm else None)
+
+
+def _hung(course: Course, moved: str | None, arm: str) -> tuple[Label, ...]:
+    """Return where what is moved, or what it hangs on, was hung on its arm; nothing for the arm itself."""
+    if moved is None or is_arm(moved):
+        return ()
+    for name in (moved, *course.table.above(moved)):
+        link = course.table.links[name]
+        if link is not None and link.parent == arm:
+            return (Label(link.span, f"{course.name(name)} was affixed to {arm} here"),) if link.span else ()
+    return ()
 
 
 def _carrier(course: Course, node: tree.Move, moved: str | None) -> tuple[str | None, bool]:

@@ -85,7 +85,7 @@ def shared_arms(course: Course, branches: Sequence[Uses]) -> None:
                 f"{arm} is {does} in two branches of one COBEGIN",
                 use.span,
                 "second branch",
-                secondary=(Label(first.span, "first branch"),),
+                secondary=(Label(first.span, "first branch"), *dict.fromkeys((*first.hung, *use.hung))),
                 notes=("each arm belongs to one process at a time",),
                 helps=(f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN",),
             )

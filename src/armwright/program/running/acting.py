@@ -88,7 +88,7 @@ def _affix(run: Machine, process: Process, step: Instruction) -> None:
     run.held(parent, step, process)
     if step_X is None:
         run.held(child, step, process)
-    if child == parent or child in run.tree.ancestors(parent):
+    if run.tree.would_ring(child, parent):
         note = "frames form a tree; each hangs on one other and in the end on WORLD"
         label = f"{spelled(child)} cannot hang on {'itself' if child == parent else spelled(parent)}"
         chain = [one for one in (parent, *run.tree.ancestors(parent)) if one != child and one in run.written]

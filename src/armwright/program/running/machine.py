@@ -262,8 +262,14 @@ class Machine:
 
     # ---- arms and time ---------------------------------------------------------------------------------------------
 
-    def claim(self, process: Process, arm: str, span: Span) -> None:
+    def claim(self, process: Process, arm: str, span: Span, moved: str | None = None) -> None:
         """Let a process use an arm.
+
+        Args:
+            process: that uses it.
+            arm: the arm.
+            span: the statement.
+            moved: the frame on the arm that the statement moves, if it does not name the arm itself.
 
         Raises:
             RunError: the cell has no such arm, or it belongs to another branch.
@@ -278,9 +284,19 @@ class Machine:
             if not (owner.descends_from(process) or process.descends_from(owner)):
                 text = f"{arm} is used by {owner.title} and by {process.title} of one COBEGIN"
                 note = "each arm belongs to one process at a time"
-                self.fail(process, "E503", text, span, f"belongs to {owner.title}", notes=[note])
+                hung = self._hung(moved, arm)
+                self.fail(process, "E503", text, span, f"belongs to {owner.title}", secondary=hung, notes=[note])
         if process not in owners:
             owners.append(process)
+
+    def _hung(self, moved: str | None, arm: str) -> list[Label]:
+        """Return where a frame, or what it hangs on, was hung on an arm."""
+        if moved is None or moved == arm:
+            return []
+        above = [moved, *self.tree.ancestors(moved)]
+        name = above[above.index(arm) - 1]
+        text = f"{self.spelled(name)} was affixed to {arm} here"
+        return [Label(self.written[name], text)] if name in self.written else []
 
     def take_time(self, process: Process, seconds: float, pending: Pending) -> None:
         """Let the time of a statement go by before it takes effect."""

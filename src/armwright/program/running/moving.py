@@ -47,7 +47,7 @@ def move(run: Machine, process: Process, step: Instruction) -> None:
     asked = asked_of(run, process, step)
     moved = run.name(process, asked.begin.operands[0])
     arm, implied = _carrier(run, process, moved, asked.begin)
-    run.claim(process, arm, step.span)
+    run.claim(process, arm, step.span, moved)
     _one_at_a_time(run, process, arm, step.span)
     run.idle += _STEPS_OF_A_MOVE
     stages = _plan(run, process, asked, arm, moved)
