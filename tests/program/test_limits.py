@@ -2,8 +2,12 @@
 
 import pytest
 
+from armwright.program import Source
+from armwright.program import compile as translate
+from armwright.program.editing.formatting import formatted
 from armwright.program.running.interpret import Limits
-from program.running import failure, run
+from armwright.program.syntax import tree
+from program.running import failure, printed, run
 
 HEAD = (
     "VAR f, far : FRAME ; t : TRANS ; n, i : SCALAR ; e : EVENT ;\n"
@@ -94,3 +98,27 @@ def test_who_has_the_lock() -> None:
         "E501",
         "branch 1 waits for the lock of f, held by program",
     )
+
+
+def test_long_expressions() -> None:
+    """A sum of ten thousand terms is long and not deep: it is checked, run, written out and laid out."""
+    count = 10_000
+    told = " AND ".join(["n > 0"] * count)
+    text = f"VAR n : SCALAR ; BEGIN n = 1 ; PRINT({' + '.join(['n'] * count)}) ; IF {told} THEN "
+    text += f"PRINT({' - '.join(['1'] * count)}, 1{' * 2 / 2' * count}) END."
+
+    assert printed(run(text)) == ["10000", "-9998 1"]
+    compiled = translate(Source("long.rlo", text))
+    assert formatted(Source("long.rlo", formatted(compiled.source))) == formatted(compiled.source)
+    assert sum(len(line) for line in tree.dump(compiled.tree)) < 300 * 5 * count
+
+
+@pytest.mark.parametrize("place", ["t {0}", "n > 0 AND {0}", "{0} > 0 OR n", "1 + {0}"])
+def test_mistakes_in_long_expressions(place: str) -> None:
+    """A mistake in a long sum is told once, in a message that does not repeat the sum."""
+    wrong = " + ".join(["n"] * 2000 + ["t"] + ["n"] * 2000)
+    text = f"VAR n : SCALAR ; t : TRANS ; BEGIN n = 1 ; t = XYZ(1,1,1) ; n = {place.format(wrong)} END."
+    said = translate(Source("long.rlo", text)).diagnostics
+
+    assert 1 <= len(said) <= 2
+    assert all(len(one.message) < 200 and len("".join(one.helps)) < 200 for one in said)

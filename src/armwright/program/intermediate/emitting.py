@@ -92,8 +92,8 @@ class Emitter:
                 if into is None:
                     return element
                 self.emit(Op.COPY, into, element, span=node.span)
-            case tree.Binary(operation="AND" | "OR"):
-                return self._chained(node, into or self.passing())
+            case tree.Binary():
+                return self._chain(node, into)
             case tree.Matrix():
                 return self._matrix(node, into or self.passing())
             case _:
@@ -106,17 +106,35 @@ class Emitter:
                 op, operands = Op(name.key), [self.value(argument) for argument in arguments]
             case tree.Unary(operation=operation, operand=operand):
                 op, operands = Op.NOT if operation == "NOT" else Op.NEG, [self.value(operand)]
-            case tree.Binary(operation=operation, left=left, right=right):
-                op, operands = _OPERATIONS[operation], [self.value(left), self.value(right)]
             case _:
                 raise AssertionError(f"a checked program has no {type(node).__name__}")
         to = into or self.passing()
         self.emit(op, to, *operands, span=node.span)
         return to
 
-    def _chained(self, node: tree.Binary, to: str) -> str:
+    def _chain(self, node: tree.Binary, into: str | None) -> Operand:
+        """Write the operations of a chain, one after the other."""
+        first, chain = tree.chain(node)
+        # Both sides of AND and OR go to the same place, so that of the last is that of all in front of it.
+        targets: list[str | None] = []
+        for one in reversed(chain):
+            joins = one.operation in ("AND", "OR")
+            targets.append((into or self.passing()) if joins else into)
+            into = targets[-1] if joins else None
+        left = self.value(first, into)
+        for one in chain:
+            to = targets.pop()
+            if one.operation in ("AND", "OR"):
+                left = self._joint(one, _given(to))
+                continue
+            right = self.value(one.right)
+            to = to or self.passing()
+            self.emit(_OPERATIONS[one.operation], to, left, right, span=one.span)
+            left = to
+        return left
+
+    def _joint(self, node: tree.Binary, to: str) -> str:
         """AND and OR look at the right side only where it matters: ``n > 0 AND a[n] > 2``."""
-        self.value(node.left, to)
         decides = to
         if node.operation == "OR":
             decides = self.passing()

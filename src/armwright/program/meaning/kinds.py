@@ -49,7 +49,20 @@ def need(
     Returns:
         Whether it is what is wanted.
     """
-    found = sort(names, node)
+    return _fits(names, node, sort(names, node), wanted, code, what, notes, helps)
+
+
+def _fits(  # noqa: PLR0913, PLR0917 - what ``need`` is given, and the sort
+    names: Names,
+    node: tree.Expression,
+    found: Sort | None,
+    wanted: Sort,
+    code: str,
+    what: str,
+    notes: tuple[str, ...] = (),
+    helps: Callable[[Sort], str] | None = None,
+) -> bool:
+    """Do what ``need`` does for an expression of which one knows what it is."""
     if found is wanted:
         return True
     if found is None or found in FITTING[wanted]:
@@ -84,13 +97,16 @@ def quantity(names: Names, node: tree.Expression, wanted: Dimension, what: str) 
 
 def condition(names: Names, node: tree.Expression, who: str) -> None:
     """Say that what should be a condition is none; a number is not one."""
+    _is_condition(names, node, sort(names, node), who)
 
+
+def _is_condition(names: Names, node: tree.Expression, found: Sort | None, who: str) -> None:
     def helps(found: Sort) -> str:
         if found is Sort.SCALAR and not isinstance(node, tree.Number):
             return f"write `{written(node)} <> 0`"
         return "a condition compares two numbers, such as `n > 0`"
 
-    need(names, node, Sort.CONDITION, "E219", f"{who} needs a condition", helps=helps)
+    _fits(names, node, found, Sort.CONDITION, "E219", f"{who} needs a condition", helps=helps)
 
 
 def _number(_names: Names, node: tree.Number) -> Sort | None:
@@ -156,11 +172,16 @@ def _unary(names: Names, node: tree.Unary) -> Sort | None:
 
 
 def _binary(names: Names, node: tree.Binary) -> Sort | None:
-    if node.operation in ("AND", "OR"):
-        condition(names, node.left, node.operation)
-        condition(names, node.right, node.operation)
-        return Sort.CONDITION
-    return operations.result(names, node, sort(names, node.left), sort(names, node.right))
+    first, chain = tree.chain(node)
+    found = sort(names, first)
+    for one in chain:
+        if one.operation in ("AND", "OR"):
+            _is_condition(names, one.left, found, one.operation)
+            condition(names, one.right, one.operation)
+            found = Sort.CONDITION
+        else:
+            found = operations.result(names, one, found, sort(names, one.right))
+    return found
 
 
 def _matrix(names: Names, node: tree.Matrix) -> Sort | None:

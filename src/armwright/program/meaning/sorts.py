@@ -7,6 +7,8 @@ from armwright.program.syntax import tree
 
 # A longer expression is not repeated in a message; its place is marked anyway.
 _LONGEST_SHOWN = 32
+# In advice it is repeated up to here.
+_LONGEST_WRITTEN = 100
 # How tightly operations bind; comparisons stand between.
 _STRENGTH = {"OR": 1, "AND": 2, "+": 5, "-": 5, "*": 6, "/": 6}
 _COMPARISON, _NOT, _MINUS, _ATOM = 4, 3, 7, 8
@@ -73,8 +75,9 @@ def called(node: tree.Expression) -> str:
 
 
 def written(node: tree.Expression) -> str:
-    """Return an expression as one would write it, with no more parentheses than it takes."""
-    return _written(node)[0]
+    """Return an expression as one would write it, with no more parentheses than it takes; of a long one the start."""
+    text = _written(node)[0]
+    return text if len(text) <= _LONGEST_WRITTEN else f"{text[:_LONGEST_WRITTEN].rpartition(' ')[0]} ..."
 
 
 def _written(node: tree.Expression) -> tuple[str, int]:
@@ -83,10 +86,14 @@ def _written(node: tree.Expression) -> tuple[str, int]:
         case tree.Unary(operation=operation, operand=operand):
             strength, gap = (_NOT, " ") if operation == "NOT" else (_MINUS, "")
             return f"{operation}{gap}{_inside(operand, strength)}", strength
-        case tree.Binary(operation=operation, left=left, right=right):
-            strength = _STRENGTH.get(operation, _COMPARISON)
-            low = strength + (strength == _COMPARISON)
-            return f"{_inside(left, low)} {operation} {_inside(right, strength + 1)}", strength
+        case tree.Binary():
+            first, chain = tree.chain(node)
+            text, own = _written(first)
+            for one in chain:
+                strength = _STRENGTH.get(one.operation, _COMPARISON)
+                left = text if own >= strength + (strength == _COMPARISON) else f"({text})"
+                text, own = f"{left} {one.operation} {_inside(one.right, strength + 1)}", strength
+            return text, own
         case _:
             return _atom(node), _ATOM
 

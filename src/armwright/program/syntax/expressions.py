@@ -58,14 +58,16 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
         chained = strength == last == _COMPARISON
         if chained:
             _chained(tokens, start)
-        height, last = tokens.height, strength
-        if tokens.depth + height >= DEEPEST:
+        # A sum of many terms is long and not deep: only what is nested counts.
+        height = tokens.height if strength == last else tokens.height + 1
+        last = strength
+        if tokens.depth + height > DEEPEST:
             tokens.too_deep()
         sign = tokens.take()
         tokens.enter()
         right = expression(tokens, "a value", "", strength + 1)
         tokens.depth -= 1
-        tokens.height = 1 + max(height, tokens.height)
+        tokens.height = max(height, tokens.height + 1)
         if chained and isinstance(left, tree.Binary):
             # What was meant is that both hold.
             right = tree.Binary(right.span, sign.key, left.right, right)

@@ -61,6 +61,7 @@ from armwright.program.syntax.tree.values import (
     String,
     Unary,
     Variable,
+    chain,
 )
 from armwright.program.syntax.tree.walking import (
     dump,
@@ -124,6 +125,7 @@ __all__ = [
     "Via",
     "Wait",
     "While",
+    "chain",
     "dump",
     "walk",
 ]

@@ -100,6 +100,19 @@ class Binary:
     right: "Expression"
 
 
+def chain(node: Binary) -> tuple["Expression", list[Binary]]:
+    """Return the first operand of a chain of operations, and the operations from the first to the last.
+
+    ``a + b + c`` is ``(a + b) + c``: a sum of ten thousand terms is that deep on its left side, so nobody goes down
+    there by calling himself.
+    """
+    operations, first = [node], node.left
+    while isinstance(first, Binary):
+        operations.append(first)
+        first = first.left
+    return first, operations[::-1]
+
+
 @attrs.frozen
 class Matrix:
     """Values in parentheses; twelve if all is well, n, o, a, p column by column."""
