@@ -157,3 +157,31 @@ def test_help() -> None:
 
     assert result.returncode == 0
     assert "armwright check examples/stacking.rlo" in result.stdout
+
+
+def test_several_programs(wrong: Path, tmp_path: Path) -> None:
+    """Several files, and all programs in a folder and its folders, are checked one after the other, each once."""
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    (inner / "good.rlo").write_text("BEGIN PAUSE 1 END.\n")
+    result = check(wrong, tmp_path)
+
+    assert result.returncode == 1
+    assert [line for line in result.stdout.splitlines() if ".rlo: " in line or "programs" in line] == [
+        "wrong.rlo: 1 error",
+        "good.rlo: no errors",
+        "2 programs: 1 error",
+    ]
+    data = json.loads(check(tmp_path, "--json").stdout)
+    assert (data["errors"], [Path(one["path"]).name for one in data["programs"]]) == (1, ["good.rlo", "wrong.rlo"])
+    log = json.loads(check(tmp_path, "--format", "sarif").stdout)
+    (found,) = log["runs"][0]["results"]
+    assert found["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == wrong.as_posix()
+
+
+def test_folder_without_programs(tmp_path: Path) -> None:
+    """A folder in which there is no program is told of."""
+    result = check(tmp_path)
+
+    assert result.returncode == 1
+    assert "there is no program in this folder; expected files *.rlo" in result.stderr

@@ -76,6 +76,7 @@ def test_events_file(stacked: Path) -> None:
     assert events[6]["text"] == "ARM_1 [OBJ1] MOVE: PTP OBJ2 @100"
     assert events[6]["source"] == "MOVE OBJ1 TO OBJ2"
     assert all(a["t1"] <= b["t0"] + 1e-9 for a, b in pairwise(events))
+    assert all(len(f"{event[key]!r}") <= 12 for event in events for key in ("t0", "t1"))
 
 
 def test_frames_file(stacked: Path) -> None:

@@ -182,3 +182,19 @@ def test_thousands_in_one_line() -> None:
 
     assert len(rows) > 10_000
     assert time.process_time() - started < GENEROUS
+
+
+def test_more_messages_than_one_reads() -> None:
+    """Of thousands of messages the first hundred are shown, errors before warnings, and the others are counted."""
+    text = "VAR f : FRAME ;\nBEGIN\n" + "".join(f"  f{number} = 1 ;\n" for number in range(3000)) + "END.\n"
+    compiled = translate(Source("t.rlo", text))
+    shown = render(compiled.diagnostics, compiled.source)
+
+    assert len(compiled.diagnostics) == 3001
+    assert shown.count("error[E202]") == 100
+    assert "L304" not in shown
+    assert (
+        "note: 2901 more are not shown; one mistake may have caused many. `armwright check --format json` prints all"
+        in shown.splitlines()
+    )
+    assert shown.endswith("t.rlo: 3000 errors, 1 warning\n")

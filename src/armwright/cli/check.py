@@ -1,6 +1,7 @@
 """``armwright check``: what the translator has to say about a program, and what it makes of it."""
 
 import enum
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -8,12 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.printing import print_json
-from armwright.cli.programs import ProgramFile, Std, Strict
-from armwright.errors import ExitStatus
+from armwright.cli.programs import Std, Strict
+from armwright.errors import ExitStatus, FileFormatError
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
     from armwright.program import Compilation
+
+
+_SUFFIX = ".rlo"
 
 
 class Emit(enum.StrEnum):
@@ -33,10 +37,13 @@ class Format(enum.StrEnum):
 
 
 def check(  # noqa: PLR0917 - Typer reads one parameter per option
-    program: ProgramFile,
+    programs: Annotated[
+        list[Path],
+        typer.Argument(help="The programs, in RLO; of a folder all in it that end in .rlo.", show_default=False),
+    ],
     cell: Annotated[
         Path | None,
-        typer.Option("--cell", help="The cell it will run in; frames, arms and devices are then checked too."),
+        typer.Option("--cell", help="The cell they will run in; frames, arms and devices are then checked too."),
     ] = None,
     emit: Annotated[
         Emit | None, typer.Option(help="Print this instead; diagnostics go to the error output.", show_default=False)
@@ -46,29 +53,72 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
     output_format: Annotated[Format, typer.Option("--format", help="How to print diagnostics.")] = Format.TEXT,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
-    """Check an RLO program without running it.
+    """Check RLO programs without running them.
 
-    Exit status 0: it can run (there may be warnings); 1: it has errors.
+    Exit status 0: all can run (there may be warnings); 1: one or more have errors.
 
     **Example:** `armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code`
     """
-    from armwright.cli.programs import given_cell, in_its_cell, print_diagnostics
+    from armwright.cli.programs import given_cell, in_its_cell
 
-    compiled, _ = in_its_cell(program, given_cell(cell), strict=strict, std=std)
+    paths, given = _found(programs), given_cell(cell)
+    compiled = [in_its_cell(path, given, strict=strict, std=std)[0] for path in paths]
     if as_json or output_format is Format.JSON:
-        print_json(_as_data(compiled, emit))
+        several = [_as_data(one, emit) for one in compiled]
+        print_json(several[0] if len(several) == 1 else _together(several, paths))
     elif output_format is Format.SARIF:
-        from armwright.program.messages.sarif import to_sarif
+        from armwright.program.messages.sarif import sarif_of
 
-        log = to_sarif(compiled.diagnostics, compiled.source, program.as_posix())
-        print_json(log)
+        pairs = zip(compiled, paths, strict=True)
+        print_json(sarif_of([(one.diagnostics, one.source, path.as_posix()) for one, path in pairs]))
     else:
-        for line in _emitted(compiled, emit) if emit else ():
-            print(line)
-        if not emit or compiled.diagnostics:
-            print_diagnostics(compiled.diagnostics, compiled.source, to_errors=emit is not None)
-    if compiled.code is None:
+        for one in compiled:
+            _print(one, emit)
+        if len(compiled) > 1:
+            print(_counted(compiled), file=sys.stderr if emit else sys.stdout)
+    if any(one.code is None for one in compiled):
         raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
+
+
+def _found(given: list[Path]) -> list[Path]:
+    """Return the programs that are asked for, each once: of a folder all in it and in its folders.
+
+    Raises:
+        FileFormatError: a folder has none.
+    """
+    paths: dict[Path, None] = {}
+    for path in given:
+        inside = sorted(path.rglob(f"*{_SUFFIX}")) if path.is_dir() else [path]
+        if not inside:
+            raise FileFormatError(str(path), None, "", f"there is no program in this folder; expected files *{_SUFFIX}")
+        paths |= dict.fromkeys(inside)
+    return list(paths)
+
+
+def _print(compiled: "Compilation", emit: Emit | None) -> None:
+    from armwright.cli.programs import print_diagnostics
+
+    for line in _emitted(compiled, emit) if emit else ():
+        print(line)
+    if not emit or compiled.diagnostics:
+        print_diagnostics(compiled.diagnostics, compiled.source, to_errors=emit is not None)
+
+
+def _counted(compiled: "list[Compilation]") -> str:
+    """Return the last line of a report on several programs."""
+    errors = sum(one.is_error for program in compiled for one in program.diagnostics)
+    counts = [(errors, "error"), (sum(len(program.diagnostics) for program in compiled) - errors, "warning")]
+    said = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
+    return f"{len(compiled)} programs: {', '.join(said) or 'no errors'}"
+
+
+def _together(several: list[dict[str, Any]], paths: list[Path]) -> dict[str, Any]:
+    """Return what is wrong with several programs as plain data, each with its path."""
+    return {
+        "errors": sum(one["errors"] for one in several),
+        "warnings": sum(one["warnings"] for one in several),
+        "programs": [{"path": path.as_posix(), **one} for one, path in zip(several, paths, strict=True)],
+    }
 
 
 def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:

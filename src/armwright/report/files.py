@@ -112,7 +112,7 @@ def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic])
     return {
         "program": code.source.name,
         "cell": recording.cell.name,
-        "duration": recording.duration,
+        "duration": _seconds(recording.duration),
         "trace": recording.trace(),
         "stages": [_stage(stage, recording, code) for stage in recording.stages],
         "diagnostics": [to_json(one, code.source) for one in diagnostics],
@@ -128,7 +128,7 @@ def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
         "kind": run.stage.kind,
         "to": list(run.to),
         "speed": run.speed,
-        "start": run.t0,
+        "start": _seconds(run.t0),
         "duration": motion.duration,
         "length": run.length,
         "stopped": run.stopped,
@@ -165,12 +165,17 @@ def _detour(stage: Stage) -> dict[str, Any] | None:
     }
 
 
+def _seconds(time: float) -> float:
+    """Return a time of the clock as people write it: a number of ticks times the period is 6.7490000000000006."""
+    return round(time, 9)
+
+
 def _events(recording: Recording, code: Code) -> Iterator[str]:
     for effect in recording.effects:
         source = code.source
         event = {
-            "t0": effect.t0,
-            "t1": effect.t1,
+            "t0": _seconds(effect.t0),
+            "t1": _seconds(effect.t1),
             "line": source.line(effect.span.start),
             "column": source.column(effect.span.start),
             "kind": effect.kind,

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 Piece: TypeAlias = tuple[str, str]
 Row: TypeAlias = list[Piece]
 
+# So many are read one by one at most; the rest is counted.
+MOST_SHOWN = 100
 _TAB = 4
 _NARROWEST_GUTTER = 2
 # Longer lines are shown in part, from so many characters before the first place on.
@@ -24,7 +26,7 @@ _QUIET = "bold blue"
 
 
 def render(diagnostics: Iterable[Diagnostic], source: Source) -> str:
-    """Return all diagnostics as plain text, sorted by place, with a count at the end."""
+    """Return diagnostics as plain text, sorted by place, a hundred at most, with a count of all at the end."""
     return "".join("".join(text for text, _ in row).rstrip() + "\n" for row in _page(diagnostics, source))
 
 
@@ -42,8 +44,14 @@ def render_rich(diagnostics: Iterable[Diagnostic], source: Source) -> "Text":
 
 def _page(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
     ordered = in_order(diagnostics)
-    for diagnostic in ordered:
+    # Of too many the errors come first: a warning is never shown in place of what keeps a program from running.
+    shown = in_order(sorted(ordered, key=lambda one: not one.is_error)[:MOST_SHOWN])
+    for diagnostic in shown:
         yield from _block(diagnostic, source)
+        yield [("", "")]
+    if len(ordered) > MOST_SHOWN:
+        rest = f"{len(ordered) - MOST_SHOWN} more are not shown; one mistake may have caused many"
+        yield [("note", "bold"), (f": {rest}. `armwright check --format json` prints all", "")]
         yield [("", "")]
     yield [(count_line(ordered, source), "bold" if ordered else "")]
 

@@ -20,8 +20,21 @@ def to_sarif(diagnostics: Sequence[Diagnostic], source: Source, path: str | None
         source: the program.
         path: of the program as it shall stand in the log; its name when left out.
     """
-    uri = PurePath(path or source.name).as_posix()
-    codes = sorted({one.code for one in diagnostics})
+    return sarif_of([(diagnostics, source, path or source.name)])
+
+
+def sarif_of(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> dict[str, Any]:
+    """Return what is to be said of several programs as one SARIF log.
+
+    Args:
+        programs: of each the diagnostics, the text, and the path as it shall stand in the log.
+    """
+    codes = sorted({one.code for diagnostics, _, _ in programs for one in diagnostics})
+    results = [
+        _result(one, source, PurePath(path).as_posix(), codes)
+        for diagnostics, source, path in programs
+        for one in diagnostics
+    ]
     return {
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
         "version": "2.1.0",
@@ -35,7 +48,7 @@ def to_sarif(diagnostics: Sequence[Diagnostic], source: Source, path: str | None
                     }
                 },
                 "columnKind": "unicodeCodePoints",
-                "results": [_result(one, source, uri, codes) for one in diagnostics],
+                "results": results,
             }
         ],
     }

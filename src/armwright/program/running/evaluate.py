@@ -16,6 +16,8 @@ from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # Numbers beyond this are a slip, and squares of them would overflow.
 LARGEST = 1e100
+# Points nearer than this part of their distance from the origin, or of a metre, are the same point.
+_ROUNDING = 1e-12
 
 
 class ValueFault(Exception):  # noqa: N818 - it never leaves the interpreter
@@ -72,6 +74,16 @@ def _shift(x: float, y: float, z: float, units: UnitSystem) -> Array:
     return X
 
 
+def _distance(p: Array, q: Array) -> float:
+    """Return how far two points are apart [m]: nothing, where rounding alone may have put them apart.
+
+    Where a hand stands is worked out through joints and frames some metres long, each of which rounds.
+    """
+    apart = float(np.linalg.norm(p - q))
+    scale = max(1.0, float(np.abs(p).max()), float(np.abs(q).max()))
+    return apart if apart > _ROUNDING * scale else 0.0
+
+
 def matrix(numbers: Sequence[float], units: UnitSystem) -> Array:
     """Return twelve numbers as a place, the rotation made exact where it nearly is one.
 
@@ -107,6 +119,6 @@ IN_UNITS: Mapping[Op, Callable[..., Any]] = {
     Op.ROTX: _turn(0),
     Op.ROTY: _turn(1),
     Op.ROTZ: _turn(2),
-    Op.DIST: lambda f, g, units: float(np.linalg.norm(f[:3, 3] - g[:3, 3])) / units.metres,
+    Op.DIST: lambda f, g, units: _distance(f[:3, 3], g[:3, 3]) / units.metres,
     Op.MATX: lambda *given: matrix(given[:-1], given[-1]),
 }
