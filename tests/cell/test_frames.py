@@ -134,35 +134,36 @@ def test_any_history(history: list[tuple[str, str, str, int]]) -> None:
         np.testing.assert_allclose(tree.relation(frame, WORLD), tree.world(frame), atol=ROUNDING)
 
 
+NAMES = tuple(f"F{number}" for number in range(8))
+
+
+def changed(tree: FrameTree, rng: np.random.Generator) -> FrameTree:
+    """Return a tree with one change drawn at random, or the same where what was drawn cannot be done."""
+    one, other = (str(name) for name in rng.choice(NAMES, 2, replace=False))
+    both = one in tree and other in tree and not tree.would_ring(one, other)
+    changes = {
+        "place": lambda: tree.place(one, random_pose(rng)),
+        "affix": lambda: tree.affix(one, other) if both else tree,
+        "affix at": lambda: tree.affix(one, other, random_pose(rng), rigid=bool(rng.integers(2))) if both else tree,
+        "unfix": lambda: tree.unfix(one) if one in tree else tree,
+        "without": lambda: tree.without(one) if one in tree else tree,
+    }
+    return changes[str(rng.choice([*changes]))]()
+
+
 def test_worlds_that_were_asked_for_before(sample: Sample) -> None:
     """Where a frame stands depends on the tree alone, to the last bit, and not on what was asked of it before."""
-    names = [f"F{number}" for number in range(8)]
     for rng in sample.cases(200):
         tree = FrameTree()
-        for name in names[:2]:
-            tree = tree.place(name, random_pose(rng))
         for _ in range(60):
-            one, other = (str(name) for name in rng.choice(names, 2, replace=False))
-            match rng.integers(5):
-                case 0:
-                    tree = tree.place(one, random_pose(rng))
-                case 1 if tree.has_value(one := names[0]) and not tree.would_ring(other, one):
-                    tree = tree.affix(other, one, random_pose(rng), rigid=bool(rng.integers(2)))
-                case 2 if one in tree and other in tree and not tree.would_ring(one, other):
-                    tree = tree.affix(one, other)
-                case 3 if one in tree:
-                    tree = tree.unfix(one)
-                case 4 if one in tree:
-                    tree = tree.without(one)
-                case _:
-                    continue
+            tree = changed(tree, rng)
             for name in rng.permutation([*tree])[:3]:
                 tree.world(str(name))
-        anew = FrameTree(dict(tree.nodes))
+        anew, order = FrameTree(dict(tree.nodes)), [*tree]
         for name in tree:
             np.testing.assert_array_equal(tree.world(name), anew.world(name))
             np.testing.assert_allclose(tree.world(name), tree.relation(name, WORLD), atol=ROUNDING)
-            assert name == WORLD or [*tree].index(tree.nodes[name].parent) < [*tree].index(name)
+            assert name == WORLD or order.index(tree.nodes[name].parent) < order.index(name)
             for child in tree.nodes:
                 assert tree.would_ring(child, name) == (child == name or child in tree.ancestors(name))
     sample.record("frame trees after 60 changes: poses as of a tree made anew, to the bit", sample.count(200), 0)

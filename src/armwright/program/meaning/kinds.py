@@ -52,7 +52,7 @@ def need(
     return _fits(names, node, sort(names, node), wanted, code, what, notes, helps)
 
 
-def _fits(  # noqa: PLR0913, PLR0917 - what ``need`` is given, and the sort
+def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
     names: Names,
     node: tree.Expression,
     found: Sort | None,

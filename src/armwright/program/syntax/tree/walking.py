@@ -7,7 +7,7 @@ import attrs
 from armwright.program.syntax.tree.values import Number
 from armwright.program.text.source import Span
 
-
+# Deeper levels are not shown further to the right.
 _DEEPEST_SHOWN = 100
 
 
