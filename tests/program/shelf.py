@@ -24,7 +24,7 @@ REJECTED = sorted((HERE / "rejected").rglob("*.rlo"))
 ACCEPTED = sorted((HERE / "accepted").rglob("*.rlo"))
 
 EXPECTATION = re.compile(r"// expect: ([ELRW]\d{3}) line (\d+)")
-CELL = re.compile(r"// cell: (arms|frames|devices|visions) (.*)")
+CELL = re.compile(r"// cell: (arms|frames|devices|visions|reach) (.*)")
 STRICT = re.compile(r"// strict$", re.MULTILINE)
 OLD = re.compile(r"// std=83$", re.MULTILINE)
 IMPORT = re.compile(r"// import: (\S+): (.*)")
@@ -45,6 +45,7 @@ def cell_of(text: str) -> KnownCell | None:
         frames=hanging(told.get("frames", ())),
         devices=frozenset(told["devices"]) if "devices" in told else None,
         visions=frozenset(told["visions"]) if "visions" in told else None,
+        reach=float(told["reach"][0]) if "reach" in told else None,
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from armwright.cell.simulator import Simulator
-from armwright.program import Compilation, Source, known_cell
+from armwright.program import Compilation, KnownCell, Source, known_cell
 from armwright.program import compile as translate
 from armwright.program.following.flow import _Follower
 from armwright.program.intermediate.code import Code
@@ -16,6 +16,7 @@ from armwright.program.running.interpret import run as run_on
 from program.running import cell_of
 from program.shelf import BARE, compile_program
 from program.wandering import Wandering
+from samples import Sample
 
 CELL = cell_of("cell2")
 # Said of single statements that fail when a run comes to them.
@@ -99,6 +100,32 @@ def test_certain_errors_are_errors_of_runs(seed: int) -> None:
         text = without(text, trial.failed) if trial.failed else None
         if text is None:
             return
+
+
+def test_never_reached(sample: Sample) -> None:
+    """Of a statement that no way leads to no run ever begins one, whatever way it takes."""
+    told = 0
+    for rng in sample.cases(200):
+        lines = Wandering(int(rng.integers(10**6))).program().split("\n")
+        for at in rng.permutation(len(lines))[:3]:
+            if lines[at].endswith(" ;") and not lines[at].startswith(("VAR", "PROCEDURE", "UNTIL", "END", "COEND")):
+                lines[at] = str(rng.choice(["HALT ;", "IF n > 3 THEN HALT ELSE HALT ;"]))
+        compilation = compiled("\n".join(lines))
+        if any(one.is_error for one in compilation.diagnostics):
+            continue
+        unreached = {compilation.source.line(one.span.start) for one in compilation.diagnostics if one.code == "L305"}
+        told += len(unreached)
+        assert not unreached & Trial(compilation).begun
+    sample.record("statements told never to be reached, and reached by no run", told, 0)
+
+
+def test_frames_of_the_cell_are_near() -> None:
+    """Who misspells a frame that only the cell has is told its name, and that it is to be declared."""
+    cell = KnownCell(arms=frozenset({"ARM_1"}), frames={"FEEDER": "WORLD"})
+    (said,) = translate(Source("test.rlo", "BEGIN MOVE ARM_1 TO fedeer END."), cell).diagnostics
+
+    assert said.code == "E202"
+    assert said.helps == ("did you mean `FEEDER`, a frame of the cell? Declare it with `VAR FEEDER : FRAME ;`",)
 
 
 def test_most_runs_fail_where_it_was_said() -> None:

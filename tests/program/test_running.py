@@ -328,7 +328,8 @@ def test_no_distance_but_rounding(units: str) -> None:
     """A hand that has come to its goal is no distance from it, though its joints round; a micrometre is told."""
     text = (
         f"UNITS {units} ; VAR f : FRAME ; BEGIN f = WORLD * XYZ(450mm, 151mm, 63mm) * ROTX(180) * ROTZ(12.3) ;"
-        "MOVE ARM_1 TO f ; PRINT(DIST(ARM_1, f)) ; IF DIST(ARM_1, f) = 0 THEN PRINT(1) ; PRINT(DIST(f, f * XYZ(0.001mm, 0, 0))) END."
+        "MOVE ARM_1 TO f ; PRINT(DIST(ARM_1, f)) ; IF DIST(ARM_1, f) = 0 THEN PRINT(1) ;"
+        "PRINT(DIST(f, f * XYZ(0.001mm, 0, 0))) END."
     )
 
     assert printed(run(text)) == ["0", "1", "1e-06" if units == "M" else "0.001"]

@@ -1,5 +1,6 @@
 """Cures of diagnostics as an editor offers them: one at a time where the cursor is, or all that are certain."""
 
+import re
 from collections.abc import Iterable
 
 import attrs
@@ -7,11 +8,14 @@ import attrs
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.fixing import apart
 from armwright.program.editing.places import Edit
-from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.messages.diagnostics import Diagnostic, Fix
 from armwright.program.text.source import Source, Span
 
 # A longer text is not repeated in a title.
 _LONGEST_SHOWN = 30
+_DID_YOU_MEAN = re.compile(r"did you mean `([A-Za-z][\w-]*)`")
+# The place of a misspelt word is the word, or ends with it: `WITH SPED`.
+_LAST_WORD = re.compile(r"(?<![\w-])[^\W\d_][\w-]*\Z")
 
 
 @attrs.frozen
@@ -30,12 +34,29 @@ class QuickFix:
 
 
 def quickfixes(analysis: Analysis, span: Span) -> tuple[QuickFix, ...]:
-    """Return the cures of what is wrong in a stretch of text."""
+    """Return the cures of what is wrong in a stretch of text: those that are certain, and names that were meant."""
+    source = analysis.compiled.source
+    found = [_meant(one, source) for one in analysis.compiled.diagnostics]
     return tuple(
-        QuickFix(_title(one, analysis.compiled.source), _edits(one), one)
-        for one in analysis.compiled.diagnostics
+        QuickFix(_title(one, source), _edits(one), said)
+        for one, said in zip(found, analysis.compiled.diagnostics, strict=True)
         if one.fixes and any(_touch(place, span) for place in (one.span, *(fix.span for fix in one.fixes)))
     )
+
+
+def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:
+    """Return a diagnostic that asks whether another word was meant with that word as its cure.
+
+    It is no certain one, so that an editor offers it and `armwright fix` leaves it alone.
+    """
+    word = next((match[1] for one in diagnostic.helps if (match := _DID_YOU_MEAN.match(one))), None)
+    if diagnostic.fixes or word is None:
+        return diagnostic
+    written = _LAST_WORD.search(source.slice(diagnostic.span))
+    if written is None:
+        return diagnostic
+    start = diagnostic.span.start + written.start()
+    return attrs.evolve(diagnostic, fixes=(Fix(Span(start, diagnostic.span.end), word),))
 
 
 def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[Edit, ...]:

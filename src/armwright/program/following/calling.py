@@ -117,10 +117,10 @@ class Calling:
             argument = given.get(key)
             bindings[key] = own
             if key not in procedure.parameters:
-                course.table.valued.put(own, False)
+                course.table.lacks(own)
                 course.table.links.put(own, None)
             elif argument is None:
-                course.table.valued.put(own, True)
+                course.table.has(own)
             else:
                 bindings[key] = self._bound(argument, kind, own, node.span if node else argument.span)
         return Activation(scope=course.symbols.scope(procedure.node.name.key), bindings=bindings)
@@ -135,7 +135,7 @@ class Calling:
         if kind.kind is Kind.FRAME:
             if isinstance(argument, tree.Name | tree.Index | tree.ArmName | tree.Poison):
                 return course.frame(argument)
-            course.table.valued.put(own, True)
+            course.table.has(own)
             course.table.links.put(own, None)
             return own
         give(course, own, course.number(argument) if kind.kind is Kind.SCALAR else None, span)

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import attrs
 
 from armwright.program.following.facts import EVERYTHING, Book, Facts, same
-from armwright.program.following.hanging import UNKNOWN, Hanging, is_any, is_arm
+from armwright.program.following.hanging import UNKNOWN, Hanging, Parting, is_any, is_arm
 from armwright.program.following.writes import ANY_ARM, Writes, Writing
 from armwright.program.intermediate.code import Kind
 from armwright.program.meaning.known import KnownCell
@@ -77,6 +77,8 @@ class Course:
     Attributes:
         first: whether this is the first pass of a loop that has others: what is not certain to run is passed over.
         over: whether HALT has ended the way that is being followed.
+        ended: the HALT or RETRY that did.
+        conditions: in how many IFs and WHILEs the place lies that is being followed.
     """
 
     def __init__(
@@ -103,6 +105,8 @@ class Course:
         self.calls: list[Called] = []
         self.branches: list[Uses] = []
         self.first = self.over = False
+        self.ended: Span | None = None
+        self.conditions = 0
         self._arms: dict[int, str | None] = {}
         self._implied: dict[int, bool] = {}
         self._settled: set[str] = set()
@@ -237,6 +241,7 @@ class Course:
 
     def _need_variable(self, node: tree.Name | tree.Index) -> None:
         if self.has_value(node):
+            self._need_certain(node)
             return
         head = node.name if isinstance(node, tree.Index) else node
         scope, kind = self.now.scope, self._kind(node)
@@ -255,6 +260,42 @@ class Course:
             "no value here",
             secondary=secondary,
             helps=(f"write `{written(node)} = {'100' if kind is Kind.SCALAR else '( twelve numbers )'} ;` before",),
+        )
+
+    def _need_certain(self, node: tree.Name | tree.Index) -> None:
+        """Warn of a variable that has a value on one way here and none on the other.
+
+        Where the use depends on a condition too, that may be the one on which it has the value.
+        """
+        name = self.variable(node)
+        parting = True if name is None or is_any(name) else self.table.is_sure(name)
+        if name is None or not isinstance(parting, Parting) or self.conditions > parting.depth:
+            return
+        open_cell = self.cell is None and self._kind(node) is Kind.FRAME
+        if open_cell or not self.settle(name):
+            return
+        self.say(
+            "W207",
+            f"`{written(node)}` may have no value here",
+            node.span,
+            "needs a value",
+            secondary=(Label(parting.span, "it gets one on one side of this IF only"),),
+            helps=("give it a value before the IF, or on both sides",),
+            severity=Severity.WARNING,
+        )
+
+    def unreached(self, span: Span) -> None:
+        """Point at a statement that no way leads to."""
+        if self.ended is None:
+            return
+        self.say(
+            "L305",
+            "this statement is never reached",
+            span,
+            "no way leads here",
+            secondary=(Label(self.ended, "nothing behind this is done"),),
+            helps=("leave it out, or put a condition in front of what ends the way",),
+            severity=Severity.WARNING,
         )
 
     def _no_place(self, node: tree.Name | tree.Index, secondary: tuple[Label, ...], *, from_cell: bool) -> None:
@@ -350,7 +391,7 @@ class Course:
         if is_any(name):
             self.facts.wipe(name)
         else:
-            self.table.valued.put(name, True)
+            self.table.has(name)
             self.numbers.put(name, None)
 
     # ---- saying ----------------------------------------------------------------------------------------------------

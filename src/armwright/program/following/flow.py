@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import attrs
 
-from armwright.program.following import handling, linking, processes
+from armwright.program.following import handling, linking, processes, sharing
 from armwright.program.following.calling import Calling
 from armwright.program.following.course import LAST, Course, Uses
 from armwright.program.following.facts import Outcome, Shaky
-from armwright.program.following.hanging import UNKNOWN, is_arm
+from armwright.program.following.hanging import UNKNOWN, Parting, is_arm
 from armwright.program.following.writes import ANY_ARM, ANYTHING, NOTHING, Writes, every
 from armwright.program.intermediate.code import Kind
 from armwright.program.meaning.known import KnownCell
@@ -71,7 +71,7 @@ def check(
     follower.all(program.statements)
     course.over = False
     follower.others()
-    found = [*course.found, *processes.check(program, symbols, source)]
+    found = [*course.found, *processes.check(program, symbols, source), *sharing.check(program, symbols)]
     return Flow(arms=course.arms, implied=course.implied), found
 
 
@@ -82,6 +82,7 @@ class _Follower:
         self._course = course
         self._calling = Calling(course, self.all)
         self._depth = self._loops = 0
+        self._recovering = False
         self._steps: dict[type, Callable[..., None]] = {
             tree.Assign: lambda node: linking.assign(course, node),
             tree.Affix: lambda node: linking.affix(course, node),
@@ -114,6 +115,7 @@ class _Follower:
         """Follow several, one after the other, up to a HALT."""
         for statement in statements:
             if self._course.over:
+                self._course.unreached(statement.span)
                 return
             self.one(statement)
 
@@ -143,8 +145,10 @@ class _Follower:
     def _writes(self, *statements: tree.Statement) -> Writes:
         return self._course.writing.all(statements, self._course.now.scope)
 
-    def _end(self, _: tree.Halt | tree.Retry) -> None:
-        self._course.over = True
+    def _end(self, node: tree.Halt | tree.Retry) -> None:
+        # Of a RETRY that has no TRY to go back to something has been said.
+        says = isinstance(node, tree.Halt) or self._recovering
+        self._course.over, self._course.ended = True, node.span if says else None
 
     def _print(self, node: tree.Print) -> None:
         self._course.need(*(item for item in node.items if not isinstance(item, tree.String)))
@@ -180,7 +184,12 @@ class _Follower:
             course.forget(self._writes(node))
             return
         otherwise = () if node.otherwise is None else (node.otherwise,)
-        self._meet(self._way((node.then,)), self._way(otherwise))
+        course.conditions += 1
+        ways = self._way((node.then,)), self._way(otherwise)
+        course.conditions -= 1
+        course.table.parting = Parting(node.head, course.conditions)
+        self._meet(*ways)
+        course.table.parting = None
 
     def _move(self, node: tree.Move) -> None:
         """Follow a MOVE; what its actions do may happen or not, while the arm is on its way."""
@@ -216,13 +225,18 @@ class _Follower:
             course.forget(writes)
         well = self._way(node.body, mark)
         course.forget(writes if retries else self._writes(*node.body))
-        self._meet(well, self._way(node.recovery, mark))
+        outside, self._recovering = self._recovering, True
+        recovered = self._way(node.recovery, mark)
+        self._recovering = outside
+        self._meet(well, recovered)
 
     # ---- loops -----------------------------------------------------------------------------------------------------
 
     def _while(self, node: tree.While) -> None:
         self._course.need(node.condition)
+        self._course.conditions += 1
         self._loop(node, (node.body,), certain=False)
+        self._course.conditions -= 1
 
     def _repeat(self, node: tree.Repeat) -> None:
         self._loop(node, node.body, certain=True)

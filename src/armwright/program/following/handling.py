@@ -145,6 +145,7 @@ def begin(course: Course, node: tree.Move) -> str | None:
             course.need(clause.value)
     if arm is None:
         return None
+    _left_hanging(course, node, arm)
     course.use(arm, node.span.to(node.moved.span), moves=True, hung=_hung(course, moved, arm))
     goal = course.frame(node.goal)
     if goal is not None and not course.table.unknown(goal) and course.table.carrier(goal) == arm:
@@ -177,6 +178,26 @@ def end(course: Course, node: tree.Move, arm: str | None, *, halted: bool) -> No
             # Something was reported of the goal, or it is given to a procedure in a way that is not followed.
             at = UNKNOWN
     course.table.arrive(arm, at, node.span if moved == arm else None)
+
+
+def _left_hanging(course: Course, node: tree.Move, arm: str) -> None:
+    """Warn of a frame that the fingers have let go, and that follows the arm all the same."""
+    left = course.table.hands[arm].left
+    if left is None:
+        return
+    frame, opened = left
+    link, name = course.table.links[frame], course.name(frame)
+    if link is None or link.parent != arm:
+        return
+    course.say(
+        "W209",
+        f"`{name}` still hangs on {arm}, whose fingers have let it go",
+        node.span,
+        f"{name} goes along",
+        secondary=(Label(opened, "they open here"), *((Label(link.span, "affixed here"),) if link.span else ())),
+        helps=(f"write `UNFIX {name} FROM {arm}` behind OPEN",),
+        severity=Severity.WARNING,
+    )
 
 
 def _hung(course: Course, moved: str | None, arm: str) -> tuple[Label, ...]:

@@ -39,6 +39,14 @@ class Assignment:
 
 
 @attrs.frozen
+class Parting:
+    """An IF of which one side gives a variable its value: its head, and in how many others it stands."""
+
+    span: Span
+    depth: int
+
+
+@attrs.frozen
 class Hand:
     """What is known of one hand, but for what it holds.
 
@@ -49,6 +57,7 @@ class Hand:
         arrival: the MOVE of the arm itself that brought it there.
         arrived_open: whether the fingers were open then.
         opened: the OPEN since then.
+        left: the frame that the fingers let go while it hung on the arm, and the OPEN that did it.
     """
 
     open: bool | None = None
@@ -57,6 +66,7 @@ class Hand:
     arrival: Span | None = None
     arrived_open: bool | None = None
     opened: Span | None = None
+    left: tuple[str, Span] | None = None
 
 
 @attrs.frozen
@@ -114,12 +124,17 @@ class Hanging:
             facts, default=None, unknown=_ANY_LINK, joined=_joined_links, watch=self._watch
         )
         self.valued = Book(facts, default=False, unknown=True, joined=either)
+        # Of what may have a value, whether it has one on every way here, or where the ways have parted.
+        self.sure: Book[Parting | bool] = Book(facts, default=False, unknown=True, joined=self._joined_sure)
+        self.parting: Parting | None = None
+        # Where frames stand that hang on nothing and got their place by twelve numbers [m].
+        self.spots: Book[tuple[float, ...] | None] = Book(facts, default=None, unknown=None, joined=same)
         self.assigned: Book[Assignment | None] = Book(facts, default=None, unknown=None, joined=same)
         self.hands = Book(facts, default=Hand(), unknown=_ANY_HAND, joined=_joined_hands, group=HANDS)
         self.grips: Book[Grip | None] = Book(facts, default=None, unknown=_ANY_GRIP, joined=_joined_grips, group=GRIPS)
         frames = dict(cell.frames) if cell else {}
         for name in (WORLD, STATION, *frames):
-            self.valued.put(name, True)
+            self.has(name)
         for name, parent in frames.items():
             if parent != WORLD:
                 self.links.put(name, Link(parent))
@@ -180,7 +195,21 @@ class Hanging:
             return UNKNOWN
         return next((arm for arm, frame in grips.items() if frame == name), None)
 
+    def is_sure(self, name: str) -> "Parting | bool":
+        """Return whether what may have a value has one on every way here; if not, where the ways parted."""
+        return self.sure[name]
+
     # ---- changing --------------------------------------------------------------------------------------------------
+
+    def has(self, name: str) -> None:
+        """Take note that a variable has a value, or that nobody knows."""
+        self.valued.put(name, True)
+        self.sure.put(name, True)
+
+    def lacks(self, name: str) -> None:
+        """Take note that a variable has no value yet."""
+        self.valued.put(name, False)
+        self.sure.put(name, False)
 
     def hang(self, child: str, parent: str, span: Span | None, *, rigid: bool = False) -> None:
         """Hang a frame on another."""
@@ -189,7 +218,8 @@ class Hanging:
             return
         link = _ANY_LINK if is_any(parent) else Link(parent, span, rigid)
         self.links.put(child, link)
-        self.valued.put(child, True)
+        self.spots.put(child, None)
+        self.has(child)
         if self._facts.shaky and not self._steady(child):
             self.lose()
 
@@ -208,7 +238,8 @@ class Hanging:
             self.forget(name)
             return
         self.assigned.put(name, Assignment(self._order, span, moved=self.valued[name]))
-        self.valued.put(name, True)
+        self.spots.put(name, None)
+        self.has(name)
         leader = self.leader(name)
         if leader is None:
             self.lose()
@@ -252,13 +283,16 @@ class Hanging:
 
     def open(self, arm: str, span: Span) -> None:
         """Open the fingers."""
-        self.hands.put(arm, attrs.evolve(self.hands[arm], open=True, doubtful=False, opened=span))
+        grip = self.grips[arm]
+        held = None if grip is None or grip.frame == UNKNOWN else grip.frame
+        left = None if held is None or (link := self.links[held]) is None or link.parent != arm else (held, span)
+        self.hands.put(arm, attrs.evolve(self.hands[arm], open=True, doubtful=False, opened=span, left=left))
         self.grips.put(arm, None)
 
     def close(self, arm: str, span: Span) -> None:
         """Close the fingers."""
         hand = self.hands[arm]
-        self.hands.put(arm, attrs.evolve(hand, open=False, doubtful=False))
+        self.hands.put(arm, attrs.evolve(hand, open=False, doubtful=False, left=None))
         self.grips.put(arm, Grip(hand.at, span) if hand.at else None)
 
     # ---- forgetting ------------------------------------------------------------------------------------------------
@@ -269,8 +303,9 @@ class Hanging:
             self._facts.wipe(name)
         else:
             self.links.put(name, self.links.unknown)
-            self.valued.put(name, True)
+            self.has(name)
             self.assigned.put(name, None)
+            self.spots.put(name, None)
         self.lose()
 
     def forget_hand(self, arm: str | None, *, grasps: bool) -> None:
@@ -293,8 +328,9 @@ class Hanging:
         if is_any(name):
             self._facts.wipe(name)
         else:
-            self.valued.put(name, True)
+            self.has(name)
             self.assigned.put(name, None)
+            self.spots.put(name, None)
 
     def lose(self) -> None:
         """Take note that any frame may have been moved: where hands stand and what they hold is unknown."""
@@ -314,6 +350,11 @@ class Hanging:
                     self.cut(child)
 
     # ---- inside ----------------------------------------------------------------------------------------------------
+
+    def _joined_sure(self, one: Parting | bool, other: Parting | bool) -> Parting | bool:  # noqa: FBT001 - two values
+        if one == other:
+            return one
+        return next((each for each in (one, other) if isinstance(each, Parting)), self.parting or True)
 
     def _hold(self, arm: str, grip: Grip, frame: str | None) -> None:
         """Let a hand hold something else than before, or nothing, or nobody knows what."""

@@ -1,5 +1,6 @@
 """What gives frames their places and hangs them on one another in the course of a program."""
 
+from armwright.program.following import sizes
 from armwright.program.following.course import Course
 from armwright.program.following.hanging import is_any, is_arm
 from armwright.program.intermediate.code import Kind
@@ -18,6 +19,7 @@ def assign(course: Course, node: tree.Assign) -> None:
     frame = course.frame(target)
     if frame is not None:
         place(course, frame, target, node.span)
+        sizes.placed(course, frame, node)
         return
     for kind in (Kind.SCALAR, Kind.TRANS):
         if (name := course.variable(target, kind)) is not None:
@@ -30,7 +32,7 @@ def give(course: Course, name: str, value: tuple[float, Span] | None, span: Span
     if is_any(name):
         course.facts.wipe(name)
         return
-    course.table.valued.put(name, True)
+    course.table.has(name)
     course.numbers.put(name, None if value is None else (value[0], span))
 
 
@@ -81,6 +83,7 @@ def affix(course: Course, node: tree.Affix) -> None:
         return
     if node.at is None:
         _late(course, node, child, parent)
+        sizes.grasped(course, node, child, parent)
     else:
         course.table.displace(child)
     course.table.hang(child, parent, node.link, rigid=node.rigid)

@@ -20,12 +20,14 @@ class KnownCell:
         frames: that have a value from the start, each with the frame it hangs on.
         devices: that can be operated; None when any will do.
         visions: frames that the camera has an answer for; None when nothing is known of the camera.
+        reach: of the arm that reaches farthest [m]; None when that is not known.
     """
 
     arms: frozenset[str]
     frames: Mapping[str, str] = attrs.field(factory=dict)
     devices: frozenset[str] | None = None
     visions: frozenset[str] | None = None
+    reach: float | None = None
 
 
 @attrs.frozen(kw_only=True)
@@ -52,6 +54,7 @@ def known_cell(cell: Cell) -> KnownCell:
         frames={name: node.parent for name, node in cell.frames.items()},
         devices=cell.devices,
         visions=frozenset(cell.visions),
+        reach=max((one.arm.reach for one in cell.arms.values()), default=None),
     )
 
 

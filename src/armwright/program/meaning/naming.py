@@ -164,6 +164,10 @@ class Names:
             if key in table.declared or table.types[key] is not None
         ]
 
+    def _of_the_cell(self) -> list[str]:
+        """Return the frames that the cell has and the program has not."""
+        return [] if self.cell is None else [name for name in self.cell.frames if name not in self.main.types]
+
     def near(self, text: str, known: Callable[[], Collection[str]]) -> str | None:
         """Return what a name was probably meant to be; None where nothing is near, or too much was asked.
 
@@ -222,6 +226,8 @@ class Names:
             helps = (f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`",)
         elif near := self.near(name.text, lambda: [*self.spelled(), *self.arms()]):
             helps = (f"did you mean `{near}`?",)
+        elif near := self.near(name.text, self._of_the_cell):
+            helps = (f"did you mean `{near}`, a frame of the cell? Declare it with `VAR {near} : FRAME ;`",)
         elif (owner := self._owner(name.key)) is not None:
             notes = (f"procedure `{owner.node.name.text}` has a name like this, which is known only there",)
         self.found.say("E202", f"`{name.text}` is not declared", name.span, "unknown name", notes=notes, helps=helps)
