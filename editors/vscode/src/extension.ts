@@ -89,9 +89,9 @@ async function complain(error: unknown): Promise<void> {
   }
 }
 
-/** Fill in what a launch without launch.json leaves open: the program in the editor. */
+/** Fill in what a launch leaves open: the program in the editor; cell, language and strictness as in the settings. */
 function completed(
-  _folder: vscode.WorkspaceFolder | undefined,
+  folder: vscode.WorkspaceFolder | undefined,
   launch: vscode.DebugConfiguration,
 ): vscode.DebugConfiguration | undefined {
   const document = vscode.window.activeTextEditor?.document;
@@ -101,6 +101,15 @@ function completed(
   if (!launch["program"]) {
     void vscode.window.showErrorMessage("armwright: the launch names no program. Open one, or write `program` in launch.json.");
     return undefined;
+  }
+  const program = String(launch["program"]);
+  const scope = program.includes("${") ? (document?.uri ?? folder?.uri) : vscode.Uri.file(program);
+  const settings = vscode.workspace.getConfiguration("armwright", scope);
+  for (const name of ["cell", "std", "strict"]) {
+    const setting = settings.get<string | boolean>(name);
+    if (launch[name] === undefined && setting !== undefined && setting !== "") {
+      launch[name] = setting;
+    }
   }
   return launch;
 }

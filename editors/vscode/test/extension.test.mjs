@@ -28,11 +28,13 @@ function anything(...names) {
 
 /** An editor whose settings name a command, with a program open; `given` takes what the extension registers. */
 function editor(path, given) {
-  const vscode = anything("commands", "debug", "window", "workspace", "DebugAdapterExecutable");
+  const vscode = anything("commands", "debug", "window", "workspace", "Uri", "DebugAdapterExecutable");
   vscode.version = "1.91.0";
   vscode.env.language = "en";
   vscode.env.appName = "stand-in";
-  vscode.workspace.getConfiguration = () => ({ get: (key) => (key === "path" ? path : undefined) });
+  vscode.workspace.getConfiguration = () => ({
+    get: (key) => ({ path, cell: "${workspaceFolder}/cell.toml", std: "83", strict: true })[key],
+  });
   vscode.workspace.workspaceFolders = undefined;
   vscode.workspace.textDocuments = [];
   vscode.window.activeTextEditor = { document: { languageId: "rlo", fileName: "/cell/weld.rlo" } };
@@ -101,4 +103,8 @@ test("the server is `armwright lsp`, the debugger `armwright debug`, of the armw
   assert.deepEqual([factory.type, provider.type], ["rlo", "rlo"]);
   assert.deepEqual({ ...factory.factory.createDebugAdapterDescriptor() }, { command: path, args: ["debug"] });
   assert.deepEqual([launch.type, launch.program], ["rlo", "/cell/weld.rlo"]);
+  // What the launch leaves open is as in the settings; what it says stays.
+  assert.deepEqual([launch.cell, launch.std, launch.strict], ["${workspaceFolder}/cell.toml", "83", true]);
+  const own = { type: "rlo", request: "launch", program: "a.rlo", cell: "b.toml", std: "2", strict: false };
+  assert.deepEqual(provider.provider.resolveDebugConfiguration(undefined, { ...own }), own);
 });

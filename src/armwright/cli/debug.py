@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.programs import CODE_SUFFIX, CellFile, Std
+from armwright.cli.programs import CODE_SUFFIX, CellFile, Std, Strict
 from armwright.errors import ExitStatus
 from armwright.program.text.words import Standard
 
@@ -21,11 +21,13 @@ def debug(
     ] = None,
     cell: CellFile = None,
     std: Std = Standard.RLO_2,
+    strict: Strict = False,
 ) -> None:
     """Run an RLO program step by step, forwards and back.
 
     With a program it is a debugger on the terminal; `help` lists its commands. Without one it speaks the Debug
-    Adapter Protocol over stdin and stdout, for editors: their launch names program, cell, stopOnEntry, std and output.
+    Adapter Protocol over stdin and stdout, for editors: their launch names program, cell, std,
+    strict, stopOnEntry and output.
 
     **Example:** `armwright debug examples/stacking.rlo --cell examples/stanford_cell.toml`
     """
@@ -37,7 +39,7 @@ def debug(
     from armwright.cli.debug_terminal import Terminal
     from armwright.program.debugging.editor import Launch, LoadError
 
-    launch = Launch(program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False)
+    launch = Launch(program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False, strict=strict)
     try:
         loaded = load(launch)
     except LoadError as error:
@@ -70,6 +72,7 @@ def load(launch: "Launch") -> "Loaded":
     from armwright.cli.programs import given_cell, imported_files, in_its_cell
     from armwright.files.reading import read_program
     from armwright.program.debugging.editor import Loaded, LoadError
+    from armwright.program.editing.cells import Cells
     from armwright.program.intermediate.assembly import assemble
     from armwright.program.messages.diagnostics import count_line
     from armwright.program.messages.rendering import render
@@ -80,13 +83,16 @@ def load(launch: "Launch") -> "Loaded":
             message = f"{launch.program.name} needs a cell to run in"
             raise LoadError(message, f"{message}\n")
         return Loaded(code=assemble(read_program(launch.program), str(launch.program)), cell=given, is_listed=True)
-    compiled, place = in_its_cell(launch.program, given, strict=False, std=launch.std)
+    if given is None:
+        around = Cells().around(launch.program.parent, read_program(launch.program), None).file
+        given = None if around is None else around.cell
+    compiled, place = in_its_cell(launch.program, given, strict=launch.strict, std=launch.std)
     if compiled.code is None:
         raise LoadError(
             count_line(compiled.diagnostics, compiled.source), render(compiled.diagnostics, compiled.source)
         )
     if place is None:
-        message = f"{launch.program.name} needs a cell to run in, and IMPORTs none"
+        message = f"{launch.program.name} needs a cell to run in: it IMPORTs none, and beside it there is not just one"
         raise LoadError(message, f"{message}\n")
     imports = imported_files(launch.program, compiled)
     return Loaded(code=compiled.code, cell=place, diagnostics=compiled.diagnostics, imports=imports)
@@ -108,7 +114,7 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
         cell=launch.cell,
         imports=loaded.imports,
         command="armwright debug",
-        options={"std": launch.std.value},
+        options={"std": launch.std.value, "strict": launch.strict},
     )
     diagnostics = (*loaded.diagnostics, *warnings(recording))
     made = (recording, loaded.code, diagnostics, origin)

@@ -275,6 +275,34 @@ def test_expressions_and_completions(client: Client) -> None:
     assert client.ask("setExpression", expression="obj2", value="obj1 * t1")["value"].endswith("0.4,0.15,0.15)")
 
 
+def test_assignments_in_the_console(client: Client, written: Any) -> None:
+    """In the console `n = 7` gives a value, as in a program; in parentheses and in a watch it compares."""
+    program = written(
+        "VAR n : SCALAR ; a : ARRAY [2] OF SCALAR ;\nBEGIN\n  n = 1 ; a[1] = 2 ;\n  PRINT(n, a[1])\nEND.\n"
+    )
+    client.launch(program, lines=(4,))
+    client.wait("stopped")
+
+    def console(text: str) -> str:
+        return str(client.ask("evaluate", expression=text, context="repl")["result"])
+
+    assert [console("n = 7"), console("(n = 7)"), console("n"), console("a[1] = n * 2 ;"), console("a[n - 6]")] == [
+        *("7", "true", "7", "14", "14")
+    ]
+    assert client.ask("evaluate", expression="n = 8", context="watch")["result"] == "false"
+    assert client.refused("evaluate", expression="ARM_1 = 5", context="repl")
+
+
+def test_language_and_strictness_of_a_launch(client: Client, written: Any) -> None:
+    """A launch names language and strictness; without a cell the only one beside the program is meant."""
+    text = (CORPUS / "p02.rlo").read_text(encoding="utf-8")
+    program = written(text)
+    (program.parent / "cell.json").write_text((CORPUS / "cell1.json").read_text(encoding="utf-8"))
+
+    assert "1 error" in client.refused("launch", program=str(program), std="83", strict=True)
+    client.ask("launch", program=str(program), std="83", stopOnEntry=True)
+
+
 def test_arrays_come_in_pieces(client: Client, written: Any) -> None:
     """Of a large array an editor can ask for some elements."""
     program = written("VAR a : ARRAY [100,100] OF SCALAR ;\nBEGIN\n  a[3,7] = 5 ;\n  PRINT(a[3,7])\nEND.\n")

@@ -3,9 +3,12 @@
 import random
 from pathlib import Path
 
+import attrs
 import pytest
 
 from armwright.errors import InvalidValueError
+from armwright.program import KnownCell, Source
+from armwright.program import compile as translate
 from armwright.program.editing.analysing import Settings, analyse
 from armwright.program.editing.analysis import Analysis, View
 from armwright.program.editing.cells import Cells
@@ -281,6 +284,31 @@ PIECES = (
     *("//", '"', "ARM_1", "arm-", "f", "PROCEDURE ", "VAR ", ":", "FRAME", "IF ", "THEN ", "ON ", "DO ", "\r\n", "\n"),
     *("🤖", "é", "\u2028", "\ufeff", "100 ", "25mm", "1e", ".", "COBEGIN ", "TRY ", "RECOVER ", "\x00", "UNITS "),
 )
+
+
+@pytest.mark.parametrize(
+    ("line", "title"),
+    [
+        ("MVOE ARM_1 TO part", "write `MOVE` instead of `MVOE`"),
+        ("MOVE ARM_1 TO pratt", "write `part` instead of `pratt`"),
+        ("MOVE ARM_1 TO part WITH SPED = 5", "write `SPEED` instead of `SPED`"),
+        ("MOVE ARM_1 TO fedeer", "write `FEEDER` instead of `fedeer`"),
+    ],
+)
+def test_words_that_were_meant(line: str, title: str) -> None:
+    """What a message asks for by "did you mean" is offered as a fix, and is none of those made all at once."""
+    text = f"VAR part : FRAME ;\nBEGIN\n  READ VISIONS (part) ;\n  {line} ;\nEND.\n"
+    cell = KnownCell(arms=frozenset({"ARM_1"}), frames={"FEEDER": "WORLD"})
+    analysis = attrs.evolve(analysis_of(text), compiled=translate(Source("t.rlo", text), cell))
+    [fix] = quickfixes(analysis, Span(0, len(text)))
+
+    assert fix.title == title
+    assert not fix.diagnostic.fixes
+    [edit] = fix.edits
+    mended = translate(Source("t.rlo", edited(text, fix.edits)), cell)
+    assert edit.text in mended.source.text
+    assert {one.code for one in mended.diagnostics} <= {"E202"}
+    assert all_fixes(analysis.compiled.diagnostics) == ()
 
 
 def ask_everything(analysis: Analysis, text: str, offset: int, new: str) -> None:

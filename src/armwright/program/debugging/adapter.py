@@ -233,6 +233,7 @@ def _launched(arguments: Arguments) -> Launch:
         output=Path(arguments.text("output")) if arguments.text("output", "") else None,
         stop_on_entry=arguments.flag("stopOnEntry"),
         no_debug=arguments.flag("noDebug"),
+        strict=arguments.flag("strict"),
     )
 
 

@@ -35,8 +35,9 @@ class Launch:
 
     Attributes:
         program: path of the program.
-        cell: path of the cell; None where the program imports it.
+        cell: path of the cell; None where the program imports it, or the only cell file beside it is meant.
         std: the language.
+        strict: whether an AFFIX that is only implied is an error.
         output: a folder for what a run leaves; None for none.
         stop_on_entry: whether to stop in front of the first statement.
         no_debug: whether to run without stops.
@@ -48,6 +49,7 @@ class Launch:
     output: Path | None
     stop_on_entry: bool
     no_debug: bool
+    strict: bool = False
 
 
 @attrs.frozen(kw_only=True)

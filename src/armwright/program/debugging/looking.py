@@ -16,6 +16,8 @@ from armwright.program.messages.rendering import render
 
 # So many elements are sent to an editor that does not say how many it wants.
 _MOST_ELEMENTS = 1000
+# What gives a variable or an element a value.
+_ASSIGNMENT = re.compile(r"([A-Za-z][\w-]*(?:\s*\[[^\[\]]*\])?)\s*=\s*(.+)", re.DOTALL)
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
 
 
@@ -73,10 +75,21 @@ def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
 
 
 def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
-    """Answer ``evaluate``: any expression of the language, or the tree of frames."""
+    """Answer ``evaluate``: any expression of the language, or the tree of frames.
+
+    In the console ``hit = 7`` gives a value, as it does in a program; for a comparison one writes ``(hit = 7)``.
+    """
     debugger = session.standing
     path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
-    shown = debugger.evaluate(arguments.text("expression").strip().rstrip(";"), path, level)
+    text = arguments.text("expression").strip().rstrip(";")
+    given = _ASSIGNMENT.fullmatch(text) if arguments.text("context", "") == "repl" else None
+    if given is None:
+        shown = debugger.evaluate(text, path, level)
+    else:
+        kept = debugger.evaluate(given[1], path, level).kept
+        if kept is None:
+            raise RequestError(f"`{given[1]}` cannot be given a value; for a comparison write `({text})`")
+        shown = debugger.assign(kept, given[2], path, level)
     answer = _variable(session, shown, path, level)
     return {"result": answer.pop("value"), **answer}
 

@@ -7,11 +7,11 @@ from lsprotocol import types as lsp
 from armwright.errors import ArmwrightError
 from armwright.program.editing import replies
 from armwright.program.editing.completions import completions
-from armwright.program.editing.formatting import formatted
 from armwright.program.editing.hints import hints
 from armwright.program.editing.hovers import hover
 from armwright.program.editing.occurrences import Occurrence
 from armwright.program.editing.outline import folds, outline
+from armwright.program.editing.partial import formatted_around
 from armwright.program.editing.places import Edit, drift
 from armwright.program.editing.quickfixes import all_fixes, quickfixes
 from armwright.program.editing.renames import nameable, rename
@@ -163,7 +163,7 @@ def _changes(server: RloServer) -> None:
                         title=one.title,
                         kind=lsp.CodeActionKind.QuickFix,
                         diagnostics=None if diagnostic is None else [diagnostic],
-                        is_preferred=True,
+                        is_preferred=bool(one.diagnostic.fixes),
                         edit=lsp.WorkspaceEdit(changes={uri: replies.text_edits(ruler, one.edits)}),
                     )
                 )
@@ -178,7 +178,7 @@ def _changes(server: RloServer) -> None:
         document = server.document(params.text_document.uri)
         before = document.text
         try:
-            after = formatted(Source(document.name, before), std=server.office.settings.std)
+            after = formatted_around(Source(document.name, before), std=server.office.settings.std)
         except ArmwrightError as error:
             raise refusal(str(error)) from error
         if "\r\n" in before:
