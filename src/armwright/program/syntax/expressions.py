@@ -59,7 +59,7 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
         if chained:
             _chained(tokens, start)
         # A sum of many terms is long and not deep: only what is nested counts.
-        height = tokens.height if strength == last else tokens.height + 1
+        height = tokens.height if strength == last and not chained else tokens.height + 1
         last = strength
         if tokens.depth + height > DEEPEST:
             tokens.too_deep()
