@@ -183,5 +183,5 @@ def test_folder_without_programs(tmp_path: Path) -> None:
     """A folder in which there is no program is told of."""
     result = check(tmp_path)
 
-    assert result.returncode == 1
+    assert result.returncode == 4
     assert "there is no program in this folder; expected files *.rlo" in result.stderr
