@@ -46,7 +46,6 @@ LIMITS: Mapping[str, Limit] = {
     "frames": Limit(10_000, "frames", "frames of a cell"),
     "hanging": Limit(1000, "frames", "frames of a cell that hang on one another, from a frame down to WORLD"),
     "arms": Limit(20, "arms", "arms of a cell"),
-    "imports": Limit(100, "files", "files that a program imports"),
     "turns": Limit(1000, "turns", "how far the limits of a revolute joint may lie from zero"),
     "message_mb": Limit(16, "MB", "one message to the language server or the debug adapter"),
     "header_bytes": Limit(8192, "bytes", "the header of such a message"),
