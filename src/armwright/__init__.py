@@ -47,11 +47,12 @@ if TYPE_CHECKING:
     from armwright.dynamics.payload import payload
     from armwright.dynamics.simulate import simulate
     from armwright.dynamics.terms import terms
-    from armwright.errors import ArmwrightError, GravityWarning, UnitWarning
+    from armwright.errors import ArmwrightError, CacheWarning, GravityWarning, UnitWarning
     from armwright.kinematics.damping import damped_rates
     from armwright.kinematics.differential import differential_inverse
     from armwright.kinematics.forward import forward, link_poses
     from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
+    from armwright.kinematics.inverse.turns import images
     from armwright.kinematics.jacobian import jacobian
     from armwright.kinematics.manipulability import manipulability
     from armwright.kinematics.singularities import singularities
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Arm": "arm.model",
     "ArmwrightError": "errors",
+    "CacheWarning": "errors",
     "GravityWarning": "errors",
     "Trace": "accuracy.measured",
     "Trajectory": "motion.trajectory",
@@ -109,6 +111,7 @@ _HOME = {
     "forward": "kinematics.forward",
     "forward_dynamics": "dynamics.forward_dynamics",
     "hold": "motion.trajectory",
+    "images": "kinematics.inverse.turns",
     "inverse": "kinematics.inverse.closed_form",
     "inverse_branches": "kinematics.inverse.closed_form",
     "inverse_dynamics": "dynamics.newton_euler",
@@ -165,6 +168,7 @@ _HOME = {
 __all__ = [
     "Arm",
     "ArmwrightError",
+    "CacheWarning",
     "GravityWarning",
     "Trace",
     "Trajectory",
@@ -199,6 +203,7 @@ __all__ = [
     "forward",
     "forward_dynamics",
     "hold",
+    "images",
     "inverse",
     "inverse_branches",
     "inverse_dynamics",

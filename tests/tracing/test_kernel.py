@@ -2,9 +2,6 @@
 
 import math
 import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +9,6 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.files.store import cache_folder
 from armwright.kinematics.inverse.closed_form import BRANCHES
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.shoulder import first_three
@@ -156,55 +152,3 @@ def test_random_arm(rng: np.random.Generator) -> None:
     q, qd, qdd = random_postures(arm, rng, 90).reshape(3, 30, 4)
 
     np.testing.assert_allclose(kernel(q, qd, qdd), inverse_dynamics(arm, q, qd, qdd, drives=False), atol=1e-11)
-
-
-_START = """
-import os, sys, time
-import numpy as np
-from armwright.tracing.emit import emit
-from armwright.tracing.kernel import Kernel
-from armwright.tracing.scalar import sin
-kernel = Kernel(emitted=emit("wave", lambda x: [[sin(x[0]) * 1.25]], {"x": 1}))
-print(repr(float(kernel(np.array([0.5]))[0])), len(kernel.one.stats.cache_hits))
-"""
-
-
-def _start(cache: Path) -> subprocess.Popen[str]:
-    environment = {**os.environ, "ARMWRIGHT_CACHE": str(cache)}
-    return subprocess.Popen([sys.executable, "-c", _START], env=environment, stdout=subprocess.PIPE, text=True)
-
-
-def test_second_start_compiles_nothing(tmp_path: Path) -> None:
-    """Another process finds the compiled kernel on the disk."""
-    first, _ = _start(tmp_path).communicate(timeout=300)
-    second, _ = _start(tmp_path).communicate(timeout=300)
-
-    assert first.split() == [repr(math.sin(0.5) * 1.25), "0"]
-    assert second.split() == [repr(math.sin(0.5) * 1.25), "1"]
-
-
-def test_processes_that_start_together(tmp_path: Path) -> None:
-    """Four processes that want the same kernel at once all get it, and one of them compiles it."""
-    running = [_start(tmp_path) for _ in range(4)]
-    said = [process.communicate(timeout=300)[0].split() for process in running]
-
-    assert {line[0] for line in said} == {repr(math.sin(0.5) * 1.25)}
-    assert sum(line[1] == "0" for line in said) == 1
-
-
-def test_a_home_that_cannot_be_written(tmp_path: Path) -> None:
-    """Without a cache folder the kernel is compiled for the process alone."""
-    (tmp_path / "file").write_text("in the way")
-
-    said, _ = _start(tmp_path / "file").communicate(timeout=300)
-
-    assert said.split()[0] == repr(math.sin(0.5) * 1.25)
-
-
-def test_where_kernels_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The folder of the user's caches is used, or the one that ARMWRIGHT_CACHE names."""
-    monkeypatch.delenv("ARMWRIGHT_CACHE", raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", "/somewhere")
-    assert cache_folder() == Path("/somewhere/armwright")
-    monkeypatch.setenv("ARMWRIGHT_CACHE", "/elsewhere")
-    assert cache_folder() == Path("/elsewhere")

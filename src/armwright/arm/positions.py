@@ -39,7 +39,7 @@ def positions(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> A
     """
     array = joint_array(q, known_arm(arm).n, what)
     if array.size and np.abs(array).max() > _TURN:
-        _ask_for_degrees(arm, array, what, callers + 1)
+        ask_for_degrees(arm, array, what, callers + 1)
     return array
 
 
@@ -109,8 +109,15 @@ def _known(*limits: float) -> list[float]:
     return [limit for limit in limits if math.isfinite(limit)]
 
 
-def _ask_for_degrees(arm: Arm, q: Array, what: str, callers: int) -> None:
-    """Warn of positions that look like degrees, unless the package itself has called the public function."""
+def ask_for_degrees(arm: Arm, q: Array, what: str, callers: int) -> None:
+    """Warn of positions that look like degrees, unless the package itself has called the public function.
+
+    Args:
+        arm: the arm, with n joints.
+        q: (..., n) joint positions.
+        what: how they are called in the message.
+        callers: how many calls up from here the public function is.
+    """
     frame = inspect.currentframe()
     for _ in range(callers + 1):
         frame = frame.f_back if frame else None

@@ -1,12 +1,14 @@
 """An arm's quantities as compiled kernels: the same equations as everywhere, traced for that arm."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeAlias
 
 import attrs
 
 from armwright.arm.model import Arm
+from armwright.arm.positions import admitted, ask_for_degrees
+from armwright.arrays import Array
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.articulated_body import articulated_body
 from armwright.dynamics.forward_dynamics import NEGLIGIBLE, forward_dynamics, less_friction
@@ -43,7 +45,7 @@ class CompiledArm:
     They are called like the plain functions of the same names, without the arm, and give the same numbers but for
     rounding. A configuration has the same bits alone, in any batch and on any number of threads. Each takes
     ``threads=``, how many cores to use (all, when left out), and ``out=``, arrays to fill: see ``Kernel.function``.
-    Angles of more than a turn get no warning here.
+    Positions that look like degrees get the same warning; no number may be beyond 1e12.
 
     Attributes:
         arm: the arm, with n joints.
@@ -126,7 +128,8 @@ class CompiledArm:
             UnsupportedArmError: the arm has no such function.
         """
         emitted = emit_quantity(self.arm, name)
-        return Kernel(emitted=emitted, explain=partial(_QUANTITIES[name].plain, self.arm))
+        plain, remark = _QUANTITIES[name].plain, partial(_ask_for_degrees, self.arm, emitted.inputs)
+        return Kernel(emitted=emitted, explain=partial(plain, self.arm), remark=remark)
 
     def _function(self, name: str) -> Function:
         return self.kernel(name).function(name, str(getattr(type(self), name).__doc__))
@@ -154,12 +157,19 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
     def equation(*lists: Numbers) -> Rows | Guarded:
         return quantity.equation(arm, *lists)
 
-    return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags)
+    bounds = dict.fromkeys(_POSITIONS, admitted(arm).tolist())
+    return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags, bounds=bounds)
 
 
 def quantity_names() -> tuple[str, ...]:
     """Return the names of the quantities that can be compiled."""
     return tuple(_QUANTITIES)
+
+
+def _ask_for_degrees(arm: Arm, inputs: Iterable[str], arrays: Sequence[Array], callers: int) -> None:
+    for name, array in zip(inputs, arrays, strict=True):
+        if name in _POSITIONS:
+            ask_for_degrees(arm, array, name, callers + 1)
 
 
 def _forward(arm: Arm, q: Numbers) -> Rows:
@@ -241,6 +251,8 @@ def _size(arm: Arm, letter: str | int) -> int:
     return letter if isinstance(letter, int) else {"n": arm.n, "f": arm.n + 2}[letter]
 
 
+# The inputs that are positions of joints.
+_POSITIONS = ("q", "near")
 _STATE: dict[str, tuple[str | int, ...]] = {"q": ("n",), "qd": ("n",)}
 _MOTION = {**_STATE, "qdd": ("n",)}
 _Q = {"q": ("n",)}

@@ -66,7 +66,7 @@ class DifferentialInverse:
     """Joint rates, and whether there are any.
 
     Attributes:
-        rates: (..., 6) joint speeds [rad/s]; 0 where the posture is singular.
+        rates: (..., 6) joint speeds [rad/s]; NaN where the posture is singular.
         factors: (..., 3) shoulder [m], elbow [m] and wrist: the factors of the determinant.
         singular: (..., 3) which of them vanish.
     """
@@ -134,7 +134,7 @@ def differential_inverse(
     singular = np.abs(factors) < SINGULAR_FACTOR
     found = stack([sign * rate for sign, rate in zip(shoulder.signs, rates, strict=True)], lead)
     return DifferentialInverse(
-        rates=np.where(singular.any(axis=-1, keepdims=True), 0.0, found), factors=factors, singular=singular
+        rates=np.where(singular.any(axis=-1, keepdims=True), np.nan, found), factors=factors, singular=singular
     )
 
 

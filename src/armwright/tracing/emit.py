@@ -19,33 +19,18 @@ import numpy as np
 
 from armwright.errors import InvalidValueError, shown
 from armwright.tracing import elementary
-from armwright.tracing.fuse import fused
-from armwright.tracing.graph import Graph, Node, Traced, operation_count, reachable
+from armwright.tracing.assignments import Code, Watched
+from armwright.tracing.graph import Graph, Traced, operation_count
 from armwright.tracing.scalar import Scalar
 
 # Configurations in a block. So few that the processor fetches the next block while it works on this one, and enough
 # for two to four vectors.
 LANES = 16
 
+# What a kernel returns beside 0; see ``Emitted``.
+MEANINGLESS, UNUSUAL = 1, 2
+
 Shape: TypeAlias = tuple[int, ...]
-
-_INFIX = {
-    "add": "{} + {}",
-    "subtract": "{} - {}",
-    "multiply": "{} * {}",
-    "divide": "{} / {}",
-    "negate": "-{}",
-    "absolute": "abs({})",
-    # Adding and taking away 1.5 · 2^52 leaves no digit behind the point.
-    "round": "({} + 6755399441055744.0) - 6755399441055744.0",
-    "sqrt": "sqrt({0} if {0} > 0.0 else 0.0)",
-    "atan2": "arc_tangent({}, {})",
-    "less": "{} < {}",
-    "less_equal": "{} <= {}",
-    "select": "{1} if {0} else {2}",
-}
-
-_NOT_FINITE = {"nan": "np.nan", "inf": "np.inf", "-inf": "-np.inf"}
 
 _HEAD = '''"""Emitted by armwright. {count} operations per configuration."""
 
@@ -89,10 +74,10 @@ def rows(first, last, {arguments}):
 {body}
             trusted[k] += trust
 {store}
-    lost = 0
+    found = 0
     for k in range({lanes}):
-        lost += 0 if trusted[k] == 0.0 else 1
-    return lost
+        found |= 0 if trusted[k] == 0.0 else (2 if trusted[k] > 0.0 else 1)
+    return found
 """
 
 _ONE = """
@@ -102,7 +87,7 @@ def one({arguments}):
     if {misfit}:
         return 1
 {body}
-    return 0 if trust == 0.0 else 1
+    return 0 if trust == 0.0 else (2 if trust > 0.0 else 1)
 """
 
 
@@ -125,9 +110,10 @@ Equation: TypeAlias = Callable[..., Sequence[Sequence[Scalar]] | Guarded]
 class Emitted:
     """The source of a kernel and what it takes.
 
-    Both functions fill the output arrays and return 0, or another number where some configuration came out without
-    meaning: the shape of an input is wrong, an input is not finite (or the inputs add up to more than a float holds),
-    or a condition of the equation is broken.
+    Both functions fill the output arrays and return a status, 0 where all is well. ``MEANINGLESS`` is set in it where
+    some configuration came out without meaning: the shape of an input is wrong, an input is not finite or beyond
+    ``LARGEST``, or a condition of the equation is broken. ``UNUSUAL`` is set where an input is outside of the bounds
+    that were given to ``emit``; the outputs are right all the same.
 
     Attributes:
         title: what it computes, in words.
@@ -157,6 +143,7 @@ def emit(
     *,
     shapes: Sequence[Shape] | None = None,
     flags: Collection[int] = (),
+    bounds: Mapping[str, Sequence[float]] | None = None,
 ) -> Emitted:
     """Trace an equation and write its kernel.
 
@@ -167,6 +154,7 @@ def emit(
             by row.
         shapes: shape of one value of each output; vectors when left out.
         flags: numbers of the outputs that are truth values.
+        bounds: by the name of an input, how far from 0 each of its numbers usually is; what is farther is told.
 
     Raises:
         InvalidValueError: the name of an input is no identifier: names become part of what is executed.
@@ -182,7 +170,14 @@ def emit(
     outputs = [[_node(graph, x) for x in row] for row in rows]
     given = tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes)
     flat = [node for row in outputs for node in row]
-    code = _Code(graph, flat, [_node(graph, x) for x in positive], [x.node for row in lists for x in row])
+    far = {
+        x.node: float(bound)
+        for name, row in zip(taken, lists, strict=True)
+        for x, bound in zip(row, (bounds or {}).get(name, ()), strict=False)
+        if math.isfinite(bound)
+    }
+    watched = Watched([x.node for row in lists for x in row], [_node(graph, x) for x in positive], far)
+    code = Code(graph, flat, watched)
     operations = operation_count(graph, flat)
     door = _Door(tuple(taken.values()), given, tuple(flags))
     top = head(sum(operations.values()))
@@ -228,7 +223,7 @@ def stretch(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: int) -
     graph = Graph()
     given = graph.inputs(inputs)
     outputs = [_node(graph, x) for x in equation(list(given))]
-    code = _Code(graph, outputs, [], [])
+    code = Code(graph, outputs, Watched([], [], {}))
     operations = operation_count(graph, outputs)
     load = [f"x[{row} * {LANES} + k]" for row in range(inputs)]
     store = [f"y[{row} * {LANES} + k] = {{}}" for row in range(len(outputs))]
@@ -305,61 +300,7 @@ class _Door(NamedTuple):
             yield f"{place} = {{}} != 0" if is_flag else f"{place} = {{}}"
 
 
-class _Code:
-    """The assignments of a kernel, the same for one configuration and for many."""
-
-    def __init__(self, graph: Graph, outputs: Sequence[int], positive: Sequence[int], inputs: Sequence[int]) -> None:
-        self._graph, self._outputs, self._positive, self._inputs = graph, outputs, positive, inputs
-        asked = [*outputs, *positive]
-        self._order = reachable(graph, [*inputs, *asked])
-        self.joined = fused(graph, self._order, asked)
-        self._gone = set(self.joined.values())
-
-    def lines(self, load: Sequence[str], store: Sequence[str], *, watched: bool = True) -> str:
-        """Write one assignment per node, and whether the inputs can be trusted.
-
-        Args:
-            load: where each input comes from.
-            store: the statement that takes each output, with a gap for its name.
-            watched: whether to say if the inputs can be trusted.
-        """
-        lines: list[str] = []
-        names: dict[int, str] = {}
-        circular: set[int] = set()
-        for i in self._order:
-            node = self._graph.nodes[i]
-            names[i] = f"v{i}"
-            if node.op == "constant":
-                names[i] = f"({node.value!r})" if math.isfinite(node.value) else f"({_NOT_FINITE[str(node.value)]})"
-            elif node.op == "input":
-                lines.append(f"v{i} = {load[int(node.value)]}")
-            elif node.op in ("sin", "cos"):
-                angle = node.operands[0]
-                names[i] = f"{node.op}{angle}"
-                if angle not in circular:
-                    circular.add(angle)
-                    lines.append(f"sin{angle}, cos{angle} = sine_cosine({names[angle]})")
-            elif i in self.joined:
-                lines.append(f"v{i} = {self._fused(node, self.joined[i], names)}")
-            elif i not in self._gone:
-                lines.append(f"v{i} = {_INFIX[node.op].format(*(names[j] for j in node.operands))}")
-        lines += [place.format(names[node]) for place, node in zip(store, self._outputs, strict=True)]
-        if not watched:
-            return "\n".join(lines)
-        # Not a number where an input is none; a condition that fails makes it none.
-        lines += [f"trust = {' + '.join(names[i] for i in self._inputs)}", "trust = trust - trust"]
-        lines += [f"trust = trust if {names[i]} > 0.0 else np.nan" for i in self._positive]
-        return "\n".join(lines)
-
-    def _fused(self, node: Node, product: int, names: dict[int, str]) -> str:
-        a, b = (names[j] for j in self._graph.nodes[product].operands)
-        first, second = node.operands
-        if node.op == "add":
-            return f"fma({a}, {b}, {names[second if first == product else first]})"
-        return f"fma({a}, {b}, -{names[second]})" if first == product else f"fma(-{a}, {b}, {names[first]})"
-
-
-def _rows_source(code: _Code, door: _Door) -> str:
+def _rows_source(code: Code, door: _Door) -> str:
     width_in = sum(map(math.prod, door.inputs))
     width_out = sum(map(math.prod, door.outputs))
     body = code.lines(
@@ -391,7 +332,7 @@ def _moves(lines: Sequence[str], shapes: Sequence[Shape]) -> str:
     return "\n".join(text)
 
 
-def _one_source(code: _Code, door: _Door) -> str:
+def _one_source(code: Code, door: _Door) -> str:
     body = code.lines(list(door.places("in")), list(door.stores()))
     return _ONE.format(
         signature=door.types(rows=False),

@@ -4,8 +4,9 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache, cached_property
+from functools import cache, cached_property, reduce
 from itertools import pairwise
+from operator import or_
 from typing import Any, TypeVar
 
 import attrs
@@ -13,8 +14,9 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, cores, floats
 from armwright.errors import InvalidValueError, ShapeError
+from armwright.tracing.assignments import LARGEST
 from armwright.tracing.cache import compiled
-from armwright.tracing.emit import LANES, Emitted, Shape
+from armwright.tracing.emit import LANES, MEANINGLESS, UNUSUAL, Emitted, Shape
 
 T = TypeVar("T")
 
@@ -25,19 +27,30 @@ _ROWS_PER_THREAD = 4096
 # is made for the kernel. What does not come so goes the careful way. The inputs are names that ``emit`` has checked.
 _DOOR = """
 def door({inputs}, *, threads=None, out=None):
-    if out is None:
-        try:
-            if {first}.ndim == {axes}:
+    try:
+        if not ({plain} is array):
+            pass
+        elif {first}.ndim == {axes}:
+            if out is None:
                 {blanks}
                 if not one({inputs}, {outputs}):
                     return {outputs}
-            elif {all_rows} and (len({first}) < {few} or threads == 1):
-                rows_asked = len({first})
+            else:
+                {given}
+                if {fit} and not one({inputs}, {outputs}):
+                    return out
+        elif {all_rows} and (len({first}) < {few} or threads == 1):
+            rows_asked = len({first})
+            if out is None:
                 {blanks_of_many}
                 if not rows(0, rows_asked, {inputs}, {outputs}):
                     return {outputs}
-        except (AttributeError, TypeError):
-            pass
+            else:
+                {given}
+                if {fit_many} and not rows(0, rows_asked, {inputs}, {outputs}):
+                    return out
+    except foreign:
+        pass
     return careful(({inputs},), threads, out)
 """
 
@@ -49,10 +62,12 @@ class Kernel:
     Attributes:
         emitted: its source, and the shapes of its inputs and outputs.
         explain: raises the error that belongs to inputs for which the conditions of the equation do not hold.
+        remark: called with inputs that are unusual, and with how many calls up from it the caller stands.
     """
 
     emitted: Emitted
     explain: Callable[..., object] | None = None
+    remark: Callable[[Sequence[Array], int], object] | None = None
 
     @cached_property
     def one(self) -> Callable[..., int]:
@@ -72,7 +87,7 @@ class Kernel:
         a tuple of them for several outputs. It returns an array (..., *shape), or a tuple of them. It raises
 
         - ShapeError: a last axis, or the leading axes do not fit, or ``out`` does not.
-        - InvalidValueError: a number is NaN or infinite, or there are fewer than one ``threads``.
+        - InvalidValueError: a number is NaN, infinite or beyond 1e12, or there are fewer than one ``threads``.
         - another ArmwrightError: a condition of the equation does not hold.
 
         Args:
@@ -81,23 +96,35 @@ class Kernel:
         """
         inputs = self.emitted.inputs
         outputs = [f"out{i}" for i in range(len(self._kinds))]
-        known: dict[str, Any] = {"empty": np.empty, "careful": self._careful}
+        known: dict[str, Any] = {"empty": np.empty, "array": np.ndarray, "careful": self._careful, "foreign": _FOREIGN}
 
         def blanks(before: str) -> str:
             shapes = (f"({before}{', '.join(map(str, shape))},), {kind.__name__}" for shape, kind in self._kinds)
             return "; ".join(f"{out} = empty({shape})" for out, shape in zip(outputs, shapes, strict=True))
 
+        def fitting(before: str) -> str:
+            return " and ".join(
+                f"{out}.shape == ({before}{', '.join(map(str, shape))},)"
+                for out, (shape, _) in zip(outputs, self._kinds, strict=True)
+            )
+
         def when_needed(part: str) -> Callable[..., int]:
             def detour(*arrays: Array) -> int:
                 # Compiled when it is first needed, and from then on called directly.
                 known[part] = getattr(self, part)
-                return int(known[part](*arrays))
+                known["foreign"] = (*_FOREIGN, _refused_by_numba())
+                try:
+                    return int(known[part](*arrays))
+                except known["foreign"]:
+                    return MEANINGLESS  # the careful way says why
 
             return detour
 
         known |= {part: when_needed(part) for part in ("one", "rows")}
         text = _DOOR.format(
             inputs=", ".join(inputs),
+            # Numba takes a masked array for its numbers, once it has met an array of another class.
+            plain=" is ".join(f"{x}.__class__" for x in inputs),
             first=next(iter(inputs)),
             axes=len(next(iter(inputs.values()))),
             # A compiled function takes long to find out that one of its inputs has too few axes.
@@ -105,6 +132,9 @@ class Kernel:
             few=2 * _ROWS_PER_THREAD,
             blanks=blanks(""),
             blanks_of_many=blanks("rows_asked, "),
+            given=f"{', '.join(outputs)} = out",
+            fit=fitting(""),
+            fit_many=fitting("rows_asked, "),
             outputs=", ".join(outputs),
         )
         exec(text, known)  # noqa: S102 - numbers, and names that are identifiers
@@ -126,12 +156,15 @@ class Kernel:
             raise InvalidValueError(f"threads: expected a whole number above 0, or None for all cores, got {threads!r}")
         arrays, lead = self._checked(inputs)
         results = self._results(lead, out)
-        if self._run(arrays, lead, results, threads):
+        status = self._run(arrays, lead, results, threads)
+        if status & MEANINGLESS:
             for name, array in zip(self.emitted.inputs, arrays, strict=True):
-                floats(array, name)
-            # Inputs that add up to more than a float holds are suspected without reason.
+                floats(array, name, LARGEST)
+            # Many inputs just below what is allowed are suspected without reason.
             if self.explain is not None:
                 self.explain(*arrays)
+        if status & UNUSUAL and self.remark is not None:
+            self.remark(arrays, 2)
         return results[0] if len(results) == 1 else tuple(results)
 
     def _checked(self, inputs: Sequence[ArrayLike]) -> tuple[list[Array], Shape]:
@@ -170,7 +203,17 @@ class Kernel:
         flat = [_rows(x, lead, shape) for x, shape in zip(arrays, shapes, strict=True)]
         flat += results if len(lead) == 1 else [x.reshape(rows, *x.shape[len(lead) :]) for x in results]
         most = max(rows // _ROWS_PER_THREAD, 1)
-        return sum(on_cores(lambda a, b: self.rows(a, b, *flat), rows, threads, most=most))
+        return reduce(or_, on_cores(lambda a, b: self.rows(a, b, *flat), rows, threads, most=most))
+
+
+# What the shortest way meets in arrays of other numbers; with Numba loaded, its own error too.
+_FOREIGN = (AttributeError, TypeError, ValueError)
+
+
+def _refused_by_numba() -> type[Exception]:
+    from numba.core.errors import NumbaError  # noqa: PLC0415 - loaded by now
+
+    return NumbaError
 
 
 def _input(value: ArrayLike, shape: Shape, name: str) -> Array:

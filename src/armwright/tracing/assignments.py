@@ -1,0 +1,104 @@
+"""From a graph to the assignments of a kernel, the same for one configuration and for many."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from armwright.tracing.fuse import fused
+from armwright.tracing.graph import Graph, Node, reachable
+
+_INFIX = {
+    "add": "{} + {}",
+    "subtract": "{} - {}",
+    "multiply": "{} * {}",
+    "divide": "{} / {}",
+    "negate": "-{}",
+    "absolute": "abs({})",
+    # Adding and taking away 1.5 · 2^52 leaves no digit behind the point.
+    "round": "({} + 6755399441055744.0) - 6755399441055744.0",
+    "sqrt": "sqrt({0} if {0} > 0.0 else 0.0)",
+    "atan2": "arc_tangent({}, {})",
+    "less": "{} < {}",
+    "less_equal": "{} <= {}",
+    "select": "{1} if {0} else {2}",
+}
+
+# No input is larger: of the sine of a larger angle less than ten digits would be right.
+LARGEST = 1e12
+_NOT_FINITE = {"nan": "np.nan", "inf": "np.inf", "-inf": "-np.inf"}
+
+
+class Watched(NamedTuple):
+    """What tells whether a configuration can be trusted.
+
+    Attributes:
+        inputs: nodes that must be finite and no larger than ``LARGEST``.
+        positive: nodes that must be above 0.
+        bounds: by node, beyond what it is unusual.
+    """
+
+    inputs: Sequence[int]
+    positive: Sequence[int]
+    bounds: Mapping[int, float]
+
+    def lines(self, names: Mapping[int, str]) -> Iterator[str]:
+        """Give the assignments of ``trust``: 0; not a number without meaning; above 0 where an input is unusual."""
+        # One sum of squares tells of each of them: it is not a number, infinite or too large where one of them is.
+        yield "size = 0.0"
+        yield from (f"size = fma({names[i]}, {names[i]}, size)" for i in self.inputs)
+        yield f"trust = 0.0 if size <= {LARGEST**2!r} else np.nan"
+        yield from (f"trust = trust if {names[i]} > 0.0 else np.nan" for i in self.positive)
+        yield from (
+            f"trust = trust if abs({names[i]}) <= {bound!r} else trust + 1.0" for i, bound in self.bounds.items()
+        )
+
+
+class Code:
+    """The assignments of a kernel, the same for one configuration and for many."""
+
+    def __init__(self, graph: Graph, outputs: Sequence[int], watched: Watched) -> None:
+        self._graph, self._outputs, self._watched = graph, outputs, watched
+        asked = [*outputs, *watched.positive]
+        self._order = reachable(graph, [*watched.inputs, *asked])
+        self.joined = fused(graph, self._order, asked)
+        self._gone = set(self.joined.values())
+
+    def lines(self, load: Sequence[str], store: Sequence[str], *, watched: bool = True) -> str:
+        """Write one assignment per node, and whether the inputs can be trusted.
+
+        Args:
+            load: where each input comes from.
+            store: the statement that takes each output, with a gap for its name.
+            watched: whether to say if the inputs can be trusted.
+        """
+        lines: list[str] = []
+        names: dict[int, str] = {}
+        circular: set[int] = set()
+        for i in self._order:
+            node = self._graph.nodes[i]
+            names[i] = f"v{i}"
+            if node.op == "constant":
+                names[i] = f"({node.value!r})" if math.isfinite(node.value) else f"({_NOT_FINITE[str(node.value)]})"
+            elif node.op == "input":
+                lines.append(f"v{i} = {load[int(node.value)]}")
+            elif node.op in ("sin", "cos"):
+                angle = node.operands[0]
+                names[i] = f"{node.op}{angle}"
+                if angle not in circular:
+                    circular.add(angle)
+                    lines.append(f"sin{angle}, cos{angle} = sine_cosine({names[angle]})")
+            elif i in self.joined:
+                lines.append(f"v{i} = {self._fused(node, self.joined[i], names)}")
+            elif i not in self._gone:
+                lines.append(f"v{i} = {_INFIX[node.op].format(*(names[j] for j in node.operands))}")
+        lines += [place.format(names[node]) for place, node in zip(store, self._outputs, strict=True)]
+        if not watched:
+            return "\n".join(lines)
+        return "\n".join([*lines, *self._watched.lines(names)])
+
+    def _fused(self, node: Node, product: int, names: dict[int, str]) -> str:
+        a, b = (names[j] for j in self._graph.nodes[product].operands)
+        first, second = node.operands
+        if node.op == "add":
+            return f"fma({a}, {b}, {names[second if first == product else first]})"
+        return f"fma({a}, {b}, -{names[second]})" if first == product else f"fma(-{a}, {b}, {names[first]})"

@@ -1,0 +1,169 @@
+"""Compiled functions on disk: found by the next process, mended whatever happened to them, never trusted unchecked."""
+
+import math
+import os
+import pickle
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import armwright
+from armwright.files.store import Store
+from samples import Sample
+
+SOURCES = str(Path(armwright.__file__).parents[1])
+VALUE = repr(math.sin(0.5) * 1.25)
+
+_START = """
+import sys
+import numpy as np
+from armwright.tracing.emit import emit
+from armwright.tracing.kernel import Kernel
+from armwright.tracing.scalar import sin
+kernel = Kernel(emitted=emit("wave", lambda x: [[sin(x[0]) * 1.25]], {"x": 1}))
+print(repr(float(kernel(np.array([0.5]))[0])), len(kernel.one.stats.cache_hits))
+"""
+
+
+def starting(cache: Path | None, **more: Any) -> subprocess.Popen[str]:
+    environment = {name: os.environ[name] for name in ("PATH", "TMPDIR") if name in os.environ}
+    environment |= {"PYTHONPATH": SOURCES, "PYTHONDONTWRITEBYTECODE": "1"}
+    if cache is not None:
+        environment["ARMWRIGHT_CACHE"] = str(cache)
+    return subprocess.Popen(
+        [sys.executable, "-c", _START],
+        env=environment | more.pop("env", {}),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **more,
+    )
+
+
+def start(cache: Path | None, **more: Any) -> str:
+    """How often one start, without a word on the error output, found what was compiled before: "0" or "1"."""
+    said, complained = starting(cache, **more).communicate(timeout=300)
+    assert complained == ""
+    value, hits = said.split()
+    assert value == VALUE
+    return hits
+
+
+def entries(cache: Path) -> list[Path]:
+    return [path for path in (cache / "compiled").iterdir() if path.suffix != ".lock"]
+
+
+def test_second_start_compiles_nothing(tmp_path: Path) -> None:
+    """Another process finds the compiled kernel on the disk: one file, for the user alone, and no source."""
+    assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
+
+    (entry,) = entries(tmp_path)
+    assert entry.stat().st_mode & 0o777 == 0o600
+    assert [path.name for path in tmp_path.iterdir()] == ["compiled"]
+
+
+def test_processes_that_start_together(tmp_path: Path) -> None:
+    """Four processes that want the same kernel at once all get it, and one of them compiles it."""
+    running = [starting(tmp_path) for _ in range(4)]
+    said = [process.communicate(timeout=300)[0].split() for process in running]
+
+    assert {line[0] for line in said} == {VALUE}
+    assert sum(line[1] == "0" for line in said) == 1
+
+
+def _half(data: bytes) -> bytes:
+    return data[: len(data) // 2]
+
+
+def _flipped(data: bytes) -> bytes:
+    return data[:-9] + bytes([data[-9] ^ 1]) + data[-8:]
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "cut off": _half,
+    "empty": lambda _: b"",
+    "foreign": lambda _: b"\x7fELF and so on",
+    "one bit": _flipped,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_damage_is_mended_without_a_word(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
+    """After any damage the kernel is compiled again, and the start after that finds it."""
+    start(tmp_path)
+    (entry,) = entries(tmp_path)
+    entry.write_bytes(damage(entry.read_bytes()))
+
+    assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
+
+
+def test_sound_bytes_that_are_no_function(tmp_path: Path) -> None:
+    """An entry that is whole, but of a Numba that wrote otherwise, is made anew too."""
+    start(tmp_path)
+    (entry,) = entries(tmp_path)
+    Store(entry.parent).put(entry.name, pickle.dumps((b"no code", b"no function")))
+
+    assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
+
+
+class _Poison:
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str]]:
+        return os.mkdir, ("PWNED",)
+
+
+def test_poison_is_not_loaded(tmp_path: Path) -> None:
+    """Code that somebody put in the place of an entry does not run: neither a pickle nor a source nor a bytecode."""
+    cache = tmp_path / "cache"
+    start(cache)
+    (entry,) = entries(cache)
+    sound = entry.read_bytes()
+    poison = pickle.dumps(_Poison())
+    old = cache / "kernels" / entry.name[:32]
+    old.mkdir(parents=True)
+    (old / "kernel.py").write_text("import os; os.mkdir('PWNED')")
+
+    for bad in (poison, sound[:50] + poison, sound + poison, sound[:18] + bytes(32) + poison):
+        entry.write_bytes(bad)
+        assert start(cache, cwd=tmp_path) == "0"
+    assert not (tmp_path / "PWNED").exists()
+
+
+def test_files_may_not_grow(tmp_path: Path) -> None:
+    """Where files may not grow, as with ulimit -f 4, the kernel is compiled for the process alone, and kept later."""
+
+    def small() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+
+    assert start(tmp_path, preexec_fn=small) == "0"
+    assert entries(tmp_path) == []
+    assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
+
+
+def test_killed_while_compiling(tmp_path: Path, sample: Sample) -> None:
+    """Whenever a process is killed, the next one finds a whole entry or none."""
+    killed = 0
+    for rng in sample.cases(30):
+        shutil.rmtree(tmp_path / "compiled", ignore_errors=True)
+        process = starting(tmp_path)
+        time.sleep(float(rng.uniform(0.3, 3.0)))
+        process.send_signal(signal.SIGKILL)
+        process.communicate()
+        start(tmp_path)
+        assert start(tmp_path) == "1"
+        killed += 1
+    sample.record("processes killed while they compiled: later starts that failed", killed, 0)
+
+
+def test_a_file_for_a_cache(tmp_path: Path) -> None:
+    """Where the cache folder is a file, the kernel is compiled for the process alone."""
+    (tmp_path / "file").write_text("in the way")
+
+    assert start(tmp_path / "file") == "0"
