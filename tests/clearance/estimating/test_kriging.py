@@ -245,3 +245,16 @@ def test_features_that_do_not_fit(known: Surrogate) -> None:
     """There is one number for each feature."""
     with pytest.raises(ShapeError, match=r"seen: expected 2 features, got shape \(3,\)"):
         solve_features(known, [0.0, 0.0, 0.0])
+
+
+def test_feature_of_chance_alone_teaches_nothing(rng: np.random.Generator) -> None:
+    """A feature that impacts leave to chance is noise of its whole spread, not a surface through the runs."""
+    x = rng.random((96, 3))
+    values = np.column_stack([x @ [1.0, 0.5, 0.2], rng.standard_normal(96)])
+
+    found = learn("pqr", x, ("smooth", "chance"), values, ranges=[(0, 1)] * 3)
+
+    new = rng.random((200, 3))
+    mean, deviation = found.predict(new)
+    assert np.abs(mean[:, 0] - new @ [1.0, 0.5, 0.2]).max() < 1e-2
+    assert np.median(deviation[:, 1]) > 0.7 * values[:, 1].std()

@@ -18,8 +18,9 @@ from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
 
 # Lengths over which a feature may change, as part of the range of a parameter.
 _LENGTHS = (0.1, 30.0)
-# What chance adds, as part of the variance of a feature: less than the smallest is lost in rounding.
-_NOISE = (1e-8, 1e-1)
+# What chance adds, as part of the variance of a feature: less than the smallest is lost in rounding, and a feature
+# that impacts leave to chance is nothing but noise. What cannot be told from it teaches nothing.
+_NOISE = (1e-8, 1.0)
 _AMPLITUDE = (1e-2, 1e4)
 # From so many points the surface of a feature is learnt; more cost time with their cube.
 MOST_POINTS = 300
