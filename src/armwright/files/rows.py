@@ -33,6 +33,14 @@ class Cells(NamedTuple):
     cells: tuple[str, ...]
 
 
+def text_cell(text: str) -> str:
+    """Return a text as one cell of a table, which no spreadsheet takes for a formula: quoted where it must be."""
+    plain = " ".join(text.splitlines()) if len(text.splitlines()) > 1 else text.strip("\r\n")
+    if plain.lstrip()[:1] in ("=", "+", "-", "@"):
+        plain = f"'{plain}"
+    return '"' + plain.replace('"', '""') + '"' if any(sign in plain for sign in ',;"\t') else plain
+
+
 def read_rows(path: Path | str) -> tuple[Cells, Iterator[Cells]]:
     """Return the names of the columns as they are written, and the rows below; empty lines are left out.
 
