@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armwright.errors import FileFormatError
-from armwright.files.rows import Cells, number_in_cell, of_one_width, read_rows
+from armwright.files.rows import Cells, number_in_cell, of_one_width, read_rows, text_cell
 
 Write = Callable[[str], Path]
 
@@ -91,3 +91,19 @@ def test_no_number(text: str, message: str) -> None:
         number_in_cell("t.csv", 3, "x_mm", text)
 
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("text", "cell"),
+    [
+        ("J2.force_N", "J2.force_N"),
+        ("=1+1", "'=1+1"),
+        (" @SUM(A1)", "' @SUM(A1)"),
+        ("a,b", '"a,b"'),
+        ('say "so"', '"say ""so"""'),
+        ("two\nlines", "two lines"),
+    ],
+)
+def test_a_text_is_one_cell(text: str, cell: str) -> None:
+    """A name in the head of a table stays one cell on one line, and no spreadsheet computes it."""
+    assert text_cell(text) == cell

@@ -14,6 +14,7 @@ from armwright.clearance.ledger import Ledger, ledger
 from armwright.clearance.predictability import APART, FINER, Outlook
 from armwright.clearance.simulation import Simulation, Status
 from armwright.errors import ShapeError
+from armwright.files.rows import text_cell
 from armwright.version import __version__
 
 # Energy that the balance may lack before a reader is told, as a part of what was lost, or so little [J].
@@ -256,7 +257,7 @@ def samples_csv(run: Run) -> Iterator[str]:
         columns[f"{pin.name}.force_N"] = simulation.forces[rows, i]
     for field in attrs.fields(Ledger):
         columns[f"{field.name}_J"] = getattr(run.energy, field.name)[rows]
-    yield ",".join(columns) + "\n"
+    yield ",".join(map(text_cell, columns)) + "\n"
     line = ",".join(["%.10g"] * len(columns)) + "\n"
     # Adding 0 turns -0 into 0, which reads better.
     yield from (line % tuple(row) for row in (np.stack(list(columns.values()), axis=-1) + 0.0).tolist())
