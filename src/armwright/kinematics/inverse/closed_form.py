@@ -10,7 +10,7 @@ from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.kinematics.inverse.branches import BRANCHES, Branches, branches, merged
-from armwright.kinematics.inverse.family import moved_inside
+from armwright.kinematics.inverse.family import moved_inside, turned_inside
 from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, judge, typed_poses
 from armwright.kinematics.inverse.numeric import numeric_inverse
 from armwright.kinematics.inverse.reach import nearest_centre
@@ -137,17 +137,21 @@ def _closed(arm: Arm, shoulder: Shoulder, X: Array, near: Array) -> InverseSolut
     candidates = []
     for i in np.flatnonzero(miss <= max(EDGE, miss.min())):
         q = nearest_image(arm, postures[i], near)
-        choosers = [joint for joint, is_free in zip(_CHOOSERS[kind], free[i], strict=True) if is_free]
-        for joint in choosers:
-            if violations(arm, q):
-                q = moved_inside(arm, q, near, partial(_members, arm, shoulder, target, int(i)), joint=joint)
         together = [joints for joints, is_free in zip(_FREE[kind], free[i], strict=True) if is_free]
+        moving = {joint for joints in together for joint in joints}
+        choosers = [joint for joint, is_free in zip(_CHOOSERS[kind], free[i], strict=True) if is_free]
+        members = partial(_members, arm, shoulder, target, int(i))
+        for joint in choosers:
+            outside = {fault.joint for fault in violations(arm, q)}
+            # A joint outside its limits that does not move with the free one stays there, whatever that does.
+            if not outside or outside - moving:
+                break
+            if kind == "spherical" and joint == _CHOOSERS[kind][-1] and len(together) == 1:
+                q = turned_inside(arm, q, near, members, joint=joint, other=_FREE[kind][-1][-1])
+            else:
+                q = moved_inside(arm, q, near, members, joint=joint)
         angles = np.array(shoulder.angles(q.tolist()))
-        candidates.append(
-            Candidate(
-                q, label(shoulder, BRANCHES[i], angles), tuple(sorted({j for joints in together for j in joints}))
-            )
-        )
+        candidates.append(Candidate(q, label(shoulder, BRANCHES[i], angles), tuple(sorted(moving))))
     return judge(arm, X, candidates, near, apart=_SAME_POSTURE, X_near=X_near)
 
 

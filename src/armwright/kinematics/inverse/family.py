@@ -14,6 +14,9 @@ _TRIED = 721
 _LEAST = 8
 _CLOSER = 15
 _FINER = 4
+# How far a joint is moved to see which way another goes with it [rad].
+_PROBE = 0.5
+_TURN = 2 * np.pi
 # Joints that are together this far outside their limits are inside [rad] or [m].
 _INSIDE = 1e-10
 
@@ -31,10 +34,10 @@ def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Arr
         members: returns the members (k, n) of the family that places (k, n) of the arm lead to.
         joint: number of the free joint, from 1.
     """
-    limits, start = arm.joints[joint - 1].limits, near[joint - 1]
-    lower, upper = max(limits.lower, start - np.pi), min(limits.upper, start + np.pi)
+    lower, upper = _room(arm, near, joint)
     if lower > upper:
         return q
+    start = near[joint - 1]
 
     def at(places: Array) -> Array:
         starts = np.tile(near, (len(places), 1))
@@ -54,6 +57,48 @@ def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Arr
         fan = np.linspace(-width, width, 2 * _FINER + 1)
         places, width = np.unique(np.clip(places[low][:, None] + fan, lower, upper)), width / _FINER
     return q
+
+
+def turned_inside(
+    arm: Arm, q: Array, near: Array, members: Callable[[Array], Array], *, joint: int, other: int
+) -> Array:
+    """Turn two joints whose axes lie on one line, against each other, until both are inside their limits.
+
+    The members of such a family are known: what one joint turns, the other turns back. So the least turn that brings
+    both inside lies at a limit of one of them.
+
+    Args:
+        arm: the arm.
+        q: (n,) the member with the joint near, which comes back when no other is inside.
+        near: (n,) where the arm is.
+        members: returns the members (k, n) of the family that places (k, n) of the arm lead to.
+        joint: number of the free joint, from 1.
+        other: number of the joint that turns with it.
+    """
+    lower, upper = _room(arm, near, joint)
+    if lower > upper:
+        return q
+    start, limits = near[joint - 1], arm.joints[other - 1].limits
+    starts = np.tile(near, (2, 1))
+    starts[1, joint - 1] += _PROBE
+    here, probed = members(starts)[:, other - 1]
+    way = 1.0 if abs(np.remainder(probed - here + np.pi, _TURN) - np.pi - _PROBE) < _PROBE else -1.0
+    images = _TURN * np.arange(-2, 3)
+    reached = [way * (limit - here + images) for limit in (limits.lower, limits.upper) if np.isfinite(limit)]
+    turns = np.concatenate([[0.0, lower - start, upper - start], *reached])
+    turns = turns[(turns >= lower - start) & (turns <= upper - start)]
+    turns = turns[np.abs(turns).argsort(kind="stable")]
+    starts = np.tile(near, (len(turns), 1))
+    starts[:, joint - 1] += turns
+    rows = members(starts)
+    inside = np.flatnonzero(_excess(arm, rows) < _INSIDE)
+    return nearest_image(arm, rows[inside[0]], near) if inside.size else q
+
+
+def _room(arm: Arm, near: Array, joint: int) -> tuple[float, float]:
+    """Return from where to where a free joint may move: inside its limits, half a turn at most."""
+    limits, start = arm.joints[joint - 1].limits, near[joint - 1]
+    return max(limits.lower, start - np.pi), min(limits.upper, start + np.pi)
 
 
 def _excess(arm: Arm, q: Array) -> Array:
