@@ -6,6 +6,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
+from armwright.dynamics.compiled import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward import forward
@@ -16,6 +17,7 @@ from armwright.motion.follow import PathError
 from armwright.motion.straight import straight_line
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
+from armwright.study.puma_moves import study_poses
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +75,26 @@ def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
     assert "mm off the line" in str(way.price)
     if by == "via":
         assert all(leg.certificate.holds for leg in way.legs)
+
+
+def test_a_way_round_near_the_joint_move() -> None:
+    """Where the wrist has to be turned over on the way, two certified lines by a pose near the joint move do it.
+
+    Seed 002 from B to C: joint 5 goes from 11.6 to -20.2 degrees; no pose beside the line helps.
+    """
+    fast = compile_arm(load_arm("puma560"))
+    B, C = study_poses()[1:]
+    q = next(branch.q for branch in inverse(fast.arm, B).allowed if branch.label == "left, down, no-flip")
+
+    way = line_or_detour(fast, q, C, by="via")
+
+    assert way.by == "via"
+    assert [leg.certificate.holds for leg in way.legs] == [True, True]
+    np.testing.assert_allclose(fast.forward(way.trajectory(way.trajectory.duration)), C, atol=1e-6)
+    lowest, highest = way.trajectory.extremes(0)
+    assert (lowest >= fast.arm.limit("lower")).all()
+    assert (highest <= fast.arm.limit("upper")).all()
+    assert (way.trajectory.peaks(1) <= fast.arm.limit("speed") * (1 + 1e-9)).all()
 
 
 def test_damped_rates_keep_efforts(through_the_wrist: tuple[Array, Array]) -> None:

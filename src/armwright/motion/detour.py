@@ -1,6 +1,7 @@
 """Ways round what stops a straight line: by a via pose beside it, or along it by damped rates; and their price."""
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import Literal, TypeAlias
 
 import attrs
@@ -8,10 +9,12 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
-from armwright.arrays import Array, ArrayLike
+from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import InvalidValueError, one_of
 from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import clean_pose
+from armwright.kinematics.inverse.turns import images, travel
 from armwright.motion.deviation import Spline, Ways, deviation_of
 from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.limit_use import slowing_for_limits
@@ -27,6 +30,11 @@ By: TypeAlias = Literal["via", "damped"]
 _BESIDE = (0.02, 0.05, 0.1, 0.2, 0.4)
 _DIRECTIONS = 8
 _TURNS = (0.1, 0.3, 0.6)
+# Poses of the joint moves between the ends that are tried: fractions of the way, and joint moves, the shortest first.
+_ON_THE_WAY = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+_JOINT_MOVES = 3
+# Then what lies round the shortest one is tried: rings of so many, joints off by so much, in parts of the way.
+_SCATTERED, _SCATTER, _PARTS = 16, (0.1, 0.1, 0.2, 0.2), (0.3, 0.9)
 # A way round that takes longer than the line by so many times its duration is worth looking for another.
 _LONG = 2.0
 # A line that takes so many times its duration, and so much longer [s], is crawled along. A way round is looked for
@@ -98,10 +106,11 @@ def line_or_detour(
 ) -> Detour:
     """Plan a straight line, and where it cannot be run, a way round.
 
-    By ``via``: a stop at a pose beside the line, or at the same place with the hand turned, that two certified lines
-    lead to and from; the nearest that is found. By ``damped``: along the line, where the posture is nearly singular
-    with joint rates that stay bounded, so that the hand leaves the line there and comes back. A line that could only
-    be crawled along, at a tenth of its speed, is gone round too, where that takes less than half the time.
+    By ``via``: a stop at a pose beside the line, at the same place with the hand turned, or on or near a joint move
+    between the ends, that two certified lines lead to and from; the nearest that is found. By ``damped``: along the
+    line, where the posture is nearly singular with joint rates that stay bounded, so that the hand leaves the line
+    there and comes back. A line that could only be crawled along, at a tenth of its speed, is gone round too, where
+    that takes less than half the time.
 
     Args:
         arm: an arm, or a compiled one, which plans faster.
@@ -166,7 +175,7 @@ def _crawl(asked: Line, line: CertifiedLine) -> PathError:
 def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation: float, speed: float) -> Detour | None:
     """Return the fastest way by one of the nearest via poses; None where none is found."""
     ways: list[Detour] = []
-    for ring in _rings(line, obstacle.fraction):
+    for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver_of(arm), q, line.B)):
         for via in ring:
             try:
                 there = certified(arm, q, via, deviation=deviation, speed=speed, closely=False)
@@ -206,6 +215,30 @@ def _rings(line: Line, fraction: float) -> Iterator[list[Array]]:
             axes = (*directions, along, -along)
             ring += [_moved(X, np.zeros(3), _TURNS[number] * axis) for axis in axes]
         yield ring
+
+
+def _on_joint_moves(solver: Solver, q: Array, X_goal: Array) -> Iterator[list[Array]]:
+    """Give poses through which joint moves to the goal bring the hand, then poses round the shortest such move.
+
+    Joint moves pass where no line near the straight one does: from one branch to the other through a singular
+    configuration. The poses round it are the same in every call.
+    """
+    arm = solver.arm
+    ends = [image for branch in inverse(arm, X_goal, q).allowed for image in images(arm, branch.q)]
+    ends = sorted(ends, key=lambda end: travel(arm, q, end))[:_JOINT_MOVES]
+    if not ends:
+        return
+    yield [np.asarray(solver.forward(q + part * (end - q))) for end in ends for part in _ON_THE_WAY]
+    chance = np.random.default_rng(2)
+    for scatter in _SCATTER:
+        parts = chance.uniform(*_PARTS, size=(_SCATTERED, 1))
+        off = scatter * chance.standard_normal((_SCATTERED, arm.n))
+        yield list(solver.forward(q + parts * (ends[0] - q) + np.where(_turning(arm), off, 0.0)))
+
+
+def _turning(arm: Arm) -> Flags:
+    """Return which joints turn (n,): a slide is not moved by radians."""
+    return np.array([joint.revolute for joint in arm.joints])
 
 
 def _moved(X: Array, shift: Array, turn: Array) -> Array:
