@@ -14,6 +14,9 @@ from armwright.errors import ShapeError
 from armwright.kinematics.forward import forward
 from armwright.spatial.poses import one_pose
 
+# A path that turns its corners without a stop has to round them, and it is gross motion.
+_CORNER_DEVIATIONS = 20.0
+
 Around: TypeAlias = Literal["via", "damped"]
 
 
@@ -75,6 +78,8 @@ class Cell:
         contact_deepest: how deep an arm may press into it [m].
         vision_time: how long the camera takes for an answer [s].
         deviation: allowed distance from straight lines [m].
+        corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations when
+            left out, see ``corner_room``.
         period: of the servo [s].
         around: how to go round what stops a straight line, by ``via`` poses or ``damped`` rates; None to stop there.
     """
@@ -92,6 +97,7 @@ class Cell:
     contact_deepest: float = 5e-3
     vision_time: float = 0.1
     deviation: float = 1e-3
+    corner: float | None = None
     period: float = 1e-3
     around: Around | None = None
 
@@ -102,6 +108,11 @@ class Cell:
             for name, one in self.arms.items()
         }
         object.__setattr__(self, "arms", stand)
+
+    @property
+    def corner_room(self) -> float:
+        """How far a path past several frames may be from the straight legs between them [m]."""
+        return _CORNER_DEVIATIONS * self.deviation if self.corner is None else self.corner
 
     def tree(self) -> FrameTree:
         """Return the frame tree at the start: bases and hands of the arms, STATION, and the frames of the file.

@@ -38,6 +38,8 @@ _TYPED_ROTATION = 2e-2
 # A faster servo fills a disk, a slower one controls nothing [ms].
 SERVO_MS = (0.1, 100.0)
 DEVIATION_MM = (1e-3, 1e3)
+# No more than a corner of any use; a hundredth of a millimetre is no corner any more, but a stop.
+CORNER_MM = (1e-2, 1e3)
 # How to go round what stops a straight line, as it is written.
 WAYS_ROUND: Mapping[str, Around | None] = {"none": None, "via": "via", "damped": "damped"}
 # What the camera finds after its last answer, as it is written.
@@ -79,6 +81,7 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         contact_deepest=contact.number("deepest_mm", default=5.0, lower=1e-3, upper=1e3) * 1e-3,
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
+        corner=_corner(motion),
         around=_around(motion),
     )
     top.allow("devices")
@@ -96,6 +99,14 @@ def _gravity(top: Table) -> Array:
             f"expected no more than {_STRONGEST_GRAVITY:g} m/s² in all; that of the earth is [0, 0, -9.80665]",
         )
     return gravity
+
+
+def _corner(motion: Table) -> float | None:
+    """Read how far a path past several frames may be from its legs; without the key it goes by the deviation."""
+    if "corner_mm" not in motion:
+        motion.allow("corner_mm")
+        return None
+    return motion.number("corner_mm", lower=CORNER_MM[0], upper=CORNER_MM[1]) * 1e-3
 
 
 def _around(motion: Table) -> Around | None:

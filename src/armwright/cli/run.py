@@ -104,6 +104,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     options = {
         "servo_ms": place.period * 1e3,
         "deviation_mm": place.deviation * 1e3,
+        "corner_mm": place.corner_room * 1e3,
         "around": place.around or Around.NONE.value,
         "std": std.value,
         "strict": strict,

@@ -31,8 +31,8 @@ from armwright.spatial.rotations import rotation_vector
 
 # The rule's knots are halved at most this often before the path is given up: 1/64 of the rule's step.
 _HALVINGS = 6
-# A path through several frames turns its corners without a stop, so it must round them; and it is gross motion. It
-# may leave the straight ways between its frames by this much more than a line may leave its own.
+# The report's path through several frames turns its corners without a stop, so it must round them; and it is gross
+# motion. It may leave the straight ways between its frames by this much more than a line may leave its own.
 _CORNER_ROOM = 20.0
 # Turning the hand by this much is allowed where the place may be off by one metre's thousandth: 5 mrad per mm.
 TURN_PER_METRE = 5.0
@@ -106,7 +106,7 @@ def follow(arm: Arm, path: Path, q_start: ArrayLike, *, deviation: float, speed:
     """
     if path.lengths().max() <= NEGLIGIBLE:
         return Followed(trajectory=hold(q_start, 0.0), knots=1, deviation=0.0, turn_deviation=0.0, slowed="")
-    _check_ends(arm, path)
+    check_ends(arm, path)
     allowed = deviation if len(path.poses) == 2 else _CORNER_ROOM * deviation
     solver, q = solver_of(arm), np.asarray(q_start, dtype=np.float64)
     try:
@@ -161,7 +161,7 @@ def _followed(
     )
 
 
-def _check_ends(arm: Arm, path: Path) -> None:
+def check_ends(arm: Arm, path: Path) -> None:
     """Refuse a path to a pose that no posture reaches, before anything between is looked at."""
     for segment, X in enumerate(path.poses[1:]):
         solution = inverse(arm, X)

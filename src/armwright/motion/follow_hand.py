@@ -27,6 +27,8 @@ Counts: TypeAlias = npt.NDArray[np.intp]
 
 # Knots to begin with: so far apart [s], and so many on each blend and each straight way at least and at most.
 _STEP, _FEWEST, _ENOUGH = 0.02, 4, 500
+# The same for a path whose time is a mere parameter: only the deviation tells how many it takes.
+_WIDE_STEP = 0.1
 # Rounds of putting knots where they are missing; the deviation falls with the fourth power of the step.
 _ROUNDS, _CLOSER, _MOST = 8, 1.1, 500_000
 # Whole turns; a limit passed by this part of one is not passed.
@@ -97,7 +99,7 @@ def carry(solver: Solver, hand: HandPath, times: Array, near: Array, *, ends: En
         PathError: no branch carries through: what stops each of them, where.
     """
     arm = solver.arm
-    t = _first_knots(hand)
+    t = _first_knots(hand, _STEP)
     stops: dict[str, _Stop] = {}
     for start in _starts(arm, hand(0.0), near):
         found = _carried(solver, hand, t, start, ends=ends, deviation=deviation)
@@ -105,11 +107,40 @@ def carry(solver: Solver, hand: HandPath, times: Array, near: Array, *, ends: En
             return found
         stops[start.label] = found
     first = next(iter(stops.values()))
-    way = int(np.clip(np.searchsorted(times, first.time, side="right") - 1, 0, len(times) - 2))
-    fraction = float(np.clip((first.time - times[way]) / (times[way + 1] - times[way]), 0.0, 1.0))
+    way, fraction = _on_the_way(times, first.time)
     reasons = "; ".join(f"{label}: {_place(hand, times, stop.time)} {stop.why}" for label, stop in stops.items())
     message = f"no branch carries the hand to its last pose. {reasons}"
     raise PathError(first.cause, way, fraction, message, joint=first.joint, reason=first.why)
+
+
+def carry_on(solver: Solver, hand: HandPath, times: Array, q_start: Array, *, deviation: float, room: float) -> Carried:
+    """Solve a path of the hand for the joints from the posture that the arm has.
+
+    Args:
+        solver: the arm.
+        hand: the path, run at both ends; its time is a mere parameter.
+        times: (k,) of its poses.
+        q_start: (n,) joint positions at its start.
+        deviation: as for ``carry``.
+        room: how far off the hand may be where it is looked for what stops the arm [m].
+
+    Raises:
+        PathError: what stops the arm, where.
+    """
+    start = Posture("", q_start)
+    t = _first_knots(hand, _WIDE_STEP)
+    found = _carried(solver, hand, t, start, ends="running", deviation=deviation, room=room)
+    if isinstance(found, Carried):
+        return found
+    way, fraction = _on_the_way(times, found.time)
+    message = f"{_place(hand, times, found.time)} {found.why}"
+    raise PathError(found.cause, way, fraction, message, joint=found.joint, reason=found.why)
+
+
+def _on_the_way(times: Array, t: float) -> tuple[int, float]:
+    """Return on which way between poses, from 0, a time is, and at which fraction of it."""
+    way = int(np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 2))
+    return way, float(np.clip((t - times[way]) / (times[way + 1] - times[way]), 0.0, 1.0))
 
 
 def _starts(arm: Arm, X: Array, near: Array) -> list[Posture]:
@@ -121,9 +152,9 @@ def _starts(arm: Arm, X: Array, near: Array) -> list[Posture]:
     return sorted(starts, key=lambda posture: travel(arm, near, posture.q))
 
 
-def _first_knots(hand: HandPath) -> Array:
+def _first_knots(hand: HandPath, step: float) -> Array:
     lengths = np.diff(hand.knots)
-    parts = np.clip(np.ceil(lengths / _STEP), _FEWEST, _ENOUGH).astype(np.intp)
+    parts = np.clip(np.ceil(lengths / step), _FEWEST, _ENOUGH).astype(np.intp)
     return _divided(hand.knots, parts)
 
 
@@ -135,23 +166,35 @@ def _divided(times: Array, parts: Counts) -> Array:
 
 
 def _carried(
-    solver: Solver, hand: HandPath, t: Array, start: Posture, *, ends: Ends, deviation: float
+    solver: Solver,
+    hand: HandPath,
+    t: Array,
+    start: Posture,
+    *,
+    ends: Ends,
+    deviation: float,
+    room: float | None = None,
 ) -> Carried | _Stop:
-    """Follow one branch: what it comes to, or what really stops it."""
-    found = _knotted(solver, hand, t, start, ends=ends, deviation=deviation)
+    """Follow one branch: what it comes to, or what really stops it.
+
+    With ``room``, see ``carry_on``, no joint is turned by whole turns at the start to be inside its limits later.
+    """
+    turns = room is None
+    found = _knotted(solver, hand, t, start, ends=ends, deviation=deviation, turns=turns)
     if isinstance(found, Carried) or found.cause == "reach":  # a pose out of reach is so for every posture
         return found
-    room = Room(deviation, TURN_PER_METRE * deviation)
-    look = look_closely(solver, hand(t), t, start.q, room, poses_only=True)
+    wide = deviation if room is None else room
+    look = look_closely(solver, hand(t), t, start.q, Room(wide, TURN_PER_METRE * wide), poses_only=True)
     if look is None:
         return found
     times = np.interp(look.places, np.arange(len(t)), t)
-    beyond = _stopped(solver.arm, _turned_inside(solver.arm, look.q, None), None, hand(times), times)
+    q = _turned_inside(solver.arm, look.q, None) if turns else look.q
+    beyond = _stopped(solver.arm, q, None, hand(times), times)
     if beyond is None and look.stop is not None:
         beyond = _Stop(look.stop.cause, look.stop.reason, look.stop.joint, float(times[-1]))
     if beyond is not None:
         return found if (found.cause, found.joint) == (beyond.cause, beyond.joint) else beyond
-    return _knotted(solver, hand, t, start, ends=ends, deviation=deviation, guide=Guide(t, look))
+    return _knotted(solver, hand, t, start, ends=ends, deviation=deviation, turns=turns, guide=Guide(t, look))
 
 
 def _knotted(
@@ -162,6 +205,7 @@ def _knotted(
     *,
     ends: Ends,
     deviation: float,
+    turns: bool,
     guide: Guide | None = None,
 ) -> Carried | _Stop:
     """Put knots on one branch until the hand stays within the deviation."""
@@ -169,7 +213,7 @@ def _knotted(
     for _ in range(_ROUNDS):
         X = hand(t)
         q, missed = chain(solver, X, start.q) if guide is None else beside(solver, X, guide.postures(t))
-        q = _turned_inside(arm, q, missed)
+        q = _turned_inside(arm, q, missed) if turns else q
         if (stop := _stopped(arm, q, missed, X, t)) is not None:
             return stop
         still = np.zeros(arm.n)

@@ -15,7 +15,7 @@ from armwright.kinematics.inverse.turns import images, travel
 from armwright.motion.certificate import LimitName
 from armwright.motion.detour import By, Detour, line_or_detour
 from armwright.motion.follow import PathError, follow
-from armwright.motion.path import NEGLIGIBLE, Path
+from armwright.motion.path import Path
 from armwright.motion.quintic import point_to_point
 from armwright.motion.rounded import rounded_move
 from armwright.motion.stops import Cause, cause_of
@@ -53,15 +53,17 @@ class StageGoal:
     """What one stage has to do.
 
     Attributes:
-        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` through several, ``BLEND`` straight from one to the
-            next with rounded corners.
+        kind: ``PTP`` to one pose, ``LINE`` to one pose, ``SPLINE`` and ``BLEND`` past several without a stop.
         poses: (k, 4, 4) tool poses in the base frame of the arm.
         blend: how far from a corner the rounding may begin [m]; only for ``BLEND``.
+        corner: how far a ``SPLINE`` may be off the straight legs, and pass a pose [m]; None for the report's own
+            X-spline through the poses.
     """
 
     kind: StageKind
     poses: Array
     blend: float | None = None
+    corner: float | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -200,10 +202,9 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
         yield from (_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number))
         return
     path = Path(poses=np.concatenate([forward(arm, q)[None], poses]))
-    if goal.kind == "BLEND" and (path.lengths() > NEGLIGIBLE).sum() > 1:
-        assert goal.blend is not None  # noqa: S101 - a BLEND has one
+    if goal.kind == "BLEND" or goal.corner is not None:
         try:
-            yield _rounded(arm, path, q, goal.blend, manner)
+            yield _rounded(arm, path, q, goal, manner)
         except PathError as error:
             raise StageError(number, _on_the_way(arm, path, error)) from error
         return
@@ -226,18 +227,17 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
     )
 
 
-def _rounded(arm: Arm, path: Path, q: Array, blend: float, manner: Manner) -> Stage:
-    move = rounded_move(arm, path, q, blend=blend, deviation=manner.deviation, speed=manner.speed)
-    certificate = move.certificate
-    assert certificate is not None  # noqa: S101 - the move keeps to a planned path
+def _rounded(arm: Arm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> Stage:
+    run = rounded_move(
+        arm, path, q, corner=goal.corner, blend=goal.blend, deviation=manner.deviation, speed=manner.speed
+    )
     return Stage(
-        kind="BLEND",
-        trajectory=whole_ticks(move.trajectory, manner.period),
+        kind=goal.kind,
+        trajectory=whole_ticks(run.trajectory, manner.period),
         length=_length(path.poses),
-        knots=certificate.knots,
-        # Of the path with sharp corners: what the rounding leaves out, and what the joints are off.
-        deviation=float(move.misses.max()) + certificate.deviation,
-        slowed="" if certificate.because is None else _slower(certificate.factor, certificate.because),
+        knots=run.knots,
+        deviation=run.deviation,
+        slowed=run.slowed,
     )
 
 

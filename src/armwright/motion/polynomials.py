@@ -41,6 +41,30 @@ def shifted(terms: Array, by: Array) -> Array:
     return moved
 
 
+def composed(outer: Array, inner: Array) -> Array:
+    """Return the coefficients of polynomials of polynomials.
+
+    Args:
+        outer: (m, k, n) coefficients of q(s).
+        inner: (m, d) coefficients of s(t).
+
+    Returns:
+        (m, (k - 1)(d - 1) + 1, n) coefficients of q(s(t)).
+    """
+    segments, count, joints = outer.shape
+    degree = inner.shape[1] - 1
+    terms = np.zeros((segments, (count - 1) * degree + 1, joints))
+    # Powers of the inner polynomial, one after the other.
+    power = np.ones((segments, 1))
+    for k in range(count):
+        terms[:, : power.shape[1]] += power[..., None] * outer[:, k, None]
+        higher = np.zeros((segments, power.shape[1] + degree))
+        for d in range(degree + 1):
+            higher[:, d : d + power.shape[1]] += inner[:, d, None] * power
+        power = higher
+    return terms
+
+
 def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
     """Return the smallest and the largest value (m, n) on each segment, by the roots of the derivative.
 

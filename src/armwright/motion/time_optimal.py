@@ -17,6 +17,7 @@ from armwright.motion.certificate import LIMITS, LimitName
 from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
 from armwright.motion.joint_path import Grid, gridded, pieces_of, through_knots
 from armwright.motion.phase_plane import SolverName, fastest
+from armwright.motion.polynomials import composed
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.trajectory import Trajectory, hold, join
 
@@ -190,15 +191,8 @@ def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
 def _composed(grid: Grid, sd: Array) -> Trajectory:
     """Return q(s(t)) with s' as given at the ends of the intervals and s'' constant on each."""
     durations = 2 * grid.lengths / (sd[1:] + sd[:-1])
-    half = np.diff(sd) / durations / 2
-    count = grid.local.shape[1]
-    terms = np.zeros((len(durations), 2 * count - 1, grid.local.shape[2]))
-    for power in range(count):
-        # (s' t + s''/2 t²) to this power, by the binomial theorem.
-        for i in range(power + 1):
-            weight = math.comb(power, i) * sd[:-1] ** (power - i) * half**i
-            terms[:, power + i] += weight[:, None] * grid.local[:, power]
-    return Trajectory(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=terms)
+    inner = np.stack([np.zeros_like(durations), sd[:-1], np.diff(sd) / durations / 2], axis=1)
+    return Trajectory(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=composed(grid.local, inner))
 
 
 def _bindings(solver: Solver, run: Trajectory, *, efforts: bool) -> tuple[Binding, ...]:

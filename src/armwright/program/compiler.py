@@ -125,7 +125,7 @@ def _compile(
         course, odd_course = flow.check(program, symbols, spelling, cell, strict=strict, source=source)
         found += odd_course
         if not any(one.is_error for one in found):
-            code = translate(source, program, symbols, course, spelling)
+            code = attrs.evolve(translate(source, program, symbols, course, spelling), standard=std)
     return Compilation(
         source=source,
         standard=std,

@@ -27,6 +27,7 @@ from armwright.program.intermediate.code import (
 )
 from armwright.program.meaning.units import DECLARABLE, UnitSystem, dimension
 from armwright.program.text.source import Source, Span
+from armwright.program.text.words import Standard
 
 HEAD = "; armwright intermediate code, form 1"
 
@@ -53,6 +54,8 @@ def _lines(code: Code) -> Iterator[str]:
     yield HEAD
     yield f"program {json.dumps(code.source.name, ensure_ascii=False)}"
     yield f"units {code.units.length} {code.units.angle}"
+    if code.standard is not Standard.RLO_2:
+        yield f"standard {code.standard.value}"
     yield from (f"name {text}" for text in code.spelling.values())
     for name, kind in code.types.items():
         yield f"var {name} {kind}"
@@ -121,6 +124,7 @@ class _Reader:
         self._number = 0
         self._program = "program"
         self._units = UnitSystem()
+        self._standard = Standard.RLO_2
         self._spelling: dict[str, str] = {}
         self._types: dict[str, Type] = {}
         self._procedures: dict[str, _Procedure] = {}
@@ -132,6 +136,7 @@ class _Reader:
         words: Mapping[str, Callable[[str], None]] = {
             "program": self._read_program,
             "units": self._read_units,
+            "standard": self._read_standard,
             "name": self._read_name,
             "var": self._read_variable,
             "procedure": self._read_procedure,
@@ -187,6 +192,12 @@ class _Reader:
             if unit not in DECLARABLE:
                 self._fail(f"unknown unit {unit!r}", closest(unit, DECLARABLE))
             self._units = attrs.evolve(self._units, **{dimension(unit): unit})
+
+    def _read_standard(self, rest: str) -> None:
+        known = [standard.value for standard in Standard]
+        if rest not in known:
+            self._fail(f"unknown standard {rest!r}, expected {' or '.join(known)}")
+        self._standard = Standard(rest)
 
     def _read_name(self, rest: str) -> None:
         self._spelling[self._name(rest)] = rest
@@ -274,6 +285,7 @@ class _Reader:
             procedures=procedures,
             units=self._units,
             spelling=self._spelling,
+            standard=self._standard,
             source=source,
         )
         numbers = [number for number, *_ in self._steps]

@@ -9,6 +9,7 @@ import attrs
 
 from armwright.program.meaning.units import UnitSystem
 from armwright.program.text.source import Source, Span
+from armwright.program.text.words import Standard
 
 NORMAL_SPEED = 100.0
 LOWEST_SPEED, HIGHEST_SPEED = 1.0, 120.0
@@ -145,8 +146,9 @@ class Trajectory(enum.StrEnum):
     """The basic trajectories.
 
     ``PTP``: all joints at once, at rest at both ends. ``LINE``: the moved frame on a straight line.
-    ``SPLINE``: through frames without a stop, at rest at the last. ``BLEND``: straight from frame to frame, with
-    rounded corners.
+    ``SPLINE``: past frames without a stop, at rest at the last; straight between corners that are rounded as far as
+    the cell allows, or through the frames by the report's X-spline in RLO-83. ``BLEND``: the same, rounded from a
+    distance on that the program tells.
     """
 
     PTP = "PTP"
@@ -258,6 +260,7 @@ class Code:
         procedures: by name.
         units: what numbers count at run time.
         spelling: how the program first writes each canonical name that is not in upper case.
+        standard: which RLO it was read as; motion past VIA points is that of the report in RLO-83.
         source: the program text.
     """
 
@@ -267,6 +270,7 @@ class Code:
     procedures: Mapping[str, ProcedureCode] = attrs.field(factory=dict)
     units: UnitSystem = attrs.field(factory=UnitSystem)
     spelling: Mapping[str, str] = attrs.field(factory=dict)
+    standard: Standard = Standard.RLO_2
     source: Source
 
     def spelled(self, name: str) -> str:

@@ -16,6 +16,7 @@ from armwright.program.following.hanging import is_arm
 from armwright.program.intermediate.code import (
     Instruction,
     StagePlan,
+    Trajectory,
     stages_of,
     stages_text,
 )
@@ -28,14 +29,13 @@ from armwright.program.running.obstacles import CODES, stopped, ways_round, wher
 from armwright.program.running.process import Activation, Guard, Motion, Process
 from armwright.program.running.recording import Run, RunStage, efforts
 from armwright.program.text.source import Span
+from armwright.program.text.words import Standard
 from armwright.spatial.poses import inverse
 
 # A place this many times farther than the arm reaches was probably typed in another unit.
 _OTHER_UNIT = 50.0
 # A hand that closed on a frame still stands at it when both are so near [m], and entries of rotations.
 _SAME_PLACE = 1e-6
-# A guarded motion finds something out by the place at which it stops; it keeps to its line this much more closely.
-_GUARDED = 0.05
 # Planning a MOVE takes as long as so many steps of other kinds, whether it can be made or not.
 _STEPS_OF_A_MOVE = 1000
 
@@ -210,11 +210,11 @@ def _plan(run: Machine, process: Process, asked: Asked, arm: str, moved: str) ->
             kind=one.kind.value,
             poses=np.stack([X_BW @ _pose(run, process, asked.goals[label]) @ X_MH for label in one.frames]),
             blend=asked.blend,
+            corner=cell.corner_room if one.kind is Trajectory.SPLINE and run.code.standard is Standard.RLO_2 else None,
         )
         for one in plans
     ]
-    deviation = cell.deviation * (_GUARDED if asked.guards else 1.0)
-    manner = Manner(speed=asked.speed, deviation=deviation, period=cell.period, around=cell.around)
+    manner = Manner(speed=asked.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
     try:
         stages = plan(place.arm, run.hardware.posture(arm, run.now), goals, manner)
     except StageError as error:

@@ -1,0 +1,220 @@
+"""Past several frames without a stop: how far off the straight legs, how fast, and how smoothly."""
+
+import attrs
+import numpy as np
+import pytest
+
+from armwright.arm.load import load_arm
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.kinematics.forward import forward
+from armwright.kinematics.inverse.closed_form import inverse
+from armwright.motion.continuity import continuity
+from armwright.motion.plan import Manner, Stage, StageError, StageGoal, plan
+from armwright.spatial.poses import pose
+from armwright.spatial.rotations import rotation_from_vector
+from oracles.legs import beside_legs, turns_beside_legs
+from samples import Sample
+
+CORNER = 0.02
+# What a corner may miss in orientation for each metre that it may miss in position [rad/m].
+TURN = 5.0
+MIDDLE = min(5e-4, CORNER / 10)
+LENGTHS = (0.02, 0.6)
+LOOKS = 4000
+DOWN = np.diag((1.0, -1.0, -1.0))
+ROUNDING = 1e-9
+
+
+def by_via(arm: Arm, q: Array, X: Array, corner: float | None = CORNER, speed: float = 100.0) -> Stage:
+    return plan(arm, q, [StageGoal(kind="SPLINE", poses=X[1:], corner=corner)], Manner(speed=speed))[0]
+
+
+def with_stops(arm: Arm, q: Array, X: Array, speed: float = 100.0) -> float:
+    """How long the same legs take as straight lines, one by one [s]."""
+    goals = [StageGoal(kind="LINE", poses=Y[None]) for Y in X[1:]]
+    return sum(stage.trajectory.duration for stage in plan(arm, q, goals, Manner(speed=speed)))
+
+
+def random_way(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
+    """A posture, and poses from there past 1 to 6 others; half of the ways turn the hand."""
+    vias, turning = int(rng.integers(1, 7)), bool(rng.integers(2))
+    lower, upper = np.maximum(arm.limit("lower"), -3.0), np.minimum(arm.limit("upper"), 3.0)
+    while True:
+        q = rng.uniform(lower, upper)
+        X = [forward(arm, q)]
+        for _ in range(40 * vias):
+            way = rng.normal(size=3)
+            way *= np.exp(rng.uniform(*np.log(LENGTHS))) / np.linalg.norm(way)
+            turn = rng.normal(size=3) * rng.choice((0.1, 0.5)) if turning else np.zeros(3)
+            Y = pose(X[-1][:3, :3] @ rotation_from_vector(turn), X[-1][:3, 3] + way)
+            if inverse(arm, Y).allowed:
+                X.append(Y)
+            if len(X) == vias + 2:
+                return q, np.stack(X)
+
+
+def faults(arm: Arm, stage: Stage, X: Array) -> list[str]:
+    """What a path past frames does that it should not, by where the hand is seen alone."""
+    run, found = stage.trajectory, []
+    hand = forward(arm, run(np.linspace(0, run.duration, LOOKS)))
+    places = beside_legs(hand, X, CORNER)
+    turns = [leg for leg in turns_beside_legs(hand, X, TURN * CORNER) if leg is not None]
+    for legs, unit, what in ((places, 1.0, "position"), (turns, TURN, "orientation")):
+        for leg in legs:
+            if leg.farthest > unit * CORNER:
+                found.append(f"{what} off its leg by {leg.farthest:.4g}")
+            if leg.middle > unit * MIDDLE:
+                found.append(f"{what} off the middle of its leg by {leg.middle:.4g}")
+            if max(leg.turns) > 1:
+                found.append(f"distance in {what} turns {leg.turns} times")
+    if max(leg.missed for leg in places) > CORNER:
+        found.append("a frame is passed too far off")
+    if max(leg.farthest for leg in places) > (stage.deviation or 0.0):
+        found.append("farther off than the stage says")
+    return found
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+def test_random_ways_are_smooth_and_never_slower(name: str, sample: Sample) -> None:
+    """Beside each leg the hand swings out at its ends alone, and the way is no slower than the legs with stops."""
+    arm = load_arm(name)
+    count = failures = stops = 0
+    slowest = middle = 0.0
+    for rng in sample.cases(100):
+        while True:
+            q, X = random_way(arm, rng)
+            try:
+                lasting = with_stops(arm, q, X)
+            except StageError:
+                continue
+            break
+        stage = by_via(arm, q, X)
+        count, stops = count + 1, stops + ("stop" in stage.slowed)
+        found = faults(arm, stage, X) if "stop" not in stage.slowed else []
+        run = stage.trajectory
+        if run.duration > lasting * (1 + ROUNDING):
+            found.append(f"slower than with stops: {run.duration:.3f} s, {lasting:.3f} s")
+        if continuity(run).order < 2 and "stop" not in stage.slowed:
+            found.append("the acceleration jumps")
+        for name_of, order in (("speed", 1), ("acceleration", 2)):
+            if (run.peaks(order) > arm.limit(name_of) * (1 + ROUNDING)).any():
+                found.append(f"a limit of {name_of} is passed")
+        slowest = max(slowest, run.duration / lasting)
+        hand = forward(arm, run(np.linspace(0, run.duration, LOOKS)))
+        middle = max([middle, *(leg.middle for leg in beside_legs(hand, X, CORNER))])
+        failures += bool(found)
+        assert not found, found
+    what = f"ways of {arm.name} past 1 to 6 frames: off the legs, turning points, limits, slower than with stops"
+    sample.record(what, count, failures, part_of_time_with_stops=slowest, off_the_middle_mm=middle * 1e3, stops=stops)
+    assert stops <= 0.02 * count + 1
+
+
+def corner_of_ur5() -> tuple[Arm, Array, Array]:
+    """The corner at which the report's spline swings, before a straight 300 mm."""
+    arm = load_arm("ur5")
+    X = np.stack([pose(DOWN, p) for p in ((0.45, -0.3, 0.25), (0.45, -0.15, 0.45), (0.45, 0.15, 0.45))])
+    return arm, inverse(arm, X[0]).best.q, X
+
+
+def test_the_spline_of_the_report_swings() -> None:
+    """The X-spline through the same frames swings to both sides of the straight 300 mm behind the corner."""
+    arm, q, X = corner_of_ur5()
+
+    found = faults(arm, by_via(arm, q, X, corner=None), X)
+
+    assert any("off the middle" in fault for fault in found)
+    assert any("turns" in fault for fault in found)
+    assert not faults(arm, by_via(arm, q, X), X)
+
+
+def test_speed_is_even_behind_a_corner() -> None:
+    """On the straight 300 mm behind the corner the hand gathers speed once and loses it once."""
+    arm, q, X = corner_of_ur5()
+    run = by_via(arm, q, X).trajectory
+    t = np.linspace(0, run.duration, LOOKS)
+    places = forward(arm, run(t))[:, :3, 3]
+    speed = np.linalg.norm(np.gradient(places, t, axis=0), axis=-1)[places[:, 1] > -0.1]
+
+    rising = np.diff(speed)[np.abs(np.diff(speed)) > 1e-4 * speed.max()] > 0
+    assert (np.diff(rising.astype(int)) != 0).sum() <= 1
+
+
+def test_a_way_there_and_back() -> None:
+    """A way that turns straight round comes no nearer to its frame than allowed, without a corner in time."""
+    arm, _, X = corner_of_ur5()
+    X = X[[0, 1, 0]]
+    q = inverse(arm, X[0]).best.q
+
+    stage = by_via(arm, q, X)
+
+    assert continuity(stage.trajectory).order >= 2
+    assert stage.trajectory.duration <= with_stops(arm, q, X)
+    hand = forward(arm, stage.trajectory(np.linspace(0, stage.trajectory.duration, LOOKS)))[:, :3, 3]
+    assert np.linalg.norm(hand - X[1, :3, 3], axis=-1).min() <= CORNER
+
+
+def test_tiny_legs_beside_long_ones() -> None:
+    """A leg of a millimetre between long ones takes no longer without a stop, and neither do equal frames."""
+    arm, q, X = corner_of_ur5()
+    for shift in (0.0, 1e-10, 1e-6, 1e-4, 3e-4, 1e-3, 5e-3):
+        Y = np.stack([X[0], X[1], pose(DOWN, X[1, :3, 3] + (shift, 0, 0)), X[2]])
+        stage = by_via(arm, q, Y)
+
+        assert stage.trajectory.duration <= with_stops(arm, q, Y)
+        assert stage.deviation is not None
+        assert stage.deviation <= CORNER
+        assert continuity(stage.trajectory).order >= 2
+        np.testing.assert_allclose(forward(arm, stage.trajectory(stage.trajectory.duration)), Y[-1], atol=1e-8)
+
+
+def test_very_different_turns() -> None:
+    """Legs that turn the hand by half a turn, a leg on the spot and legs that do not turn go into one another."""
+    arm, q, X = corner_of_ur5()
+    turned = [
+        pose(rotation_from_vector([0, 0, a]) @ DOWN, p)
+        for a, p in zip((0, 0, 2.0, 2.0), X[[0, 1, 1, 2], :3, 3], strict=True)
+    ]
+    Y = np.stack(turned)
+
+    stage = by_via(arm, q, Y)
+
+    assert not faults(arm, stage, Y)
+    assert stage.trajectory.duration <= with_stops(arm, q, Y)
+    assert continuity(stage.trajectory).order >= 2
+
+
+def test_speed_changes_the_timing_alone() -> None:
+    """At a tenth of the speed the joints pass the same places, ten times as late or somewhat less."""
+    arm, q, X = corner_of_ur5()
+    fast, slow = by_via(arm, q, X).trajectory, by_via(arm, q, X, speed=10.0).trajectory
+
+    assert 3 < slow.duration / fast.duration < 10.5
+    there = forward(arm, fast(np.linspace(0, fast.duration, 400)))[:, :3, 3]
+    dense = forward(arm, slow(np.linspace(0, slow.duration, 20_000)))[:, :3, 3]
+    assert max(np.linalg.norm(dense - p, axis=-1).min() for p in there) < 1e-4
+
+
+@pytest.mark.parametrize("corner", [1e-4, 1e-3, 5e-3, 0.1])
+def test_the_corner_is_what_was_asked(corner: float) -> None:
+    """Whatever is allowed, the hand passes the frame within it, and hardly faster where it is less."""
+    arm, q, X = corner_of_ur5()
+    stage = by_via(arm, q, X, corner=corner)
+
+    hand = forward(arm, stage.trajectory(np.linspace(0, stage.trajectory.duration, LOOKS)))[:, :3, 3]
+    missed = np.linalg.norm(hand - X[1, :3, 3], axis=-1).min()
+    assert stage.deviation is not None
+    assert missed <= stage.deviation + ROUNDING <= corner + 2 * ROUNDING
+    # Of two windows of smoothing the longer one is taken where it costs less than a hundredth of the time.
+    assert stage.trajectory.duration >= 0.98 * by_via(arm, q, X, corner=10 * corner).trajectory.duration
+    assert stage.trajectory.duration <= with_stops(arm, q, X)
+
+
+def test_without_limits_of_acceleration() -> None:
+    """An arm whose joints have no limit of acceleration gathers its speed smoothly all the same."""
+    arm, q, X = corner_of_ur5()
+    free = attrs.evolve(
+        arm, joints=[attrs.evolve(j, limits=attrs.evolve(j.limits, acceleration=np.inf)) for j in arm.joints]
+    )
+
+    assert continuity(by_via(free, q, X).trajectory).order >= 2
