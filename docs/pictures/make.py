@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from armwright import inverse, link_poses, load_arm, simulate
+from armwright import forward, inverse, link_poses, load_arm, simulate
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.calibration.measurements import read_measurements
@@ -22,6 +22,7 @@ from armwright.clearance.simulation import simulate as simulate_play
 from armwright.dynamics.integrators import Adaptive
 from armwright.dynamics.simulation import Event, JointState, Simulation
 from armwright.kinematics.inverse.solution import Branch
+from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.report.calibrated import calibrated
 from armwright.report.calibrated_files import distances_figure
 from armwright.spatial.poses import pose
@@ -300,6 +301,47 @@ MAGNIFIED = 50
 JOURNALS = ("J2", "J3", "J4")
 
 
+# The corner past which both paths go [m]; what is drawn of the way off the leg behind it is so many times enlarged.
+CORNER = np.array([(0.45, -0.30, 0.25), (0.45, -0.15, 0.45), (0.45, 0.15, 0.45)])
+# To be seen on a white page and on a dark one, without anything behind.
+BOTH = "#8a94a0"
+PATHS = (("the report's X-spline", "#d9822b", None), ("rounded corners", "#3d8fd1", 0.02))
+
+
+def past_frames() -> Figure:
+    """Draw both paths past a corner: off the leg behind it, and the speed of the hand."""
+    arm = load_arm("ur5")
+    X = pose(np.diag((1.0, -1.0, -1.0)), CORNER)
+    q = inverse(arm, X[0]).best.q
+    figure = Figure(figsize=(8.6, 3.4), layout="constrained", facecolor="none")
+    off, fast = figure.subplots(1, 2)
+    off.axhline(0.0, color=BOTH, linewidth=0.8, linestyle=(0, (4, 3)))
+    for label, colour, corner in PATHS:
+        goal = StageGoal(kind="SPLINE", poses=X[1:], corner=corner)
+        (stage,) = plan(arm, q, [goal], Manner())
+        t = np.linspace(0.0, stage.trajectory.duration, 2001)
+        hand = forward(arm, stage.trajectory(t))[:, :3, 3]
+        behind = hand[:, 1] > CORNER[1, 1] - 0.02
+        off.plot(
+            hand[behind, 1] * 1e3, (hand[behind, 2] - CORNER[1, 2]) * 1e3, color=colour, linewidth=1.6, label=label
+        )
+        speed = np.linalg.norm(np.gradient(hand, t, axis=0), axis=-1)
+        fast.plot(t, speed * 1e3, color=colour, linewidth=1.6)
+        lifted = 5 if corner is None else 22
+        fast.annotate(f"{t[-1]:.2f} s", (t[-1], 0), (6, lifted), textcoords="offset points", color=colour)
+    off.set(xlabel="y [mm]: the leg from -150 to 150", ylabel="above the straight leg [mm]", ylim=(-16, 12))
+    fast.set(xlabel="time [s]", ylabel="speed of the hand [mm/s]", ylim=(0, None), xlim=(0, 1.75))
+    off.legend(frameon=False, labelcolor="linecolor", loc="lower right")
+    for axes in (off, fast):
+        axes.set_facecolor("none")
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.spines[["left", "bottom"]].set_color(BOTH)
+        axes.tick_params(colors=BOTH)
+        axes.xaxis.label.set_color(BOTH)
+        axes.yaxis.label.set_color(BOTH)
+    return figure
+
+
 def draw_linkage(axes: Axes, run: Rattling) -> None:
     """Draw the five-bar at the start, its path, and the path taken with the error magnified."""
     linkage, q = run.task.linkage, run.task.ideal.q
@@ -367,6 +409,7 @@ def main() -> None:
         write(postures(), "postures.svg")
         write(released(), "released.svg")
         write(two_moves(), "two_moves.svg")
+        write(past_frames(), "past_frames.svg")
         write(rattling(), "rattling.svg")
         write(before_and_after(), "calibrated.svg")
 

@@ -375,6 +375,7 @@ FAULTS = {
         5,
         "motion, around: expected one of damped, none, via, got the text 'dampd'; did you mean 'damped'?",
     ),
+    "no corner": (ARM + "[motion]\ncorner_mm = 0\n", 5, "motion, corner_mm: expected 0.01 to 1000, got 0"),
     "no deviation": (ARM + "[motion]\ndeviation_mm = 0\n", 5, "motion, deviation_mm: expected 0.001 to 1000, got 0"),
     "a misspelt table": (ARM + "[motions]\nservo_ms = 1\n", 4, "motions: unknown key; did you mean 'motion'?"),
     "a misspelt table below": (ARM + "[device]\nPRESS = {}\n", 4, "device: unknown key; did you mean 'devices'?"),
