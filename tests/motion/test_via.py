@@ -197,7 +197,7 @@ def test_speed_changes_the_timing_alone() -> None:
 
 @pytest.mark.parametrize("corner", [1e-4, 1e-3, 5e-3, 0.1])
 def test_the_corner_is_what_was_asked(corner: float) -> None:
-    """Whatever is allowed, the hand passes the frame within it, and hardly faster where it is less."""
+    """Whatever is allowed, the hand passes the frame within it, and takes no longer than with a stop there."""
     arm, q, X = corner_of_ur5()
     stage = by_via(arm, q, X, corner=corner)
 
@@ -205,8 +205,6 @@ def test_the_corner_is_what_was_asked(corner: float) -> None:
     missed = np.linalg.norm(hand - X[1, :3, 3], axis=-1).min()
     assert stage.deviation is not None
     assert missed <= stage.deviation + ROUNDING <= corner + 2 * ROUNDING
-    # Of two windows of smoothing the longer one is taken where it costs less than a hundredth of the time.
-    assert stage.trajectory.duration >= 0.98 * by_via(arm, q, X, corner=10 * corner).trajectory.duration
     assert stage.trajectory.duration <= with_stops(arm, q, X)
 
 
