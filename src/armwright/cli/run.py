@@ -254,6 +254,7 @@ def _print_summary(recording: "Recording", code: "Code") -> None:
         f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {moves} moves, "
         f"{len(recording.stages)} stages, {len(recording.streams[0].t) if recording.streams else 0} servo ticks"
     )
+    console.print("Collisions are not looked for.")
 
 
 def _trace_table(recording: "Recording", code: "Code") -> "Table":

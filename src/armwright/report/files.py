@@ -114,6 +114,18 @@ def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic])
         "cell": recording.cell.name,
         "duration": _seconds(recording.duration),
         "trace": recording.trace(),
+        "contacts": [
+            {
+                "line": code.source.line(one.span.start),
+                "arm": one.arm,
+                "t0": one.t0,
+                "t1": one.t1,
+                **one.data["contact"],
+            }
+            for one in recording.effects
+            if "contact" in one.data
+        ],
+        "collisions": "not looked for",
         "stages": [_stage(stage, recording, code) for stage in recording.stages],
         "diagnostics": [to_json(one, code.source) for one in diagnostics],
     }
