@@ -277,7 +277,7 @@ def test_unreachable_stage_is_named(stanford: Arm) -> None:
 
 def test_deviation_must_be_positive(stanford: Arm) -> None:
     """A line cannot be kept to nothing."""
-    with pytest.raises(InvalidValueError, match="more than 0 m, got 0"):
+    with pytest.raises(InvalidValueError, match="deviation: expected 1e-09 m or more"):
         place_knots(stanford, Path(poses=[at(0.5, 0, 0.1), at(0.5, 0.1, 0.1)]), deviation=0, speed=100)
 
 

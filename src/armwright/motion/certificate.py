@@ -1,14 +1,18 @@
 """What a planned path is certified to keep: its deviation, and the limits of the joints."""
 
+import math
 from typing import Literal, TypeAlias
 
 import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
+from armwright.arrays import Array, number
+from armwright.errors import InvalidValueError
 
 LimitName: TypeAlias = Literal["speed", "acceleration", "effort"]
+# No bound closer than this can be certified: rounding and the solution of poses take up what is left [m].
+CLOSEST = 1e-9
 LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "effort")
 
 
@@ -21,16 +25,18 @@ class Certificate:
         deviation_asked: bound of the distance of the hand from the path [m].
         deviation: upper bound of what that distance is, between samples as well [m].
         deviation_seen: the largest distance that was seen [m].
-        turn_asked: bound of the angle from the orientation that belongs to the progress on the path [rad].
+        turn_asked: bound of the angle from the orientation that belongs to the progress on the path, and on a straight
+            line to the position of the hand on it as well [rad].
         turn: upper bound of what that angle is [rad].
         turn_seen: the largest angle that was seen [rad].
+        backward: upper bound of how far the hand runs backwards along a straight line [m]; None for other paths.
         worst_time: when the largest distance was seen [s].
         worst_place: (3,) where the hand was then, seen from the base [m].
         knots: number of poses that were solved.
         looks: how often the hand was looked at in between.
         peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at the
             looks.
-        factor: how many times slower the motion is than was asked for, 1 for not at all.
+        factor: how many times slower the motion is than the speed of the tool has it, 1 for not at all.
         because: which limit, and which joint, from 0, that is for; None where nothing had to give way.
     """
 
@@ -48,6 +54,7 @@ class Certificate:
     peaks: dict[LimitName, Array]
     factor: float
     because: tuple[LimitName, int] | None
+    backward: float | None = None
 
     @property
     def holds(self) -> bool:
@@ -55,6 +62,7 @@ class Certificate:
         return (
             self.deviation <= self.deviation_asked
             and self.turn <= self.turn_asked
+            and (self.backward is None or self.backward <= self.deviation_asked)
             and all(self.use(name)[1] <= 1 + 1e-9 for name in LIMITS)
         )
 
@@ -83,8 +91,23 @@ class Certificate:
             lines.append("; ".join(f"joint {j + 1} uses {part:.0%} of its {name}" for name, j, part in uses))
         if self.because is not None:
             name, joint = self.because
-            lines.append(f"{self.factor:.2f} times slower than asked, for the {name} of joint {joint + 1}")
+            lines.append(
+                f"{self.factor:.2f} times slower than the tool speed has it, for the {name} of joint {joint + 1}"
+            )
         return "\n".join(lines)
+
+
+def checked_deviation(deviation: float) -> float:
+    """Return an allowed distance of the hand from its path [m].
+
+    Raises:
+        InvalidValueError: it is none, or closer than can be certified.
+    """
+    if not CLOSEST <= number(deviation, "deviation") < math.inf:
+        raise InvalidValueError(
+            f"deviation: expected {CLOSEST:g} m or more, the closest that can be certified, got {deviation:g}"
+        )
+    return deviation
 
 
 def slowing(arm: Arm, peaks: dict[LimitName, Array]) -> tuple[float, tuple[LimitName, int] | None]:

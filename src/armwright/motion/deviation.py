@@ -4,6 +4,11 @@ The hand is looked at so often on every interval between two knots. Between two 
 leave its chord by more than d²/8 times its greatest acceleration; the distance from a straight way is convex, so it
 is on the chord no more than at the looks. And how much the hand may accelerate follows from the speeds and
 accelerations of the joints, which are known exactly on every interval, and the levers of the arm.
+
+The orientation is held against that which belongs to the planned progress on the way, and, on a single line, against
+that which belongs to the position nearest to the hand as well: a hand that lags behind its progress while it turns
+would otherwise be turned too far for where it is. On a line shorter than the allowed distance every position is near
+enough, and the progress alone counts.
 """
 
 import math
@@ -18,6 +23,8 @@ from armwright.arrays import Array
 # exceed it, but no more often than the second.
 _ADDED = 0.25
 _LOOKS = (4, 200)
+# Positions of the hand and entries of its rotation are computed to so many roundings.
+_ROUNDINGS = 64 * float(np.finfo(np.float64).eps)
 
 
 class Ways(NamedTuple):
@@ -61,7 +68,9 @@ class Deviation(NamedTuple):
 
     Attributes:
         place: (m,) upper bound of the distance from the way [m].
-        turn: (m,) upper bound of the angle from the orientation that belongs to the progress on the way [rad].
+        turn: (m,) upper bound of the angle from the orientation that belongs to the progress on the way, and, where
+            that was asked for, to the position on it [rad].
+        backward: upper bound of how far the hand runs backwards along a single line [m]; 0 where not asked for.
         seen: (m,) the largest distance that was seen [m].
         seen_turn: (m,) the largest angle that was seen [rad].
         speed: (m, n) the largest speeds of the joints, exactly.
@@ -72,6 +81,7 @@ class Deviation(NamedTuple):
 
     place: Array
     turn: Array
+    backward: float
     seen: Array
     seen_turn: Array
     speed: Array
@@ -81,7 +91,14 @@ class Deviation(NamedTuple):
 
 
 def deviation_of(
-    arm: Arm, forward: object, ways: Ways, spline: Spline, *, allowed: float, allowed_turn: float
+    arm: Arm,
+    forward: object,
+    ways: Ways,
+    spline: Spline,
+    *,
+    allowed: float,
+    allowed_turn: float,
+    by_position: bool = False,
 ) -> Deviation:
     """Return how far a motion strays from straight ways.
 
@@ -92,32 +109,64 @@ def deviation_of(
         spline: where it is.
         allowed: the distance that matters [m]; it decides how often the hand is looked at.
         allowed_turn: the angle that matters [rad].
+        by_position: whether all intervals are of one line, on which the orientation is held against the position of
+            the hand too, and running backwards is looked for.
     """
     qd, qdd = cubic_peaks(spline.joints, spline.lengths)
-    pull, spin = _accelerations(arm, ways, spline, qd, qdd)
-    wanted = np.sqrt(np.maximum(pull / allowed, 2 * spin / allowed_turn) / (8 * _ADDED)) * spline.lengths
+    hand = hand_bounds(arm, spline.joints, spline.lengths, qd, qdd)
+    spin = _spin_off(ways, spline, hand)
+    size = np.sqrt(np.einsum("mi,mi->m", ways.shift, ways.shift))
+    placed = by_position and bool(size[0] > allowed)
+    angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
+    # As an estimate the hand moves along the line as was planned; the bound below does without.
+    rate = cubic_peaks(spline.progress[..., None], spline.lengths)[0][:, 0]
+    most = np.maximum(spin, _spin_of(hand, angle * hand.pull / size, angle * rate)) if placed else spin
+    wanted = np.sqrt(np.maximum(hand.pull / allowed, 2 * most / allowed_turn) / (8 * _ADDED)) * spline.lengths
     looks = int(min(max(math.ceil(wanted.max()), _LOOKS[0]), _LOOKS[1]))
     part = np.linspace(0.0, 1.0, looks + 1)
     t = part * spline.lengths[:, None]
     c = spline.joints
     q = ((c[:, None, 3] * t[..., None] + c[:, None, 2]) * t[..., None] + c[:, None, 1]) * t[..., None] + c[:, None, 0]
     X = forward(q)  # type: ignore[operator]
-    off = _distances(ways, X)
+    along = _along(ways, X)
+    off = _distances(ways, X, along)
     s = spline.progress
     done = ((s[:, 3, None] * t + s[:, 2, None]) * t + s[:, 1, None]) * t + s[:, 0, None]
-    half = _half_sines(ways, done, X)
-    between = (spline.lengths / looks) ** 2 / 8
-    seen, seen_half = off.max(axis=1), half.max(axis=1)
+    half = _half_sines(ways, done, X).max(axis=1)
+    step = spline.lengths / looks
+    between = step**2 / 8
+    bound, backward = half + between * spin, 0.0
+    if placed:
+        # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
+        hurry = hand.pull / size
+        rate = np.abs(np.diff(along, axis=1)).max(axis=1) / step + step * hurry
+        beyond = np.maximum(np.maximum(-along, along - 1).max(axis=1) + between * hurry, 0.0)
+        seen_half = _half_sines(ways, along, X).max(axis=1)
+        by_place = seen_half + between * _spin_of(hand, angle * hurry, angle * rate) + angle * beyond / 2
+        half, bound = np.maximum(half, seen_half), np.maximum(bound, by_place)
+        backward = _backward(along * size[:, None], between * hand.pull)
+    seen = off.max(axis=1)
     return Deviation(
-        place=seen + between * pull,
-        turn=2 * np.arcsin(np.minimum(seen_half + between * spin, 1.0)),
+        place=seen + between * hand.pull + _ROUNDINGS * (1.0 + np.abs(ways.p_A).max()),
+        turn=2 * np.arcsin(np.minimum(bound, 1.0)) + _ROUNDINGS,
+        backward=backward,
         seen=seen,
-        seen_turn=2 * np.arcsin(np.minimum(seen_half, 1.0)),
+        seen_turn=2 * np.arcsin(np.minimum(half, 1.0)),
         speed=qd,
         acceleration=qdd,
         worst=part[off.argmax(axis=1)],
         looks=looks,
     )
+
+
+def _backward(along: Array, between: Array) -> float:
+    """Return how far a hand at most runs back along its line, from looks (m, k) [m] and what lies between them (m,)."""
+    farthest = np.maximum.accumulate(along.ravel()).reshape(along.shape)
+    back = (farthest - along).max(axis=1)
+    # Between two looks the hand is off the chord by so much at most, before it turns back and after. Where the chord
+    # rises by four times that, the hand never turns back.
+    rising = np.diff(along, axis=1).min(axis=1) > 4 * between
+    return float(np.where(rising & (back <= 0), 0.0, back + 2 * between.max()).max())
 
 
 def turned(turn: Array, fraction: Array) -> Array:
@@ -130,11 +179,16 @@ def turned(turn: Array, fraction: Array) -> Array:
     return np.asarray(np.eye(3) + np.sin(phase) * K + (2 * np.sin(phase / 2) ** 2) * (K @ K))
 
 
-def _distances(ways: Ways, X: Array) -> Array:
-    """Return the distances (m, k) of hands (m, k, 4, 4) from their ways."""
+def _along(ways: Ways, X: Array) -> Array:
+    """Return the fractions (m, k) of their ways, or of what goes on beyond them, that hands (m, k, 4, 4) are at."""
     come = X[..., :3, 3] - ways.p_A[:, None]
     square = np.einsum("mi,mi->m", ways.shift, ways.shift)
-    along = (come @ ways.shift[:, :, None])[..., 0] / np.where(square > 0, square, 1.0)[:, None]
+    return np.asarray((come @ ways.shift[:, :, None])[..., 0] / np.where(square > 0, square, 1.0)[:, None])
+
+
+def _distances(ways: Ways, X: Array, along: Array) -> Array:
+    """Return the distances (m, k) of hands (m, k, 4, 4) from their ways."""
+    come = X[..., :3, 3] - ways.p_A[:, None]
     off = come - np.clip(along, 0.0, 1.0)[..., None] * ways.shift[:, None]
     return np.asarray(np.sqrt(np.einsum("mki,mki->mk", off, off)))
 
@@ -152,18 +206,25 @@ def half_sines(R_A: Array, R_B: Array) -> Array:
     return np.asarray(np.sqrt(a * a + b * b + c * c) / (4 * w))
 
 
-def _accelerations(arm: Arm, ways: Ways, spline: Spline, qd: Array, qdd: Array) -> tuple[Array, Array]:
-    """Return upper bounds on every interval (m,): of the hand's acceleration, and of that of its turn off the way.
-
-    The turn off the way is a unit quaternion; the second derivative of its vector part is at most half the angular
-    acceleration and a quarter of the squared angular speed.
-    """
+def _spin_off(ways: Ways, spline: Spline, hand: "HandBounds") -> Array:
+    """Return an upper bound (m,) of the acceleration of the hand's turn off the orientation of its progress."""
     sd, sdd = cubic_peaks(spline.progress[..., None], spline.lengths)
-    hand = hand_bounds(arm, spline.joints, spline.lengths, qd, qdd)
     angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
-    rate = angle * sd[:, 0]
-    spin = (hand.spin_change + angle * sdd[:, 0] + hand.spin * rate) / 2 + (hand.spin + rate) ** 2 / 4
-    return hand.pull, np.asarray(spin)
+    return _spin_of(hand, angle * sdd[:, 0], angle * sd[:, 0])
+
+
+def _spin_of(hand: "HandBounds", change: Array, rate: Array) -> Array:
+    """Return an upper bound (m,) of the acceleration of half the turn of the hand off an orientation that turns itself.
+
+    The turn off it is a unit quaternion; the second derivative of its vector part is at most half the angular
+    acceleration and a quarter of the squared angular speed.
+
+    Args:
+        hand: how the hand moves.
+        change: (m,) angular acceleration of that orientation, at most [rad/s²].
+        rate: (m,) its angular speed, at most [rad/s].
+    """
+    return np.asarray((hand.spin_change + change + hand.spin * rate) / 2 + (hand.spin + rate) ** 2 / 4)
 
 
 class HandBounds(NamedTuple):

@@ -225,7 +225,13 @@ def _deviation(solver: Solver, path: Path, knots: Knots, trajectory: Trajectory,
     ways = Ways(A[:, :3, 3], R_A, B[:, :3, 3] - A[:, :3, 3], turn)
     spline = Spline(np.diff(knots.times), trajectory.coefficients, progress)
     return deviation_of(
-        solver.arm, solver.forward, ways, spline, allowed=allowed, allowed_turn=TURN_PER_METRE * allowed
+        solver.arm,
+        solver.forward,
+        ways,
+        spline,
+        allowed=allowed,
+        allowed_turn=TURN_PER_METRE * allowed,
+        by_position=len(path.poses) == 2,
     )
 
 

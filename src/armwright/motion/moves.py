@@ -8,13 +8,13 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
-from armwright.arrays import Array, ArrayLike, floats, number, of_shape
+from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import typed_poses
 from armwright.kinematics.inverse.turns import middle
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
-from armwright.motion.certificate import Certificate, LimitName
+from armwright.motion.certificate import Certificate, LimitName, checked_deviation
 from armwright.motion.detour import By, Detour, line_or_detour
 from armwright.motion.efforts import effort_peaks
 from armwright.motion.follow import TURN_PER_METRE, PathError
@@ -193,8 +193,7 @@ def along(
     deviation: float = 1e-4,
 ) -> Move:
     """Return the move along a path of the hand, with its certificate; arguments and errors as of ``cartesian_move``."""
-    if not 0 < number(deviation, "deviation") < np.inf:
-        raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation:g}")
+    checked_deviation(deviation)
     solver = solver_of(arm)
     found = carry(solver, hand, times, _near(solver.arm, near), ends=ends, deviation=deviation)
     strays = found.strays

@@ -10,6 +10,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, of_shape
 from armwright.errors import InvalidValueError
+from armwright.motion.certificate import checked_deviation
 from armwright.motion.quintic import TOP_SPEED, check_speed
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
@@ -127,8 +128,7 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
         raise InvalidValueError(
             f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
         )
-    if not deviation > 0:
-        raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation}")
+    checked_deviation(deviation)
     lengths = path.lengths()
     moving = [i for i, length in enumerate(lengths) if length > NEGLIGIBLE]
     times, segments, fractions = [0.0], [0], [0.0]

@@ -13,7 +13,7 @@ from armwright.errors import InvalidValueError
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import clean_pose
 from armwright.kinematics.inverse.solution import Answer, violations
-from armwright.motion.certificate import Certificate, LimitName, slowing
+from armwright.motion.certificate import CLOSEST, Certificate, LimitName, checked_deviation, slowing
 from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned, turning_points
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
@@ -112,8 +112,9 @@ def straight_line(
         q_start: (n,) present joint positions [rad] or [m].
         X_goal: (4, 4) pose at the end of the line.
         deviation: allowed distance of the hand from the line [m].
-        turn: allowed angle from the orientation that belongs to the progress on the line [rad]; 5 mrad for each mm
-            of the deviation when left out.
+        turn: allowed angle from the orientation that belongs to the position of the hand on the line, and to its
+            progress on it [rad]; 5 mrad for each mm of the deviation when left out. On a line shorter than the
+            deviation the progress alone counts.
         speed: 1 to 120, 100 is normal: by the report's rule, as a LINE of the robot language has it.
         period: of the servo [s], to end on a whole number of them; any duration when left out.
 
@@ -147,8 +148,10 @@ def certified(
     solver = solver_of(arm)
     q, A, B = _ends(solver, q_start, X_goal, deviation)
     turn = TURN_PER_METRE * deviation if turn is None else number(turn, "turn")
-    if not turn > 0:
-        raise InvalidValueError(f"turn: expected more than 0 rad, got {turn:g}")
+    if not turn >= CLOSEST:
+        raise InvalidValueError(
+            f"turn: expected {CLOSEST:g} rad or more, the closest that can be certified, got {turn:g}"
+        )
     line = timed_line(solver.arm, A, B, speed)
     if line is None:
         return _nowhere(solver.arm, q, A, deviation, turn)
@@ -180,6 +183,7 @@ def certified(
         },
         factor=slower.factor,
         because=slower.because,
+        backward=found.backward,
     )
     return CertifiedLine(trajectory=trajectory, certificate=certificate)
 
@@ -230,8 +234,7 @@ def _efforts(solver: Solver, spline: Spline, looks: int, factor: float) -> Array
 
 def _ends(solver: Solver, q_start: ArrayLike, X_goal: ArrayLike, deviation: float) -> tuple[Array, Array, Array]:
     """Return the posture and the pose at the start, and the pose at the end, of a line that the arm can end."""
-    if not 0 < number(deviation, "deviation") < math.inf:
-        raise InvalidValueError(f"deviation: expected more than 0 m, got {deviation:g}")
+    checked_deviation(deviation)
     q = one_posture(solver.arm, q_start, "q_start")
     B = clean_pose(X_goal)
     for fault in violations(solver.arm, q):
@@ -297,8 +300,10 @@ def _refined(
         c = xspline(times, np.concatenate([q, s[:, None]], axis=1)).coefficients
         spline = Spline(np.diff(times), c[..., :n], c[..., n])
         ways = Ways.of_one(line.A, line.B, line.turn, len(spline.lengths))
-        found = deviation_of(solver.arm, solver.forward, ways, spline, allowed=deviation, allowed_turn=turn)
-        excess = np.maximum(found.place / deviation, found.turn / turn)
+        found = deviation_of(
+            solver.arm, solver.forward, ways, spline, allowed=deviation, allowed_turn=turn, by_position=True
+        )
+        excess = np.maximum(np.maximum(found.place, found.backward) / deviation, found.turn / turn)
         if excess.max() <= 1:
             return spline, found, times
         _check_rush(solver.arm, line, found, spline.lengths, q)
@@ -384,6 +389,7 @@ def _nowhere(arm: Arm, q: Array, A: Array, deviation: float, turn: float) -> Cer
             peaks={"speed": none, "acceleration": none, "effort": none},
             factor=1.0,
             because=None,
+            backward=0.0,
         ),
     )
 
