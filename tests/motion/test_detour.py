@@ -82,7 +82,7 @@ def test_a_way_round_near_the_joint_move() -> None:
 
     Seed 002 from B to C: joint 5 goes from 11.6 to -20.2 degrees; no pose beside the line helps.
     """
-    fast = compile_arm(load_arm("puma560"))
+    fast = compile_arm(load_arm("puma560-seed"))
     B, C = study_poses()[1:]
     q = next(branch.q for branch in inverse(fast.arm, B).allowed if branch.label == "left, down, no-flip")
 
