@@ -1,16 +1,32 @@
-"""The servo stream of arms that are stopped on their way, by differences from tick to tick."""
+"""The servo stream of programs, and of arms that are stopped on their way, by differences from tick to tick."""
 
-import numpy as np
+from pathlib import Path
+
+import attrs
 import pytest
 
+from armwright.cell.model import Cell
+from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.program.running.interpret import Machine, RunError
-from armwright.program.running.interpret import run as go
-from armwright.program.running.recording import Recording, motion_rows
+from armwright.program.running.interpret import RunError, interpret
+from armwright.program.running.recording import Recording
 from program.running import cell_of, code_of, corpus_text
+from program.streams import differences
 
-# What a limit may be exceeded by.
-AT_MOST = 1.001
+EXAMPLES = Path(__file__).parents[2] / "examples"
+CELLS = {
+    "bench": "stanford_cell",
+    "twelve_moves": "stanford_cell",
+    "portable": "stanford_cell",
+    "stacking": "stanford_cell",
+    "palletise": "stanford_cell",
+    "weld": "stanford_cell",
+    "gearbox": "puma_cell",
+    "around": "puma_cell",
+    "peg": "peg_cell",
+    "hand_over": "two_arms",
+    "hand_over_sideways": "two_arms",
+}
 HEAD = "VAR f, g : FRAME ; n : SCALAR ; BEGIN f = (1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.01) ; g = f * XYZ(0, 0.2, -0.1) ; "
 PROGRAMS = {
     "peg": corpus_text("p07"),
@@ -18,37 +34,83 @@ PROGRAMS = {
     "halted": HEAD + "MOVE ARM_1 TO g WITH SPEED = 120, ON DIST(ARM_1, g) < 0.1 DO HALT END.",
     "failing": HEAD + "n = 0 ; MOVE ARM_1 TO g WITH SPEED = 120, ON DIST(ARM_1, g) < 0.1 DO n = 1 / n END.",
 }
+# Both arms are under way when one of them divides by 0; the other one is slow, and has stopped sooner.
+TWO_ARMS = """
+VAR f1, g1, f2 : FRAME ; n : SCALAR ;
+BEGIN
+  n = 0 ;
+  f1 = (1,0,0, 0,-1,0, 0,0,-1, 0.45, 0.25, 0.15) ;
+  g1 = (1,0,0, 0,-1,0, 0,0,-1, 0.45,-0.25, 0.20) ;
+  f2 = (-1,0,0, 0,1,0, 0,0,-1, 0.65, 0.25, 0.20) ;
+  MOVE ARM_1 TO f1 ;
+  {TRY}
+    COBEGIN
+      PRIORITY 1 : BEGIN MOVE ARM_1 TO g1 WITH SPEED = 120, ON DIST(ARM_1, g1) < 0.3 DO n = 1 / n END ;
+      PRIORITY 2 : BEGIN MOVE ARM_2 TO f2 WITH SPEED = 10 END
+    COEND
+  {RECOVER}
+END.
+"""
 
 
-def recorded(text: str) -> tuple[Recording, RunError | None]:
-    """Run a program above a plane to its end or to its failure."""
-    cell = cell_of("jam")
-    machine = Machine(code_of(text, cell), cell, Simulator(cell))
+def recorded(text: str, cell: Cell) -> tuple[Recording, RunError | None]:
+    """Run a program to its end or to its failure; return what is recorded, and the failure."""
     try:
-        go(machine)
+        return interpret(code_of(text, cell), cell, Simulator(cell)), None
     except RunError as error:
-        return machine.recording(), error
-    return machine.recording(), None
+        failed = error
+    assert failed.recording is not None
+    return failed.recording(), failed
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.rlo")))
+def test_examples_by_differences(name: str) -> None:
+    """In motion.csv of every example all limits hold from tick to tick, and qd and qdd are the derivatives."""
+    cell = attrs.evolve(read_cell(EXAMPLES / f"{CELLS[name]}.toml"), around="via" if name == "around" else None)
+    recording, failed = recorded((EXAMPLES / f"{name}.rlo").read_text(encoding="utf-8"), cell)
+
+    assert failed is None
+    assert (found := differences(recording)).keep(), found
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_stopped_arm_keeps_its_limits(name: str) -> None:
     """At contact, at HALT and after an error no joint passes its limits from tick to tick, and all come to rest."""
-    recording, _ = recorded(PROGRAMS[name])
-    table = np.array([[float(x) for x in row.split(",")[2:]] for row in list(motion_rows(recording.streams))[1:]])
-    arm, period = recording.cell.arms["ARM_1"].arm, recording.cell.period
-    q, qd, qdd = (table[:, i * arm.n : (i + 1) * arm.n] for i in range(3))
+    recording, _ = recorded(PROGRAMS[name], cell_of("jam"))
 
-    assert (np.abs(np.diff(q, axis=0)) <= AT_MOST * arm.limit("speed") * period).all()
-    assert (np.abs(np.diff(qd, axis=0)) <= AT_MOST * arm.limit("acceleration") * period).all()
-    assert (np.abs(qdd) <= AT_MOST * arm.limit("acceleration")).all()
     assert any(stage.stopped for stage in recording.stages)
-    assert not qd[-1].any()
+    assert (found := differences(recording)).keep(), found
+
+
+def test_all_arms_come_to_rest_when_one_fails() -> None:
+    """An arm that fails at full speed brakes longer than the one beside it; the run lasts until both are at rest."""
+    text = TWO_ARMS.format(TRY="", RECOVER="")
+    recording, failed = recorded(text, read_cell(EXAMPLES / "two_arms.toml"))
+
+    assert failed is not None
+    assert failed.diagnostic.code == "E240"
+    assert [stage.stopped for stage in recording.stages] == [False, True, True]
+    slow, fast = (max(stage.t1 for stage in recording.stages if stage.arm == arm) for arm in ("ARM_2", "ARM_1"))
+    assert slow < fast
+    assert fast == pytest.approx(recording.duration)
+    assert (found := differences(recording)).keep(), found
+
+
+def test_a_recovery_begins_when_all_arms_are_at_rest() -> None:
+    """What follows on the error of a branch waits for the arm of that branch, however long it brakes."""
+    text = TWO_ARMS.format(TRY="TRY", RECOVER="RECOVER MOVE ARM_1 TO f1 END")
+    recording, failed = recorded(text, read_cell(EXAMPLES / "two_arms.toml"))
+
+    assert failed is None
+    *_, stopped, back = (stage for stage in recording.stages if stage.arm == "ARM_1")
+    assert (stopped.stopped, back.stopped) == (True, False)
+    assert back.t0 == pytest.approx(stopped.t1)
+    assert (found := differences(recording)).keep(), found
 
 
 def test_too_deep() -> None:
     """An arm that comes down too fast is stopped all the same; the message says how deep it came and what helps."""
-    recording, error = recorded(PROGRAMS["too deep"])
+    recording, error = recorded(PROGRAMS["too deep"], cell_of("jam"))
     assert error is not None
     said = error.diagnostic
 

@@ -308,11 +308,12 @@ def recover(run: Machine, process: Process, error: RunError) -> bool:
     Returns:
         Whether there is one.
     """
-    span = error.diagnostic.span
+    span, at_rest = error.diagnostic.span, run.ticks
     while True:
         ends = [_cancel(run, branch, span) for branch in process.branches]
         process.branches = []
-        process.wake = max([*ends, _still(run, process, span)])
+        # The arm of the branch that failed may be the last to come to rest.
+        process.wake = at_rest = max([at_rest, *ends, _still(run, process, span)])
         process.pending = process.waiting = None
         if (attempt := _attempt(run, process, span)) is not None:
             process.at = attempt.recovery
