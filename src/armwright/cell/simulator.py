@@ -126,11 +126,14 @@ class Simulator:
 
     def _depth(self, arm: str, tip: _Tip, now: float) -> float:
         """Return how deep one tip presses on the plane [m]."""
-        run = self._runs[arm]
-        if self._cell.contact_height is None or run.local(now) < tip.since * self._cell.period - _TOUCHES:
+        local, period, plane = self._runs[arm].local(now), self._cell.period, self._cell.contact_height
+        if plane is None or local < tip.since * period - _TOUCHES:
             return 0.0
-        height = self._heights(arm, run.trajectory, tip.pose, np.array([run.local(now)]))[0]
-        return max(0.0, self._cell.contact_height - float(height))
+        tick = round(local / period)
+        if abs(local - tick * period) <= _TOUCHES and tick < len(tip.above):
+            # A guard asks on every tick, and there the height is known.
+            return max(0.0, -float(tip.above[tick]))
+        return max(0.0, plane - float(self._heights(arm, self._runs[arm].trajectory, tip.pose, np.array([local]))[0]))
 
     def _tips(self, arm: str, trajectory: Trajectory, tip: Array, pressing: Sequence[Array]) -> tuple[_Tip, ...]:
         """Return what may press on the plane: what the arm shall bring to the goal, and what it is pressed with now."""
