@@ -5,7 +5,6 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.motion.polynomials import derivative, extremes, shifted
-from armwright.motion.trajectory import Trajectory
 from armwright.program.running.recording import Recording, RunStage, motion_rows
 
 # What a limit may be exceeded by.
@@ -69,29 +68,35 @@ def _of_arm(recording: Recording, name: str, rows: list[list[str]]) -> Differenc
         least = np.abs(np.diff(slope, axis=0))
         beyond = (away - least) / limit
         for tick in np.flatnonzero((beyond > ROUNDING).any(axis=1)).tolist():
-            within = np.maximum(least[tick], _change(stages, tick, period, order))
-            beyond[tick] = (away[tick] - within) / limit
+            low, high = _range(stages, tick, period, order)
+            # At the end of a stage the row says what comes just after it.
+            ends = slope[tick : tick + 2]
+            low, high = np.minimum(low, ends.min(axis=0)), np.maximum(high, ends.max(axis=0))
+            beyond[tick] = (away[tick] - (high - low)) / limit
         off = max(off, float(beyond.max(initial=0.0)))
     assert not qd[-1].any()
     return Differences(speed=found[0], acceleration=found[1], off=off)
 
 
-def _change(stages: list[RunStage], tick: int, period: float, order: int) -> Array | float:
-    """Return by how much a derivative changes within a tick (n,), knots inside it and its end included."""
+def _range(stages: list[RunStage], tick: int, period: float, order: int) -> tuple[Array | float, Array | float]:
+    """Return the smallest and largest value (n,) of a derivative within a tick, with both sides of every knot in it."""
     for stage in stages:
         begin = tick - round(stage.t0 / period)
         if 0 <= begin < stage.duration / period - _HAIR:
-            low, high = _range(stage.motion, begin * period, min((begin + 1) * period, stage.duration), order)
-            return high - low
-    return 0.0
+            motion, start, end = stage.motion, begin * period, min((begin + 1) * period, stage.duration)
+            inside = motion.times[(motion.times > start) & (motion.times < end)]
+            cuts = np.concatenate([[start], inside, [end]])
+            segments = np.searchsorted(motion.times, cuts[:-1], side="right") - 1
+            terms = shifted(motion.coefficients[segments], cuts[:-1] - motion.times[segments])
+            low, high = extremes(derivative(terms, order), np.diff(cuts))
+            return low.min(axis=0), high.max(axis=0)
+    return 0.0, 0.0
 
 
-def _range(motion: Trajectory, begin: float, end: float, order: int) -> tuple[Array, Array]:
-    """Return the smallest and largest value of a derivative between two times, both sides of every jump included."""
-    inside = motion.times[(motion.times > begin) & (motion.times < end)]
-    cuts = np.concatenate([[begin], inside, [end]])
-    segments = np.searchsorted(motion.times, cuts[:-1], side="right") - 1
-    terms = shifted(motion.coefficients[segments], cuts[:-1] - motion.times[segments])
-    low, high = extremes(derivative(terms, order), np.diff(cuts))
-    after = motion(end, order)
-    return np.minimum(low.min(axis=0), after), np.maximum(high.max(axis=0), after)
+def share_at_stop(recording: Recording, stage: RunStage) -> float:
+    """Return the largest part of a speed limit at the last tick at which a stage that was stopped kept to its plan."""
+    planned, arm, period = stage.stage.trajectory, recording.cell.arms[stage.arm].arm, recording.cell.period
+    ticks = np.arange(round(stage.duration / period) + 1) * period
+    left = np.abs(stage.motion(ticks) - planned(ticks)).max(axis=1) > _LEFT
+    last = ticks[max(0, int(left.argmax()) - 1)] if left.any() else 0.0
+    return float((np.abs(planned(last, 1)) / arm.limit("speed")).max())

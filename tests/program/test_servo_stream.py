@@ -10,8 +10,10 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.program.running.interpret import RunError, interpret
 from armwright.program.running.recording import Recording
+from program.guarded import guarded_program
 from program.running import cell_of, code_of, corpus_text
-from program.streams import differences
+from program.streams import Differences, differences, share_at_stop
+from samples import Sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CELLS = {
@@ -34,6 +36,9 @@ PROGRAMS = {
     "halted": HEAD + "MOVE ARM_1 TO g WITH SPEED = 120, ON DIST(ARM_1, g) < 0.1 DO HALT END.",
     "failing": HEAD + "n = 0 ; MOVE ARM_1 TO g WITH SPEED = 120, ON DIST(ARM_1, g) < 0.1 DO n = 1 / n END.",
 }
+# How many of 200 random programs have an arm stopped above half a speed limit, two arms, an arm stopped past frames,
+# and an error, at least.
+SHARES = {"fast": 60, "two arms": 40, "corners": 40, "failed": 20}
 # Both arms are under way when one of them divides by 0; the other one is slow, and has stopped sooner.
 TWO_ARMS = """
 VAR f1, g1, f2 : FRAME ; n : SCALAR ;
@@ -106,6 +111,48 @@ def test_a_recovery_begins_when_all_arms_are_at_rest() -> None:
     assert (stopped.stopped, back.stopped) == (True, False)
     assert back.t0 == pytest.approx(stopped.t1)
     assert (found := differences(recording)).keep(), found
+
+
+def cells(folder: Path) -> tuple[Cell, list[Cell]]:
+    """Return a cell of two arms and some of one, all above a plane of contact."""
+    two = attrs.evolve(read_cell(EXAMPLES / "two_arms.toml"), contact_height=0.02, deviation=0.01)
+    ones = []
+    for model in ("stanford", "ur5", "puma560"):
+        place = folder / f"{model}.toml"
+        place.write_text(
+            f'[arms.ARM_1]\nmodel = "{model}"\nhand = [1,0,0, 0,-1,0, 0,0,-1, 0.45,0,0.25]\n'
+            "[contact]\nz = 0.02\n[motion]\ndeviation_mm = 10\n",
+            encoding="utf-8",
+        )
+        ones.append(read_cell(place))
+    return two, ones
+
+
+def test_random_programs_by_differences(sample: Sample, tmp_path: Path) -> None:
+    """Guards, contact, corners, errors, two arms: no limit is passed from tick to tick, and all arms come to rest."""
+    two, ones = cells(tmp_path)
+    full, drawn = 200, 0
+    found = {"fast": 0, "two arms": 0, "corners": 0, "failed": 0}
+    worst = Differences(speed=0.0, acceleration=0.0, off=0.0)
+    for rng in sample.cases(full):
+        arms, fails = 1 + sample.case % 5 // 3, sample.case % 20 in (0, 3, 13)
+        text = guarded_program(rng, arms=arms, corners=sample.case % 2 == 0, fails=fails)
+        recording, failed = recorded(text, two if arms == 2 else ones[sample.case % 3])
+        one = differences(recording)
+        assert one.keep(), f"{one}\n{text}"
+        worst, drawn = worst.worst(one), drawn + 1
+        stopped = [stage for stage in recording.stages if stage.stopped]
+        found["fast"] += any(share_at_stop(recording, stage) > 0.5 for stage in stopped)
+        found["corners"] += any(stage.stage.kind in ("BLEND", "SPLINE") for stage in stopped)
+        found["two arms"] += arms == 2
+        found["failed"] += failed is not None
+    figures = {**found, **attrs.asdict(worst)}
+    sample.record("guarded, halting and failing programs", drawn, 0, **figures)
+    # Programs differ: in a small sample the shares say less.
+    least = drawn / full if sample.whole else drawn / full / 2
+    if drawn < sample.count(full):
+        return  # one case is repeated
+    assert {name: found[name] >= least * share for name, share in SHARES.items()} == dict.fromkeys(SHARES, True), found
 
 
 def test_too_deep() -> None:
