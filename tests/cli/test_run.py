@@ -76,7 +76,76 @@ def test_events_file(stacked: Path) -> None:
     assert events[6]["text"] == "ARM_1 [OBJ1] MOVE: PTP OBJ2 @100"
     assert events[6]["source"] == "MOVE OBJ1 TO OBJ2"
     assert all(a["t1"] <= b["t0"] + 1e-9 for a, b in pairwise(events))
+    assert {event["process"] for event in events} == {"program"}
     assert all(len(f"{event[key]!r}") <= 12 for event in events for key in ("t0", "t1"))
+
+
+def test_events_of_two_arms(tmp_path: Path) -> None:
+    """Events of two branches stand in the order in which they began, each with its process; so does the trace."""
+    done = armwright("run", EXAMPLES / "hand_over.rlo", "--cell", EXAMPLES / "two_arms.toml", "-o", tmp_path / "out")
+
+    events = [json.loads(line) for line in (tmp_path / "out/events.jsonl").read_text().splitlines()]
+    assert [event["t0"] for event in events] == sorted(event["t0"] for event in events)
+    arms = {(event["process"], event["arm"]) for event in events if event["arm"] is not None}
+    assert arms == {("branch 1", "ARM_1"), ("branch 2", "ARM_2")}
+    words = done.stdout.split("\n \n")[0].splitlines()
+    rows = [line.split() for line in words if " branch " in line]
+    assert len(rows) > 10
+    starts = [float(row[1]) for row in rows]
+    assert starts == sorted(starts)
+    moved = next(row for row in rows if "MOVE:" in row)
+    assert (moved[3:5], float(moved[2])) == (["branch", "1"], next(e["t1"] for e in events if e["kind"] == "MOVE"))
+    page = (tmp_path / "out/report.html").read_text()
+    assert '"process":"branch 2"' in page.replace('": "', '":"')
+
+
+def test_events_say_what_they_did(tmp_path: Path) -> None:
+    """An assignment shows the place that a frame got, in the units of the program, and in SI as data."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text(
+        "UNITS MM ;\nVAR near : FRAME ; n : SCALAR ;\n"
+        "BEGIN n = 0 ; near = (1,0,0, 0,-1,0, 0,0,-1, 450, 100, 250) ;\n"
+        'MOVE ARM_1 TO near, ON n < 1 DO PRINT ("on the way") ;\nEND.'
+    )
+    done = armwright("run", program, "--cell", STANFORD, "-o", out)
+
+    assert done.returncode == 0, done
+    events = [json.loads(line) for line in (out / "events.jsonl").read_text().splitlines()]
+    assert [event["kind"] for event in events] == ["PLACE", "MOVE", "PRINT", "END"]
+    assert events[0]["text"] == "near = (1,0,0, 0,-1,0, 0,0,-1, 450,100,250)"
+    assert events[0]["pose"] == [1, 0, 0, 0, -1, 0, 0, 0, -1, 0.45, 0.1, 0.25]
+    assert (events[1]["t0"], events[2]["t0"]) == (0, 0)
+    run = json.loads((out / "run.json").read_text())
+    assert all(len(repr(one["duration"])) <= 14 for one in (run, *run["stages"]))
+
+
+@pytest.mark.parametrize("ends", ["halted", "braked"])
+def test_a_stopped_move_shows_what_it_did(ends: str, tmp_path: Path) -> None:
+    """A MOVE that was halted, or braked by the end of the program, has the duration and length that it came to."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    branch = f"BEGIN PAUSE 0.3 ; {'HALT' if ends == 'braked' else 'near = 1'} END"
+    guard = ", ON near > 0.3 DO HALT" if ends == "halted" else ""
+    program.write_text(
+        "VAR goal : FRAME ; near : SCALAR ;\n"
+        "BEGIN near = 0 ; goal = (1,0,0, 0,-1,0, 0,0,-1, 0.45, 0.1, 0.25) ;\nCOBEGIN\n"
+        f"BEGIN MOVE ARM_1 TO goal{guard} END ;\n"
+        f"{branch} ;\nCOEND ;\nEND."
+    )
+    done = armwright("run", program, "--cell", STANFORD, "-o", out, columns=200)
+
+    assert done.returncode == 0, done
+    events = [json.loads(line) for line in (out / "events.jsonl").read_text().splitlines()]
+    (move,) = (event for event in events if event["kind"] == "MOVE")
+    assert move["text"].endswith(f"; {ends}")
+    assert move[ends] is True
+    run = json.loads((out / "run.json").read_text())
+    (stage,) = run["stages"]
+    assert stage["stopped"] is True
+    assert move["t1"] - move["t0"] == pytest.approx(stage["duration"], abs=1e-3)
+    note = f"stopped on its way, after {stage['duration']:.3f} s and {stage['length'] * 1e3:.1f} mm of "
+    assert note in (out / "report.html").read_text()
+    row = next(line for line in done.stdout.splitlines() if "PTP goal, stopped" in line)
+    assert f"{stage['duration']:.3f}" in row
 
 
 def test_frames_file(stacked: Path) -> None:

@@ -260,9 +260,17 @@ def _print_summary(recording: "Recording", code: "Code") -> None:
 def _trace_table(recording: "Recording", code: "Code") -> "Table":
     from rich.text import Text
 
-    shown = (effect for effect in recording.effects if effect.kind != "PLACE")
-    rows = ((Text(str(code.source.line(one.span.start)), style="dim"), f"{one.t0:.3f}", one.text) for one in shown)
-    return table(("line", "s", "what happened"), rows, words=(2,))
+    processes = recording.processes
+    rows: list[tuple[str | Text, ...]] = []
+    for one in recording.effects:
+        if one.kind == "PLACE":
+            continue
+        line, end = Text(str(code.source.line(one.span.start)), style="dim"), f"{one.t1:.3f}" if one.t1 > one.t0 else ""
+        who = (one.process,) if len(processes) > 1 else ()
+        rows.append((line, f"{one.t0:.3f}", end, *who, one.text))
+    if len(processes) > 1:
+        return table(("line", "from s", "to s", "process", "what happened"), rows, words=(3, 4))
+    return table(("line", "from s", "to s", "what happened"), rows, words=(3,))
 
 
 def _stage_table(recording: "Recording", code: "Code") -> "Table":
@@ -270,10 +278,10 @@ def _stage_table(recording: "Recording", code: "Code") -> "Table":
     for stage in recording.stages:
         off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
         line = str(code.source.line(stage.span.start))
-        what = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}"
-        duration, length = f"{stage.duration:.3f}", f"{stage.length * 1e3:.0f}"
-        rows.append((line, what, duration, length, off, *_peaks(stage, recording)))
-    return table(("line", "stage", "s", "mm", "off mm", "peak speed", "peak effort"), rows, words=(1,))
+        what = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}{', stopped' if stage.stopped else ''}"
+        start, duration, length = f"{stage.t0:.3f}", f"{stage.duration:.3f}", f"{stage.length * 1e3:.0f}"
+        rows.append((line, what, start, duration, length, off, *_peaks(stage, recording)))
+    return table(("line", "stage", "from s", "s", "mm", "off mm", "peak speed", "peak effort"), rows, words=(1,))
 
 
 def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":

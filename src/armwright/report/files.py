@@ -109,10 +109,10 @@ def ending(recording: Recording, code: Code) -> dict[str, Any]:
 
 def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic]) -> dict[str, Any]:
     """Return a run in short, as plain data in SI units."""
-    return {
+    found = {
         "program": code.source.name,
         "cell": recording.cell.name,
-        "duration": _seconds(recording.duration),
+        "duration": recording.duration,
         "trace": recording.trace(),
         "contacts": [
             {
@@ -129,6 +129,7 @@ def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic])
         "stages": [_stage(stage, recording, code) for stage in recording.stages],
         "diagnostics": [to_json(one, code.source) for one in diagnostics],
     }
+    return {name: rounded(value) for name, value in found.items()}
 
 
 def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
@@ -140,7 +141,7 @@ def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
         "kind": run.stage.kind,
         "to": list(run.to),
         "speed": run.speed,
-        "start": _seconds(run.t0),
+        "start": run.t0,
         "duration": motion.duration,
         "length": run.length,
         "stopped": run.stopped,
@@ -177,26 +178,33 @@ def _detour(stage: Stage) -> dict[str, Any] | None:
     }
 
 
-def _seconds(time: float) -> float:
-    """Return a time of the clock as people write it: a number of ticks times the period is 6.7490000000000006."""
-    return round(time, 9)
+def rounded(value: Any) -> Any:
+    """Return plain data with its numbers as people write them: ticks times the period is 6.7490000000000006."""
+    if isinstance(value, float):
+        return round(value, _DIGITS) + 0.0  # adding 0 turns -0 into 0
+    if isinstance(value, Mapping):
+        return {name: rounded(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(one) for one in value]
+    return value
 
 
 def _events(recording: Recording, code: Code) -> Iterator[str]:
     for effect in recording.effects:
         source = code.source
         event = {
-            "t0": _seconds(effect.t0),
-            "t1": _seconds(effect.t1),
+            "t0": effect.t0,
+            "t1": effect.t1,
             "line": source.line(effect.span.start),
             "column": source.column(effect.span.start),
             "kind": effect.kind,
+            "process": effect.process,
             "arm": effect.arm,
             "text": effect.text,
             "source": " ".join(source.slice(effect.span).split()),
             **effect.data,
         }
-        yield json.dumps(event, ensure_ascii=False) + "\n"
+        yield json.dumps(rounded(event), ensure_ascii=False) + "\n"
 
 
 def left_out(recording: Recording, most_rows: int) -> tuple[str, ...]:

@@ -60,12 +60,14 @@ class Effect:
         t1: when it ended [s]; equal to t0 where it takes no time.
         line: line of the program, from 1.
         text: what it did, such as ``ARM_1 [obj1] MOVE: PTP obj2 @100``.
+        process: that did it, such as ``branch 2``; empty where there is only one.
     """
 
     t0: float
     t1: float
     line: int
     text: str
+    process: str = ""
 
 
 @attrs.frozen(kw_only=True)

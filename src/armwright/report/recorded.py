@@ -55,6 +55,7 @@ def page_of(
     """
     source, cell, failure = code.source, recording.cell, recording.failure
     effects, fewer = _fewer(recording.effects, "lines of what happened")
+    processes = recording.processes
     stages, fewer_stages = _fewer(recording.stages, "stages")
     status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
     why = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
@@ -73,7 +74,16 @@ def page_of(
             for one in said
         ]
         + [Message(severity="note", text=text) for text in (*why, *left_out, *fewer, *fewer_stages)],
-        effects=[Effect(t0=one.t0, t1=one.t1, line=source.line(one.span.start), text=one.text) for one in effects],
+        effects=[
+            Effect(
+                t0=one.t0,
+                t1=one.t1,
+                line=source.line(one.span.start),
+                text=one.text,
+                process=one.process if len(processes) > 1 else "",
+            )
+            for one in effects
+        ],
         stages=[_stage(one, source.line(one.span.start)) for one in stages],
         arms=[_record(one, cell) for one in recording.streams],
         animation=_animation(recording, code),

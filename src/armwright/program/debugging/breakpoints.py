@@ -99,7 +99,7 @@ class Watch:
         now = _value(view, self.kept)
         before, self.last = self.last, now
         process = mover(view, self.kept)
-        motion = None if process is None or process.motion is None else (process.path, process.motion.begun)
+        motion = None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
         if self.told is not None:
             # The motion goes on, or has just come to its end.
             self.told = motion if motion == self.told else None
@@ -126,14 +126,14 @@ class Watch:
         """
         self.last = _value(view, self.kept)
         process = mover(view, self.kept) if told else None
-        self.told = None if process is None or process.motion is None else (process.path, process.motion.begun)
+        self.told = None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
 
     def rides(self, view: Machine) -> bool:
         """Whether an arm moves it, so that every tick has to be looked at."""
         process = mover(view, self.kept)
         if process is None or process.motion is None:
             return False
-        return self.told != (process.path, process.motion.begun)
+        return self.told != (process.path, process.motion.begun.tick)
 
 
 def _value(view: Machine, kept: str) -> "Array | float | None":

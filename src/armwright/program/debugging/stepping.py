@@ -74,4 +74,4 @@ def step_of(machine: Machine, kind: StepKind, path: Path) -> Step:
 
 def stage_of(process: Process) -> tuple[int, int] | None:
     """Return which stage of which motion a process is in: the tick of its beginning, its number in the record."""
-    return None if process.motion is None else (process.motion.begun, process.motion.record)
+    return None if process.motion is None else (process.motion.begun.tick, process.motion.record)

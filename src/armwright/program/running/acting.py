@@ -12,7 +12,8 @@ from armwright.program.messages.diagnostics import Label
 from armwright.program.running.contact import look_out, note_contact
 from armwright.program.running.evaluate import IN_UNITS, PLAIN, ValueFault
 from armwright.program.running.machine import Machine
-from armwright.program.running.process import Element, Pending, Process, Value
+from armwright.program.running.process import Element, Pending, Process
+from armwright.program.running.wording import shown
 from armwright.spatial.poses import to_noap
 
 Handler = Callable[[Machine, Process, Instruction], None]
@@ -95,7 +96,13 @@ def _affix(run: Machine, process: Process, step: Instruction) -> None:
         hung = [Label(run.written[one], f"{spelled(one)} got its place here") for one in chain[:3]]
         run.fail(process, "E305", "this AFFIX would close a ring", step.span, label, secondary=hung, notes=[note])
     run.grow(run.tree.affix(child, parent, step_X, rigid=rigid), child, step.span)
-    run.effect("AFFIX", f"AFFIX {spelled(child)} -> {spelled(parent)}", step.span)
+    run.effect(
+        process,
+        "AFFIX",
+        f"AFFIX {spelled(child)} -> {spelled(parent)}",
+        step.span,
+        data={"child": child, "parent": parent, "rigidly": rigid},
+    )
 
 
 def _unfix(run: Machine, process: Process, step: Instruction) -> None:
@@ -114,7 +121,7 @@ def _unfix(run: Machine, process: Process, step: Instruction) -> None:
         where = [Label(run.written[child], "here it got its place")] if child in run.written else []
         run.fail(process, "E306", text, step.span, label, secondary=where, helps=[instead])
     run.grow(run.tree.unfix(child), child, step.span)
-    run.effect("UNFIX", f"UNFIX {spelled(child)}", step.span)
+    run.effect(process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": above})
 
 
 # ---- tools and sensors ---------------------------------------------------------------------------------------------
@@ -144,7 +151,9 @@ def _fingers(run: Machine, process: Process, step: Instruction) -> None:
         look_out(run, motion)
     text = f"{arm} {step.op}" + (f" TO {width:g}" if width is not None else "")
     run.take_time(
-        process, time, Pending(kind="GRASP" if closed else "OPEN", text=text, since=run.ticks, span=step.span, arm=arm)
+        process,
+        time,
+        Pending(kind="GRASP" if closed else "OPEN", text=text, since=run.starts(), span=step.span, arm=arm),
     )
 
 
@@ -155,7 +164,7 @@ def _operate(run: Machine, process: Process, step: Instruction) -> None:
     except DeviceError as error:
         run.fail(process, "R602", str(error), step.span, "the device is asked here")
     text = f"{run.spelled(device)} {state}"
-    run.take_time(process, time, Pending(kind="OPERATE", text=text, since=run.ticks, span=step.span))
+    run.take_time(process, time, Pending(kind="OPERATE", text=text, since=run.starts(), span=step.span))
 
 
 def _look(run: Machine, process: Process, step: Instruction) -> None:
@@ -166,14 +175,17 @@ def _look(run: Machine, process: Process, step: Instruction) -> None:
         run.fail(process, "R601", str(error), step.span, "the camera is asked here")
     text = f"READ VISIONS {run.spelled(name)}"
     place = (name, np.asarray(X_WF))
-    run.take_time(process, time, Pending(kind="READ", text=text, since=run.ticks, span=step.span, place=place))
+    data: dict[str, object] = {"frame": name, "pose": to_noap(place[1]).tolist()}
+    pending = Pending(kind="READ", text=text, since=run.starts(), span=step.span, place=place, data=data)
+    run.take_time(process, time, pending)
 
 
 def _read_arm(run: Machine, process: Process, step: Instruction) -> None:
     arm = run.name(process, step.operands[0])
     run.claim(process, arm, step.span)
     run.set_hand(arm, step.span)
-    run.effect("READ", f"READ SYSTEM {arm}", step.span, arm=arm)
+    data: dict[str, object] = {"frame": arm, "pose": to_noap(run.tree.world(arm)).tolist()}
+    run.effect(process, "READ", f"READ SYSTEM {arm}", step.span, arm=arm, data=data)
 
 
 # ---- words for people ----------------------------------------------------------------------------------------------
@@ -181,23 +193,10 @@ def _read_arm(run: Machine, process: Process, step: Instruction) -> None:
 
 def _print(run: Machine, process: Process, step: Instruction) -> None:
     line = " ".join(
-        operand.value if isinstance(operand, Text) else _shown(run, run.read(process, operand, step))
+        operand.value if isinstance(operand, Text) else shown(run.read(process, operand, step), run.code.units)
         for operand in step.operands
     )
-    run.effect("PRINT", f'PRINT "{line}"', step.span, data={"printed": line})
-
-
-def _shown(run: Machine, value: Value) -> str:
-    """Return a value for people: numbers to six digits, places with lengths in the units of the program."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, float | int):
-        return f"{value + 0.0:.6g}"
-    assert isinstance(value, np.ndarray)  # noqa: S101 - elements have been read
-    numbers = to_noap(value)
-    numbers[9:] /= run.code.units.metres
-    texts = [f"{0.0 if abs(number) < 1e-12 else number:.6g}" for number in numbers.tolist()]
-    return "(" + ", ".join(",".join(texts[i : i + 3]) for i in range(0, 12, 3)) + ")"
+    run.effect(process, "PRINT", f'PRINT "{line}"', step.span, data={"printed": line})
 
 
 HANDLERS: Mapping[Op, Handler] = {

@@ -176,14 +176,14 @@ def _signal(run: Machine, process: Process, step: Instruction) -> None:
     for other in run.processes:
         if other.waiting and other.waiting.what == "event" and name in other.waiting.names:
             other.waiting, other.wake = None, run.ticks
-    run.effect("SIGNAL", f"SIGNAL {run.spelled(name)}", step.span)
+    run.effect(process, "SIGNAL", f"SIGNAL {run.spelled(name)}", step.span, data={"event": name})
 
 
 def _wait(run: Machine, process: Process, step: Instruction) -> None:
     name = run.name(process, step.operands[0])
     if run.events.get(name, 0) > 0:
         run.events[name] -= 1
-        run.effect("WAIT", f"WAIT {run.spelled(name)}", step.span)
+        run.effect(process, "WAIT", f"WAIT {run.spelled(name)}", step.span, data={"event": name})
         return
     # When the event comes the same instruction is looked at again.
     process.at -= 1
@@ -196,7 +196,7 @@ def _pause(run: Machine, process: Process, step: Instruction) -> None:
         text = f"a PAUSE of {seconds:g} s is not possible"
         run.fail(process, "E231", text, step.span, f"expected 0 to {_LONGEST_PAUSE:g} s")
     text = f"PAUSE {seconds:g}"
-    run.take_time(process, seconds, Pending(kind="PAUSE", text=text, since=run.ticks, span=step.span))
+    run.take_time(process, seconds, Pending(kind="PAUSE", text=text, since=run.starts(), span=step.span))
 
 
 def _lock(run: Machine, process: Process, step: Instruction) -> None:
@@ -208,7 +208,7 @@ def _lock(run: Machine, process: Process, step: Instruction) -> None:
     for name in names:
         run.locks[name] = process
     process.locks += names
-    run.effect("LOCK", f"LOCK {', '.join(map(run.spelled, names))}", step.span)
+    run.effect(process, "LOCK", f"LOCK {', '.join(map(run.spelled, names))}", step.span, data={"variables": names})
 
 
 def _locked_by(run: Machine, name: str) -> set[Process]:
@@ -255,15 +255,15 @@ def _retry(run: Machine, process: Process, step: Instruction) -> None:  # noqa: 
 def _halt(run: Machine, process: Process, step: Instruction) -> None:
     """End the program; in a procedure that an action calls, the MOVE of that action, as in the action itself."""
     if not any(one.kind == "action" for one in process.stack):
-        finish(run, step.span, "HALT")
+        finish(run, process, step.span, "HALT")
         return
     while process.now.kind != "action":
         _leave(run, process, step.span)
     halt(run, process, step)
 
 
-def _stop(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
-    finish(run, step.span, "END")
+def _stop(run: Machine, process: Process, step: Instruction) -> None:
+    finish(run, process, step.span, "END")
 
 
 def rest(run: Machine, span: Span) -> list[str]:
@@ -288,15 +288,28 @@ def _still(run: Machine, process: Process, span: Span) -> int:
     note_contact(run, motion, end_of_motion)
     words, contact = contact_of(motion)
     process.motion = None
-    run.effect("STOP", f"{motion.arm} stops{words}", span, arm=motion.arm, data=contact)
+    run.effect(process, "STOP", f"{motion.arm} stops{words}", span, until=end_of_motion, arm=motion.arm, data=contact)
+    if not motion.data.get("halted"):
+        motion.data["braked"] = True
+        motion.text += "; braked"
+    run.effect(
+        process,
+        "MOVE",
+        motion.text,
+        motion.span,
+        since=motion.begun,
+        until=end_of_motion,
+        arm=motion.arm,
+        data=motion.data,
+    )
     return end_of_motion
 
 
-def finish(run: Machine, span: Span, word: str) -> None:
+def finish(run: Machine, process: Process, span: Span, word: str) -> None:
     """End the program: arms at rest, devices off, the frame table true."""
     off = rest(run, span)
     words = "".join(f"; {run.spelled(device)} OFF" for device in off)
-    run.effect("END", f"{word}{words}", span, data={"switched_off": off})
+    run.effect(process, "END", f"{word}{words}", span, data={"switched_off": off})
 
 
 def recover(run: Machine, process: Process, error: RunError) -> bool:
@@ -319,7 +332,7 @@ def recover(run: Machine, process: Process, error: RunError) -> bool:
             process.at = attempt.recovery
             release(run, process, attempt.locks)
             said = f"{error.diagnostic.code} in line {run.code.source.line(span.start)}: {error.diagnostic.message}"
-            run.effect("ERROR", said, span, data={"code": error.diagnostic.code})
+            run.effect(process, "ERROR", said, span, data={"code": error.diagnostic.code})
             return True
         if process.parent is None:
             run.ticks = process.wake

@@ -22,7 +22,7 @@ from armwright.program.running.machine import Limits, Machine, RunError
 from armwright.program.running.moving import go_on
 from armwright.program.running.obstacles import detour_warning
 from armwright.program.running.process import Process
-from armwright.program.running.recording import Effect, Failure, Recording, RunStage, efforts
+from armwright.program.running.recording import Effect, Failure, Recording, RunStage, efforts, in_order
 
 # No TRY helps a program that runs for ever: what is tried again would run for ever again.
 _FINAL = ("E504", "E506")
@@ -80,7 +80,7 @@ def due(machine: Machine) -> Process:
     """
     process = ready(machine)
     if process is None:
-        raise _stopped(machine, deadlock(machine), None)
+        raise _stopped(machine, deadlock(machine), machine.program, None)
     return process
 
 
@@ -105,7 +105,7 @@ def advance(machine: Machine, process: Process) -> None:
         _advance(machine, process)
     except RunError as error:
         if error.diagnostic.code in _FINAL or not recover(machine, process, error):
-            raise _stopped(machine, error, process.last_arm) from None
+            raise _stopped(machine, error, process, process.last_arm) from None
 
 
 def _advance(machine: Machine, process: Process) -> None:
@@ -124,7 +124,15 @@ def _advance(machine: Machine, process: Process) -> None:
         process.pending = None
         if pending.place is not None:
             machine.place(process, *pending.place, pending.span)
-        machine.effect(pending.kind, pending.text, pending.span, since=pending.since, arm=pending.arm)
+        machine.effect(
+            process,
+            pending.kind,
+            pending.text,
+            pending.span,
+            since=pending.since,
+            arm=pending.arm,
+            data=pending.data,
+        )
         return
     if process.follows is not None:
         go_on(machine, process)
@@ -139,10 +147,10 @@ def _advance(machine: Machine, process: Process) -> None:
     HANDLERS[step.op](machine, process, step)
 
 
-def _stopped(machine: Machine, error: RunError, arm: str | None) -> RunError:
+def _stopped(machine: Machine, error: RunError, process: Process, arm: str | None) -> RunError:
     """Return the error with the frames as they are when all arms are at rest and all devices off."""
     rest(machine, error.diagnostic.span)
-    failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm)
+    failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm, process=process.title)
     return RunError(error.diagnostic, machine.tree, machine.now, lambda: _failed(machine, failure))
 
 
@@ -151,8 +159,18 @@ def _failed(machine: Machine, failure: Failure) -> Recording:
     found, recording = failure.diagnostic, machine.recording()
     text = f"{found.code} in line {machine.code.source.line(found.span.start)}: {found.message}"
     data = {"code": found.code, "failed_at": failure.time}
-    end = Effect(t0=failure.time, t1=machine.now, kind="ERROR", span=found.span, text=text, arm=failure.arm, data=data)
-    return attrs.evolve(recording, effects=(*recording.effects, end), failure=failure)
+    end = Effect(
+        t0=failure.time,
+        t1=machine.now,
+        kind="ERROR",
+        span=found.span,
+        text=text,
+        process=failure.process,
+        order=machine.starts().order,
+        arm=failure.arm,
+        data=data,
+    )
+    return attrs.evolve(recording, effects=in_order((*recording.effects, end)), failure=failure)
 
 
 def warnings(recording: Recording) -> tuple[Diagnostic, ...]:

@@ -16,10 +16,11 @@ from armwright.kinematics.forward import forward
 from armwright.program.following.hanging import is_arm
 from armwright.program.intermediate.code import Code, Instruction, Kind, Operand, Type
 from armwright.program.messages.diagnostics import Diagnostic, Label
-from armwright.program.running.process import Activation, Element, Pending, Process, Value
-from armwright.program.running.recording import Effect, EffectKind, Recording, Run, RunStage, stream
+from armwright.program.running.process import Activation, Element, Pending, Process, Start, Value
+from armwright.program.running.recording import Effect, EffectKind, Recording, Run, RunStage, in_order, stream
+from armwright.program.running.wording import shown
 from armwright.program.text.source import Span
-from armwright.spatial.poses import from_noap
+from armwright.spatial.poses import from_noap, to_noap
 
 # A time this part of a period behind a tick is on it.
 _ON_A_TICK = 1e-9
@@ -95,7 +96,7 @@ class Machine:
         self.locks: dict[str, Process] = {}
         self.owners: dict[str, list[Process]] = {}
         self.hands: dict[str, Hand] = {name: Hand() for name in cell.arms}
-        self.ticks, self.idle, self.activations = 0, 0, 0
+        self.ticks, self.idle, self.activations, self.begun = 0, 0, 0, 0
         self.over = False
         self.written: dict[str, Span] = {}  # where each frame last got its place or its parent
         self.effects: list[Effect] = []
@@ -116,7 +117,7 @@ class Machine:
         return Recording(
             cell=cell,
             duration=self.now,
-            effects=tuple(self.effects),
+            effects=in_order(self.effects),
             stages=tuple(self.stages),
             streams=tuple(
                 stream(name, arm.arm, arm.start, self.runs[name], duration=self.now, period=cell.period)
@@ -203,7 +204,13 @@ class Machine:
             return
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
         self.place(process, name, value, step.span)
-        self.effect("PLACE", f"{self.spelled(name)} =", step.span)
+        self.effect(
+            process,
+            "PLACE",
+            f"{self.spelled(name)} = {shown(value, self.code.units)}",
+            step.span,
+            data={"frame": name, "pose": to_noap(value).tolist()},
+        )
 
     def has_place(self, name: str) -> bool:
         """Whether a frame stands somewhere."""
@@ -303,19 +310,38 @@ class Machine:
         process.pending = pending
         process.wake = self.ticks + math.ceil(seconds / self.cell.period - _ON_A_TICK)
 
+    def starts(self) -> Start:
+        """Return the present tick as the start of what takes time, behind all that has begun before."""
+        self.begun += 1
+        return Start(self.ticks, self.begun)
+
     def effect(
         self,
+        process: Process,
         kind: EffectKind,
         text: str,
         span: Span,
         *,
-        since: int | None = None,
+        since: Start | None = None,
+        until: int | None = None,
         arm: str | None = None,
         data: dict[str, object] | None = None,
     ) -> None:
-        """Record what the program did up to now."""
-        begun = self.now if since is None else since * self.cell.period
-        self.effects.append(Effect(t0=begun, t1=self.now, kind=kind, span=span, text=text, arm=arm, data=data or {}))
+        """Record what a process did up to now, or does up to a later tick."""
+        start, period = since or self.starts(), self.cell.period
+        self.effects.append(
+            Effect(
+                t0=start.tick * period,
+                t1=self.now if until is None else until * period,
+                kind=kind,
+                span=span,
+                text=text,
+                process=process.title,
+                order=start.order,
+                arm=arm,
+                data=data or {},
+            )
+        )
 
     # ---- errors ----------------------------------------------------------------------------------------------------
 

@@ -64,7 +64,7 @@ def move(run: Machine, process: Process, step: Instruction) -> None:
         stages=stages,
         speed=asked.speed,
         depth=len(process.stack),
-        begun=run.ticks,
+        begun=run.starts(),
         since=run.ticks,
         until=run.ticks,
         guards=asked.guards,
@@ -346,5 +346,5 @@ def _finish(run: Machine, process: Process, motion: Motion) -> None:
     note_contact(run, motion)
     words, contact = contact_of(motion)
     data = {**motion.data, **contact}
-    run.effect("MOVE", motion.text + words, motion.span, since=motion.begun, arm=arm, data=data)
+    run.effect(process, "MOVE", motion.text + words, motion.span, since=motion.begun, arm=arm, data=data)
     process.motion = None

@@ -77,9 +77,14 @@ def _lead(detour: Detour, arm: str) -> str:
 
 
 def note_of(run: RunStage) -> str:
-    """Return what a report has to say beside a stage: what it goes round and how, and why it is slow."""
+    """Return what a report has to say beside a stage: where it was stopped, what it goes round, why it is slow."""
     stage = run.stage
     notes = [stage.slowed] if stage.slowed else []
+    if run.stopped:
+        notes.append(
+            f"stopped on its way, after {run.duration:.3f} s and {run.length * 1e3:.1f} mm "
+            f"of {stage.trajectory.duration:.3f} s and {stage.length * 1e3:.1f} mm"
+        )
     if stage.obstacle is not None and stage.detour is not None:
         why = where_and_why(stage.obstacle, stage.kind, run.to, run.arm)
         notes = [f"the straight way is stopped {why}", f"{_lead(stage.detour, run.arm)}: {stage.detour.price}", *notes]

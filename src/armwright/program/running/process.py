@@ -13,6 +13,19 @@ from armwright.program.text.source import Span
 
 
 @attrs.frozen
+class Start:
+    """When something began.
+
+    Attributes:
+        tick: of the servo.
+        order: counts all that has begun; of the same tick, what began first has the smaller number.
+    """
+
+    tick: int
+    order: int
+
+
+@attrs.frozen
 class Element:
     """An element of an array, or a variable, as a value in passing: what it names is read and written."""
 
@@ -102,7 +115,7 @@ class Motion:
         stages: what is still to do after the present stage, with the names of where they lead.
         speed: as asked for.
         depth: how many activations its process had when it began; those after them belong to its actions.
-        begun: when the MOVE began [ticks].
+        begun: when the MOVE began.
         since: when the present stage began [ticks].
         until: when it will end [ticks].
         guards: to be looked at on every tick.
@@ -123,7 +136,7 @@ class Motion:
     stages: list[tuple[Stage, tuple[str, ...]]]
     speed: float
     depth: int
-    begun: int
+    begun: Start
     since: int
     until: int
     guards: list[Guard]
@@ -157,18 +170,20 @@ class Pending:
     Attributes:
         kind: of the effect.
         text: of the trace.
-        since: when it began [ticks].
+        since: when it began.
         span: the statement.
         arm: the arm that does it, or None.
         place: a frame that gets a place then, and the place.
+        data: further facts for the events.
     """
 
     kind: Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
     text: str
-    since: int
+    since: Start
     span: Span
     arm: str | None = None
     place: tuple[str, Array] | None = None
+    data: dict[str, object] = attrs.field(factory=dict)
 
 
 @attrs.define(eq=False)

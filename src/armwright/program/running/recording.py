@@ -54,6 +54,8 @@ class Effect:
         kind: what it was.
         span: the statement in the program.
         text: one line of the trace, such as ``ARM_1 [obj1] MOVE: PTP obj2 @100``.
+        process: that did it, as people call it: ``program``, ``branch 2``.
+        order: counts all that has begun; of the same time, what began first has the smaller number.
         arm: the arm that did it, or None.
         data: further facts by name, as JSON can carry them.
     """
@@ -63,6 +65,8 @@ class Effect:
     kind: EffectKind
     span: Span
     text: str
+    process: str = "program"
+    order: int = 0
     arm: str | None = None
     data: Mapping[str, Any] = attrs.field(factory=dict)
 
@@ -153,11 +157,13 @@ class Failure:
         diagnostic: what happened, at which statement.
         time: when [s]; the arms came to rest after it.
         arm: the arm that was to move; None where none was.
+        process: in which it happened, as people call it.
     """
 
     diagnostic: Diagnostic
     time: float
     arm: str | None = None
+    process: str = "program"
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -167,8 +173,8 @@ class Recording:
     Attributes:
         cell: in which it ran.
         duration: [s], a whole number of servo periods.
-        effects: in order of time.
-        stages: in order of time.
+        effects: in the order in which they began.
+        stages: in the order in which they began.
         streams: one per arm.
         trees: the frame tree at the start and after each change, with the time of the change [s].
         postures: by arm, the posture (n,) at the end.
@@ -185,6 +191,11 @@ class Recording:
     failure: Failure | None = None
 
     @property
+    def processes(self) -> tuple[str, ...]:
+        """The processes that did anything, in the order in which they began."""
+        return tuple(dict.fromkeys(one.process for one in self.effects))
+
+    @property
     def tree(self) -> FrameTree:
         """The frame tree at the end."""
         return self.trees[-1][1]
@@ -192,6 +203,11 @@ class Recording:
     def trace(self) -> list[str]:
         """Return the lines of the trace."""
         return [effect.text for effect in self.effects if effect.kind not in _SILENT]
+
+
+def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Return effects in the order in which they began."""
+    return tuple(sorted(effects, key=lambda one: (one.t0, one.order)))
 
 
 def stream(name: str, arm: Arm, start: Array, runs: Sequence[Run], *, duration: float, period: float) -> Stream:

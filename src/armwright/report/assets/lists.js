@@ -78,14 +78,30 @@ function showProgram() {
   keepInSight(byId("trace"), byId("trace").children[present]);
 }
 
+// When something was done: its start, and its end where it took time.
+function timesOf(effect) {
+  const took = effect.t1 - effect.t0 > HAIR;
+  return took ? `${number(effect.t0, 2)} – ${number(effect.t1, 2)} s` : `${number(effect.t0, 2)} s`;
+}
+
+// Which process a line belongs to, in words and in a colour of its own.
+function processTag(process, processes) {
+  const tag = make("span", { className: "process", textContent: process });
+  tag.style.setProperty("--hue", `var(${hue(processes.indexOf(process))})`);
+  return tag;
+}
+
 function fillTrace() {
   byId("trace-card").hidden = !data.effects.length;
+  const processes = [...new Set(data.effects.map((effect) => effect.process))];
+  byId("trace").classList.toggle("processes", processes.length > 1);
   byId("trace").append(
     ...data.effects.map((effect, i) => {
       const row = make(
         "button",
         { type: "button" },
-        make("time", { textContent: `${number(effect.t0, 2)} s` }),
+        make("time", { textContent: timesOf(effect) }),
+        ...(processes.length > 1 ? [processTag(effect.process, processes)] : []),
         make("span", { className: "text", textContent: effect.text }),
       );
       row.addEventListener("click", () => seek(effect.t0, i));
