@@ -25,6 +25,7 @@ from armwright.kinematics.inverse.solution import Branch
 from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.report.calibrated import calibrated
 from armwright.report.calibrated_files import distances_figure
+from armwright.report.svg import alike, steady
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study import puma_moves
@@ -46,10 +47,12 @@ STYLE = {
 
 
 def write(figure: Figure, name: str) -> None:
-    """Write a figure beside this script."""
+    """Write a figure beside this script, unless the one that is there is the same but for rounding."""
     text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    (HERE / name).write_text(text.getvalue(), encoding="utf-8")
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    picture, new = HERE / name, steady(text.getvalue())
+    if not (picture.exists() and alike(new, picture.read_text(encoding="utf-8"))):
+        picture.write_text(new, encoding="utf-8")
 
 
 # The eight postures.

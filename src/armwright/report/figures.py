@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.report.svg import steady
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,14 +133,14 @@ def spread(count: int, most: int) -> Array:
 
 
 def svg_text(figure: "Figure") -> str:
-    """Return a figure as the text of an SVG file, the same for the same figure."""
+    """Return a figure as the text of an SVG file, the same for the same figure on every machine."""
     import matplotlib as mpl  # noqa: PLC0415
 
     text = io.StringIO()
     # Without a date and with fixed names of its parts, a figure changes only when its numbers do.
     with mpl.rc_context({"svg.hashsalt": "armwright"}):
         figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()
+    return steady(text.getvalue())
 
 
 def literal(text: str) -> str:
