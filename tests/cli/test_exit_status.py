@@ -127,3 +127,71 @@ def test_broken_pipe(arguments: str) -> None:
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=120)
 
     assert (done.returncode, done.stderr) == (ExitStatus.BROKEN_PIPE, "")
+
+
+@pytest.mark.parametrize(
+    ("typed", "status"),
+    [("PRINT (1) ;\n", 0), ("n = ;\n", 1), ("MOVE ARM_1 TO ARM_2 ;\n", 1), (":load none.rlo\n", 4), (":oh\n", 2)],
+)
+def test_statuses_of_a_session(typed: str, status: int) -> None:
+    """A session that is read from a pipe ends with the highest status of its lines, and each line carries its own."""
+    call = [sys.executable, "-m", "armwright", "repl", "--json"]
+    done = subprocess.run(call, input=typed, capture_output=True, text=True, check=False, timeout=120)
+
+    assert done.returncode == status, done
+    assert max(json.loads(line)["exit_status"] for line in done.stdout.splitlines()) == status
+
+
+def test_status_of_a_statement_that_cannot_be_done() -> None:
+    """A statement without errors that cannot be done is no error of the text."""
+    cell = Path(__file__).parents[2] / "examples" / "stanford_cell.toml"
+    typed = "VAR far : FRAME ;\nfar = (1,0,0,0,-1,0,0,0,-1,9,0,0.2) ;\nMOVE ARM_1 TO far ;\n"
+    call = [sys.executable, "-m", "armwright", "repl", "--json", "--cell", str(cell)]
+    done = subprocess.run(call, input=typed, capture_output=True, text=True, check=False, timeout=120)
+
+    assert done.returncode == ExitStatus.INFEASIBLE, done
+    assert [json.loads(line)["exit_status"] for line in done.stdout.splitlines()] == [0, 0, 3]
+
+
+def test_rows_carry_their_status(tmp_path: Path) -> None:
+    """Where a command takes several files, each of its rows says how it went, and the highest ends the command."""
+    (tmp_path / "good.rlo").write_text("BEGIN\n    PAUSE 1\nEND.\n")
+    (tmp_path / "bad.rlo").write_text("BEGIN x = END.\n")
+    files = ("good.rlo", "bad.rlo", "none.rlo")
+
+    laid_out = armwright("fmt", "--json", "--check", *files, cwd=tmp_path)
+    cured = armwright("fix", "--json", *files, cwd=tmp_path)
+
+    assert [row["exit_status"] for row in json.loads(cured.stdout)] == [0, 1, 4]
+    assert [row["exit_status"] for row in json.loads(laid_out.stdout)][2] == 4
+    assert laid_out.returncode == max(row["exit_status"] for row in json.loads(laid_out.stdout))
+    assert cured.returncode == 4
+
+
+def test_a_debugger_without_a_cell_is_called_wrongly(tmp_path: Path) -> None:
+    """A program with errors and a program without a cell end the debugger differently."""
+    (tmp_path / "bad.rlo").write_text("BEGIN x = END.\n")
+    (tmp_path / "good.rlo").write_text("BEGIN PAUSE 1 END.\n")
+
+    assert armwright("debug", "bad.rlo", cwd=tmp_path).returncode == ExitStatus.PROGRAM_ERRORS
+    assert armwright("debug", "good.rlo", cwd=tmp_path).returncode == ExitStatus.USAGE
+
+
+def test_changed_results_are_told(tmp_path: Path) -> None:
+    """Whoever reads a file of results that was changed since it was written is told so."""
+    from armwright.files.output import write_folder  # noqa: PLC0415 - one test
+
+    contents = {"points.csv": "a,b\n1,2\n", "told.json": "{}", "p.rlo": "BEGIN x = END.", "poses.toml": "x = 1"}
+    write_folder(tmp_path / "out", contents, {"command": "armwright"})
+    calls = {
+        "points.csv": (("iso9283",), ("calibrate", "puma560"), ("clearance", "estimate", "five-bar")),
+        "told.json": (("clearance", "correct", "five-bar", "--estimate"),),
+        "p.rlo": (("run",),),
+        "poses.toml": (("move", "joint", "puma560"),),
+    }
+    for name in calls:
+        (tmp_path / "out" / name).write_text(contents[name] + " ")
+    for name, commands in calls.items():
+        for command in commands:
+            done = armwright(*command, tmp_path / "out" / name)
+            assert "not what the run has written" in done.stderr, (command, done)

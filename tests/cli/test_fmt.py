@@ -141,7 +141,7 @@ def test_json(written: Path) -> None:
     right, bad = json.loads(result.stdout)
 
     assert result.returncode == 5
-    assert right == {"program": str(written), "changed": True}
+    assert right == {"program": str(written), "exit_status": 5, "changed": True}
     assert bad["program"] == str(wrong)
     assert "the program has no END" in bad["error"]
 

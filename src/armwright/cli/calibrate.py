@@ -10,7 +10,7 @@ from armwright.cli.numbers import units_of
 from armwright.cli.options import Json, Quiet
 from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
-from armwright.cli.results import write_results
+from armwright.cli.results import warn_of_stray, write_results
 
 if TYPE_CHECKING:
     from armwright.report.calibrated import Calibrated
@@ -52,6 +52,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.report.calibrated_files import calibrated_files
 
     model = with_tool(load_arm(arm), tool_mm)
+    warn_of_stray(measured)
     measurements = read_measurements(measured, model, units=units_of(units))
     with waiting("calibrating", quiet=quiet or as_json) as told, one_core():
         found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, progress=told)

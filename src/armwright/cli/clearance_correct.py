@@ -8,7 +8,7 @@ import typer
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
 from armwright.cli.printing import json_text, plain_console, print_json, print_table, table
-from armwright.cli.results import write_results
+from armwright.cli.results import warn_of_stray, write_results
 
 if TYPE_CHECKING:
     from armwright.arrays import Array
@@ -124,6 +124,7 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
     from armwright.errors import FileFormatError, InvalidValueError
     from armwright.files.reading import read_text
 
+    warn_of_stray(estimate)
     text = read_text(estimate)
     try:
         told = json.loads(text)

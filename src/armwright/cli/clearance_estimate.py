@@ -46,7 +46,9 @@ def estimate(
     """
     from armwright.clearance.estimating.measured import RestMeasured, read_measured
     from armwright.clearance.reader import load_linkage
+    from armwright.cli.results import warn_of_stray
 
+    warn_of_stray(measured)
     model, found = load_linkage(linkage), read_measured(measured)
     noise = None if noise_um is None else noise_um * 1e-6
     told = _at_rest(model, found, noise) if isinstance(found, RestMeasured) else _on_paths(model, found, sweep, noise)

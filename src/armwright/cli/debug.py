@@ -44,7 +44,7 @@ def debug(
         loaded = load(launch)
     except LoadError as error:
         print(error.page, end="")
-        raise typer.Exit(ExitStatus.PROGRAM_ERRORS) from None
+        raise typer.Exit(error.status) from None
     Terminal(loaded).run()
 
 
@@ -81,7 +81,7 @@ def load(launch: "Launch") -> "Loaded":
     if launch.program.suffix == CODE_SUFFIX:
         if given is None:
             message = f"{launch.program.name} needs a cell to run in"
-            raise LoadError(message, f"{message}\n")
+            raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
         return Loaded(code=assemble(read_program(launch.program), str(launch.program)), cell=given, is_listed=True)
     if given is None:
         around = Cells().around(launch.program.parent, read_program(launch.program), None).file
@@ -93,7 +93,7 @@ def load(launch: "Launch") -> "Loaded":
         )
     if place is None:
         message = f"{launch.program.name} needs a cell to run in: it IMPORTs none, and beside it there is not just one"
-        raise LoadError(message, f"{message}\n")
+        raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
     imports = imported_files(launch.program, compiled)
     return Loaded(code=compiled.code, cell=place, diagnostics=compiled.diagnostics, imports=imports)
 

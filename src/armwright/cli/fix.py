@@ -40,7 +40,6 @@ def fix(
 
     acted_on = given_cell(cell)
     rows: list[dict[str, Any]] = []
-    statuses: list[ExitStatus] = []
     for path in programs:
         try:
             source = read_source(path)
@@ -48,22 +47,19 @@ def fix(
             if result.cures and not diff:
                 write_back(path, result.text)
         except ArmwrightError as error:
-            rows.append({"program": str(path), "errors": 1, "error": str(error)})
-            statuses.append(error.exit_status)
+            rows.append({"program": str(path), "exit_status": error.exit_status, "errors": 1, "error": str(error)})
             if not as_json:
                 print(f"armwright: {error}", file=sys.stderr)
             continue
         rows.append(_as_data(result))
-        if rows[-1]["errors"]:
-            statuses.append(ExitStatus.PROGRAM_ERRORS)
         if not as_json:
             if diff and result.cures:
                 print_difference(source, result.text)
             _print(result, done="could be cured" if diff else "cured")
     if as_json:
         print_json(rows)
-    if statuses:
-        raise typer.Exit(max(statuses))
+    if any(row["exit_status"] for row in rows):
+        raise typer.Exit(max(row["exit_status"] for row in rows))
 
 
 def _translator(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":
@@ -103,4 +99,6 @@ def _as_data(result: "Fixed") -> dict[str, Any]:
     from armwright.program.messages.diagnostics import to_json
 
     cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.what} for cure in result.cures]
-    return {**diagnostics_data(result.compilation), "cures": cures}
+    found = diagnostics_data(result.compilation)
+    status = ExitStatus.PROGRAM_ERRORS if found["errors"] else ExitStatus.DONE
+    return {**found, "exit_status": status, "cures": cures}

@@ -42,9 +42,8 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
     from armwright.program.editing.formatting import formatted
 
     rows: list[dict[str, Any]] = []
-    statuses: list[ExitStatus] = []
     for path in programs:
-        row: dict[str, Any] = {"program": str(path)}
+        row: dict[str, Any] = {"program": str(path), "exit_status": ExitStatus.DONE}
         rows.append(row)
         try:
             source = read_source(path)
@@ -53,11 +52,12 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
             if row["changed"] and not (check or diff or stdout or path == INPUT):
                 write_back(path, after)
         except ArmwrightError as error:
-            row["error"] = str(error)
-            statuses.append(error.exit_status)
+            row |= {"exit_status": error.exit_status, "error": str(error)}
             if not as_json:
                 print(f"armwright: {error}", file=sys.stderr)
             continue
+        if check and row["changed"]:
+            row["exit_status"] = ExitStatus.CHECK_FAILED
         if as_json:
             continue
         if diff:
@@ -68,10 +68,8 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
             print(_said(source, changed=row["changed"], check=check))
     if as_json:
         print_json(rows)
-    if check and any(row.get("changed") for row in rows):
-        statuses.append(ExitStatus.CHECK_FAILED)
-    if statuses:
-        raise typer.Exit(max(statuses))
+    if any(row["exit_status"] for row in rows):
+        raise typer.Exit(max(row["exit_status"] for row in rows))
 
 
 def _said(source: "Source", *, changed: bool, check: bool) -> str:

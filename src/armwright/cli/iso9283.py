@@ -83,6 +83,7 @@ def _assessed(
     from armwright.accuracy.assess import assess
     from armwright.accuracy.cycles import TooFewError
     from armwright.accuracy.measurements import read_measurements
+    from armwright.cli.results import warn_of_stray
 
     for name, value, valid in (
         ("--band-mm", band_mm, band_mm is None or 0 < band_mm < float("inf")),
@@ -91,6 +92,8 @@ def _assessed(
         if not valid:
             raise typer.BadParameter(f"expected a number above 0, got {value:g}", param_hint=name)
     bounds = {bound.name: bound for bound in map(_bound, limits)}
+    for path in files:
+        warn_of_stray(path)
     tests = read_measurements(files)
     try:
         found = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)

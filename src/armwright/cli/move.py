@@ -11,7 +11,7 @@ from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, QuietButWarnings
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
 from armwright.cli.progress import counting
-from armwright.cli.results import write_results
+from armwright.cli.results import warn_of_stray, write_results
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -155,6 +155,7 @@ def _planned(
     from armwright.motion.moves import cartesian_move, joint_move, stopping_move
     from armwright.motion.poses_file import read_poses
 
+    warn_of_stray(poses)
     arm, file = load_arm(name), read_poses(poses)
     start = None if near is None else joint_values(arm, near, "--near")
     deviation = (0.1 if deviation_mm is None else deviation_mm) * 1e-3

@@ -42,9 +42,12 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.arm.load import load_arm
     from armwright.calibration.measurements import read_measurements
     from armwright.calibration.planning import plan_poses as planned
+    from armwright.cli.results import warn_of_stray
     from armwright.files.output import write_file
 
     model = with_tool(load_arm(arm), tool_mm)
+    if after is not None:
+        warn_of_stray(after)
     measured = None if after is None else read_measurements(after, model, units=units_of(units)).q
     plan = planned(model, count, index=index, seed=seed, turns=turns, measured=measured)  # type: ignore[arg-type]
     if output is not None:

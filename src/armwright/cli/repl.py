@@ -34,7 +34,8 @@ def repl(
 
     An expression shows its value, :frames the frame tree, :undo goes back, :save writes the session as a program,
     :help tells the rest. Names and words are completed with the tab key. Without a terminal the lines of the
-    standard input are taken, and the exit status is 1 if anything went wrong.
+    standard input are taken, and the exit status is the highest of what went wrong: 1 for a statement with errors,
+    3 for one that could not be done, 4 for a file.
 
     **Example:** `armwright repl --cell examples/stanford_cell.toml`
     """
@@ -54,8 +55,8 @@ def repl(
         talk.answer(commands.load_file(program))
     if not watched:
         _converse(session, commands, Script(), talk)
-        if talk.wrong:
-            raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
+        if talk.status:
+            raise typer.Exit(talk.status)
         return
     _greet(session)
     with _interruptible(), editing(session, COMMANDS):
@@ -133,13 +134,13 @@ class _Talk:
     """Shows people what came of their inputs.
 
     Attributes:
-        wrong: whether anything went wrong so far.
+        status: the highest of all that went wrong so far.
     """
 
     def __init__(self) -> None:
         from armwright.cli.terminal import console
 
-        self.wrong = False
+        self.status = ExitStatus.DONE
         self._console = console(highlight=False, soft_wrap=True)
 
     def answer(self, answer: "Answer") -> None:
@@ -147,7 +148,7 @@ class _Talk:
         from armwright.cli.programs import print_diagnostics
         from armwright.program.interactive.taken_back import SILENT
 
-        self.wrong = self.wrong or answer.is_wrong
+        self.status = max(self.status, answer.status)
         for effect in answer.effects:
             if effect.kind == "PRINT":
                 self._console.print(effect.data["printed"])
@@ -163,7 +164,7 @@ class _Talk:
         try:
             reply = commands.run(line)
         except ArmwrightError as error:
-            self.wrong = True
+            self.status = max(self.status, error.exit_status)
             self._console.print(f"error: {error}", style="bold red")
             return
         for text in reply.lines:
@@ -185,7 +186,7 @@ class _Json(_Talk):
 
     def answer(self, answer: "Answer") -> None:
         """Give an answer as plain data."""
-        self.wrong = self.wrong or answer.is_wrong
+        self.status = max(self.status, answer.status)
         self._give(_as_data(answer))
 
     def command(self, commands: "Commands", line: str) -> None:
@@ -194,12 +195,13 @@ class _Json(_Talk):
         try:
             reply = commands.run(line)
         except ArmwrightError as error:
-            self.wrong = True
-            self._give({**data, "ok": False, "error": str(error)})
+            self.status = max(self.status, error.exit_status)
+            self._give({**data, "ok": False, "exit_status": error.exit_status, "error": str(error)})
             return
         entered = {} if reply.answer is None else _as_data(reply.answer)
-        self.wrong = self.wrong or not entered.get("ok", True)
-        self._give({**data, "ok": True, "lines": list(reply.lines), **entered})
+        if reply.answer is not None:
+            self.status = max(self.status, reply.answer.status)
+        self._give({**data, "ok": True, "exit_status": ExitStatus.DONE, "lines": list(reply.lines), **entered})
 
     def _give(self, data: dict[str, Any]) -> None:
         print(json.dumps({**data, "time": self._session.state.machine.now}, ensure_ascii=False))
@@ -210,6 +212,7 @@ def _as_data(answer: "Answer") -> dict[str, Any]:
 
     return {
         "ok": not answer.is_wrong,
+        "exit_status": answer.status,
         "printed": list(answer.printed),
         "effects": [
             {"t0": one.t0, "t1": one.t1, "kind": one.kind, "arm": one.arm, "text": one.text, **one.data}

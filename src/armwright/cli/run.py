@@ -81,10 +81,12 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
+    from armwright.cli.results import warn_of_stray
     from armwright.errors import FileFormatError
     from armwright.program.running.interpret import Limits, RunError
     from armwright.report.files import Origin
 
+    warn_of_stray(program)
     given = given_cell(cell)
     code, place, said, imports = _translated(program, given, strict=strict, std=std, as_json=as_json)
     place = _adjusted(place, servo_ms, deviation_mm, around)

@@ -136,7 +136,7 @@ def test_an_error(client: Client, written: Any) -> None:
     said = client.wait("output")
     assert said["category"] == "stderr"
     assert said["output"].startswith("error[E240]: 1 cannot be divided by 0")
-    assert client.wait("exited")["exitCode"] == 1
+    assert client.wait("exited")["exitCode"] == 3
 
 
 def test_errors_are_not_stopped_at_when_nobody_asks(client: Client, written: Any) -> None:
@@ -147,7 +147,7 @@ def test_errors_are_not_stopped_at_when_nobody_asks(client: Client, written: Any
     client.ask("launch", program=str(program), cell=str(CORPUS / "cell1.json"))
     client.ask("configurationDone")
 
-    assert client.wait("exited")["exitCode"] == 1
+    assert client.wait("exited")["exitCode"] == 3
 
 
 def test_a_program_with_errors(client: Client, written: Any) -> None:
@@ -207,7 +207,7 @@ def test_terminate_and_restart(client: Client, written: Any) -> None:
     assert (client.line(), client.value("n")) == (4, "2")
     client.ask("terminate")
 
-    assert client.wait("exited")["exitCode"] == 1
+    assert client.wait("exited")["exitCode"] == 130
     client.wait("terminated")
 
 

@@ -355,7 +355,7 @@ def test_watched_frame_on_an_arm() -> None:
     assert line(debugger) == 14
     motion = debugger.machine.program.motion
     assert motion is not None
-    assert 1 <= debugger.view.ticks - motion.begun < 20
+    assert 1 <= debugger.view.ticks - motion.begun.tick < 20
     assert debugger.run("continue").reason == "end"
 
 

@@ -18,6 +18,7 @@ from armwright.program.editing.places import UTF_16, Ruler, columns
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic
 from armwright.program.messages.rendering import render
+from armwright.program.running.machine import RunError
 from armwright.program.running.recording import Recording
 from armwright.program.text.source import Span
 from armwright.program.text.words import Standard
@@ -76,14 +77,15 @@ class LoadError(ArmwrightError, ValueError):
 
     Attributes:
         page: all that is wrong with it, with the lines.
+        status: with which a command ends.
     """
 
     exit_status = ExitStatus.PROGRAM_ERRORS
 
-    def __init__(self, message: str, page: str) -> None:
-        """Keep both texts."""
+    def __init__(self, message: str, page: str, status: ExitStatus = ExitStatus.PROGRAM_ERRORS) -> None:
+        """Keep both texts, and with which status a command ends: that of errors in the program, unless said."""
         super().__init__(message)
-        self.page = page
+        self.page, self.status = page, status
 
 
 Load = Callable[[Launch], Loaded]
@@ -234,6 +236,7 @@ class EditorSession:
             return
         self.ended = True
         assert self.loaded is not None  # noqa: S101 - it has run
+        status = ExitStatus.DONE if stop.reason == "end" else RunError.exit_status
         if stop.diagnostic is not None:
             self.say(render([stop.diagnostic], self.loaded.code.source), "stderr")
         elif self.launch is not None and self.launch.output is not None:
@@ -241,7 +244,8 @@ class EditorSession:
                 self.say(self._save(self.launch, self.loaded, self.live.recording()) + "\n", "console")
             except ArmwrightError as error:
                 self.say(f"{error}\n", "stderr")
-        self.send("exited", {"exitCode": 0 if stop.reason == "end" else 1})
+                status = error.exit_status
+        self.send("exited", {"exitCode": int(status)})
         self.send("terminated", {})
 
     def give_up(self) -> None:
@@ -250,7 +254,7 @@ class EditorSession:
             if self.debugger.running:
                 self.debugger.pause()
             self.ended = True
-            self.send("exited", {"exitCode": 1})
+            self.send("exited", {"exitCode": int(ExitStatus.INTERRUPTED)})
             self.send("terminated", {})
 
     # ---- what is told ----------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 import attrs
 
 from armwright.cell.model import Cell
+from armwright.errors import ExitStatus
 from armwright.program.following import flow
 from armwright.program.following.flow import Flow
 from armwright.program.interactive.entering import Entry, moved, read
@@ -78,6 +79,7 @@ class Answer:
         source: the text that they are about.
         remarks: what else is to be known, such as what an error took back.
         refused: whether there was nothing wrong with it but that the program has come to a HALT.
+        failed: whether it was begun and could not go on.
     """
 
     complete: bool = True
@@ -86,11 +88,19 @@ class Answer:
     source: Source
     remarks: tuple[str, ...] = ()
     refused: bool = False
+    failed: bool = False
 
     @property
     def is_wrong(self) -> bool:
         """Whether something in it could not be done."""
         return self.refused or any(one.is_error for one in self.diagnostics)
+
+    @property
+    def status(self) -> ExitStatus:
+        """How a command ends with which nothing else was done."""
+        if self.refused or self.failed:
+            return ExitStatus.INFEASIBLE
+        return ExitStatus.PROGRAM_ERRORS if self.is_wrong else ExitStatus.DONE
 
     @property
     def printed(self) -> tuple[str, ...]:
@@ -327,7 +337,7 @@ class Session:
         effects: list[Effect] = []
         found: list[Diagnostic] = []
         remarks: list[str] = []
-        refused = False
+        refused = failed = False
         for number, statement in enumerate(entry.statements):
             before, shown = self.state, statement.span.start in entry.shown
             if before.machine.over and not shown:
@@ -340,6 +350,7 @@ class Session:
                 go_through(machine)
             except RunError as error:
                 found.append(error.diagnostic)
+                failed = True
                 remarks += [*taken_back(before.machine, machine), *_left(len(entry.statements) - number - 1)]
                 break
             effects += machine.effects[len(before.machine.effects) :]
@@ -348,7 +359,12 @@ class Session:
                 text = " ".join(source.slice(statement.span).split())
                 self._go_on(checked.state(machine, (*before.statements, statement), text))
         return Answer(
-            source=source, effects=tuple(effects), diagnostics=tuple(found), remarks=tuple(remarks), refused=refused
+            source=source,
+            effects=tuple(effects),
+            diagnostics=tuple(found),
+            remarks=tuple(remarks),
+            refused=refused,
+            failed=failed,
         )
 
     def _declare(self, checked: _Checked) -> None:
