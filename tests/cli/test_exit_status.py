@@ -179,7 +179,7 @@ def test_a_debugger_without_a_cell_is_called_wrongly(tmp_path: Path) -> None:
 
 def test_changed_results_are_told(tmp_path: Path) -> None:
     """Whoever reads a file of results that was changed since it was written is told so."""
-    from armwright.files.output import write_folder  # noqa: PLC0415 - one test
+    from armwright.files.output import write_folder
 
     contents = {"points.csv": "a,b\n1,2\n", "told.json": "{}", "p.rlo": "BEGIN x = END.", "poses.toml": "x = 1"}
     write_folder(tmp_path / "out", contents, {"command": "armwright"})
