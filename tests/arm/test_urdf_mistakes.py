@@ -244,3 +244,12 @@ def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     ):
         load_arm(tmp_path / "arm.urdf")
     assert issubclass(MissingExtraError, ImportError)
+
+
+def test_a_xacro_file_is_no_arm_file(tmp_path: Path) -> None:
+    """A file of xacro is not read as TOML: the message says how it becomes URDF."""
+    path = tmp_path / "arm.urdf.xacro"
+    path.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:include filename="a"/></robot>')
+
+    with pytest.raises(FileFormatError, match="xacro is expanded before it is URDF"):
+        load_arm(path)

@@ -18,6 +18,10 @@ from armwright.files.limits import beyond, limit
 _CATALOGUE = Path(__file__).parent / "catalogue"
 
 
+# Files of the robot description format; one of xacro is told apart there, with what to do.
+_URDF = (".urdf", ".xacro")
+
+
 def arm_names() -> tuple[str, ...]:
     """Return the names of the catalogue, sorted."""
     return tuple(sorted(path.stem for path in _CATALOGUE.glob("*.toml")))
@@ -38,7 +42,7 @@ def load_arm(name: str | Path) -> Arm:
     if not isinstance(name, str | Path):
         raise KindError(f"name: expected the name of an arm or the path of a file, got {shown(name)}")
     if is_path(name):
-        return load_urdf(name) if Path(name).suffix.lower() == ".urdf" else read_arm(name)
+        return load_urdf(name) if Path(name).suffix.lower() in _URDF else read_arm(name)
     if name not in arm_names():
         raise UnknownNameError("arm", str(name), arm_names())
     return read_arm(_CATALOGUE / f"{name}.toml")
@@ -46,7 +50,7 @@ def load_arm(name: str | Path) -> Arm:
 
 def is_path(name: str | Path) -> bool:
     """Whether a name means a file and not an arm of the catalogue."""
-    return isinstance(name, Path) or "/" in name or name.lower().endswith((".toml", ".json", ".urdf"))
+    return isinstance(name, Path) or "/" in name or name.lower().endswith((".toml", ".json", *_URDF))
 
 
 def read_arm(path: Path | str) -> Arm:
