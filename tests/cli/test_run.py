@@ -159,12 +159,13 @@ def test_frames_file(stacked: Path) -> None:
 
 
 def test_run_file(stacked: Path) -> None:
-    """What made the run can be found again: inputs by hash, versions, options, seed, command."""
+    """What made the run can be found again: inputs by hash, versions, options, command."""
     run = json.loads((stacked / "run.json").read_text())
 
     assert run["inputs"]["program"]["sha256"] == hashlib.sha256(STACKING.read_bytes()).hexdigest()
     assert run["inputs"]["cell"]["sha256"] == hashlib.sha256(STANFORD.read_bytes()).hexdigest()
-    assert run["options"] == {"servo_ms": 1.0, "deviation_mm": 1.0, "around": "none", "std": "2", "strict": False}
+    options = {"servo_ms": 1.0, "deviation_mm": 1.0, "corner_mm": 20.0, "around": "none", "std": "2", "strict": False}
+    assert run["options"] == options
     assert (run["ended"], run["exit_status"], run["left_out"]) == ("finished", 0, [])
     assert run["command"].startswith("armwright run ")
     assert [stage["kind"] for stage in run["stages"]] == ["PTP"] * 3
