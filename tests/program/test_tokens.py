@@ -187,3 +187,11 @@ def test_word_in_place() -> None:
     text = "VAR größe, ＡＢ : FRAME"
 
     assert [text[token.start : token.end] for token in tokens_of(text)] == ["VAR", "größe", ",", "ＡＢ", ":", "FRAME"]
+
+
+def test_many_strange_characters() -> None:
+    """A million control characters are one mistake, and take as long as they are many, not the square of it."""
+    found = scanned("\x01" * 1_000_000 + "\nPAUSE 1").found
+
+    assert [diagnostic.code for diagnostic in found] == ["E101"]
+    assert found[0].notes == ("it stands in 1000000 places",)

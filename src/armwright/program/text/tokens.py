@@ -304,10 +304,15 @@ class _Scanner:
     def _hush(self) -> None:
         """Take what stands behind such a character, in its line, for something that has been told of."""
         starts = [token.start for token in self._tokens] if self._strays else []
+        line_starts: dict[int, int] = {}
         for character, spans in self._strays.items():
             for span in spans if ord(character) not in LOOK_ALIKES else ():
-                token = self._tokens[bisect_left(starts, span.end)]
-                token.damaged |= "\n" not in self._written[span.end : token.start]
+                behind = bisect_left(starts, span.end)
+                token = self._tokens[behind]
+                # Looked for once for each token, however many such characters stand before it.
+                if behind not in line_starts:
+                    line_starts[behind] = self._written.rfind("\n", 0, token.start) + 1
+                token.damaged |= line_starts[behind] <= span.end
 
     def _look_alikes(self, start: int, end: int) -> None:
         if self._written[start:end] == self._text[start:end]:
