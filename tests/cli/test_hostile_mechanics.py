@@ -115,7 +115,7 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
         (
             ("simulate", "puma560", "-q", "0,0,400,0,0,0"),
             2,
-            "joint 3 starts at 400 deg, outside its stops at -135 and 135 deg",
+            "joint 3 starts at 400 deg, outside its stops at -45 and 225 deg",
         ),
         (("simulate", "ur5", "-q", Q, "--method", "euler"), 2, "'euler' is not one of"),
     ],

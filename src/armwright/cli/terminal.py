@@ -52,10 +52,36 @@ class CleanStream(io.TextIOWrapper):
         return _Verbatim(self)
 
 
+class CleanProxy:
+    """Another's stream that takes the place of the output, as one that captures it does: cleaned, and left whole."""
+
+    def __init__(self, stream: Any) -> None:
+        """Clean what is written to a stream."""
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write a text, cleaned."""
+        self._stream.write(cleaned(text))
+        return len(text)
+
+    def verbatim(self, text: str) -> int:
+        """Write a text as it is."""
+        self._stream.write(text)
+        return len(text)
+
+    @property
+    def rich_proxied_file(self) -> "_Verbatim":
+        """Where Rich writes, which adds colours to what ``console`` has cleaned."""
+        return _Verbatim(self)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
 class _Verbatim:
     """A clean stream as Rich sees it."""
 
-    def __init__(self, stream: CleanStream) -> None:
+    def __init__(self, stream: CleanStream | CleanProxy) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
@@ -71,8 +97,10 @@ def clean_output() -> None:
 
 
 def _clean(stream: Any) -> Any:
-    if not isinstance(stream, io.TextIOWrapper) or isinstance(stream, CleanStream):
+    if stream is None or isinstance(stream, CleanStream | CleanProxy):
         return stream
+    if stream not in (sys.__stdout__, sys.__stderr__) or not isinstance(stream, io.TextIOWrapper):
+        return CleanProxy(stream)
     encoding, by_lines, at_once = stream.encoding, stream.line_buffering, stream.write_through
     # A terminal that knows no degree sign gets an escape, not a traceback.
     return CleanStream(
@@ -82,7 +110,7 @@ def _clean(stream: Any) -> Any:
 
 def print_verbatim(text: str) -> None:
     """Print a text for another program to read, such as a formatted one; where a person watches it is cleaned."""
-    if isinstance(sys.stdout, CleanStream) and not sys.stdout.isatty():
+    if isinstance(sys.stdout, CleanStream | CleanProxy) and not sys.stdout.isatty():
         sys.stdout.verbatim(text)
     else:
         print(cleaned(text) if sys.stdout.isatty() else text, end="")
