@@ -18,7 +18,7 @@ from armwright.kinematics.jacobian import jacobian_rate, tool_twist
 from armwright.kinematics.manipulability import manipulability
 from armwright.kinematics.singularities import singularity_factors
 
-PUMA = armwright.load_arm("puma560")
+PUMA = armwright.load_arm("puma560-seed")
 Q = (0.1, 0.6, 0.2, 0.3, 0.9, 0.1)
 OTHER = (0.2, 0.5, 0.3, 0.2, 0.8, 0.2)
 REST = (0.0,) * 6

@@ -105,7 +105,7 @@ def test_as_many_as_asked_for() -> None:
 
 def test_enough_to_calibrate() -> None:
     """The fewest poses that are proposed are enough for a calibration; one less is refused."""
-    arm, rng = load_arm("puma560"), np.random.default_rng(4)
+    arm, rng = load_arm("puma560-seed"), np.random.default_rng(4)
     chain = chain_of(arm)
     with pytest.raises(InvalidValueError, match="expected 8 poses or more, got 7"):
         plan_poses(arm, 7)

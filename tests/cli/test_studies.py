@@ -57,7 +57,7 @@ def test_unknown_study() -> None:
     """A misspelt study gets the nearest name."""
     done = armwright("study", "stanford-torqe")
 
-    assert (done.returncode, "Did you mean 'stanford-torque'?" in done.stderr) == (1, True)
+    assert (done.returncode, "Did you mean 'stanford-torque'?" in done.stderr) == (2, True)
 
 
 def test_singular_wrist() -> None:
@@ -97,7 +97,7 @@ def test_holding_its_weight() -> None:
 
 def test_starting_outside_the_stops() -> None:
     """A start beyond a stop is refused with the joint."""
-    done = armwright("simulate", "puma560", "-q", "0,0,170,0,0,0")
+    done = armwright("simulate", "puma560-seed", "-q", "0,0,170,0,0,0")
 
     assert done.returncode == 2
     assert "Traceback" not in done.stderr

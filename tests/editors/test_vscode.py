@@ -190,7 +190,7 @@ def test_folding_words(opening: str, closing: str) -> None:
 
 
 def test_manifest() -> None:
-    """The manifest names files that are there, one language, and a launch by program, cell, stopOnEntry and output."""
+    """The manifest names files that are there, one language, and a launch by what a program needs."""
     gives = MANIFEST["contributes"]
     (language,), (grammar,), (debugger,) = gives["languages"], gives["grammars"], gives["debuggers"]
 
@@ -199,7 +199,7 @@ def test_manifest() -> None:
     assert (EXTENSION / grammar["path"]).is_file()
     assert (grammar["language"], grammar["scopeName"]) == ("rlo", GRAMMAR["scopeName"])
     launch = debugger["configurationAttributes"]["launch"]["properties"]
-    assert list(launch) == ["program", "cell", "stopOnEntry", "output"]
+    assert list(launch) == ["program", "cell", "std", "strict", "stopOnEntry", "output"]
     assert all(
         set(configuration) - {"type", "request", "name"} <= set(launch)
         for configuration in debugger["initialConfigurations"]

@@ -15,6 +15,7 @@ from armwright.dynamics.compiled import CompiledArm, compile_arm
 from armwright.errors import InvalidValueError, KindError, RotationWarning, ShapeError, UnknownNameError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse
+from armwright.motion import detour
 from armwright.motion.blends import blended
 from armwright.motion.continuity import continuity
 from armwright.motion.follow import PathError
@@ -244,8 +245,11 @@ def test_stops_and_ways_round(puma: CompiledArm, by: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::armwright.errors.RotationWarning")
-def test_no_way_round(puma: CompiledArm) -> None:
-    """Where there is no way round either, both poses of the way are named with what stops it."""
+def test_no_way_round(puma: CompiledArm, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no way round is found either, both poses of the way are named with what stops it."""
+    # Poses beside the line alone do not help from B to C.
+    monkeypatch.setattr(detour, "_ON_THE_WAY", ())
+    monkeypatch.setattr(detour, "_SCATTER", ())
     with pytest.raises(PathError, match=r"^from pose 2 to pose 3: on the line near \(.*\) mm from the base joint 4"):
         stopping_move(puma, SEED_POSES)
 

@@ -166,6 +166,7 @@ class Commands:
         from armwright.cell.simulator import Simulator
         from armwright.cli.programs import imported_files, in_its_cell
         from armwright.files.output import write_folder
+        from armwright.files.reading import read_program
         from armwright.program.running.interpret import interpret, warnings
         from armwright.report.files import Origin, result_files, run_record
 
@@ -186,7 +187,7 @@ class Commands:
             options={"std": session.std.value},
         )
         made = (recording, compiled.code, diagnostics, origin)
-        text = program.read_text(encoding="utf-8")
+        text = read_program(program)
         write_folder(folder, {_PROGRAM: text, **result_files(*made)}, run_record(*made))
         return Reply(lines=(f"report: {folder / 'report.html'}",))
 

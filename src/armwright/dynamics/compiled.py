@@ -45,7 +45,7 @@ class CompiledArm:
     They are called like the plain functions of the same names, without the arm, and give the same numbers but for
     rounding. A configuration has the same bits alone, in any batch and on any number of threads. Each takes
     ``threads=``, how many cores to use (all, when left out), and ``out=``, arrays to fill: see ``Kernel.function``.
-    Positions that look like degrees get the same warning; no number may be beyond 1e12.
+    Positions that look like degrees get the same warning; no angle may be beyond 1e12, no other number beyond 1e100.
 
     Attributes:
         arm: the arm, with n joints.

@@ -25,6 +25,7 @@ from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.plant import Moment, Phase, Plant, Start
 from armwright.dynamics.simulation import Brake, Event, JointState, Simulation, Status
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.tracing.assignments import LARGEST_ANGLE
 
 # So many events within so short a time [s] are an entanglement.
 _ENTANGLED = 50
@@ -33,8 +34,8 @@ _INSTANT = 1e-9
 _CRUMB = 1e-9
 # More moments than this are no result that anybody looks at, and fill the memory.
 _MOMENTS = 10**7
-# No position or speed of a robot is as large; squares of such numbers are still numbers.
-_LOST = 1e50
+# No position or speed of a robot is as large; of larger angles no sine means anything.
+_LOST = LARGEST_ANGLE
 
 
 def simulate(
@@ -237,7 +238,7 @@ class _Run:
         plant, n = self._plant, self._plant.arm.n
 
         def slope(t: float, y: Array) -> Array:
-            if not np.isfinite(y).all():
+            if not np.isfinite(y).all() or np.abs(y[: 2 * n]).max() > _LOST:
                 return np.full_like(y, np.nan)
             q, qd = y[:n], y[n : 2 * n]
             moment = plant.moment(t, q, qd, phase)

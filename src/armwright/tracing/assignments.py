@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from armwright.arrays import LARGEST
 from armwright.tracing.fuse import fused
 from armwright.tracing.graph import Graph, Node, reachable
 
@@ -23,8 +24,8 @@ _INFIX = {
     "select": "{1} if {0} else {2}",
 }
 
-# No input is larger: of the sine of a larger angle less than ten digits would be right.
-LARGEST = 1e12
+# No input whose sine is taken is larger: less than ten digits would be right.
+LARGEST_ANGLE = 1e12
 _NOT_FINITE = {"nan": "np.nan", "inf": "np.inf", "-inf": "-np.inf"}
 
 
@@ -32,21 +33,30 @@ class Watched(NamedTuple):
     """What tells whether a configuration can be trusted.
 
     Attributes:
-        inputs: nodes that must be finite and no larger than ``LARGEST``.
+        angles: inputs whose sine is taken, which must be finite and no larger than ``LARGEST_ANGLE``.
+        others: inputs that must be finite and no larger than ``LARGEST``.
         positive: nodes that must be above 0.
         bounds: by node, beyond what it is unusual.
     """
 
-    inputs: Sequence[int]
+    angles: Sequence[int]
+    others: Sequence[int]
     positive: Sequence[int]
     bounds: Mapping[int, float]
+
+    @property
+    def inputs(self) -> tuple[int, ...]:
+        """All inputs."""
+        return (*self.angles, *self.others)
 
     def lines(self, names: Mapping[int, str]) -> Iterator[str]:
         """Give the assignments of ``trust``: 0; not a number without meaning; above 0 where an input is unusual."""
         # One sum of squares tells of each of them: it is not a number, infinite or too large where one of them is.
-        yield "size = 0.0"
-        yield from (f"size = fma({names[i]}, {names[i]}, size)" for i in self.inputs)
-        yield f"trust = 0.0 if size <= {LARGEST**2!r} else np.nan"
+        yield "trust = 0.0"
+        for inputs, largest in ((self.angles, LARGEST_ANGLE), (self.others, LARGEST)):
+            yield "size = 0.0"
+            yield from (f"size = fma({names[i]}, {names[i]}, size)" for i in inputs)
+            yield f"trust = trust if size <= {largest**2!r} else np.nan"
         yield from (f"trust = trust if {names[i]} > 0.0 else np.nan" for i in self.positive)
         yield from (
             f"trust = trust if abs({names[i]}) <= {bound!r} else trust + 1.0" for i, bound in self.bounds.items()

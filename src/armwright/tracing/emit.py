@@ -20,7 +20,7 @@ import numpy as np
 from armwright.errors import InvalidValueError, shown
 from armwright.tracing import elementary
 from armwright.tracing.assignments import Code, Watched
-from armwright.tracing.graph import Graph, Traced, operation_count
+from armwright.tracing.graph import Graph, Traced, operation_count, reachable
 from armwright.tracing.scalar import Scalar
 
 # Configurations in a block. So few that the processor fetches the next block while it works on this one, and enough
@@ -111,15 +111,17 @@ class Emitted:
     """The source of a kernel and what it takes.
 
     Both functions fill the output arrays and return a status, 0 where all is well. ``MEANINGLESS`` is set in it where
-    some configuration came out without meaning: the shape of an input is wrong, an input is not finite or beyond
-    ``LARGEST``, or a condition of the equation is broken. ``UNUSUAL`` is set where an input is outside of the bounds
-    that were given to ``emit``; the outputs are right all the same.
+    some configuration came out without meaning: the shape of an input is wrong, an input is not finite or too large
+    (``LARGEST_ANGLE`` where its sine is taken, ``LARGEST`` elsewhere), or a condition of the equation is broken.
+    ``UNUSUAL`` is set where an input is outside of the bounds that were given to ``emit``; the outputs are right all
+    the same.
 
     Attributes:
         title: what it computes, in words.
         rows: source of ``rows(first, last, *inputs, *outputs)``, for arrays of (N, *shape).
         one: source of ``one(*inputs, *outputs)``, for arrays of (*shape).
         inputs: shape of one value of each input, by its name.
+        angles: the names of inputs that hold a number whose sine is taken.
         outputs: shape of one value of each output.
         flags: numbers of the outputs that are truth values.
         operations: how many of each kind, per configuration.
@@ -130,6 +132,7 @@ class Emitted:
     rows: str
     one: str
     inputs: dict[str, Shape]
+    angles: frozenset[str]
     outputs: tuple[Shape, ...]
     flags: tuple[int, ...]
     operations: dict[str, int]
@@ -176,7 +179,14 @@ def emit(
         for x, bound in zip(row, (bounds or {}).get(name, ()), strict=False)
         if math.isfinite(bound)
     }
-    watched = Watched([x.node for row in lists for x in row], [_node(graph, x) for x in positive], far)
+    turned = set(_turned(graph))
+    every = [x.node for row in lists for x in row]
+    watched = Watched(
+        angles=[node for node in every if node in turned],
+        others=[node for node in every if node not in turned],
+        positive=[_node(graph, x) for x in positive],
+        bounds=far,
+    )
     code = Code(graph, flat, watched)
     operations = operation_count(graph, flat)
     door = _Door(tuple(taken.values()), given, tuple(flags))
@@ -187,11 +197,19 @@ def emit(
         rows=top + helpers + _rows_source(code, door),
         one=top + helpers + _one_source(code, door),
         inputs=taken,
+        angles=frozenset(
+            name for name, row in zip(taken, lists, strict=True) if turned.intersection(x.node for x in row)
+        ),
         outputs=given,
         flags=tuple(flags),
         operations=operations,
         joined=len(code.joined),
     )
+
+
+def _turned(graph: Graph) -> list[int]:
+    """Return the nodes that the argument of a sine or cosine comes of."""
+    return reachable(graph, [node.operands[0] for node in graph.nodes if node.op in ("sin", "cos")])
 
 
 @attrs.frozen(kw_only=True)
@@ -223,7 +241,7 @@ def stretch(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: int) -
     graph = Graph()
     given = graph.inputs(inputs)
     outputs = [_node(graph, x) for x in equation(list(given))]
-    code = Code(graph, outputs, Watched([], [], {}))
+    code = Code(graph, outputs, Watched([], [], [], {}))
     operations = operation_count(graph, outputs)
     load = [f"x[{row} * {LANES} + k]" for row in range(inputs)]
     store = [f"y[{row} * {LANES} + k] = {{}}" for row in range(len(outputs))]

@@ -12,9 +12,9 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, cores, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.tracing.assignments import LARGEST
+from armwright.tracing.assignments import LARGEST_ANGLE
 from armwright.tracing.cache import compiled
 from armwright.tracing.emit import LANES, MEANINGLESS, UNUSUAL, Emitted, Shape
 
@@ -87,7 +87,8 @@ class Kernel:
         a tuple of them for several outputs. It returns an array (..., *shape), or a tuple of them. It raises
 
         - ShapeError: a last axis, or the leading axes do not fit, or ``out`` does not.
-        - InvalidValueError: a number is NaN, infinite or beyond 1e12, or there are fewer than one ``threads``.
+        - InvalidValueError: a number is NaN, infinite or beyond 1e100, an angle is beyond 1e12, or there are fewer than
+          one ``threads``.
         - another ArmwrightError: a condition of the equation does not hold.
 
         Args:
@@ -159,7 +160,7 @@ class Kernel:
         status = self._run(arrays, lead, results, threads)
         if status & MEANINGLESS:
             for name, array in zip(self.emitted.inputs, arrays, strict=True):
-                floats(array, name, LARGEST)
+                floats(array, name, LARGEST_ANGLE if name in self.emitted.angles else LARGEST)
             # Many inputs just below what is allowed are suspected without reason.
             if self.explain is not None:
                 self.explain(*arrays)
