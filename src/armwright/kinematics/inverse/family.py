@@ -39,14 +39,9 @@ def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Arr
         return q
     start = near[joint - 1]
 
-    def at(places: Array) -> Array:
-        starts = np.tile(near, (len(places), 1))
-        starts[:, joint - 1] = places
-        return members(starts)
-
     places, width = np.linspace(lower, upper, _TRIED), (upper - lower) / (_TRIED - 1)
     for _ in range(_CLOSER):
-        rows = at(places)
+        rows = members(_placed(near, joint, places))
         excess = _excess(arm, rows)
         inside = np.flatnonzero(excess < _INSIDE)
         if inside.size:
@@ -79,20 +74,23 @@ def turned_inside(
     if lower > upper:
         return q
     start, limits = near[joint - 1], arm.joints[other - 1].limits
-    starts = np.tile(near, (2, 1))
-    starts[1, joint - 1] += _PROBE
-    here, probed = members(starts)[:, other - 1]
+    here, probed = members(_placed(near, joint, start + np.array((0.0, _PROBE))))[:, other - 1]
     way = 1.0 if abs(np.remainder(probed - here + np.pi, _TURN) - np.pi - _PROBE) < _PROBE else -1.0
     images = _TURN * np.arange(-2, 3)
     reached = [way * (limit - here + images) for limit in (limits.lower, limits.upper) if np.isfinite(limit)]
     turns = np.concatenate([[0.0, lower - start, upper - start], *reached])
     turns = turns[(turns >= lower - start) & (turns <= upper - start)]
     turns = turns[np.abs(turns).argsort(kind="stable")]
-    starts = np.tile(near, (len(turns), 1))
-    starts[:, joint - 1] += turns
-    rows = members(starts)
+    rows = members(_placed(near, joint, start + turns))
     inside = np.flatnonzero(_excess(arm, rows) < _INSIDE)
     return nearest_image(arm, rows[inside[0]], near) if inside.size else q
+
+
+def _placed(near: Array, joint: int, values: Array) -> Array:
+    """Return where the arm is (k, n), with one joint, from 1, at other values (k,)."""
+    rows = np.tile(near, (len(values), 1))
+    rows[:, joint - 1] = values
+    return rows
 
 
 def _room(arm: Arm, near: Array, joint: int) -> tuple[float, float]:
