@@ -114,13 +114,13 @@ def deviation_of(
     """
     qd, qdd = cubic_peaks(spline.joints, spline.lengths)
     hand = hand_bounds(arm, spline.joints, spline.lengths, qd, qdd)
-    spin = _spin_off(ways, spline, hand)
+    sd, sdd = (peaks[:, 0] for peaks in cubic_peaks(spline.progress[..., None], spline.lengths))
+    angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
+    spin = _spin_of(hand, angle * sdd, angle * sd)
     size = np.sqrt(np.einsum("mi,mi->m", ways.shift, ways.shift))
     placed = by_position and bool(size[0] > allowed)
-    angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
     # As an estimate the hand moves along the line as was planned; the bound below does without.
-    rate = cubic_peaks(spline.progress[..., None], spline.lengths)[0][:, 0]
-    most = np.maximum(spin, _spin_of(hand, angle * hand.pull / size, angle * rate)) if placed else spin
+    most = np.maximum(spin, _spin_of(hand, angle * hand.pull / size, angle * sd)) if placed else spin
     wanted = np.sqrt(np.maximum(hand.pull / allowed, 2 * most / allowed_turn) / (8 * _ADDED)) * spline.lengths
     looks = int(min(max(math.ceil(wanted.max()), _LOOKS[0]), _LOOKS[1]))
     part = np.linspace(0.0, 1.0, looks + 1)
@@ -204,13 +204,6 @@ def half_sines(R_A: Array, R_B: Array) -> Array:
     w = np.sqrt(np.maximum(1 + Q[..., 0, 0] + Q[..., 1, 1] + Q[..., 2, 2], 1e-12)) / 2
     a, b, c = Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]
     return np.asarray(np.sqrt(a * a + b * b + c * c) / (4 * w))
-
-
-def _spin_off(ways: Ways, spline: Spline, hand: "HandBounds") -> Array:
-    """Return an upper bound (m,) of the acceleration of the hand's turn off the orientation of its progress."""
-    sd, sdd = cubic_peaks(spline.progress[..., None], spline.lengths)
-    angle = np.sqrt(np.einsum("mi,mi->m", ways.turn, ways.turn))
-    return _spin_of(hand, angle * sdd[:, 0], angle * sd[:, 0])
 
 
 def _spin_of(hand: "HandBounds", change: Array, rate: Array) -> Array:
