@@ -40,11 +40,11 @@ test: $(VENV)/test   ## Run lint, types, the import contracts and all tests
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -n auto
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadfile
 
 proof: $(VENV)/test  ## Run every random sample at its full size and write docs/proof.md (hours; ONLY=tests/motion)
 	rm -rf out/proof
-	ARMWRIGHT_PROOF=$(CURDIR)/out/proof $(BIN)/python -m pytest -n auto -m proof --timeout 0 $(ONLY); status=$$?; \
+	OPENBLAS_NUM_THREADS=1 ARMWRIGHT_PROOF=$(CURDIR)/out/proof $(BIN)/python -m pytest -n auto -m proof --timeout 0 $(ONLY); status=$$?; \
 	    $(BIN)/python docs/make_proof.py out/proof && exit $$status
 
 examples: $(VENV)/core   ## Run every example into out/

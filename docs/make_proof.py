@@ -8,7 +8,8 @@ _PAGE = Path(__file__).parent / "proof.md"
 _HEAD = """# Random samples at full size
 
 `make proof` runs every random sample of the tests at its full size and writes this page. `make test` draws a tenth of
-each anew in every run. A row is repeated with `ARMWRIGHT_SEED` set to its seed and `ARMWRIGHT_PROOF=out/proof`.
+each, or less where that takes minutes, anew in every run. A row is repeated with `ARMWRIGHT_SEED` set to its seed and
+`ARMWRIGHT_PROOF=out/proof`.
 
 | what was tried | count | failures | figures | seed | test |
 |---|---:|---:|---|---:|---|
@@ -21,8 +22,9 @@ def table(folder: Path) -> dict[str, str]:
     rows = {}
     for file in sorted(folder.glob("*.json")):
         for row in json.loads(file.read_text()):
+            told = {name.replace("_", " "): value for name, value in row.items() if name not in _FIXED}
             figures = "; ".join(
-                f"{name.replace('_', ' ')} {value}" for name, value in row.items() if name not in _FIXED
+                f"{name} {value:.6g}" if isinstance(value, float) else f"{name} {value}" for name, value in told.items()
             )
             cells = (row["what"], f"{row['count']:,}", row["failures"], figures, row["seed"], f"`{row['test']}`")
             rows[f"{row['test']} {row['what']}"] = f"| {' | '.join(map(str, cells))} |"

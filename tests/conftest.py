@@ -26,7 +26,8 @@ def rng() -> np.random.Generator:
 @pytest.fixture
 def sample(request: pytest.FixtureRequest) -> Iterator[Sample]:
     """Random cases, drawn anew in every run; a failure says how to repeat them."""
-    mine = drawn(request.node.nodeid)
+    share = request.node.get_closest_marker("share")
+    mine = drawn(request.node.nodeid, *(share.args if share else ()))
     yield mine
     if folder := os.environ.get("ARMWRIGHT_PROOF"):
         mine.keep(Path(folder))

@@ -9,8 +9,8 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-# What `make test` draws of a sample that `make proof` runs whole.
-_SHARE = 0.1
+# What `make test` draws of a sample that `make proof` runs whole; `@pytest.mark.share(0.01)` names another part.
+SHARE = 0.1
 
 
 @attrs.define
@@ -21,6 +21,7 @@ class Sample:
         test: the test's id, as pytest writes it.
         seed: of all cases; ``ARMWRIGHT_SEED`` repeats one.
         whole: whether the full numbers are run.
+        share: what is drawn of them otherwise.
         case: the number of the case under way; -1 before the first.
         rows: what was counted, for the table of `make proof`.
     """
@@ -28,12 +29,13 @@ class Sample:
     test: str
     seed: int
     whole: bool
+    share: float = SHARE
     case: int = -1
     rows: list[dict[str, object]] = attrs.field(factory=list)
 
     def count(self, full: int) -> int:
-        """Return how many cases to draw of ``full``: all in `make proof`, a tenth otherwise, never none."""
-        return full if self.whole else max(1, round(full * _SHARE))
+        """Return how many cases to draw of ``full``: all in `make proof`, the test's share otherwise, never none."""
+        return full if self.whole else max(1, round(full * self.share))
 
     def cases(self, full: int, *, stream: int = 0) -> Iterator[np.random.Generator]:
         """Draw the cases of a sample of ``full``, each with random numbers of its own.
@@ -66,8 +68,8 @@ class Sample:
             (folder / f"{name}.json").write_text(json.dumps(self.rows, indent=1))
 
 
-def drawn(test: str) -> Sample:
+def drawn(test: str, share: float = SHARE) -> Sample:
     """Return the sample of a test: a new seed unless ``ARMWRIGHT_SEED`` gives one, whole in `make proof`."""
     seed = os.environ.get("ARMWRIGHT_SEED")
     number = secrets.randbelow(10**9) if seed is None else int(seed)
-    return Sample(test, number, bool(os.environ.get("ARMWRIGHT_PROOF")))
+    return Sample(test, number, bool(os.environ.get("ARMWRIGHT_PROOF")), share)

@@ -17,6 +17,8 @@ _LONGEST_NAME = 100
 _MOST_LISTED = 100
 # Of a value that is not what was expected, a message shows this many characters.
 _LONGEST_SHOWN = 60
+# Of a message so many characters are kept at its beginning, and so many at its end.
+_BEGINNING, _ENDING = 4000, 500
 
 
 class ExitStatus(enum.IntEnum):
@@ -44,6 +46,10 @@ class ArmwrightError(Exception):
 
     exit_status: ClassVar[ExitStatus] = ExitStatus.INFEASIBLE
 
+    def __str__(self) -> str:
+        """Return the text, without the middle of a name or value that is a page long."""
+        return shortened(super().__str__())
+
 
 class KindError(ArmwrightError, TypeError):
     """A value is of the wrong kind: a text where numbers belong, a name where an arm does."""
@@ -61,6 +67,18 @@ class InvalidValueError(ArmwrightError, ValueError):
     """A value is of the right kind but has no meaning here."""
 
     exit_status = ExitStatus.USAGE
+
+
+class TooFewError(InvalidValueError):
+    """Too little was measured: fewer cycles than a standard asks for, or too few readings for what is sought."""
+
+    exit_status = ExitStatus.INFEASIBLE
+
+
+class IncapableArmError(InvalidValueError):
+    """An arm cannot make a motion at any speed: its joints are too weak, or its file leaves open what they may do."""
+
+    exit_status = ExitStatus.INFEASIBLE
 
 
 class UnknownNameError(ArmwrightError, LookupError):
@@ -93,6 +111,10 @@ class FileFormatError(ArmwrightError, ValueError):
 
 class ContradictionError(ArmwrightError, ValueError):
     """What was measured contradicts the model: no values of its parameters explain the data."""
+
+
+class DoubtfulError(ContradictionError):
+    """All was done and told, and the data contradict the model all the same; the text says by what."""
 
 
 class CheckFailedError(ArmwrightError, ValueError):
@@ -152,6 +174,18 @@ def shown(value: object) -> str:
     """Write a value for a message: on one line, not too long."""
     text = " ".join(repr(value).split())
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+
+
+def counted(count: int, thing: str) -> str:
+    """Return how many there are of a thing, such as ``1 move`` and ``2 moves``."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+def shortened(text: str) -> str:
+    """Return a message without its middle where it is longer than anybody reads: it repeats what was given."""
+    if len(text) <= _BEGINNING + _ENDING:
+        return text
+    return f"{text[:_BEGINNING]} ... {text[-_ENDING:]}"
 
 
 def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:

@@ -1,5 +1,6 @@
 """Files of measurements, and what is made of them."""
 
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 from armwright.accuracy.assess import Assessment, assess
 from armwright.accuracy.measurements import AnyTest, PathTest, PoseTest, read_measurements
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
+from armwright.files.limits import raised
 
 Read = Callable[..., tuple[AnyTest, ...]]
 HEAD = "test,pose,cycle,x_mm,y_mm\n"
@@ -314,3 +316,32 @@ def test_examples() -> None:
     assert of["AT", "line"] == pytest.approx(np.hypot(0.17, 0) * 1e-3 / np.sqrt(2), abs=0.03e-3)
     assert 0 < of["CR", "square"] < 20e-3 / np.sqrt(2)
     assert not found.few
+
+
+LONG = {
+    "poses": f"{HEAD}pose,P1,commanded,400,0\n" + "".join(f"pose,P1,{i},400.{i},0.{i}\n" for i in range(1, 20_000)),
+    "runs": "test,path,cycle,t_s,x_mm,y_mm\n"
+    + "".join(f"path,L,{cycle},{i},{i},0.{i}\n" for cycle in ("commanded", 1, 2, 3) for i in range(5000)),
+}
+
+
+@pytest.mark.parametrize("kind", LONG)
+def test_memory_of_a_row(kind: str, read: Read) -> None:
+    """A row takes some hundred bytes, so that a million rows take less than 500 MB; as objects they took twice that."""
+    read(POSE)
+    tracemalloc.start()
+
+    read(LONG[kind])
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+
+    assert peak / 20_000 < 400
+
+
+def test_too_many_parts(read: Read) -> None:
+    """More poses and runs than a laboratory measures are refused with the limit; raised by name, they are read."""
+    rows = "".join(f"pose,P{i},commanded,{i},0\npose,P{i},1,{i},0\npose,P{i},2,{i},0.1\n" for i in range(6))
+
+    with raised(entries=5), pytest.raises(FileFormatError, match=r"csv:17: test: too many tests.*at most 5 entries"):
+        read(HEAD + rows)
+    assert len(read(HEAD + rows)) == 6

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from armwright.accuracy.corner import corner_deviations
-from armwright.accuracy.cycles import TooFewError
 from armwright.accuracy.measured import Trace
 from armwright.accuracy.path import path_deviation, path_velocity
 from armwright.accuracy.settling import posing_time, settling
 from armwright.accuracy.weaving import weaving_deviation
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from armwright.spatial.rotations import rotation_from_vector
 
 ROUNDING = 1e-12
@@ -261,7 +260,7 @@ REST = Trace(places=((0, 0), (1, 0), (1, 0)), times=(0, 1, 9))
 MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
     "few": (lambda: path_deviation(LINE, [RUN] * 9), TooFewError, "path: ISO 9283 asks for 10 cycles, got 9"),
     "few corners": (lambda: corner_deviations(BEND, [rounded(0.1)]), TooFewError, "asks for 3 cycles, got 1"),
-    "one": (lambda: path_deviation(LINE, [RUN], few=True), InvalidValueError, "needs 2 cycles at least"),
+    "one": (lambda: path_deviation(LINE, [RUN], few=True), TooFewError, "needs 2 cycles at least"),
     "no length": (
         lambda: path_deviation(Trace(places=((0, 0), (0, 0))), [RUN] * 10),
         InvalidValueError,

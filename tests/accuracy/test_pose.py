@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from armwright.accuracy.compliance import static_compliance
-from armwright.accuracy.cycles import TooFewError
 from armwright.accuracy.distance import distance_accuracy, distance_repeatability
 from armwright.accuracy.pose import pose_accuracy, pose_repeatability
 from armwright.accuracy.variation import exchangeability, multidirectional_variation, pose_drift
-from armwright.errors import InvalidValueError, KindError, ShapeError
+from armwright.errors import InvalidValueError, KindError, ShapeError, TooFewError
 from armwright.spatial.rotations import rotation_from_vector
 
 # Rounding of places of a metre.
@@ -193,13 +192,13 @@ def test_compliance() -> None:
 THIRTY = np.zeros((30, 2))
 MISTAKES: dict[str, tuple[Any, type[Exception], str]] = {
     "few": (lambda: pose_accuracy(THIRTY[:12], (0, 0)), TooFewError, "pose: ISO 9283 asks for 30 cycles, got 12"),
-    "one": (lambda: pose_repeatability(THIRTY[:1], few=True), InvalidValueError, "needs 2 cycles at least, got 1"),
+    "one": (lambda: pose_repeatability(THIRTY[:1], few=True), TooFewError, "needs 2 cycles at least, got 1"),
     "directions": (
         lambda: multidirectional_variation([THIRTY, THIRTY]),
         TooFewError,
         "asks for 3 directions of approach, got 2",
     ),
-    "robots": (lambda: exchangeability([THIRTY], few=True), InvalidValueError, "needs 2 robots at least, got 1"),
+    "robots": (lambda: exchangeability([THIRTY], few=True), TooFewError, "needs 2 robots at least, got 1"),
     "few of one robot": (
         lambda: exchangeability([THIRTY] * 4 + [THIRTY[:9]]),
         TooFewError,

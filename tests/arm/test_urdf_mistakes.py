@@ -33,6 +33,14 @@ def test_twins_are_told_apart_by_line(read: Callable[..., Arm]) -> None:
         read(robot(link("a"), link("a")))
 
 
+def test_a_word_of_a_million_digits(read: Callable[..., Arm]) -> None:
+    """What begins as a number for long and is none is refused at once, not tried with every digit given back."""
+    place = f'<origin xyz="{"1" * 1_000_000}x 0 0"/>'
+
+    with pytest.raises(FileFormatError, match=r"joint 'j', origin, xyz: expected a number, got '1111"):
+        read(robot(link("a"), link("b"), joint("j", "revolute", "a", "b", LIMIT + place)))
+
+
 FORK = (
     *(link(name) for name in ("base", "a", "b")),
     joint("ja", "continuous", "base", "a"),

@@ -108,3 +108,8 @@ def test_what_an_arm_file_cannot_hold() -> None:
         InvalidValueError, match="arm 'odd': joint 1 has the gear ratio -50; in an arm file it is above 0"
     ):
         toml_text(Arm(name="odd", joints=joints, motors=[Motor(gear_ratio=-50)]))
+
+
+def test_a_file_name_that_is_no_text(back: Callable[[Arm], Arm]) -> None:
+    """Bytes of a file name that are no UTF-8, which Python keeps as half characters, do not spoil the file."""
+    assert back(attrs.evolve(load_arm("puma560"), source="a\udcff.urdf")).source == "a\\udcff.urdf"

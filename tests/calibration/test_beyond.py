@@ -8,14 +8,15 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.calibration.bending import gears, largest_efforts, springs
-from armwright.calibration.beyond import calibrate_beyond
+from armwright.calibration.beyond import calibrate_beyond, judged
 from armwright.calibration.chain import Bend, chain_of
 from armwright.calibration.correcting import corrected_arm
 from armwright.calibration.fitting import calibrate_to
 from armwright.calibration.readings import Readings, readings
+from armwright.calibration.validation import dealt
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError
-from calibration.simulated import postures, random_errors
+from calibration.simulated import postures, random_arm, random_errors
 
 NOISE = 3e-5
 # What joints give under the largest effort of gravity, and half the swing of gears [rad].
@@ -41,9 +42,9 @@ def measured(
 
 def test_springs_are_found(puma: Arm, rng: np.random.Generator) -> None:
     """Joints that give under their load are told from geometry, and how much they give; gears that run true are not."""
-    seen, bent = measured(puma, rng, springs(puma), SAG)
+    seen, bent = measured(puma, rng, springs(puma), SAG, m=120)
 
-    found = calibrate_beyond(puma, seen)
+    found = calibrate_beyond(puma, seen, folds=3)
 
     kept = {one.name for one in found.tried if one.kept}
     assert kept == {"geometry", "joints that give under gravity"}
@@ -61,9 +62,9 @@ def test_springs_are_found(puma: Arm, rng: np.random.Generator) -> None:
 
 def test_gears_are_found(puma: Arm, rng: np.random.Generator) -> None:
     """Gears that run out of true once a turn are told, and springs that are not there are not."""
-    seen, _ = measured(puma, rng, gears(puma, 1), SWING)
+    seen, _ = measured(puma, rng, gears(puma, 1), SWING, m=120)
 
-    found = calibrate_beyond(puma, seen)
+    found = calibrate_beyond(puma, seen, folds=3)
 
     assert [one.name for one in found.tried if one.kept] == ["geometry", "gears, once a turn"]
     assert {"joint2.sin1", "joint3.cos1"} <= set(found.calibration.names)
@@ -72,12 +73,12 @@ def test_gears_are_found(puma: Arm, rng: np.random.Generator) -> None:
 
 def test_what_is_left_is_learnt(puma: Arm, rng: np.random.Generator) -> None:
     """What no model of ours has, such as a link that bends with the posture, is learnt as far as points tell it."""
-    seen, _ = measured(puma, rng, (), 0.0, m=300)
+    seen, _ = measured(puma, rng, (), 0.0, m=200)
     q = seen.q
     strange = 4e-4 * np.stack([np.sin(q[:, 1]) * np.cos(q[:, 2]), np.cos(q[:, 1] + q[:, 3]), np.sin(2 * q[:, 0])], 1)
     seen = attrs.evolve(seen, points=seen.points + strange)
 
-    found = calibrate_beyond(puma, seen)
+    found = calibrate_beyond(puma, seen, folds=3)
 
     first, last = found.tried[0].held_out, found.tried[-1]
     assert last.kept
@@ -96,6 +97,41 @@ def test_nothing_there(puma: Arm, rng: np.random.Generator) -> None:
     assert [one.name for one in found.tried if one.kept] == ["geometry"]
     assert found.learnt is None
     np.testing.assert_array_equal(found.predict(seen.q), found.calibration.predict(seen.q))
+
+
+def test_no_choice_has_seen_them(rng: np.random.Generator) -> None:
+    """Where readings are predicted, choice included, does not depend on what was measured in them."""
+    arm = random_arm(rng, 2)
+    seen, _ = measured(arm, rng, gears(arm, 1), SWING, m=21)
+    part = dealt(seen.q, 3, 0)[0]
+    other = attrs.evolve(seen, points=seen.points + 2e-3 * part[:, None] * rng.standard_normal(seen.points.shape))
+
+    first, second = (calibrate_beyond(arm, one, folds=3, unseen=True).unseen for one in (seen, other))
+
+    assert first is not None
+    assert second is not None
+    np.testing.assert_array_equal(first.places[part], second.places[part])
+    assert np.isfinite(first.distance).all()
+    assert second.distance[part].mean() > 2 * first.distance[part].mean()
+
+
+def test_two_parts_leave_no_choice(rng: np.random.Generator) -> None:
+    """With two parts there is nothing to choose by once one is left out: no figure is told."""
+    arm = random_arm(rng, 3)
+    seen, _ = measured(arm, rng, (), 0.0, m=30)
+
+    assert calibrate_beyond(arm, seen, folds=2, unseen=True).unseen is None
+
+
+def test_readings_of_one_posture_count_once(rng: np.random.Generator) -> None:
+    """An arm that is sent to a posture four times is off by the same each time: chance is no smaller for that."""
+    before, after = rng.normal(1e-4, 1e-5, (2, 40))
+    once = judged("", before, after, np.arange(40))
+    often = judged("", *(np.repeat(one, 4) for one in (before, after)), np.repeat(np.arange(40), 4))
+
+    assert once.chance == pytest.approx((before - after).std(ddof=1) / np.sqrt(40), rel=1e-9)
+    assert often.chance == pytest.approx(once.chance, rel=1e-9)
+    assert often.gain == pytest.approx(once.gain, abs=1e-18)
 
 
 def test_no_masses(puma: Arm, rng: np.random.Generator) -> None:

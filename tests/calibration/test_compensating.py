@@ -96,6 +96,22 @@ def test_out_of_reach(rng: np.random.Generator) -> None:
     assert there.missed[0] > 3.0
 
 
+def test_no_step_that_leads_away(rng: np.random.Generator) -> None:
+    """Goals beyond the edge of what can be reached are missed by no more than from the nearest posture passed."""
+    arm = load_arm("puma560")
+    chain = chain_of(arm)
+    q = postures(rng, arm, 40)
+    found = calibrate(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
+    near = postures(rng, arm, 60)
+    shoulder = found.chain.base[:3, 3]
+    goals = shoulder + (found.predict(near) - shoulder) * rng.uniform(1.3, 3.0, (60, 1))
+
+    there = compensated(found, goals, near)
+
+    assert np.all(there.missed <= np.linalg.norm(goals - found.predict(near), axis=1))
+    np.testing.assert_allclose(there.missed, np.linalg.norm(goals - found.predict(there.q), axis=1), atol=1e-12)
+
+
 def test_limits(rng: np.random.Generator) -> None:
     """Positions beyond the limits are told."""
     arm = load_arm("puma560")

@@ -6,7 +6,7 @@ import pytest
 from armwright.calibration.iso9283 import accuracy, repeatability
 from armwright.calibration.readings import readings
 from armwright.calibration.validation import dealt, postures
-from armwright.errors import InvalidValueError
+from armwright.errors import TooFewError
 
 
 def test_by_hand() -> None:
@@ -48,7 +48,7 @@ def test_one_posture() -> None:
 
 def test_one_posture_cannot_be_held_out() -> None:
     """Of one posture, however often measured, nothing is left to hold out."""
-    with pytest.raises(InvalidValueError, match="folds: 30 readings of one posture leave none to hold out"):
+    with pytest.raises(TooFewError, match="folds: 30 readings of one posture leave none to hold out"):
         dealt(np.ones((30, 6)), 5, 0)
 
 

@@ -1,6 +1,7 @@
 """Files of measurements, good ones and those that people send."""
 
 import math
+import tracemalloc
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -414,3 +415,29 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
 def test_more_than_points_wrong(head: str, row: str, message: str, arm: Arm, write: Write) -> None:
     """What does not belong together is named with its line and column."""
     assert message in refused(write(table(head, [row])), arm)
+
+
+def test_memory_of_a_row(arm: Arm, write: Write) -> None:
+    """A row takes some hundred bytes, so that a million rows take less than 500 MB; as texts they took 1500."""
+    rows = [f"{i % 90},-{i % 50},{i / 7:.3f},{i % 11},5,N{i}" for i in range(20_000)]
+    read_measurements(write("\n".join([f"{HEAD},name", *rows[:100], ""])), arm)
+    path = write("\n".join([f"{HEAD},name", *rows, ""]))
+    tracemalloc.start()
+
+    found = read_measurements(path, arm)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+
+    assert len(found.q) == 20_000
+    assert peak / 20_000 < 450
+
+
+def test_copies_among_many(arm: Arm, write: Write) -> None:
+    """Of very many rows those are told that say the same, wherever they stand."""
+    rows = [f"{i / 300:.6f},-20,{i},10,5" for i in range(25_000)]
+    rows[24_000] = rows[3]
+    path = write("\n".join([HEAD, *rows, ""]))
+
+    (warning,) = (text for text in read_measurements(path, arm).warnings if "copy" in text)
+
+    assert warning.startswith("line 24002 says to the last digit what line 5 said")

@@ -12,6 +12,7 @@ from armwright.calibration.fitting import calibrate
 from armwright.calibration.planning import INDICES, observability, plan_poses
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 from calibration.simulated import postures, random_errors, seen
+from samples import Sample
 
 
 @pytest.mark.parametrize("index", INDICES)
@@ -103,16 +104,21 @@ def test_as_many_as_asked_for() -> None:
     assert len(plan_poses(load_arm("ntu-3r"), 450).q) == 450
 
 
-def test_enough_to_calibrate() -> None:
-    """The fewest poses that are proposed are enough for a calibration; one less is refused."""
-    arm, rng = load_arm("puma560-seed"), np.random.default_rng(4)
+@pytest.mark.parametrize(
+    ("name", "fewest"), [("puma560", 8), ("puma560-seed", 8), ("ur5", 9), ("stanford", 8), ("ntu-3r", 6)]
+)
+def test_enough_to_calibrate(name: str, fewest: int, sample: Sample) -> None:
+    """The fewest poses that are proposed are always enough for a calibration; one less is refused."""
+    arm = load_arm(name)
     chain = chain_of(arm)
-    with pytest.raises(InvalidValueError, match="expected 8 poses or more, got 7"):
-        plan_poses(arm, 7)
+    with pytest.raises(InvalidValueError, match=f"expected {fewest} poses or more, got {fewest - 1}"):
+        plan_poses(arm, fewest - 1)
+    plan = plan_poses(arm, fewest)
 
-    q = plan_poses(arm, 8).q
+    for rng in sample.cases(100):
+        found = calibrate(arm, plan.q, seen(chain, plan.q, random_errors(rng, chain), 5e-5, rng))
 
-    assert calibrate(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng)).freedom > 0
+        assert found.freedom > 0
 
 
 @pytest.mark.parametrize("count", [0, -1])

@@ -8,12 +8,13 @@ from scipy.stats import t as student
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.calibration.beyond import calibrate_beyond
 from armwright.calibration.chain import Bend, Chain, chain_of
 from armwright.calibration.fitting import Calibration, calibrate, calibrate_to
 from armwright.calibration.model import Model, Plane
 from armwright.calibration.readings import Readings, readings, refuse_not_fitted, together
 from armwright.calibration.validation import cross_validated
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError
 from armwright.spatial.rotations import rotation_from_quaternion, rotation_from_vector
 from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
 
@@ -321,7 +322,7 @@ def test_a_frame_on_a_line(truth: Truth) -> None:
     q = truth.postures(42)
     given = readings(q, truth.points(q), frame=["one"] * 40 + ["other"] * 2)
 
-    with pytest.raises(InvalidValueError, match="frame other: 2 points do not tell where it stands; measure 3 or more"):
+    with pytest.raises(TooFewError, match="frame other: 2 points do not tell where it stands; measure 3 or more"):
         calibrate_to(truth.arm, given)
 
 
@@ -331,7 +332,7 @@ def test_few_touches(what: str, truth: Truth) -> None:
     q = truth.postures(40)
     more = readings(q[:3], plane=["a"] * 3) if what == "plane" else readings(q[:3], distances=[1] * 3, anchor=["a"] * 3)
 
-    with pytest.raises(InvalidValueError, match=f"{what} a: 3 .* only tell where it is; measure 4 or more"):
+    with pytest.raises(TooFewError, match=f"{what} a: 3 .* only tell where it is; measure 4 or more"):
         calibrate_to(truth.arm, together(readings(q, truth.points(q)), more))
 
 
@@ -340,7 +341,7 @@ def test_ways_in_millimetres(truth: Truth) -> None:
     q, other = truth.postures(40), truth.postures(40)
     apart = 1e3 * np.linalg.norm(truth.points(q) - truth.points(other), axis=1)
 
-    with pytest.raises(InvalidValueError, match=r"distances are .* are they millimetres read as metres"):
+    with pytest.raises(ContradictionError, match=r"distances are .* are they millimetres read as metres"):
         calibrate_to(truth.arm, readings(q, distances=apart, other=other))
 
 
@@ -370,7 +371,9 @@ def test_turns_told_another_way(how: str, truth: Truth) -> None:
     else:
         X[:, :3, :3] = rotation_from_quaternion(Rotation.from_matrix(X[:, :3, :3]).as_quat())
 
-    with pytest.raises(InvalidValueError, match=r"half of the poses are turned \d+ degrees .* are these its turns, in"):
+    with pytest.raises(
+        ContradictionError, match=r"half of the poses are turned \d+ degrees .* are these its turns, in"
+    ):
         calibrate(truth.arm, q, X)
 
 
@@ -387,7 +390,7 @@ def test_no_poses(by: tuple[float, ...], truth: Truth) -> None:
 
 def test_nothing_told(truth: Truth) -> None:
     """Postures all over the room do not touch one plane; that nothing is told is said, and soon."""
-    with pytest.raises(InvalidValueError, match=r"misses its readings by, .* mm, hides every error"):
+    with pytest.raises(ContradictionError, match=r"misses its readings by, .* mm, hides every error"):
         calibrate_to(load_arm("puma560"), readings(truth.postures(40), plane=["table"] * 40))
 
 
@@ -416,8 +419,9 @@ def test_too_few_to_hold_out(truth: Truth) -> None:
     q = truth.postures(44)
     given = together(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
 
-    with pytest.raises(InvalidValueError, match=r"with part \d of 5 held out: plane table"):
-        cross_validated(truth.arm, given)
+    for held_out in (cross_validated, calibrate_beyond):
+        with pytest.raises(InvalidValueError, match=r"with part \d of 5 held out: plane table"):
+            held_out(truth.arm, given)
 
 
 def test_taken(truth: Truth) -> None:

@@ -85,6 +85,17 @@ def test_a_long_chain() -> None:
     assert tree.has_value("F4999")
 
 
+def test_a_long_rigid_chain() -> None:
+    """The end of a chain that hangs rigidly takes all of it along, however long it is."""
+    links = {f"F{i}": Node(parent=f"F{i - 1}", relation=step(1), rigid=True) for i in range(1, 3000)}
+
+    tree = FrameTree({"F0": Node(parent=WORLD, relation=step(1)), **links}).place("F2999", step(0))
+
+    assert tree.leader("F2999") == "F0"
+    np.testing.assert_allclose(tree.world("F0"), step(-2999), atol=ROUNDING)
+    np.testing.assert_allclose(tree.world("F2999"), step(0), atol=ROUNDING)
+
+
 def test_world_is_fixed() -> None:
     """The root of the tree cannot be placed."""
     with pytest.raises(InvalidValueError, match="WORLD is the root"):

@@ -1,6 +1,7 @@
 """Until when a run is a prediction, against runs that the claim has not seen."""
 
 import numpy as np
+import pytest
 
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path
@@ -11,21 +12,31 @@ from armwright.clearance.simulation import simulate
 from samples import Sample
 
 
+@pytest.mark.share(0.034)
 def test_claim_holds_against_other_runs(five_bar: Linkage, sample: Sample) -> None:
-    """Until the time that is told, a run with clearances that it has not seen, a nanometre away, stays with it."""
-    worst, count = 0.0, sample.count(30)
+    """Until the time that is told, runs that the claim has not seen stay with the run.
+
+    Fifteen with clearances a nanometre away at most, one whose J2 differs by 15 picometres, and one with a quarter of
+    the step, whose error is next to none: it tells whether what is asked of a half and a third of the step is enough.
+    """
+    worst = dict.fromkeys(("a nanometre", "15 pm", "a quarter of the step"), 0.0)
+    count, over = sample.count(30), 0
     for rng in sample.cases(30):
         path, c = thesis_path(str(rng.choice(list(TEST_PATHS)))), rng.uniform(0.1e-3, 0.5e-3, 3)
         task = prepare(five_bar, path, Settings())
         run, outlook = with_outlook(task, c)
-        other = simulate(task, c + rng.uniform(-1e-9, 1e-9, 3))
-        before = run.time <= outlook.until
-        worst = max(worst, float(np.linalg.norm(other.error - run.error, axis=-1)[before].max()))
-    sample.record(
-        "predictable until t, against another run a nanometre away", count, int(worst > 2 * APART), worst=worst
-    )
+        others = c + np.concatenate([[(15e-12, 0.0, 0.0)], rng.uniform(-1e-9, 1e-9, (15, 3))])
+        finer = prepare(five_bar, path, Settings(step=task.h / 4), guess=task.ideal.q[0])
+        errors = [*simulate(task, others).error, simulate(finer, c).error]
+        until = run.time <= outlook.until
+        apart = [float(np.linalg.norm(one[until] - run.error[until], axis=-1).max()) for one in errors]
+        for name, far in zip(worst, (max(apart[1:-1]), apart[0], apart[-1]), strict=True):
+            worst[name] = max(worst[name], far)
+        over += any(far > APART for far in apart)
+    sample.record("predictable until t, against runs that were not seen: cases beyond 10 um", count, over, **worst)
 
-    assert worst < 3 * APART
+    assert worst["15 pm"] < APART
+    assert max(worst.values()) < 3 * APART
 
 
 def test_bits_beside_others(five_bar: Linkage) -> None:

@@ -111,7 +111,7 @@ class TestNothingToLean:
 
 def test_rounds(five_bar: Linkage) -> None:
     """A path cannot be moved fewer than no times."""
-    with pytest.raises(InvalidValueError, match="rounds: expected 0 or more, got -1"):
+    with pytest.raises(InvalidValueError, match="rounds: expected 0 to 100, got -1"):
         correct_nodes(five_bar, PickAndPlace(), [5e-4] * 3, rounds=-1)
 
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from armwright.clearance.equations import Rubbing
+from armwright.clearance.paths import turning
+from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings, check_step, contact_stiffness
 from armwright.clearance.simulation import Status, simulate
@@ -101,3 +103,18 @@ def test_longest_step_is_stable() -> None:
     assert found.impacts[0] > 5
     assert np.abs(found.qd[-1]).max() < 1e-3
     assert found.forces[-1, 0] == pytest.approx(GRAVITY, rel=0.02)
+
+
+@pytest.mark.parametrize(("step", "duration"), [(5e-324, 1.0), (1e-5, 1e308), (1e-5, float("inf"))])
+def test_steps_beyond_any_number(step: float, duration: float) -> None:
+    """A step or a duration that makes the number of steps infinite is refused like any other that takes too many."""
+    with pytest.raises(InvalidValueError, match="at most 20,000,000"):
+        Settings(step=step).steps(duration)
+
+
+@pytest.mark.parametrize("duration", [1e-320, 1e-10])
+def test_paths_without_time(duration: float) -> None:
+    """A path that takes next to no time is refused."""
+    crank = load_linkage("slider-crank")
+    with pytest.raises(InvalidValueError, match="expected a duration from 1e-09 s, got "):
+        prepare(crank, turning("short", 0.0, 30.0, duration))

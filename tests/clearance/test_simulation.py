@@ -6,6 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.clearance import simulation
 from armwright.clearance.contact import stiffness
 from armwright.clearance.equations import Rubbing
 from armwright.clearance.linkage import Linkage, Place
@@ -303,3 +304,13 @@ def test_other_assembly(five_bar: Linkage) -> None:
 
     assert np.abs(other[:, 0] - own[:, 0]).min() > 1.0
     np.testing.assert_allclose(other[:, 4:], own[:, 4:], rtol=0, atol=1e-10)
+
+
+def test_called_off(five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A simulation that is called off comes back from compiled code without a result."""
+    task = prepare(five_bar, thesis_path("y1"), Settings(sample=1e-3))
+    monkeypatch.setattr(
+        simulation, "on_cores_for_long", lambda work, runs, _threads: work(0, runs, np.ones(1, dtype=np.int64))
+    )
+
+    assert simulate(task).status == Status.DIVERGED

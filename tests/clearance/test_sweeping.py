@@ -12,9 +12,10 @@ import pytest
 from armwright.clearance.features import Features, features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
+from armwright.clearance.predictability import APART, perturbed
 from armwright.clearance.preparing import prepare
 from armwright.clearance.simulation import simulate
-from armwright.clearance.sweeping import FeatureSweep, feature_vector
+from armwright.clearance.sweeping import FeatureSweep, feature_vector, is_chance
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.sweep.designs import Design, latin_hypercube
 from armwright.sweep.errors import SweepError
@@ -44,14 +45,53 @@ def bits(results: Any) -> dict[str, bytes]:
 
 
 def test_features_of_the_simulation(five_bar: Linkage, task: FeatureSweep) -> None:
-    """A row of a sweep has the features of the simulation with those clearances, bit for bit, and its largest force."""
-    rows = task(np.array([ARM_B, ARM_A]))
+    """Without runs beside it a row has the features of the simulation with those clearances, bit for bit."""
+    rows = attrs.evolve(task, twins=0)(np.array([ARM_B, ARM_A]))
 
     alone = simulate(prepare(five_bar, named_path("y1"), CENTRE), ARM_A)
     for name, value in features(alone)._asdict().items():
         assert rows[f"y1_{name}"][1] == value, name
     assert rows["y1_peak"][1] == alone.peaks.max()
     assert rows["failure"] == ["", ""]
+
+
+def test_means_and_spreads_over_runs_that_nobody_can_tell_apart(five_bar: Linkage) -> None:
+    """On y9 a row is the mean of four runs a nanometre apart, with their spread and until when they are together."""
+    task = FeatureSweep(linkage=five_bar, paths=("y9",), settings_of=CENTRE)
+
+    rows = task(np.array([ARM_B, ARM_A]))
+
+    runs = simulate(prepare(five_bar, named_path("y9"), CENTRE), perturbed(ARM_A, 3))
+    for name, values in {**features(runs)._asdict(), "peak": runs.peaks.max(axis=-1)}.items():
+        assert rows[f"y9_{name}"][1] == pytest.approx(values.mean(), rel=1e-12), name
+        assert rows[f"y9_{name}_spread"][1] == pytest.approx(values.std(ddof=1), rel=1e-9), name
+    apart = np.linalg.norm(runs.error - runs.error[0], axis=-1).max(axis=0)
+    assert apart[runs.time <= rows["y9_until"][1]].max() <= APART < apart.max()
+    # The journals rattle from the start: its slope is chance, and where it begins is not.
+    assert rows["y9_slope_spread"][1] > 1e-4
+    assert rows["y9_offset_y_spread"][1] < 1e-9
+
+
+def test_chance_is_told_from_what_a_design_changes(five_bar: Linkage) -> None:
+    """Over 32 linkages slope and intercept of y13 are chance, its start and its mean are not; nothing of y1 is."""
+    task = FeatureSweep(linkage=five_bar, paths=("y1", "y13"))
+    rows = task(latin_hypercube(dict.fromkeys(task.parameters, RANGE), 32, 7).points)
+
+    names = [f"{path}_{name}" for path in task.paths for name in Features._fields]
+    chance = {name for name in names if is_chance(rows[name], rows[f"{name}_spread"], 4)}
+
+    assert chance == {"y13_slope", "y13_intercept"}
+    assert rows["y13_until"].max() < 0.1 < rows["y1_until"].min()
+
+
+def test_chance_that_is_left_in_means(rng: np.random.Generator) -> None:
+    """Means over four runs of pure chance vary by a quarter of its variance, and are not taken for more."""
+    runs = rng.normal(0.0, 1.0, (400, 4))
+    told = rng.normal(0.0, 1.1, 400)[:, None]
+
+    assert is_chance(runs.mean(axis=1), runs.std(axis=1, ddof=1), 4)
+    assert is_chance((0.7 * told + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
+    assert not is_chance((1.2 * told + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
 
 
 def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:
@@ -73,11 +113,15 @@ def test_said_beforehand(task: FeatureSweep) -> None:
     rows = evaluate(both, ARM_A[None])
 
     check_task(both, both.parameters)
-    assert set(rows.values) == {f"{path}_{name}" for path in ("y1", "x2") for name in (*Features._fields, "peak")}
-    assert {name: one.units for name, one in both.outputs.items()}["x2_slope"] == "m/s"
-    told = json.loads(json.dumps(dict(both.settings)))
-    assert told["simulation"]["friction"]["velocity"] == "centre"
-    assert told["linkage"]["bodies"][0]["mass"] == 2.5
+    told = [*Features._fields, "peak"]
+    told += [f"{name}_spread" for name in told] + ["until"]
+    assert set(rows.values) == {f"{path}_{name}" for path in ("y1", "x2") for name in told}
+    units = {name: one.units for name, one in both.outputs.items()}
+    assert (units["x2_slope"], units["x2_slope_spread"], units["x2_until"]) == ("m/s", "m/s", "s")
+    plain = json.loads(json.dumps(dict(both.settings)))
+    assert plain["simulation"]["friction"]["velocity"] == "centre"
+    assert plain["linkage"]["bodies"][0]["mass"] == 2.5
+    assert plain["twins"] == 3
 
 
 def test_feature_vector(task: FeatureSweep) -> None:
@@ -104,18 +148,20 @@ def bits_of(rows: dict[str, Any]) -> dict[str, bytes]:
     return {name: pickle.dumps(np.asarray(values).tolist()) for name, values in rows.items()}
 
 
-def test_same_bits(task: FeatureSweep, design: Design, tmp_path: Path) -> None:
+def test_same_bits(task: FeatureSweep, tmp_path: Path) -> None:
     """One process, two, a Dask cluster, and blocks of other lengths make the same bits."""
     pytest.importorskip("xarray")
     distributed = pytest.importorskip("distributed")
+    design = latin_hypercube(dict.fromkeys(task.parameters, RANGE), 6, 7, units=dict.fromkeys(task.parameters, "m"))
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0"
     ) as cluster:
         ways: list[dict[str, Any]] = [
             {"workers": 1},
-            {"workers": 1, "block": 5},
-            {"workers": 2, "block": 12},
-            {"scheduler": cluster.scheduler_address, "block": 8},
+            {"workers": 1, "block": 4},
+            {"workers": 1, "block": 1},
+            {"workers": 2, "block": 3},
+            {"scheduler": cluster.scheduler_address, "block": 2},
         ]
         found = [bits(run(task, design, tmp_path / str(i), **way)) for i, way in enumerate(ways)]
 
@@ -190,3 +236,5 @@ def test_unknown_path(five_bar: Linkage) -> None:
         FeatureSweep(linkage=five_bar, paths=("y1", "y3", "y1"))
     with pytest.raises(InvalidValueError, match="paths: expected one or more, got none"):
         FeatureSweep(linkage=five_bar, paths=())
+    with pytest.raises(InvalidValueError, match="twins: expected 0 to 15, got 16"):
+        FeatureSweep(linkage=five_bar, paths=("y1",), twins=16)

@@ -85,7 +85,8 @@ def test_json(measured: Path) -> None:
     ("arguments", "status", "says"),
     [
         (("calibrate", "pumma560", "MEASURED"), 2, "Did you mean 'puma560'?"),
-        (("calibrate", "ur5", "MEASURED"), 2, "are these its joints"),
+        (("calibrate", "ur5", "MEASURED"), 3, "are these its joints"),
+        (("calibrate", ARM, "MEASURED", "--noise-um", "0"), 2, "noise: expected a standard deviation above 0"),
         (("calibrate", "ntu-3r", "MEASURED"), 4, "joint_4_deg"),
         (("calibrate", ARM, "nowhere.csv"), 4, "nowhere.csv"),
         (("calibrate", ARM, "MEASURED", "--tool-mm", "0,0"), 2, "expected 3 finite numbers, got 2: 0,0"),
@@ -104,6 +105,69 @@ def test_mistakes(measured: Path, arguments: tuple[str, ...], status: int, says:
     assert done.returncode == status
     assert says in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_too_few_readings(measured: Path, tmp_path: Path) -> None:
+    """Fewer readings than tell the errors are no wrong call: it cannot be done, status 3."""
+    few = tmp_path / "few.csv"
+    few.write_text("".join(measured.read_text(encoding="utf-8").splitlines(keepends=True)[:6]), encoding="utf-8")
+
+    done = armwright("calibrate", ARM, few)
+
+    assert done.returncode == 3
+    assert "5 readings give 15 numbers" in done.stderr
+
+
+def coupled(path: Path, share: float) -> Path:
+    """Write readings of a ur5 whose joint 3 follows joint 2, which moves in this share of them."""
+    rng = np.random.default_rng(8)
+    arm, count = load_arm("ur5"), 90
+    q = rng.uniform(-1.2, 1.2, (count, 6)) + np.array((0.0, -1.0, 0.8, 0.0, 0.6, 0.0))
+    q[: round((1 - share) * count), 1] = -1.0
+    true = q.copy()
+    true[:, 2] += 0.5 * (q[:, 1] + 1.0)
+    points = forward(arm, true)[:, :3, 3] + rng.normal(0.0, 5e-5, (count, 3))
+    head = ",".join([*(f"joint_{i}_deg" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])
+    lines = [",".join(f"{x:.6f}" for x in (*np.degrees(a), *(1e3 * b))) for a, b in zip(q, points, strict=True)]
+    path.write_text("\n".join([head, *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_coupled_joints_are_doubtful(tmp_path: Path) -> None:
+    """Of a palletiser, q3 = a2 q2 + q3, that hardly moved joint 2 all is told and written, with status 3 and why."""
+    path = coupled(tmp_path / "coupled.csv", 0.3)
+    data = armwright("calibrate", "ur5", path, "-o", tmp_path / "out", "--json", columns=200)
+
+    assert data.returncode == 3
+    assert "armwright: the readings contradict the arm: " in data.stderr
+    assert "coupled to another (q3 = a2 q2 + q3" in data.stderr
+    assert (tmp_path / "out" / "errors.json").exists()
+    told = json.loads(data.stdout)
+    assert told["notes"][0] == f"DOUBTFUL: {told['doubts'][0]}"
+    assert (told["exit_status"], told["error"]["class"]) == (3, "DoubtfulError")
+    assert told["error"]["message"] == data.stderr.removeprefix("armwright: ").rstrip("\n")
+    assert "joint 2 is elsewhere than in the" in told["doubts"][0]
+
+
+def test_coupled_joints_are_refused(tmp_path: Path) -> None:
+    """Of a palletiser that moved joint 2 in all readings nothing is told but what to check; the status is 3."""
+    done = armwright("calibrate", "ur5", coupled(tmp_path / "coupled.csv", 1.0), "-o", tmp_path / "out")
+
+    assert done.returncode == 3
+    assert "hides every error that it may have: are these its readings?" in done.stderr
+    assert "coupled to another (q3 = a2 q2 + q3" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_stated_noise(measured: Path) -> None:
+    """Readings with 50 µm of noise contradict an arm at once that is said to be read to 20 µm, and not to 50."""
+    honest = armwright("calibrate", ARM, measured, "--noise-um", "50")
+    sharp = armwright("calibrate", ARM, measured, "--noise-um", "20", columns=400)
+
+    assert honest.returncode == 0, honest.stderr
+    assert sharp.returncode == 3
+    assert "times the 0.02 mm that are stated" in sharp.stderr
+    assert "DOUBTFUL: what is left is" in sharp.stdout
 
 
 def test_next_poses(measured: Path, tmp_path: Path) -> None:
@@ -146,11 +210,18 @@ def test_a_frame_to_check_alone(measured: Path, tmp_path: Path) -> None:
 
 def test_beyond(measured: Path, tmp_path: Path) -> None:
     """What is tried beyond geometry is told with its numbers, kept or not, on the screen and on the page."""
-    done = armwright("calibrate", ARM, measured, "--beyond", "-o", tmp_path / "out", columns=160)
+    head, *rows = measured.read_text(encoding="utf-8").splitlines()
+    some = tmp_path / "some.csv"
+    marked = [f"{row},{'check' if i % 8 == 0 else 'fit'}" for i, row in enumerate(rows)]
+    some.write_text("\n".join([f"{head},set", *marked, ""]), encoding="utf-8")
+    done = armwright("calibrate", ARM, some, "--beyond", "--folds", "3", "-o", tmp_path / "out", columns=160)
 
     assert done.returncode == 0, done.stderr
     for words in ("joints that give under gravity", "gears, twice a turn", "what is left, learnt"):
         assert words in done.stdout
         assert words in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    tried = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))["beyond"]["tried"]
+    told = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
+    tried = told["beyond"]["tried"]
+    assert {"beyond geometry, held out", "beyond geometry, kept to check"} <= set(told["distances"])
+    assert "is of points that neither fit nor choice has seen" in done.stdout
     assert [one["kept"] for one in tried] == [True, False, False, False, False]

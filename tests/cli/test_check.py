@@ -1,6 +1,7 @@
 """The command ``armwright check``, as a user calls it."""
 
 import json
+import os
 import subprocess
 from pathlib import Path
 
@@ -177,6 +178,13 @@ def test_several_programs(wrong: Path, tmp_path: Path) -> None:
     log = json.loads(check(tmp_path, "--format", "sarif").stdout)
     (found,) = log["runs"][0]["results"]
     assert found["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == wrong.as_posix()
+
+
+def test_pipe_in_a_folder(tmp_path: Path) -> None:
+    """A pipe in a folder, which nobody has named, is no program: reading it might never end."""
+    os.mkfifo(tmp_path / "x.rlo")
+
+    assert "there is no program in this folder" in armwright("check", tmp_path).stderr
 
 
 def test_folder_without_programs(tmp_path: Path) -> None:

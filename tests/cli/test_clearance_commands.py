@@ -1,6 +1,8 @@
 """``armwright clearance sweep``, ``estimate`` and ``correct`` as a user calls them."""
 
 import json
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -31,7 +33,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("sweep") / "out"
     done = armwright("clearance", "sweep", "five-bar", *CENTRE, "-n", "64", "--workers", "1", "-o", path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout == f"64 linkages on y1, y3, y7: {path}\n"
+    first, *rest = done.stdout.splitlines()
+    assert first == f"64 linkages on y1, y3, y7: {path}"
+    assert [line.partition(":")[0] for line in rest] == ["y1", "y3", "y7"]
+    assert all(re.fullmatch(r"y\d: predictable until t = 0\.2\d+ s in half .*, of 0\.25 s", line) for line in rest)
     return path
 
 
@@ -79,12 +84,15 @@ def test_table_of_an_estimate() -> None:
 
     assert done.returncode == 0, done.stderr
     lines = {line.split()[0]: line for line in done.stdout.splitlines() if line.strip()}
-    assert "90 % interval mm" in lines["mean"]
+    assert "90 % interval mm" in lines["pin"]
+    assert "identified" in lines["pin"]
     mean, deviation = (float(x) for x in lines["J4"].split()[1:3])
     assert mean == pytest.approx(0.483, abs=0.01)
     # 20 µm, ten readings: some 2 to 10 µm.
     assert 0.001 < deviation < 0.01
     assert " yes " in lines["J4"]
+    # 0.483 mm of play and a coefficient of 0.05.
+    assert "friction (0.05) may hold a journal 24 µm to either side" in done.stdout
 
 
 def test_estimate_on_paths(folder: Path) -> None:
@@ -96,7 +104,9 @@ def test_estimate_on_paths(folder: Path) -> None:
     assert found["by"] == "paths"
     check(found, 0.985)
     assert found["notes"][0] == "15 features of 3 paths, learnt from 64 simulations"
-    assert "is wrong" not in found["notes"][1]
+    assert found["notes"][1].startswith("predictable until, in half of the simulations: y1 0.2")
+    assert found["left_out"] == []
+    assert set(found["predictable_until"]) == {"y1", "y3", "y7"}
 
 
 def test_interrupted_sweep(tmp_path: Path) -> None:
@@ -124,10 +134,34 @@ def test_sweep_goes_on(folder: Path) -> None:
     again = armwright(*arguments, "-n", "64", "--json")
     other = armwright(*arguments, "-n", "32")
 
-    assert json.loads(again.stdout) == {"runs": 64, "failed": 0, "paths": ["y1", "y3", "y7"], "folder": str(folder)}
+    told = json.loads(again.stdout)
+    chaos = told.pop("chaos")
+    assert told == {"runs": 64, "failed": 0, "paths": ["y1", "y3", "y7"], "folder": str(folder)}
+    assert all(0.2 < one["earliest"] <= one["until"] < 0.25 and one["chance"] == [] for one in chaos.values())
     assert other.returncode == 3
     assert "holds another sweep: design.runs is 64 there, 32 here" in other.stderr
     assert (folder / "results.nc").read_bytes() == before
+
+
+def test_damaged_sweep(folder: Path, tmp_path: Path) -> None:
+    """Whoever reads a sweep back names the file that is damaged, with status 4; it stays as it is."""
+    swept = tmp_path / "swept"
+    shutil.copytree(folder, swept)
+    results, block = swept / "results.nc", swept / "blocks" / "000000.npz"
+    results.write_bytes(results.read_bytes()[:-1] + b"x")
+    block.write_bytes(b"")
+    sweep = ("clearance", "sweep", "five-bar", *CENTRE, "--workers", "1", "-n", "64", "-o", swept)
+
+    learnt = armwright("clearance", "estimate", "five-bar", PATHS, "--sweep", swept, "--noise-um", "2")
+    again = armwright(*sweep)
+    results.unlink()
+    anew = armwright(*sweep, "--json")
+
+    assert [done.returncode for done in (learnt, again, anew)] == [4, 4, 4]
+    assert f"armwright: {results}: damaged: its hash is not that in run.json; it stays as it is" in learnt.stderr
+    assert f"{results}: damaged" in again.stderr
+    assert json.loads(anew.stdout)["error"]["file"] == str(block)
+    assert block.read_bytes() == b""
 
 
 def test_factorial_with_friction(tmp_path: Path) -> None:
@@ -143,6 +177,8 @@ def test_factorial_with_friction(tmp_path: Path) -> None:
         assert np.unique(data.friction).tolist() == [0.0, 0.1]
         assert np.unique(data.c_J3).tolist() == [1e-4, 5e-4]
         assert data.c_J3.attrs["units"] == "m"
+        assert data.y1_slope_spread.attrs["units"] == "m/s"
+        assert data.y1_until.attrs["units"] == "s"
 
 
 def test_correct(tmp_path: Path) -> None:
@@ -157,6 +193,8 @@ def test_correct(tmp_path: Path) -> None:
     assert np.mean(found["before"]) == pytest.approx(0.559e-3, rel=0.01)
     assert np.mean(found["after"]) < 1e-6
     assert len(found["mean errors"]) == 3
+    assert (found["runs"], found["of"]) == (16, "whose clearances nobody can tell apart")
+    assert max(found["after_spread"][:2]) < 1e-8
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"path.csv", "summary.json", "paths.svg", "run.json"}
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == found
     table = np.genfromtxt(tmp_path / "out" / "path.csv", delimiter=",", names=True)
@@ -173,8 +211,22 @@ def test_correct_a_whole_path() -> None:
     lines = done.stdout.splitlines()
     assert [line.startswith("mean error ") for line in lines[:2]] == [True, True]
     assert float(lines[1].split()[2]) < 0.3 * float(lines[0].split()[2])
-    rows = [line.split() for line in lines if len(line.split()) == 5 and line.split()[0][0].isdigit()]
+    rows = [line.split() for line in lines if len(line.split()) == 7 and line.split()[0][0].isdigit()]
     assert [float(row[0]) for row in rows] == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2, 0.25])
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"misfit": 1}', "NaN", "1e300", "Infinity"])
+def test_estimates_that_are_none(text: str, tmp_path: Path) -> None:
+    """A file that is no estimate, or has numbers that no clearance has, is named."""
+    pin = '{"mean": %s, "deviation": 1e-6, "identifiable": true}' % (text if len(text) < 9 else "0")
+    pins = f'"J2": {pin}, "J3": {pin}, "J4": {pin}'
+    whole = f'{{"misfit": 1, "correlation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "parameters": {{{pins}}}}}'
+    (tmp_path / "estimate.json").write_text(whole if len(text) < 9 else text, encoding="utf-8")
+
+    done = armwright("clearance", "correct", "five-bar", "--estimate", tmp_path / "estimate.json")
+
+    assert done.returncode == 4
+    assert "expected what `armwright clearance estimate --json` prints for five-bar" in done.stderr
 
 
 MISTAKES = [
@@ -186,6 +238,7 @@ MISTAKES = [
     (("sweep", "five-bar", "-n", "100"), "a Sobol design has a power of two of points, got 100"),
     (("sweep", "five-bar", "--from-mm", "0.5", "--to-mm", "0.1"), "bounds of c_J2: they are reversed"),
     (("sweep", "five-bar", "--step", "1e-3"), "step: 0.001 s is too long for contacts of "),
+    (("sweep", "five-bar", "--twins", "16"), "twins: expected 0 to 15, got 16"),
     (("sweep", "four-bar"), "four-bar: with its pins closed it has 1 freedom"),
     (("sweep", "five-bra"), "no linkage 'five-bra'. Did you mean 'five-bar'?"),
     (("estimate", "five-bar", "none.csv"), "none.csv: no such file"),
@@ -199,7 +252,7 @@ MISTAKES = [
     (("correct", "five-bar", "--clearance", "J7=0.3"), "no pin 'J7'. Known: J2, J3, J4."),
     (("correct", "five-bar", "--clearance", "J2=x"), "expected a pin and its clearance in mm"),
     (("correct", "five-bar", "--clearance", "J2=0"), "clearances: contact needs them above 0, got 0 mm"),
-    (("correct", "five-bar", "--path", "y1", "--knots", "1"), "knots: expected 2 or more, got 1"),
+    (("correct", "five-bar", "--path", "y1", "--knots", "1"), "knots: expected 2 to 1000, got 1"),
     (("correct", "five-bar", "--friction-velocity", "center"), "no sliding speed 'center'. Did you mean 'centre'?"),
 ]  # fmt: skip
 

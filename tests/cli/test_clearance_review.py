@@ -45,7 +45,7 @@ def test_corrected_for_the_estimate(estimate: Path, tmp_path: Path) -> None:
 
 
 def test_no_path_for_a_contradiction(estimate: Path) -> None:
-    """What contradicts its model, or is not told, is nothing to correct a path for: the statuses are 3 and 2."""
+    """What contradicts its model, or is not told, is nothing to correct a path for: the status is 3."""
     estimate.write_text(json.dumps(ESTIMATE | {"misfit": 1e-9}))
     wrong = armwright("clearance", "correct", "five-bar", "--estimate", estimate)
     parameters = {**ESTIMATE["parameters"], "J3": {"mean": 2e-4, "deviation": 1e-4, "identifiable": False}}  # type: ignore[dict-item]
@@ -54,7 +54,7 @@ def test_no_path_for_a_contradiction(estimate: Path) -> None:
 
     assert wrong.returncode == 3
     assert "the data contradict the model" in wrong.stderr
-    assert unknown.returncode == 2
+    assert unknown.returncode == 3
     assert "the measurement does not tell J3" in unknown.stderr
 
 
@@ -85,7 +85,8 @@ def test_given_twice(estimate: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "status", "text"),
     [
-        (["correct", "five-bar", "--rounds", "-1"], 2, "rounds: expected 0 or more, got -1"),
+        (["correct", "five-bar", "--rounds", "-1"], 2, "rounds: expected 0 to 100, got -1"),
+        (["correct", "five-bar", "--rounds", str(10**30)], 2, "rounds: expected 0 to 100, got 1000"),
         (["correct", "five-bar", "--estimate", "nowhere.json"], 4, "nowhere.json: no such file"),
         (["correct", "four-bar"], 2, "with its pins closed it has 1 freedom, and a place of the tip tells 2"),
         (["sweep", "five-bar", "--paths", "y1", "--step", "4.6e-5", "-o", "{out}"], 2, "is too long for contacts"),

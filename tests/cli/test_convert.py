@@ -55,6 +55,37 @@ def test_part_of_a_chain(tmp_path: Path) -> None:
     assert load_arm(tmp_path / "part.toml").n == 3
 
 
+def test_joints_held_elsewhere(tmp_path: Path) -> None:
+    """A joint is held where the command line says, in degrees, or in millimetres if it slides; at 0 without a word."""
+    part = ("--lock", "forearm_roll=30,wrist_tilt,hand_roll=-12.5")
+
+    done = armwright("convert", EXAMPLE, "-o", tmp_path / "part.toml", *part)
+
+    assert done.returncode == 0
+    held = {"forearm_roll": np.radians(30), "wrist_tilt": 0.0, "hand_roll": np.radians(-12.5)}
+    arm = load_arm(tmp_path / "part.toml")
+    assert arm == load_urdf(EXAMPLE, lock=held)
+    q = np.array([0.1, 0.2, 0.3, 0.4])
+    whole = forward(load_urdf(EXAMPLE), [*q, *held.values()])
+    np.testing.assert_allclose(forward(arm, q), whole, atol=1e-12)
+
+
+def test_slides_held_elsewhere(tmp_path: Path) -> None:
+    """Where a slide is held is said in millimetres."""
+    slide = EXAMPLE.read_text(encoding="utf-8").replace(
+        '<joint name="elbow_tilt" type="revolute">', '<joint name="elbow_tilt" type="prismatic">'
+    )
+    (tmp_path / "slide.urdf").write_text(slide, encoding="utf-8")
+
+    done = armwright("convert", "slide.urdf", "-o", "held.toml", "--lock", "elbow_tilt=20", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    expected = load_urdf(tmp_path / "slide.urdf", lock={"elbow_tilt": 0.02})
+    np.testing.assert_allclose(
+        forward(load_arm(tmp_path / "held.toml"), np.zeros(6)), forward(expected, np.zeros(6)), atol=1e-12
+    )
+
+
 def test_notes(tmp_path: Path) -> None:
     """What was not taken as it stands in a URDF file is said."""
     text = EXAMPLE.read_text(encoding="utf-8").replace('velocity="3.6"', 'velocity="0"')
@@ -84,6 +115,10 @@ def test_other_commands_read_urdf() -> None:
         (("puma560", "-o", "puma.toml", "--lock", "j1"), 2, "only URDF files have links and joints to name"),
         (("pumma560", "-o", "puma.toml"), 2, "Did you mean 'puma560'?"),
         ((EXAMPLE, "-o", "seven.toml", "--tip", "tool_pont"), 2, "no link 'tool_pont'. Did you mean 'tool_point'?"),
+        ((EXAMPLE, "-o", "seven.toml", "--lock", "waist=x"), 2, "--lock: expected J1,J2=30, got 'x' for waist"),
+        ((EXAMPLE, "-o", "seven.toml", "--lock", "waist=nan"), 2, "waist"),
+        ((EXAMPLE, "-o", "seven.toml", "--lock", "waist=1e300"), 2, "waist"),
+        ((EXAMPLE, "-o", "seven.toml", "--lock", "waist=400"), 2, "waist"),
         ((EXAMPLE, "-o", "seven.toml", "--lock", "waits"), 2, "no joint 'waits'. Did you mean 'waist'?"),
         (("no.urdf", "-o", "no.toml"), 4, "no.urdf: no such file"),
     ],

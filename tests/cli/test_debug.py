@@ -5,6 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+from typer.testing import CliRunner
+
+from armwright.cli.app import app
+from armwright.program.running import excerpt
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BENCH, STANFORD = EXAMPLES / "bench.rlo", EXAMPLES / "stanford_cell.toml"
 
@@ -85,11 +91,38 @@ def test_a_program_that_goes_wrong(tmp_path: Path) -> None:
     """An error is shown with its line, and the program stands in front of it."""
     program = tmp_path / "wrong.rlo"
     program.write_text("VAR n : SCALAR ;\nBEGIN\n  n = 0 ;\n  PRINT(1 / n)\nEND.\n")
-    _, said = debug("c", "p n", "c", "q", program=program)
+    status, said = debug("c", "p n", "c", "q", program=program)
 
+    assert status == 3
     assert "error[E240]: 1 cannot be divided by 0" in said
     assert "    0.000 s  program, line 4: 1 cannot be divided by 0" in said
     assert "0  SCALAR" in said
+
+
+def test_the_status_of_where_a_program_stands(tmp_path: Path) -> None:
+    """Who leaves a program in front of its failure ends with the failure's status; who mends it does not."""
+    program = tmp_path / "wrong.rlo"
+    program.write_text("VAR n : SCALAR ;\nBEGIN\n  n = 0 ;\n  PRINT(1 / n)\nEND.\n")
+
+    assert debug("c", program=program)[0] == 3
+    assert debug("c", "c", "back", "q", program=program)[0] == 0
+    assert debug("c", "set n = 1", "c", program=program)[0] == 0
+
+
+def test_many_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many lines that come at once the first and the last are shown, and how many there are between."""
+    program = tmp_path / "many.rlo"
+    program.write_text('VAR i : SCALAR ;\nBEGIN\n  FOR i = 1 TO 20000 DO PRINT("again") ;\nEND.\n')
+    monkeypatch.setattr(excerpt, "ON_A_TERMINAL", 4)
+
+    done = CliRunner().invoke(app, ["debug", str(program), "--cell", str(STANFORD)], input="c\nq\n")
+
+    said = done.output.splitlines()
+    left_out = [int(one.split()[2].replace(",", "")) for one in said if one.startswith("... and ")]
+    assert done.exit_code == 0
+    assert "more; `armwright run -o FOLDER` keeps all in events.jsonl" in done.output
+    # The end of the program is a line, too, and may be among those left out.
+    assert 0 <= sum('PRINT "again"' in one for one in said) + sum(left_out) - 20_000 <= 1
 
 
 def test_a_program_that_cannot_run(tmp_path: Path) -> None:

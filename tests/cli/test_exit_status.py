@@ -41,16 +41,30 @@ def test_page_lists_errors() -> None:
         (("inverse", "puma560"), 2, "BadParameter", "--xyz"),
         (("convert", "puma560", "-o", "/proc/no/puma.urdf"), 4, "OutputError", "cannot make '/proc/no'"),
         (("iso9283", "none.csv"), 4, "FileFormatError", "none.csv"),
+        (("check", "none.rlo", "--format", "json"), 4, "FileFormatError", "none.rlo"),
+        (("check", "none.rlo", "--format=json"), 4, "FileFormatError", "none.rlo"),
     ],
 )
 def test_error_as_json(arguments: tuple[str, ...], status: int, kind: str, message: str) -> None:
     """Under --json an error is a document with its status and class, and nothing else is printed."""
-    done = armwright(*arguments, "--json")
+    done = armwright(*arguments, *(() if arguments[-1].endswith("json") else ("--json",)))
     told = json.loads(done.stdout)
 
     assert (done.returncode, done.stderr) == (status, "")
     assert (told["exit_status"], told["error"]["class"]) == (status, kind)
     assert message in told["error"]["message"]
+
+
+def test_error_of_the_page(tmp_path: Path) -> None:
+    """The document on the page is what its mistake is answered with."""
+    told = json.loads(PAGE.partition("```json\n")[2].partition("```")[0])
+    place = "[1, 0, 0,  0,-1, 0,  0, 0,-1,   0.45, 0.00, 0.25]"
+    (tmp_path / "cell.toml").write_text(f"[arms.ARM_1]\nhand = {place}\n[motion]\nservo_ms = -1\n")
+    (tmp_path / "p.rlo").write_text("BEGIN PAUSE 1 END.")
+
+    done = armwright("check", "p.rlo", "--cell", "cell.toml", "--json", cwd=tmp_path)
+
+    assert json.loads(done.stdout) == told
 
 
 def test_error_of_a_file_as_json() -> None:
@@ -129,14 +143,29 @@ def test_broken_pipe(arguments: str) -> None:
     assert (done.returncode, done.stderr) == (ExitStatus.BROKEN_PIPE, "")
 
 
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    ("arguments", "status", "output", "errors"),
+    [("arms", 0, True, False), ("show pumma560", 2, False, True), ("show pumma560 --json", 2, True, False)],
+)
+def test_closed_streams(closed: str, arguments: str, status: int, output: bool, errors: bool) -> None:  # noqa: FBT001
+    """What is said to a closed output is lost; it changes no status, and gets into no other stream."""
+    command = f"{sys.executable} -m armwright {arguments} {closed}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=120)
+
+    assert done.returncode == status
+    assert bool(done.stdout) == (output and not re.search(r"(?<!2)>&-", closed))
+    assert bool(done.stderr) == (errors and "2>&-" not in closed)
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.parametrize(
     ("typed", "status"),
     [("PRINT (1) ;\n", 0), ("n = ;\n", 1), ("MOVE ARM_1 TO ARM_2 ;\n", 1), (":load none.rlo\n", 4), (":oh\n", 2)],
 )
 def test_statuses_of_a_session(typed: str, status: int) -> None:
     """A session that is read from a pipe ends with the highest status of its lines, and each line carries its own."""
-    call = [sys.executable, "-m", "armwright", "repl", "--json"]
-    done = subprocess.run(call, input=typed, capture_output=True, text=True, check=False, timeout=120)
+    done = armwright("repl", "--json", fed=typed)
 
     assert done.returncode == status, done
     assert max(json.loads(line)["exit_status"] for line in done.stdout.splitlines()) == status
@@ -162,8 +191,12 @@ def test_rows_carry_their_status(tmp_path: Path) -> None:
     laid_out = armwright("fmt", "--json", "--check", *files, cwd=tmp_path)
     cured = armwright("fix", "--json", *files, cwd=tmp_path)
 
-    assert [row["exit_status"] for row in json.loads(cured.stdout)] == [0, 1, 4]
-    assert [row["exit_status"] for row in json.loads(laid_out.stdout)][2] == 4
+    rows = json.loads(cured.stdout)
+    assert [row["exit_status"] for row in rows] == [0, 1, 4]
+    assert [row.get("error", {}).get("class") for row in rows] == [None, "ProgramError", "FileFormatError"]
+    assert rows[2]["error"]["file"] == "none.rlo"
+    missing = json.loads(laid_out.stdout)[2]
+    assert (missing["exit_status"], missing["error"]["class"]) == (4, "FileFormatError")
     assert laid_out.returncode == max(row["exit_status"] for row in json.loads(laid_out.stdout))
     assert cured.returncode == 4
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from armwright.cli.rewriting import read_source, write_back
+
 WRITTEN = "begin open arm-1 ; { now } grasp end.\n"
 LAID_OUT = "BEGIN\n  OPEN ARM_1 ;  { now }\n  GRASP\nEND.\n"
 
@@ -43,6 +45,18 @@ def test_in_place(written: Path) -> None:
     assert (first.returncode, first.stdout.decode()) == (0, f"laid out: {written}\n")
     assert (second.returncode, second.stdout.decode()) == (0, f"as it should be: {written}\n")
     assert [path.name for path in written.parent.iterdir()] == ["arm.rlo"]
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+@pytest.mark.parametrize("end", [b"\n", b"\r\n"])
+def test_ends_of_lines(written: Path, mark: bytes, end: bytes) -> None:
+    """Lines go on to end as they did, and a mark of byte order stays, whether fmt or fix has changed them."""
+    written.write_bytes(mark + b"begin open arm-1 ;\n{ now } grasp\nend.\n".replace(b"\n", end))
+
+    write_back(written, LAID_OUT)
+
+    assert written.read_bytes() == mark + LAID_OUT.encode().replace(b"\n", end)
+    assert read_source(written).text == LAID_OUT
 
 
 def test_check(written: Path) -> None:
@@ -143,7 +157,7 @@ def test_json(written: Path) -> None:
     assert result.returncode == 5
     assert right == {"program": str(written), "exit_status": 5, "changed": True}
     assert bad["program"] == str(wrong)
-    assert "the program has no END" in bad["error"]
+    assert "the program has no END" in bad["error"]["message"]
 
 
 def test_help() -> None:

@@ -49,6 +49,9 @@ def test_exceeded_limit_ends_with_status_five(how: str) -> None:
     assert done.stderr.startswith("armwright: limit exceeded: RP of pose P1")
     assert "AP" not in done.stderr
     assert (done.stdout == "") == (how == "-q")
+    if done.stdout:
+        told = json.loads(done.stdout)
+        assert (told["exit_status"], told["error"]["class"]) == (5, "CheckFailedError")
 
 
 def test_json() -> None:
@@ -60,6 +63,7 @@ def test_json() -> None:
     assert (first["unit"], first["cycles"], first["few"], first["holds"]) == ("m", 30, False, True)
     assert first["limit"] == pytest.approx(8e-5)
     assert not found["planar"]
+    assert found["exit_status"] == 0
 
 
 def test_the_page_of_the_format(tmp_path: Path) -> None:

@@ -18,13 +18,14 @@ Q = np.radians([10, 20, 30, 40, 50, 60])
 
 
 def test_forward_in_millimetres() -> None:
-    """The pose is printed row by row, its place in millimetres; with --json in metres."""
+    """The pose is printed row by row under its columns, its place in millimetres; with --json in metres."""
     X = forward(load_arm("puma560"), Q)
 
-    lines = armwright("forward", "puma560", "-q", Q_DEG).stdout.splitlines()
+    head, *lines = armwright("forward", "puma560", "-q", Q_DEG).stdout.splitlines()
     data = json.loads(armwright("forward", "puma560", "-q", Q_DEG, "--json").stdout)
 
-    printed = np.array([[float(word) for word in line.removesuffix(" mm").split()] for line in lines])
+    assert head.split() == ["n", "o", "a", "p", "mm"]
+    printed = np.array([[float(word) for word in line.split()] for line in lines])
     np.testing.assert_allclose(printed[:, 3], X[:3, 3] * 1e3, atol=5e-4)
     np.testing.assert_allclose(printed[:, :3], X[:3, :3], atol=5e-7)
     np.testing.assert_allclose(data["pose"], X, atol=1e-12)
@@ -55,6 +56,24 @@ def test_inverse_finds_the_posture() -> None:
     data = json.loads(done.stdout)
     assert data["answer"] == "solved"
     np.testing.assert_allclose(data["branches"][0]["q"], Q, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "line", "heads"),
+    [
+        (
+            ("inverse", "stanford", "--xyz", "400,150,50"),
+            1,
+            "j1 deg  j2 deg  j3 mm  j4 deg  j5 deg  j6 deg  branch",
+        ),
+        (("jacobian", "stanford", "-q", "0,90,500,0,45,0"), 0, "j1 rad/s  j2 rad/s  j3 m/s  j4 rad/s"),
+    ],
+)
+def test_heads_have_units(call: tuple[str, ...], line: int, heads: str) -> None:
+    """Above every column of numbers stand its joint and its unit."""
+    head = armwright(*call).stdout.splitlines()[line]
+
+    assert " ".join(head.split()).startswith(" ".join(heads.split()))
 
 
 def test_inverse_out_of_reach() -> None:

@@ -8,7 +8,7 @@ import pytest
 import typer
 from rich.console import Console
 
-from armwright.cli.numbers import named_number, numbers, within
+from armwright.cli.numbers import named_numbers, numbers, within
 from armwright.cli.printing import command_line, print_json, print_table, table
 
 TEXT = {"name": "Gelenk für die Hand", "µm": [1.5, None]}
@@ -57,16 +57,38 @@ def test_words_left_numbers_right() -> None:
 
 
 def test_named_numbers() -> None:
-    """A number with a name has a unit that may be left out, and blanks do no harm."""
-    assert named_number("J2=0.3", ("", "mm"), "a pin", "--clearance") == ("J2", 0.3, "")
-    assert named_number("AV = -1.5 mm/s", None, "a limit", "--limit") == ("AV", -1.5, "mm/s")
+    """A number with a name has a unit that may be left out, blanks do no harm, and an exponent may be small."""
+    texts = ["J2=0.3", "J3 = -1.5 mm", "J4=1e-3mm", "J5=.5", "J6=2E+1"]
+
+    found = named_numbers(texts, ("", "mm"), "a pin", "--clearance")
+
+    assert list(found.values()) == [
+        ("J2", 0.3, ""),
+        ("J3", -1.5, "mm"),
+        ("J4", 1e-3, "mm"),
+        ("J5", 0.5, ""),
+        ("J6", 20.0, ""),
+    ]
+    assert named_numbers(["AV=1mm/s"], None, "a limit", "--limit")["AV"].unit == "mm/s"
 
 
-@pytest.mark.parametrize("text", ["J2", "J2=", "=0.3", "J2=thick", "J2=0.3cm", "J2=nan", "J2=0.3=0.4"])
+@pytest.mark.parametrize("text", ["J2", "J2=", "=0.3", "J2=thick", "J2=0.3cm", "J2=nan", "J2=0.3=0.4", "J2=1_0"])
 def test_what_is_no_named_number(text: str) -> None:
     """What is something else is refused, with what was expected."""
     with pytest.raises(typer.BadParameter, match=f"expected a pin and its clearance, got {text}$"):
-        named_number(text, ("", "mm"), "a pin and its clearance", "--clearance")
+        named_numbers([text], ("", "mm"), "a pin and its clearance", "--clearance")
+
+
+def test_many_digits_that_are_no_number() -> None:
+    """A hundred thousand digits with a sign behind them are refused in the time of their length, not its square."""
+    with pytest.raises(typer.BadParameter, match="expected a pin"):
+        named_numbers([f"J2={'1' * 100_000}!"], ("", "mm"), "a pin", "--clearance")
+
+
+def test_a_name_that_is_given_twice() -> None:
+    """Of two numbers of one name none is dropped without a word."""
+    with pytest.raises(typer.BadParameter, match="J2 is given twice"):
+        named_numbers(["J2=0.3", "J3=0.3", "J2=0.4"], ("", "mm"), "a pin", "--clearance")
 
 
 def test_bounds() -> None:

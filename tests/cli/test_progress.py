@@ -7,7 +7,7 @@ from armwright.sweep.progress import Counter, Progress
 
 
 def progress(**changes: float) -> Progress:
-    told = {"runs": 729, "done": 129, "found": 29, "failed": 0, "damaged": 0, "seconds": 50.0}
+    told = {"runs": 729, "done": 129, "found": 29, "failed": 0, "seconds": 50.0}
     return Progress(**{**told, **changes})
 
 
@@ -19,7 +19,7 @@ def progress(**changes: float) -> Progress:
         ({"done": 29}, ""),
         ({"done": 729}, "14 runs/s"),
         ({"runs": 20129}, "2 runs/s, 2:46:40 left"),
-        ({"failed": 3, "damaged": 1}, "2 runs/s, 0:05:00 left, 3 failed, 1 damaged blocks made again"),
+        ({"failed": 3}, "2 runs/s, 0:05:00 left, 3 failed"),
     ],
 )
 def test_words(changes: dict[str, float], text: str) -> None:

@@ -29,16 +29,7 @@ PATIENCE = 300.0
 
 def fed(*lines: str, options: tuple[str | Path, ...] = ("--cell", CELL), cwd: Path | None = None) -> tuple[int, str]:
     """Feed lines through a pipe; return exit status and what was said."""
-    done = subprocess.run(
-        [sys.executable, "-m", "armwright", "repl", *map(str, options)],
-        input="".join(f"{line}\n" for line in lines),
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=cwd,
-        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "100"},
-        timeout=300,
-    )
+    done = armwright("repl", *options, columns=100, cwd=cwd, fed="".join(f"{line}\n" for line in lines))
     assert "Traceback" not in done.stdout + done.stderr
     return done.returncode, done.stdout + done.stderr
 
@@ -221,6 +212,17 @@ def test_a_report_without_arms(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "report.html").stat().st_size
 
 
+def test_many_lines() -> None:
+    """Of the very many lines of a statement the first and the last are shown, and how many there are between."""
+    status, said = fed("VAR i : SCALAR", "FOR i = 1 TO 20000 DO PRINT(i)", 'PRINT("' + "x" * 5000 + '")')
+
+    lines = said.splitlines()
+    assert status == 0
+    assert lines[499:502] == ["500", "... and 19,000 more; `:report DIR` keeps all in events.jsonl", "19501"]
+    assert len(lines) == 1002
+    assert "... and 4,000 more; " in lines[-1]
+
+
 def test_json() -> None:
     """With --json every input has one line of data, also one with an error."""
     status, said = fed(
@@ -235,7 +237,9 @@ def test_json() -> None:
     assert rows[3]["diagnostics"][0]["code"] == "E202"
     assert rows[4]["effects"][0]["kind"] == "PRINT"
     assert rows[5]["lines"] == ["taken back: IF n = 2 THEN PRINT(1)"]
-    assert rows[6]["error"].startswith("no command ':oh'")
+    assert (rows[3]["error"]["code"], rows[3]["error"]["line"]) == ("E202", 4)
+    assert rows[6]["error"]["class"] == "UnknownNameError"
+    assert rows[6]["error"]["message"].startswith("no command ':oh'")
 
 
 def test_the_old_language() -> None:

@@ -8,6 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +20,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.files.output import strays
-from cli_calls import armwright
+from cli_calls import armwright, armwright_process
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -192,6 +193,20 @@ def test_examples(name: str, tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / name).iterdir()} == FILES
 
 
+def test_collisions_are_not_looked_for(stacked: Path, tmp_path: Path) -> None:
+    """Whoever reads the summary, the page, run.json or --json is told that nobody has looked for collisions."""
+    program = ("run", EXAMPLES / "bench.rlo", "--cell", STANFORD)
+    (tmp_path / "far.rlo").write_text("BEGIN\n  MOVE ARM_1 TO WORLD * XYZ(9, 0, 0) ;\nEND.\n")
+    failed = armwright("run", "far.rlo", "--cell", STANFORD, "-o", "out", "--json", cwd=tmp_path)
+
+    assert armwright(*program).stdout.rstrip().endswith("Collisions are not looked for.")
+    assert json.loads(armwright(*program, "--json").stdout)["collisions"] == "not looked for"
+    assert (failed.returncode, json.loads(failed.stdout)["collisions"]) == (3, "not looked for")
+    for folder in (stacked, tmp_path / "out"):
+        assert json.loads((folder / "run.json").read_text())["collisions"] == "not looked for"
+        assert "<dt>Collisions</dt><dd>not looked for</dd>" in (folder / "report.html").read_text()
+
+
 def test_json_summary() -> None:
     """--json prints the summary and nothing else, in SI units."""
     done = armwright("run", EXAMPLES / "bench.rlo", "--cell", STANFORD, "--json")
@@ -331,9 +346,11 @@ def test_full_disk(tmp_path: Path) -> None:
     def small_files() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
-    said = fails("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "deep" / "out", before=small_files, status=4)
+    done = armwright_process("run", STACKING, "--cell", STANFORD, "-o", tmp_path / "deep" / "out", before=small_files)
 
-    assert "File too large; nothing was written" in said
+    assert done.returncode == 4
+    assert "Traceback" not in done.stderr
+    assert "File too large; nothing was written" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
@@ -518,6 +535,21 @@ def test_a_program_with_errors_leaves_old_results(tmp_path: Path) -> None:
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+def test_hashes_are_those_of_what_was_read(tmp_path: Path) -> None:
+    """The record holds the hash of a program that comes by a pipe, which nobody can read a second time."""
+    program, out, pipe = b"BEGIN PAUSE 0.1 END.\r\n", tmp_path / "out", tmp_path / "pipe.rlo"
+    os.mkfifo(pipe)
+    writing = threading.Thread(target=pipe.write_bytes, args=(program,), daemon=True)
+    writing.start()
+
+    assert armwright("run", pipe, "--cell", STANFORD, "-o", out, "-q").returncode == 0
+
+    writing.join()
+    inputs = json.loads((out / "run.json").read_text())["inputs"]
+    assert inputs["program"] == {"path": str(pipe), "sha256": hashlib.sha256(program).hexdigest()}
+    assert inputs["cell"]["sha256"] == hashlib.sha256(STANFORD.read_bytes()).hexdigest()
+
+
 def test_a_long_stream(tmp_path: Path) -> None:
     """A stream that is too long is cut, and terminal, page and record say where and what keeps it all."""
     program, out = tmp_path / "p.rlo", tmp_path / "out"
@@ -533,6 +565,19 @@ def test_a_long_stream(tmp_path: Path) -> None:
     assert len((out / "motion.csv").read_text().splitlines()) == 501
     armwright("run", program, "--cell", STANFORD, "-o", out, "--motion-rows", "2001")
     assert len((out / "motion.csv").read_text().splitlines()) == 2002
+
+
+def test_few_rows_of_many_arms(tmp_path: Path) -> None:
+    """Where there are fewer rows than arms, none are kept of a run that failed, and not all."""
+    base, posture = "base = [1,0,0, 0,1,0, 0,0,1, {0},0,0]\n", "posture = [0,0,0.3,0,1,0]\n"
+    arms = (f"[arms.ARM_{i}]\n{base.format(i)}{posture}" for i in range(3))
+    (tmp_path / "cell.toml").write_text("".join(arms))
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text("VAR n : SCALAR ; BEGIN n = 0 ; PAUSE 0.01 ; n = 1 / n END.")
+
+    fails("run", program, "--cell", tmp_path / "cell.toml", "-o", out, "--motion-rows", "2", status=3)
+
+    assert len((out / "motion.csv").read_text().splitlines()) == 1
 
 
 def test_a_long_stream_of_a_failure(tmp_path: Path) -> None:
@@ -558,5 +603,57 @@ def test_a_page_of_many_lines(tmp_path: Path) -> None:
     assert done.returncode == 0, done
     assert len((out / "events.jsonl").read_text().splitlines()) > 20000
     page = (out / "report.html").read_text()
-    assert "this page shows the first and the last 2000 of " in page
+    assert "... and 16,001 more; all in events.jsonl" in page
     assert len(page) < 1_500_000
+    trace = json.loads((out / "run.json").read_text())["trace"]
+    assert (len(trace), trace[2000]) == (4001, "... and 16,000 more; all in events.jsonl")
+
+
+def test_a_terminal_of_many_lines(tmp_path: Path) -> None:
+    """A terminal shows the first and the last of very many lines, and where all of them are."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text("VAR i : SCALAR ; BEGIN FOR i = 1 TO 20000 DO PRINT (i) ; END.")
+    call = ("run", program, "--cell", STANFORD)
+
+    kept, shown = armwright(*call, "-o", out, columns=200), armwright(*call, columns=200)
+    told = json.loads(armwright(*call, "--json").stdout)
+
+    assert "... and 19,001 more; all in events.jsonl\n" in kept.stdout.replace(" \n", "\n")
+    assert "... and 19,001 more; `-o FOLDER` keeps all in events.jsonl" in shown.stdout
+    assert 'PRINT "500"' in shown.stdout
+    assert 'PRINT "501"' not in shown.stdout
+    assert len(shown.stdout.splitlines()) < 1020
+    assert told["trace"][2000] == "... and 16,000 more; `-o FOLDER` keeps all in events.jsonl"
+
+
+def test_a_page_of_many_frames_and_changes(tmp_path: Path) -> None:
+    """A page draws some hundred frames and lists some thousand changes of their tree; what is left out is said."""
+    cell, program, out = tmp_path / "cell.toml", tmp_path / "p.rlo", tmp_path / "out"
+    frames = "".join(f"F{i} = [1,0,0, 0,1,0, 0,0,1, 0.{i:04},0,0]\n" for i in range(5000))
+    cell.write_text(Path(STANFORD).read_text().replace("[frames]\n", f"[frames]\n{frames}"))
+    cycle = "BEGIN AFFIX F1 TO F2 ; PAUSE 0.001 ; UNFIX F1 ; PAUSE 0.001 ; END"
+    program.write_text(f"VAR i : SCALAR ; F1, F2 : FRAME ; BEGIN FOR i = 1 TO 2000 DO {cycle} END.")
+
+    done = armwright("run", program, "--cell", cell, "-o", out, "-q")
+
+    assert done.returncode == 0, done
+    page = (out / "report.html").read_text()
+    assert "this page shows the first and the last 200 of 5,002 frames; all in frames.json" in page
+    assert "this page shows the first and the last 2,000 of " in page
+    assert len(page) < 3_000_000
+    assert len(json.loads((out / "frames.json").read_text())["frames"]) > 5000
+
+
+def test_a_line_of_many_letters(tmp_path: Path) -> None:
+    """Of a text of many thousand letters a page, a record and a terminal show the two ends."""
+    program, out = tmp_path / "p.rlo", tmp_path / "out"
+    program.write_text(f'BEGIN PRINT ("{"x" * 200_000}") ; END.')
+
+    done = armwright("run", program, "--cell", STANFORD, "-o", out)
+
+    rest = f"... and {200_008 - 1000:,} more; all in events.jsonl"
+    assert rest in " ".join(done.stdout.split())
+    assert rest in json.loads((out / "run.json").read_text())["trace"][0]
+    assert "x" * 200_000 in (out / "events.jsonl").read_text()
+    # The text of the program is there whole, and no line of what happened.
+    assert (out / "report.html").read_text().count("x" * 200_000) == 1

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from armwright.cli.terminal import CleanStream, cleaned, console
+from armwright.cli.terminal import CleanStream, bound_widths, cleaned, console
 
 # Red letters, a title, the bell, a C1 escape, text from right to left, a letter without width, back to the beginning.
 HOSTILE = "\x1b[31m\x1b]0;owned\x07\x9b2J\u202eevil\u200b\r\x7f\U000e0041"
@@ -171,3 +171,16 @@ def test_one_way_to_print() -> None:
     folder = Path(__file__).resolve().parents[2] / "src" / "armwright"
     making = {path.name for path in folder.rglob("*.py") if "Console(" in path.read_text(encoding="utf-8")}
     assert making == {"terminal.py"}
+
+
+@pytest.mark.parametrize("told", ["99999999999", "0", "-1", "wide", "\N{SUPERSCRIPT TWO}", "9" * 5000])
+def test_impossible_widths(told: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is not the size of a terminal is not taken for one; others stay."""
+    monkeypatch.setenv("COLUMNS", told)
+    monkeypatch.setenv("TERMINAL_WIDTH", told)
+    monkeypatch.setenv("LINES", "40")
+    bound_widths()
+
+    assert "COLUMNS" not in os.environ
+    assert "TERMINAL_WIDTH" not in os.environ
+    assert os.environ["LINES"] == "40"

@@ -2,7 +2,7 @@
 
 import inspect
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from armwright.kinematics.forward import forward, link_poses
 from armwright.kinematics.inverse.closed_form import inverse_branches
 from armwright.kinematics.jacobian import jacobian
 from oracles.arms import random_arm, random_postures
+from samples import Sample
 
 ROUNDING = 1e-11  # two orders of the same sums, and sines that differ by two units in the last place
 
@@ -67,11 +68,17 @@ def _all(values: Any) -> tuple[Array, ...]:
     return values if isinstance(values, tuple) else (values,)
 
 
-@pytest.mark.parametrize("arm", ["stanford", "random"])
 @pytest.mark.parametrize("name", PLAIN)
-def test_agrees_with_the_plain_function(name: str, arm: str, rng: np.random.Generator) -> None:
+def test_agrees_with_the_plain_function(name: str, sample: Sample) -> None:
     """A compiled quantity has the values and shapes of the plain function, for many configurations and for one."""
-    fast = compile_arm(random_arm(np.random.default_rng(5), 4) if arm == "random" else load_arm(arm))
+    for arm in some_of(sample, (load_arm("stanford"), random_arm(np.random.default_rng(5), 4))):
+        assert_agrees(name, arm, np.random.default_rng(sample.seed))
+    sample.record(f"compiled {name} is that of the plain function, arms", 2 if sample.whole else 1, 0)
+
+
+def assert_agrees(name: str, arm: Arm, rng: np.random.Generator) -> None:
+    """Check one quantity of one arm."""
+    fast = compile_arm(arm)
     inputs = _inputs(fast, name, rng, (4, 5))
 
     found = _all(getattr(fast, name)(*inputs))
@@ -89,10 +96,21 @@ def test_every_quantity_is_compared() -> None:
     assert {*PLAIN, "inverse_branches"} == set(quantity_names())
 
 
-@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
-def test_branches(name: str, rng: np.random.Generator) -> None:
+def test_branches(sample: Sample) -> None:
     """Compiled branches are those of the plain function: in reach and out of it, and where a joint is free."""
-    arm = load_arm(name)
+    arms = some_of(sample, [load_arm(name) for name in ("puma560", "stanford", "ur5")])
+    for arm in arms:
+        assert_branches(arm, np.random.default_rng(sample.seed))
+    sample.record("compiled branches are those of the plain function, arms", len(arms), 0)
+
+
+def some_of(sample: Sample, arms: Sequence[Arm]) -> list[Arm]:
+    """Return one of some arms, another in every run, and all of them in `make proof`: to compile takes seconds."""
+    return list(arms) if sample.whole else [arms[sample.seed % len(arms)]]
+
+
+def assert_branches(arm: Arm, rng: np.random.Generator) -> None:
+    """Check the branches of one arm."""
     fast = compile_arm(arm).inverse_branches
     postures = random_postures(arm, rng, 300)
     postures[:100, 4] = 0.0

@@ -22,6 +22,8 @@ from armwright.dynamics.terms import Terms, terms
 from oracles.thousand import AGREEMENT, Case, deviation, largest_deviation, thousand_arms
 from oracles.with_pinocchio import pushed
 
+pytestmark = pytest.mark.proof
+
 TWO_WAYS = 1e-10  # relative; energies and free bodies over the same links
 COMPLEX_STEP = 1e-30  # no difference is taken, so it may be as small as one likes
 

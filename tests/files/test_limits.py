@@ -12,11 +12,12 @@ from typer.testing import CliRunner
 
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.cell.reader import read_cell
+from armwright.clearance.estimating.measured import RestMeasured, read_measured
 from armwright.clearance.reader import read_linkage
 from armwright.cli.app import app
 from armwright.cli.programs import translate_file
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
-from armwright.files import limits
+from armwright.files import limits, reading
 from armwright.files.document import Document
 from armwright.files.limits import LIMITS, limit, parsed, raised
 from armwright.files.lines import longest_dotted_key
@@ -89,6 +90,10 @@ def test_urdf_limits(tmp_path: Path) -> None:
     assert load_urdf(path).n == 3
     with raised(joints=2):
         assert "too many joints between 'l0' and 'l3': 3, and at most 2 joints" in refused(lambda: load_urdf(path))
+    path.write_text("<robot name='r' " + " ".join(f"a{i}='1'" for i in range(100)) + "/>")
+    assert "thing.urdf:1: <robot>: too many attributes: 101, and at most 100 attributes are read" in refused(
+        lambda: load_urdf(path)
+    )
     path.write_text("<robot name='r'>" + "<link>" * 100 + "</link>" * 100 + "</robot>")
     assert "nested too deeply: more, and at most 60 levels" in refused(lambda: load_urdf(path))
     path.write_text("<robot name='r'>" + "<link>" * 5000 + "</link>" * 5000 + "</robot>")
@@ -106,6 +111,49 @@ def test_entities_are_not_expanded(tmp_path: Path) -> None:
     secret.write_text("swordfish")
     path.write_text(f"<!DOCTYPE robot [<!ENTITY s SYSTEM '{secret}'>]><robot name='r'><link name='a'/>&s;</robot>")
     assert "swordfish" not in refused(lambda: load_urdf(path))
+
+
+def test_imports(tmp_path: Path) -> None:
+    """The files that a program imports are counted, and so are the frames of all of them together."""
+    for i in range(3):
+        (tmp_path / f"{i}.toml").write_text(f"[frames]\nA{i} = {IDENTITY}\nB{i} = {IDENTITY}\n")
+    program = tmp_path / "p.rlo"
+    program.write_text("".join(f'IMPORT "{i}.toml" ;\n' for i in range(3)) + "BEGIN PAUSE 1 END.\n")
+
+    def notes() -> list[str]:
+        return [note for one in translate_file(program).diagnostics if one.code == "E228" for note in one.notes]
+
+    assert notes() == []
+    with raised(imports=2):
+        assert notes() == [
+            "too many files: more, and at most 2 files are read; `armwright --raise imports=NUMBER ...` allows more"
+        ]
+    with raised(frames=5):
+        assert "too many frames in all files together: 6, and at most 5 frames are read" in notes()[0]
+
+
+def test_a_long_line_among_others(tmp_path: Path) -> None:
+    """A line that ends is held to the limit as one is that does not, and counted."""
+    table = tmp_path / "table.csv"
+    table.write_text(f"a,b\n1,2\n{'1' * 19},2\n")
+
+    with raised(line_characters=20):
+        assert "table.csv:3: a line is too long" in refused(lambda: [*read_lines(table)])
+
+
+def test_poses_of_a_linkage(tmp_path: Path) -> None:
+    """The poses at which a linkage was measured are counted, however often each was read."""
+    table = tmp_path / "rest.csv"
+    rows = "".join(f"P{i // 2},{i // 2},0,{i // 2},0.1\n" for i in range(6))
+    table.write_text(f"pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm\n{rows}")
+
+    found = read_measured(table)
+    assert isinstance(found, RestMeasured)
+    assert len(found.poses) == 3
+    with raised(entries=2):
+        assert "rest.csv:6: pose: too many: more, and at most 2 entries are read" in refused(
+            lambda: read_measured(table)
+        )
 
 
 def test_typed_programs() -> None:
@@ -143,6 +191,7 @@ def test_what_a_program_imports(strange: tuple[str, str], tmp_path: Path) -> Non
 
     assert f"expected a file, got {kind}" in render(compiled.diagnostics, compiled.source)
     assert f"expected a file, got {kind}" in refused(lambda: Cells().imported(tmp_path, path))
+    assert f"expected a file, got {kind}" in Cells().around(tmp_path, "", Path(path)).problem
 
 
 def test_the_model_of_an_arm(strange: tuple[str, str], tmp_path: Path) -> None:
@@ -245,7 +294,6 @@ def test_every_file_is_read_in_one_place() -> None:
     ours = (
         "files/output.py",
         "report/movie.py",
-        "report/files.py",
         "report/markup.py",
         "explanations/explaining.py",
         "sweep/folder.py",
@@ -275,18 +323,19 @@ def test_dotted_keys() -> None:
         assert longest_dotted_key(odd) <= 1
 
 
-def test_a_table_is_not_held(tmp_path: Path) -> None:
-    """A table of many rows is read in the memory of a few, whatever its size."""
+def test_a_table_is_not_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A table of many rows is read in the memory of a few, whatever its size: its rows would take ten times as much."""
+    monkeypatch.setattr(reading, "_PIECE", 1 << 12)
     path = tmp_path / "long.csv"
-    path.write_text("a,b\n" + "1.25,2.5\n" * 400_000)
+    path.write_text("a,b\n" + "1.25,2.5\n" * 5000)
     tracemalloc.start()
 
     count = sum(1 for _ in read_rows(path)[1])
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
 
-    assert count == 400_000
-    assert peak < 12e6, peak
+    assert count == 5000
+    assert peak < 160e3, peak
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
@@ -310,3 +359,19 @@ def test_long_names_and_many() -> None:
     assert len(said) < 1200
     assert "and 19,900 more" in said
     assert isinstance(UnknownNameError("frame", "x", []), ArmwrightError)
+
+
+def test_regular_files_are_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A regular file of the system may make its reader wait, as /proc/kmsg does: none is waited for, but a pipe is."""
+    opened: dict[str, int] = {}
+    really = os.open
+    monkeypatch.setattr(os, "open", lambda path, flags: opened.update({str(path): flags}) or really(path, flags))
+    path = tmp_path / "thing.toml"
+    path.write_text("x = 1\n")
+    pipe, end = os.pipe()
+    os.write(end, b"x = 2\n")
+    os.close(end)
+
+    assert read_text(path) == "x = 1\n"
+    assert read_text(f"/proc/self/fd/{pipe}") == "x = 2\n"
+    assert [flags & os.O_NONBLOCK for flags in opened.values()] == [os.O_NONBLOCK, 0]

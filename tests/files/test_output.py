@@ -1,5 +1,6 @@
 """Results are written whole or not at all."""
 
+import errno
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,13 +14,13 @@ from armwright.files.output import write_file, write_folder
 def test_writes_and_replaces(tmp_path: Path) -> None:
     """A second run takes the place of the first, and leaves files of others alone."""
     folder = tmp_path / "a" / "b"
-    write_folder(folder, {"x.txt": "one", "y.txt": ["t", "wo"]})
-    (folder / "mine.txt").write_text("keep")
+    write_folder(folder, {"figure-x.svg": "one", "figure-y.svg": ["t", "wo"]})
+    (folder / "figure-mine.svg").write_text("keep")
 
-    write_folder(folder, {"x.txt": "three"})
+    write_folder(folder, {"figure-x.svg": "three"})
 
     (folder / "run.json").unlink()
-    assert {p.name: p.read_text() for p in folder.iterdir()} == {"x.txt": "three", "mine.txt": "keep"}
+    assert {p.name: p.read_text() for p in folder.iterdir()} == {"figure-x.svg": "three", "figure-mine.svg": "keep"}
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["b"]
 
 
@@ -31,7 +32,7 @@ def test_an_error_half_way_leaves_nothing(tmp_path: Path) -> None:
         raise OSError(28, os.strerror(28))
 
     with pytest.raises(OutputError, match="No space left on device; nothing was written"):
-        write_folder(tmp_path / "new" / "run", {"x.txt": "one", "y.txt": full_disk()})
+        write_folder(tmp_path / "new" / "run", {"figure-x.svg": "one", "figure-y.svg": full_disk()})
 
     assert list(tmp_path.iterdir()) == []
 
@@ -39,16 +40,16 @@ def test_an_error_half_way_leaves_nothing(tmp_path: Path) -> None:
 def test_interruption_leaves_the_old_result(tmp_path: Path) -> None:
     """Ctrl-C while writing keeps the last run whole."""
     folder = tmp_path / "run"
-    write_folder(folder, {"x.txt": "old"})
+    write_folder(folder, {"figure-x.svg": "old"})
 
     def interrupted() -> Iterator[str]:
         yield "new"
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_folder(folder, {"x.txt": interrupted()})
+        write_folder(folder, {"figure-x.svg": interrupted()})
 
-    assert (folder / "x.txt").read_text() == "old"
+    assert (folder / "figure-x.svg").read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["run"]
 
 
@@ -57,23 +58,23 @@ def test_a_file_in_the_way(tmp_path: Path) -> None:
     (tmp_path / "run").write_text("a file")
 
     with pytest.raises(OutputError, match=r"cannot write to '.*run': it is a file, and a folder is needed"):
-        write_folder(tmp_path / "run", {"x.txt": "one"})
+        write_folder(tmp_path / "run", {"figure-x.svg": "one"})
     with pytest.raises(OutputError, match=r"cannot make '.*run': it is a file"):
-        write_folder(tmp_path / "run" / "deeper", {"x.txt": "one"})
+        write_folder(tmp_path / "run" / "deeper", {"figure-x.svg": "one"})
     with pytest.raises(OutputError, match=r"cannot make '.*run/deeper/still': '.*run' is a file; nothing"):
-        write_folder(tmp_path / "run" / "deeper" / "still" / "more", {"x.txt": "one"})
+        write_folder(tmp_path / "run" / "deeper" / "still" / "more", {"figure-x.svg": "one"})
 
     assert (tmp_path / "run").read_text() == "a file"
 
 
 def test_a_folder_in_the_way_of_a_file(tmp_path: Path) -> None:
     """A folder named as one of the results stops the writing before any file is replaced."""
-    (tmp_path / "run" / "y.txt").mkdir(parents=True)
+    (tmp_path / "run" / "figure-y.svg").mkdir(parents=True)
 
-    with pytest.raises(OutputError, match=r"'y\.txt' in it is a folder"):
-        write_folder(tmp_path / "run", {"x.txt": "one", "y.txt": "two"})
+    with pytest.raises(OutputError, match=r"'figure-y\.svg' in it is a folder"):
+        write_folder(tmp_path / "run", {"figure-x.svg": "one", "figure-y.svg": "two"})
 
-    assert [p.name for p in (tmp_path / "run").iterdir()] == ["y.txt"]
+    assert [p.name for p in (tmp_path / "run").iterdir()] == ["figure-y.svg"]
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
@@ -81,19 +82,19 @@ def test_no_permission(tmp_path: Path) -> None:
     """A folder that may not be written is reported."""
     tmp_path.chmod(0o500)
     with pytest.raises(OutputError, match="nothing was written"):
-        write_folder(tmp_path / "run", {"x.txt": "one"})
+        write_folder(tmp_path / "run", {"figure-x.svg": "one"})
     tmp_path.chmod(0o700)
 
 
 def test_one_file(tmp_path: Path) -> None:
     """One file is written into a folder that is made for it, and replaced; others stay."""
-    path = tmp_path / "a" / "b" / "x.txt"
+    path = tmp_path / "a" / "b" / "figure-x.svg"
     write_file(path, "one")
-    (path.parent / "mine.txt").write_text("keep")
+    (path.parent / "figure-mine.svg").write_text("keep")
 
     write_file(path, ["t", "wo"])
 
-    assert {p.name: p.read_text() for p in path.parent.iterdir()} == {"x.txt": "two", "mine.txt": "keep"}
+    assert {p.name: p.read_text() for p in path.parent.iterdir()} == {"figure-x.svg": "two", "figure-mine.svg": "keep"}
 
 
 def test_one_file_half_written(tmp_path: Path) -> None:
@@ -103,9 +104,86 @@ def test_one_file_half_written(tmp_path: Path) -> None:
         yield "some"
         raise OSError(28, os.strerror(28))
 
-    write_file(tmp_path / "old.txt", "old")
-    for path in (tmp_path / "old.txt", tmp_path / "new" / "x.txt"):
+    write_file(tmp_path / "figure-old.svg", "old")
+    for path in (tmp_path / "figure-old.svg", tmp_path / "new" / "figure-x.svg"):
         with pytest.raises(OutputError, match="No space left on device; nothing was written"):
             write_file(path, full_disk())
 
-    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"old.txt": "old"}
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"figure-old.svg": "old"}
+
+
+def mounted(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    """Let a file be one that is mounted by itself: nothing takes its place, and it goes to no other."""
+    replace = Path.replace
+
+    def busy(self: Path, target: Path) -> Path:
+        if name in (self.name, target.name) and target.exists():
+            raise OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", busy)
+
+
+@pytest.mark.parametrize("links", [True, False], ids=["second names", "no second names"])
+def test_a_file_that_cannot_be_replaced_stops_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, links: bool
+) -> None:
+    """Where the last of the files cannot be moved in, the older results are there again, and nothing else."""
+    folder = tmp_path / "run"
+    write_folder(folder, {"figure-w.svg": "old w", "figure-x.svg": "old x"})
+    before = {path.name: path.read_text() for path in folder.iterdir()}
+    if not links:
+        monkeypatch.setattr(os, "link", lambda *_paths, **_how: (_ for _ in ()).throw(PermissionError(1, "no")))
+    mounted(monkeypatch, "run.json")
+
+    with pytest.raises(OutputError, match="nothing was written"):
+        write_folder(folder, {"figure-x.svg": "new x", "figure-y.svg": "new y"})
+
+    assert {path.name: path.read_text() for path in folder.iterdir()} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_a_file_that_is_mounted_is_written_where_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of a container that is one of the host can be written, but not replaced."""
+    path = tmp_path / "arm.toml"
+    path.write_text("old and longer")
+    number = path.stat().st_ino
+    mounted(monkeypatch, "arm.toml")
+
+    write_file(path, ["n", "ew"])
+
+    assert path.read_text() == "new"
+    assert path.stat().st_ino == number
+    assert [one.name for one in tmp_path.iterdir()] == ["arm.toml"]
+
+
+def test_a_full_disk_leaves_a_mounted_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the new bytes have no room, the old ones come back."""
+    path = tmp_path / "arm.toml"
+    path.write_text("old")
+    mounted(monkeypatch, "arm.toml")
+    fsync, calls = os.fsync, iter([True, False])
+
+    def full(file: int) -> None:
+        if os.fstat(file).st_ino == path.stat().st_ino and next(calls):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(file)
+
+    monkeypatch.setattr(os, "fsync", full)
+
+    with pytest.raises(OutputError, match="No space left on device; nothing was written"):
+        write_file(path, "new and longer")
+
+    assert path.read_text() == "old"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_file_in_a_folder_of_others(tmp_path: Path) -> None:
+    """Who may write to a file and not to its folder can write it all the same."""
+    path = tmp_path / "arm.toml"
+    path.write_text("old")
+    tmp_path.chmod(0o500)
+    write_file(path, "new")
+    tmp_path.chmod(0o700)
+
+    assert path.read_text() == "new"

@@ -1,5 +1,6 @@
 """Folders of results: a run replaces the older one whole, whatever strikes it."""
 
+import contextlib
 import fcntl
 import json
 import os
@@ -10,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from armwright.errors import OutputError
 from armwright.files.output import RECORD, is_stray, strays, write_folder
 from armwright.files.staging import PREFIX, remove_abandoned, staging
 from samples import Sample
 
-OLD = {f"old{i}.txt": "old" for i in range(20)} | {f"both{i}.txt": "old" for i in range(20)}
-NEW = {f"new{i}.txt": "new" for i in range(20)} | {f"both{i}.txt": "new" for i in range(20)}
+OLD = {f"figure-old{i}.svg": "old" for i in range(20)} | {f"figure-both{i}.svg": "old" for i in range(20)}
+NEW = {f"figure-new{i}.svg": "new" for i in range(20)} | {f"figure-both{i}.svg": "new" for i in range(20)}
 # Writes the new results once its first line is read; the pieces come slowly, as those of a long run do.
 WRITER = """
 import sys, time
@@ -24,7 +26,7 @@ from armwright.files.output import write_folder
 def slowly(text):
     time.sleep(0.0005)
     yield text
-files = {f"new{i}.txt": slowly("new") for i in range(20)} | {f"both{i}.txt": slowly("new") for i in range(20)}
+files = {f"figure-{kind}{i}.svg": slowly("new") for kind in ("new", "both") for i in range(20)}
 print("ready", flush=True)
 write_folder(Path(sys.argv[1]), files)
 print("done", flush=True)
@@ -33,7 +35,7 @@ print("done", flush=True)
 
 def held(folder: Path) -> dict[str, str]:
     """The files of a folder but for the record, with their texts."""
-    return {path.name: path.read_text() for path in folder.iterdir() if path.name not in (RECORD, "mine.txt")}
+    return {path.name: path.read_text() for path in folder.iterdir() if path.name not in (RECORD, "figure-mine.svg")}
 
 
 def struck(folder: Path, number: int, delay: float) -> None:
@@ -57,7 +59,7 @@ def test_signals(sample: Sample, tmp_path: Path, number: signal.Signals) -> None
     for rng in sample.cases(50):
         folder = tmp_path / str(tried) / "out"
         write_folder(folder, OLD)
-        (folder / "mine.txt").write_text("mine")
+        (folder / "figure-mine.svg").write_text("mine")
 
         struck(folder, number, rng.uniform(0.0, 0.12))
 
@@ -65,7 +67,7 @@ def test_signals(sample: Sample, tmp_path: Path, number: signal.Signals) -> None
         assert strays(folder) == ()
         write_folder(folder, NEW)
         assert held(folder) == NEW
-        assert (folder / "mine.txt").read_text() == "mine"
+        assert (folder / "figure-mine.svg").read_text() == "mine"
         assert [path.name for path in folder.parent.iterdir()] == ["out"]
         tried += 1
     sample.record(f"{number.name} while results are written", tried, 0)
@@ -91,13 +93,13 @@ def test_kill(sample: Sample, tmp_path: Path) -> None:
 
 
 def killed_between(folder: Path, moves: int) -> None:
-    """Let a process be killed after so many moves."""
+    """Let a process be killed after so many moves of new files; what goes has gone before."""
     code = (
         "import os, pathlib, sys\n"
         "from armwright.files.output import write_folder\n"
         "real, left = pathlib.Path.replace, [int(sys.argv[2])]\n"
         "def replace(path, to):\n"
-        "    left[0] -= 1\n"
+        "    left[0] -= path.parent.name == 'new'\n"
         "    if left[0] < 0: os.kill(os.getpid(), 9)\n"
         "    return real(path, to)\n"
         "pathlib.Path.replace = replace\n"
@@ -115,66 +117,148 @@ def test_killed_between_two_moves(tmp_path: Path, moves: int) -> None:
     killed_between(folder, moves)
 
     named = strays(folder)
-    assert set(named) >= {f"old{i}.txt" for i in range(20)}
+    assert set(named) >= {f"figure-old{i}.svg" for i in range(20)}
     assert all(is_stray(folder / name) for name in named)
     assert len(list(tmp_path.iterdir())) == 2  # the results, and what the dead process has left
 
-    write_folder(folder, {"one.txt": "one"})
-    assert held(folder) == {"one.txt": "one"}
+    write_folder(folder, {"figure-one.svg": "one"})
+    assert held(folder) == {"figure-one.svg": "one"}
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("removals", range(9))
+def test_killed_while_clearing_up(tmp_path: Path, removals: int) -> None:
+    """Killed after any number of removals, a staging folder is known for abandoned, however it is listed."""
+    code = (
+        "import os, pathlib, sys\n"
+        "from armwright.files.staging import KEPT, staging\n"
+        "class Listed(list):\n"
+        "    def __enter__(self): return self\n"
+        "    def __exit__(self, *_): pass\n"
+        "read = os.scandir\n"
+        "os.scandir = lambda place: Listed(sorted(read(place), key=lambda entry: entry.name != 'lock'))\n"
+        "left = [int(sys.argv[2])]\n"
+        "def counted(real):\n"
+        "    def remove(*place, **more):\n"
+        "        left[0] -= 1\n"
+        "        if left[0] < 0: os.kill(os.getpid(), 9)\n"
+        "        return real(*place, **more)\n"
+        "    return remove\n"
+        "with staging(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[1]) / 'out') as new:\n"
+        "    new.with_name(KEPT).mkdir()\n"
+        "    for name in ('new/a', 'new/b', 'kept/a'): (new.parent / name).touch()\n"
+        "    os.unlink, os.rmdir = counted(os.unlink), counted(os.rmdir)\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path), str(removals)], check=False, timeout=60)
+
+    remove_abandoned(tmp_path)
+
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_is_in_no_record(tmp_path: Path) -> None:
+    """A file that the record does not name is somebody's own, unless what it names is not there as it was written."""
+    write_folder(tmp_path, {"figure-a.svg": "a"})
+    (tmp_path / "mine.csv").write_text("mine")
+    assert not is_stray(tmp_path / "mine.csv")
+    assert not is_stray(tmp_path / "nowhere.csv")
+
+    (tmp_path / "figure-a.svg").unlink()
+
+    assert is_stray(tmp_path / "mine.csv")
+    assert not is_stray(tmp_path / "nowhere.csv")
+    assert not is_stray(tmp_path / RECORD)
 
 
 def test_record(tmp_path: Path) -> None:
     """The record says what it was given, and the SHA-256 hash of every file."""
-    write_folder(tmp_path / "out", {"a.txt": ["a", "b"], "b.bin": b"ab"}, {"command": "x"})
+    write_folder(tmp_path / "out", {"figure-a.svg": ["a", "b"], "b.bin": b"ab"}, {"command": "x"})
 
     said = json.loads((tmp_path / "out" / RECORD).read_text())
     digest = "fb8e20fc2e4c3f248c60c39bd652f3c1347298bb977b8b4d5903b85055620603"
-    assert said == {"format": "armwright results 1", "command": "x", "files": {"a.txt": digest, "b.bin": digest}}
+    assert said == {"format": "armwright results 1", "command": "x", "files": {"figure-a.svg": digest, "b.bin": digest}}
 
 
 def test_changed_files_are_the_users(tmp_path: Path) -> None:
     """A file of the old run that somebody has changed since is not removed; one as it was written is."""
-    write_folder(tmp_path, {"a.txt": "a", "b.txt": "b"})
-    (tmp_path / "a.txt").write_text("mine")
-    assert strays(tmp_path) == ("a.txt",)
+    write_folder(tmp_path, {"figure-a.svg": "a", "figure-b.svg": "b"})
+    (tmp_path / "figure-a.svg").write_text("mine")
+    assert strays(tmp_path) == ("figure-a.svg",)
 
-    write_folder(tmp_path, {"c.txt": "c"})
+    write_folder(tmp_path, {"figure-c.svg": "c"})
 
-    assert held(tmp_path) == {"a.txt": "mine", "c.txt": "c"}
+    assert held(tmp_path) == {"figure-a.svg": "mine", "figure-c.svg": "c"}
+
+
+A_TXT = "ca978112ca1bbdcafac231b39a23dc4da786eff8147c4e72b9807785afee48bb"
+
+
+@pytest.mark.parametrize("name", ["a\0b", "\ud800", "", ".."])
+def test_a_record_names_what_is_no_file(tmp_path: Path, name: str) -> None:
+    """What cannot be the name of a file is passed over, in writing and in reading."""
+    (tmp_path / RECORD).write_text(json.dumps({"format": "armwright results 1", "files": {name: A_TXT}}))
+    (tmp_path / "figure-mine.svg").write_text("mine")
+    assert not is_stray(tmp_path / "figure-mine.svg")
+
+    write_folder(tmp_path, {"figure-c.svg": "c"})
+
+    assert (tmp_path / "figure-c.svg").read_text() + (tmp_path / "figure-mine.svg").read_text() == "cmine"
+
+
+def test_a_record_names_files_of_its_own_folder(tmp_path: Path) -> None:
+    """A record that names files elsewhere removes nothing there."""
+    (tmp_path / "figure-a.svg").write_text("a")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / RECORD).write_text(
+        json.dumps({"format": "armwright results 1", "files": {"../figure-a.svg": A_TXT}})
+    )
+
+    write_folder(tmp_path / "out", {"figure-c.svg": "c"})
+
+    assert held(tmp_path / "out") == {"figure-c.svg": "c"}
+    assert (tmp_path / "figure-a.svg").exists()
 
 
 @pytest.mark.parametrize(
-    "record",
-    [
-        {"files": {"a.txt": "ca978112ca1bbdcafac231b39a23dc4da786eff8147c4e72b9807785afee48bb"}},
-        {
-            "format": "armwright results 1",
-            "files": {"../a.txt": "ca978112ca1bbdcafac231b39a23dc4da786eff8147c4e72b980"},
-        },
-        {"format": "armwright results 1", "files": ["a.txt"]},
-        [],
-    ],
+    "record", [{"files": {"figure-a.svg": A_TXT}}, {"format": "armwright results 1", "files": ["figure-a.svg"]}, []]
 )
 def test_records_of_others(tmp_path: Path, record: object) -> None:
-    """A record that armwright has not written, or that names files elsewhere, removes nothing."""
-    (tmp_path / "a.txt").write_text("a")
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "a.txt").write_text("a")
-    (tmp_path / "out" / RECORD).write_text(json.dumps(record))
+    """A record that armwright has not written is the user's own file: nothing is written over it."""
+    (tmp_path / "figure-a.svg").write_text("a")
+    (tmp_path / RECORD).write_text(json.dumps(record))
+    before = held(tmp_path)
 
-    write_folder(tmp_path / "out", {"c.txt": "c"})
+    with pytest.raises(OutputError, match=r"'run\.json' in it is not of a run of armwright.* move it away"):
+        write_folder(tmp_path, {"figure-c.svg": "c"})
 
-    assert held(tmp_path / "out") == {"a.txt": "a", "c.txt": "c"}
-    assert (tmp_path / "a.txt").exists()
+    assert held(tmp_path) == before
+    assert json.loads((tmp_path / RECORD).read_text()) == record
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_a_file_of_the_user_with_the_name_of_a_result(tmp_path: Path, *, recorded: bool) -> None:
+    """A file that no run has written is not written over, whether or not there are results of a run beside it."""
+    if recorded:
+        write_folder(tmp_path, {"figure-b.svg": "b"})
+    (tmp_path / "figure-a.svg").write_text("mine")
+    before = held(tmp_path)
+
+    with pytest.raises(OutputError, match=r"'figure-a\.svg' in it is not of a run of armwright"):
+        write_folder(tmp_path, {"figure-a.svg": "a", "figure-c.svg": "c"})
+
+    assert held(tmp_path) == before
 
 
 def test_folders_of_the_living_stay(tmp_path: Path) -> None:
     """A staging folder whose process lives stays, and so does one that somebody else has made."""
     (tmp_path / f"{PREFIX}foreign").mkdir()
-    (tmp_path / f"{PREFIX}foreign" / "precious.txt").write_text("x")
+    (tmp_path / f"{PREFIX}foreign" / "figure-precious.svg").write_text("x")
     (tmp_path / f"{PREFIX}link").symlink_to(tmp_path / f"{PREFIX}foreign")
-    dead = tmp_path / f"{PREFIX}dead"
+    (tmp_path / f"{PREFIX}empty").mkdir()
+    piped = tmp_path / f"{PREFIX}0123456789abcdef"
+    (piped / "new").mkdir(parents=True)
+    os.mkfifo(piped / "lock")
+    dead = tmp_path / f"{PREFIX}0000000000000000"
     dead.mkdir()
     (dead / "lock").touch()
     with staging(tmp_path, tmp_path / "out") as new:
@@ -182,7 +266,7 @@ def test_folders_of_the_living_stay(tmp_path: Path) -> None:
         assert new.is_dir()
         assert not dead.exists()
     left = {path.name for path in tmp_path.iterdir()}
-    assert left == {f"{PREFIX}foreign", f"{PREFIX}link"}
+    assert left == {f"{PREFIX}foreign", f"{PREFIX}link", f"{PREFIX}empty", piped.name}
 
 
 def test_two_at_once(tmp_path: Path) -> None:
@@ -218,6 +302,24 @@ def test_mount_point(tmp_path: Path) -> None:
         subprocess.run(["umount", str(folder)], check=True)
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")
+def test_full_disk(tmp_path: Path) -> None:
+    """On a disk without a byte of room nothing is left behind, not even where nothing was made yet."""
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(tmp_path)], check=False).returncode:
+        pytest.skip("this machine does not let us mount")
+    try:
+        with contextlib.suppress(OSError), (tmp_path / "mine").open("wb", buffering=0) as file:
+            while file.write(b"0" * 512):
+                pass
+
+        with pytest.raises(OutputError, match="No space left on device; nothing was written"):
+            write_folder(tmp_path / "out", NEW)
+
+        assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    finally:
+        subprocess.run(["umount", str(tmp_path)], check=True)
+
+
 def test_nothing_can_be_made_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing can be made beside a folder, its results are staged in it."""
     folder = tmp_path / "out"
@@ -235,3 +337,16 @@ def test_nothing_can_be_made_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     write_folder(folder, NEW)
 
     assert held(folder) == NEW
+
+
+@pytest.mark.parametrize("name", ["thesis.csv", "mine.svg", "arm.txt", "motion.csv.bak", "session.rlo"])
+def test_a_foreign_record_removes_nothing(tmp_path: Path, name: str) -> None:
+    """A record from elsewhere may name any file with its right hash: only what has the name of a result ever goes."""
+    (tmp_path / name).write_text("a")
+    (tmp_path / "motion.csv").write_text("a")
+    files = {name: A_TXT, "motion.csv": A_TXT}
+    (tmp_path / RECORD).write_text(json.dumps({"format": "armwright results 1", "files": files}))
+
+    write_folder(tmp_path, {"report.html": "new"})
+
+    assert held(tmp_path) == {name: "a", "report.html": "new"}

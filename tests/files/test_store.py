@@ -224,15 +224,13 @@ def test_links_count_as_what_they_lead_to(tmp_path: Path) -> None:
 
 
 def test_a_file_in_the_way(tmp_path: Path) -> None:
-    """A file with the name of the store gives way; one with the name of the cache, which the user chose, stays."""
-    (tmp_path / "cache").mkdir()
-    (tmp_path / "cache" / "store").write_text("in the way")
-    store = Store(tmp_path / "cache" / "store")
-    assert store.put(KEY, DATA)
-    assert store.get(KEY) == DATA
-
+    """A file with the name of the store, or of a folder above it, stays, and nothing is kept."""
     (tmp_path / "file").write_text("in the way")
-    assert not Store(tmp_path / "file" / "store").put(KEY, DATA)
+
+    for folder in (tmp_path / "file", tmp_path / "file" / "store"):
+        assert Store(folder).made(KEY, lambda: DATA) == DATA
+        assert not Store(folder).put(KEY, DATA)
+
     assert (tmp_path / "file").read_text() == "in the way"
 
 

@@ -396,7 +396,8 @@ def test_least_turn_of_a_straight_wrist(name: str, sample: Sample) -> None:
         near = rng.uniform(lower, upper)
         q = rng.uniform(0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper)
         q[4] = 0.0
-        q[5] += rng.choice((0.0, rng.uniform(-3, 3)))
+        # Whole turns of joint 6 lead to the same pose, and positions beyond one are taken for degrees.
+        q[5] = math.remainder(q[5] + rng.choice((0.0, rng.uniform(-3, 3))), 2 * math.pi)
         X = forward(narrow, q)
 
         solution = inverse(narrow, X, near)

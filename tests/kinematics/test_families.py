@@ -10,10 +10,11 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.forward import forward, link_poses
+from armwright.kinematics.forward import forward, link_poses, per_joint, stack
+from armwright.kinematics.inverse.branches import branches, one_branch
 from armwright.kinematics.inverse.closed_form import BRANCHES, inverse, inverse_branches
 from armwright.kinematics.inverse.posture import posture
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.recognise import closed_form_of, shoulder_of
 from armwright.kinematics.inverse.solution import Answer
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
@@ -324,3 +325,17 @@ def test_free_joint_moves_on_to_bring_the_others_inside() -> None:
     assert best.free == (4, 6)
     np.testing.assert_allclose(forward(arm, best.q), X, atol=RESIDUAL)
     assert abs(math.degrees(best.q[3])) == pytest.approx(5.0, abs=0.5)  # the least it must move, to a step
+
+
+@pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+def test_one_branch_is_one_of_eight(name: str, rng: np.random.Generator) -> None:
+    """A branch solved by itself has the joint positions that it has among all eight, of singular poses too."""
+    arm = load_arm(name)
+    shoulder = closed_form_of(arm)
+    for q in random_postures(arm, rng, 5):
+        q[4] = rng.choice((q[4], 0.0))
+        X, near = forward(arm, q), rng.uniform(-3, 3, (3, arm.n))
+        place = ([X[i, :3].tolist() for i in range(3)], X[:3, 3].tolist(), per_joint(near))
+        for i, expected in enumerate(branches(arm, shoulder, *place).q):
+            found = one_branch(arm, shoulder, *place, branch=i)
+            np.testing.assert_array_equal(stack(found, (3,)), stack(expected, (3,)))

@@ -17,6 +17,7 @@ from armwright.kinematics.inverse.turns import middle
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
 from oracles.arms import random_arm, random_postures
+from samples import Sample
 
 # Where the slope is regular the last step leaves nothing but rounding, of arms ten metres long [m] and [rad].
 RESIDUAL = 1e-12
@@ -55,13 +56,14 @@ def test_short_arms_find_their_posture_again(joints: int, rng: np.random.Generat
             assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
 
 
-def test_six_skew_turns_find_their_posture_again(rng: np.random.Generator) -> None:
+@pytest.mark.share(0.4)
+def test_six_skew_turns_find_their_posture_again(rng: np.random.Generator, sample: Sample) -> None:
     """With six skew axes every posture found meets the pose and nine of ten times the very one asked is among them.
 
     Such an arm may have sixteen postures, and no number of starts is sure to find all.
     """
-    again = 0
-    for _ in range(5):
+    again, arms = 0, sample.count(5)
+    for _ in range(arms):
         arm = random_arm(rng, 6)
         arm = attrs.evolve(arm, joints=[attrs.evolve(joint, kind="revolute", limits=TURN) for joint in arm.joints])
         assert shoulder_of(arm) is None
@@ -71,7 +73,7 @@ def test_six_skew_turns_find_their_posture_again(rng: np.random.Generator) -> No
             assert solution.answer is Answer.SOLVED
             assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
             again += int(min(np.abs(branch.q - q).max() for branch in solution) < POSTURE)
-    assert again >= 18
+    assert again >= 0.9 * 4 * arms - 1
 
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])

@@ -143,7 +143,7 @@ def test_largest_part_of_the_speed(rng: np.random.Generator) -> None:
         shares = shares._replace(lasting=np.clip(shares.lasting, -0.95, 0.95))
         limits = np.ones(3)
 
-        part, binding = _largest_part(shares, limits)
+        part, binding = _largest_part(PUMA, shares, limits)
 
         assert np.abs(shares.at(part)).max() <= 1 + 1e-8
         for above in np.linspace(part, 1.0, 1000)[1:]:

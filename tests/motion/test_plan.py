@@ -95,6 +95,26 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
     assert done > 20
 
 
+@pytest.mark.parametrize("name", ["stanford", "puma560", "ur5"])
+def test_coarser_lines_are_no_slower(name: str, rng: np.random.Generator) -> None:
+    """Who allows more than a millimetre waits no longer for it, and the hand is turned by 25 mrad at most."""
+    arm, done = load_arm(name), 0
+    for q in random_postures(arm, rng, 20):
+        A = forward(arm, q)
+        B = A @ pose(np.eye(3), rng.normal(size=3) * 10 ** rng.uniform(-2, -0.7))
+        try:
+            runs = [follow(arm, Path(poses=[A, B]), q, deviation=d, speed=100) for d in (1e-3, 2e-3, 3e-3, 5e-3, 1.0)]
+        except PathError:
+            continue
+        assert (np.diff([run.trajectory.duration for run in runs]) <= 0).all()
+        assert runs[-1].deviation <= 5e-3
+        assert runs[-1].turn_deviation <= 5e-3 * TURN_PER_METRE
+        done += 1
+        if done == 3:
+            break
+    assert done
+
+
 def test_turn_on_the_spot(stanford: Arm) -> None:
     """A path without length turns the hand where it is, evenly about one axis."""
     A, B = at(0.5, 0.1, 0.2), at(0.5, 0.1, 0.2, turn=1.0)

@@ -35,6 +35,18 @@ def test_quintic_peaks() -> None:
     assert move.peaks(2)[0] == pytest.approx(10 / np.sqrt(3) * 3 / 4)
 
 
+def test_peaks_are_the_largest_of_the_segments(rng: np.random.Generator) -> None:
+    """Segments that cannot hold the largest value are not looked at, and nothing is missed by that."""
+    for _ in range(50):
+        segments, powers, joints = (int(rng.integers(1, most)) for most in (30, 11, 8))
+        times = np.concatenate([[0.0], np.cumsum(rng.uniform(0, 0.2, segments))])
+        scale = 10.0 ** rng.uniform(-3, 3, (1, powers, 1))
+        move = Trajectory(times=times, coefficients=rng.normal(size=(segments, powers, joints)) * scale)
+
+        for order in range(3):
+            np.testing.assert_array_equal(move.peaks(order), move.segment_peaks(order).max(axis=0))
+
+
 def test_point_to_point_uses_its_limits() -> None:
     """At speed 120 some joint meets a limit exactly and none passes one; at 60 it takes twice as long."""
     arm = load_arm("puma560-seed")

@@ -89,6 +89,7 @@ def test_messages_from_code() -> None:
         ("\nsource\n", "\n", "the program text is missing"),
         ("STOP", "OPEN   ARM_1", "runs on behind"),
         ('program "test.rlo"', "program test", 'expected text in ""'),
+        ('program "test.rlo"', f"program {'[' * 100_000}", 'expected text in "", got'),
     ],
 )
 def test_refused(old: str, new: str, says: str) -> None:
@@ -99,6 +100,7 @@ def test_refused(old: str, new: str, says: str) -> None:
         assemble(text.replace(old, new, 1), "bench.rlc")
 
     assert re.match(r"bench\.rlc:\d+: ", str(caught.value))
+    assert len(str(caught.value)) < 200
 
 
 @given(st.data())

@@ -102,16 +102,17 @@ def test_hand_over_order(two_arms: Recording) -> None:
         "UNFIX part",
         "ARM_1 MOVE: PTP wait1 @100",
         "SIGNAL brought",
-        "WAIT brought",
         "ARM_2 MOVE: PTP apm; LINE meet @100",
         "ARM_2 GRASP",
         "AFFIX part -> ARM_2",
         "ARM_2 [part] MOVE: LINE apm; PTP apb; LINE bin @100",
         "SIGNAL taken",
-        "WAIT taken",
     ]
     places = [trace.index(line) for line in order]
     assert places == sorted(places)
+    ends = {one.text: one.t1 for one in two_arms.effects if one.kind in ("SIGNAL", "WAIT")}
+    assert ends["WAIT brought"] == pytest.approx(ends["SIGNAL brought"])
+    assert ends["WAIT taken"] == pytest.approx(ends["SIGNAL taken"])
     assert trace[-1] == "ARM_2 MOVE: LINE apb; PTP wait2 @100"
 
 

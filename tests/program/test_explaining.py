@@ -64,7 +64,21 @@ def test_no_title_twice() -> None:
 
 def test_run_time_pages_run() -> None:
     """What is said only while a program runs is shown by a program that runs."""
-    for code in ("E401", "E402", "E403", "E404", "E405", "E504", "E505", "E506", "R601", "W401", "W402"):
+    for code in (
+        "E401",
+        "E402",
+        "E403",
+        "E404",
+        "E405",
+        "E406",
+        "E504",
+        "E505",
+        "E506",
+        "R601",
+        "W401",
+        "W402",
+        "W403",
+    ):
         assert "// run in " in explanation(code).wrong, code
 
 

@@ -1,5 +1,6 @@
 """Programs that would run for ever, and numbers that no robot has."""
 
+import attrs
 import pytest
 
 from armwright.program import Source
@@ -7,7 +8,7 @@ from armwright.program import compile as translate
 from armwright.program.editing.formatting import formatted
 from armwright.program.running.interpret import Limits
 from armwright.program.syntax import tree
-from program.running import failure, printed, run
+from program.running import cell_of, failure, printed, run
 
 HEAD = (
     "VAR f, far : FRAME ; t : TRANS ; n, i : SCALAR ; e : EVENT ;\n"
@@ -62,6 +63,26 @@ def test_branches_without_end() -> None:
     error = failure(program("again()"))
 
     assert error.diagnostic.code == "E505"
+
+
+@pytest.mark.parametrize("around", ["{0}", "TRY {0} RECOVER PRINT(1) END"])
+def test_more_branches_than_there_may_be(around: str) -> None:
+    """Where a branch cannot begin, those before it that have not been let go yet are given up."""
+    text = program(around.format(f"COBEGIN {' ; '.join(['BEGIN PAUSE 1 END'] * 20)} COEND"))
+
+    if around == "{0}":
+        assert failure(text, limits=Limits(processes=10)).diagnostic.code == "E505"
+    else:
+        assert printed(run(text, limits=Limits(processes=10))) == ["1"]
+
+
+@pytest.mark.parametrize(("period", "time"), [(0.1, 0.6), (0.1, 0.7), (1e-3, 0.6), (2e-3, 4.35)])
+def test_a_program_that_ends_at_the_limit(period: float, time: float) -> None:
+    """A program that takes just as long as it may is not ended, however its ticks are rounded."""
+    cell = attrs.evolve(cell_of("cell1"), period=period)
+
+    assert run(f"BEGIN PAUSE {time} END.", cell, Limits(time=time)).duration == pytest.approx(time)
+    assert failure(f"BEGIN PAUSE {time + period} END.", cell, Limits(time=time)).diagnostic.code == "E506"
 
 
 @pytest.mark.parametrize(

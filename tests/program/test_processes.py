@@ -11,6 +11,7 @@ import pytest
 from armwright.program import Source
 from armwright.program import compile as translate
 from armwright.program.running.interpret import Limits
+from armwright.program.running.recording import Recording
 from program.running import cell_of, corpus_text, down, expect, failure, printed, run
 
 HOME = "VAR a, b : FRAME ; n : SCALAR ; e, g : EVENT ; BEGIN a = (1,0,0, 0,-1,0, 0,0,-1, 0.40,0.15,0.20) ; "
@@ -49,6 +50,48 @@ def test_events_count() -> None:
     recording = run(HOME + "SIGNAL e ; SIGNAL e ; WAIT e ; WAIT e ; PRINT(3) END.")
 
     assert printed(recording) == ["3"]
+
+
+def waits(recording: Recording) -> list[tuple[str, str, float, float]]:
+    """Return what was waited for: in which branch, in words, from when, until when."""
+    return [(one.process, one.text, one.t0, one.t1) for one in recording.effects if one.kind in ("WAIT", "LOCK")]
+
+
+def test_waiting_is_shown_from_its_start() -> None:
+    """WAIT and LOCK last from when they begin to wait; what is there at once takes no time."""
+    recording = run(
+        branches(
+            "BEGIN WAIT e ; LOCK (n) DO PAUSE 1 END",
+            "BEGIN PAUSE 0.5 ; SIGNAL g ; SIGNAL e ; LOCK (n) DO PAUSE 2 END",
+            "BEGIN PAUSE 0.75 ; WAIT g ; LOCK (a) DO PRINT(1) END",
+        )
+    )
+
+    assert waits(recording) == [
+        ("branch 1", "WAIT e", 0.0, pytest.approx(0.5)),
+        ("branch 1", "LOCK n", pytest.approx(0.5), pytest.approx(0.5)),
+        ("branch 2", "LOCK n", pytest.approx(0.5), pytest.approx(1.5)),
+        ("branch 3", "WAIT g", pytest.approx(0.75), pytest.approx(0.75)),
+        ("branch 3", "LOCK a", pytest.approx(0.75), pytest.approx(0.75)),
+    ]
+
+
+@pytest.mark.parametrize("ends", ["HALT", "n = 1 / n"])
+def test_waiting_in_vain(ends: str) -> None:
+    """What is waited for when a program ends is shown, too, and that it did not come."""
+    text = branches(
+        "BEGIN PAUSE 0.25 ; WAIT e END",
+        f"BEGIN LOCK (b) DO BEGIN PAUSE 1 ; {ends} END ; SIGNAL e END",
+        "BEGIN PAUSE 0.5 ; LOCK (b) DO PRINT(1) END",
+    )
+    recording = run(text) if ends == "HALT" else failure(text).recording()  # type: ignore[misc]
+
+    assert waits(recording) == [
+        ("branch 2", "LOCK b", 0.0, 0.0),
+        ("branch 1", "WAIT e, in vain", pytest.approx(0.25), pytest.approx(1.0)),
+        ("branch 3", "LOCK b, in vain", pytest.approx(0.5), pytest.approx(1.0)),
+    ]
+    assert [one.data["in_vain"] for one in recording.effects if "vain" in one.text] == [True, True]
 
 
 def test_pauses_go_by_the_clock() -> None:

@@ -1,11 +1,16 @@
 """RLO-2 at work: values, loops, procedures, arrays, recovery, guards, blends, durations."""
 
 import math
+from collections.abc import Callable
 
+import attrs
 import numpy as np
 import pytest
 
+from armwright.arm.model import Joint
 from armwright.cell.frames import WORLD
+from armwright.cell.model import Cell
+from armwright.kinematics.forward import forward
 from armwright.program.running.interpret import Limits
 from program.running import EXACT, cell_of, down, expect, failure, printed, run
 
@@ -247,6 +252,71 @@ def test_duration() -> None:
     error = failure(PLACES + "MOVE ARM_1 TO a WITH DURATION = 10ms END.").diagnostic
     assert error.code == "E405"
     assert "s or more" in error.label
+
+
+@pytest.mark.parametrize("period", [1e-3, 4e-3, 0.1])
+def test_duration_of_several_stages(period: float) -> None:
+    """With DEPARTURE and APPROACH, each of which ends on a tick, the whole takes what was asked to the tick."""
+    cell = attrs.evolve(cell_of("cell1"), period=period)
+    text = PLACES + "MOVE ARM_1 TO a WITH DEPARTURE = ARM_1 * t, WITH APPROACH = a * t, WITH DURATION = 7.5123 END."
+
+    recording = run(text, cell)
+
+    assert len(recording.stages) == 3
+    assert 7.5123 - 1e-9 <= recording.duration < 7.5123 + period
+    for stage in recording.stages:
+        assert stage.stage.trajectory.duration / period == pytest.approx(
+            round(stage.stage.trajectory.duration / period)
+        )
+
+
+def changed(cell: Cell, joints: Callable[[Joint], Joint] = lambda joint: joint, **fields: float) -> Cell:
+    """Return a cell whose arms have other joints, and other fields."""
+    arms = {}
+    for name, placed in cell.arms.items():
+        arm = attrs.evolve(placed.arm, joints=[joints(joint) for joint in placed.arm.joints], **fields)
+        arms[name] = attrs.evolve(placed, arm=arm)
+    return attrs.evolve(cell, arms=arms)
+
+
+def weak(joint: Joint) -> Joint:
+    return attrs.evolve(joint, limits=attrs.evolve(joint.limits, effort=1.0))
+
+
+def unlimited(joint: Joint) -> Joint:
+    return attrs.evolve(joint, limits=attrs.evolve(joint.limits, speed=math.inf, acceleration=math.inf))
+
+
+@pytest.mark.parametrize(
+    ("cell", "move", "said"),
+    [
+        (changed(cell_of("cell1"), weak), "VIA (a, b), WITH BLEND = 3cm", "gravity and dry friction alone ask joint"),
+        (changed(cell_of("cell1"), reach=math.inf), "STRAIGHTLY", "paths in space need its reach and its tool speed"),
+        (changed(cell_of("cell1"), unlimited), "DIRECTLY", "no joint that moves has a limit of speed or acceleration"),
+    ],
+)
+def test_a_move_that_the_arm_cannot_make_at_any_speed(cell: Cell, move: str, said: str) -> None:
+    """It is an error of the run, at the MOVE, after what was done until then; RECOVER goes on from there."""
+    error = failure(f"{PLACES} PAUSE 0.5 ; MOVE ARM_1 TO c {move} END.", cell)
+
+    assert error.diagnostic.code == "E406"
+    assert said in error.diagnostic.message
+    assert error.diagnostic.span is not None
+    assert error.recording is not None
+    assert error.recording().duration == pytest.approx(0.5)
+    assert printed(run(f'{PLACES} TRY MOVE ARM_1 TO c {move} RECOVER PRINT("on") END END.', cell)) == ["on"]
+
+
+@pytest.mark.parametrize("clause", ["", ", WITH BLEND = 3cm"])
+def test_length_is_that_of_the_way_that_the_hand_went(clause: str) -> None:
+    """The way past frames is shorter than its legs, by what its corners cut off."""
+    recording = run(f"{PLACES} MOVE ARM_1 TO a ; MOVE ARM_1 TO a VIA (b, c){clause} END.")
+
+    *_, stage = recording.stages
+    arm = recording.cell.arms["ARM_1"].arm
+    hand = forward(arm, stage.motion(np.linspace(0, stage.duration, 3000)))[:, :3, 3]
+    gone = np.linalg.norm(np.diff(hand, axis=0), axis=1).sum()
+    assert stage.length == pytest.approx(gone, rel=1e-3)
 
 
 def test_blend_rounds_corners() -> None:

@@ -10,6 +10,7 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.program.running.interpret import RunError, interpret
 from armwright.program.running.recording import Recording
+from armwright.report.files import summary
 from program.guarded import guarded_program
 from program.running import cell_of, code_of, corpus_text
 from program.streams import Differences, differences, share_at_stop
@@ -128,6 +129,7 @@ def cells(folder: Path) -> tuple[Cell, list[Cell]]:
     return two, ones
 
 
+@pytest.mark.share(0.05)
 def test_random_programs_by_differences(sample: Sample, tmp_path: Path) -> None:
     """Guards, contact, corners, errors, two arms: no limit is passed from tick to tick, and all arms come to rest."""
     two, ones = cells(tmp_path)
@@ -171,3 +173,7 @@ def test_too_deep() -> None:
         "depth": pytest.approx(depth, abs=1e-6),
         "force": pytest.approx(2e4 * depth, rel=1e-3),
     }
+    *_, move = (effect for effect in recording.effects if effect.kind == "MOVE")
+    assert move.data["contact"] == stop.data["contact"]
+    (contact,) = summary(recording, code_of(PROGRAMS["too deep"], cell_of("jam")), [])["contacts"]
+    assert (contact["t1"], contact["depth"]) == (pytest.approx(move.t1), pytest.approx(depth, abs=1e-6))

@@ -28,6 +28,12 @@ def test_only_line_ends_end_a_line() -> None:
     assert source.line(source.text.index("c")) == 2
 
 
+def test_many_lines_of_either_end() -> None:
+    """A million lines that end with returns alone take as long as they are many, not the square of it."""
+    assert Source("t.rlo", "\r" * 1_000_000).line_starts == tuple(range(1_000_001))
+    assert Source("t.rlo", "\ufeff\r\n\n\r\ra").line_starts == (1, 3, 4, 5, 6)
+
+
 def test_byte_order_mark() -> None:
     """A mark at the start of the file is no character of the first line."""
     source = Source("t.rlo", "\ufeffBEGIN END.")

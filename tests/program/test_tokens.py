@@ -195,3 +195,13 @@ def test_many_strange_characters() -> None:
 
     assert [diagnostic.code for diagnostic in found] == ["E101"]
     assert found[0].notes == ("it stands in 1000000 places",)
+    between = scanned("\x01a" * 90_000)
+    assert [diagnostic.code for diagnostic in between.found] == ["E101"]
+    assert all(token.damaged for token in between.tokens[:-1])
+
+
+def test_what_stands_behind_a_strange_character() -> None:
+    """It has been told of, up to the end of its line; the next line is judged by itself."""
+    found = scanned("a \x01 \x01 b c\n\x01\nd e")
+
+    assert [token.text for token in found.tokens if token.damaged] == ["b"]

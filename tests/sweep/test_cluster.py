@@ -52,6 +52,30 @@ def test_begun_on_the_cluster(
     assert capfd.readouterr() == ("", "")
 
 
+def test_stopped_while_rows_arrive(
+    local_cluster: Any, speeds: Design, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Rows that arrive while a sweep is stopped make no later one wait, and nobody complains of them."""
+
+    def stop(now: Progress) -> None:
+        if now.done in {3, 8}:
+            raise InterruptedError
+
+    for number in range(8):
+        with pytest.raises(InterruptedError):
+            run(
+                Fall(),
+                speeds,
+                tmp_path / str(number),
+                block=1,
+                scheduler=local_cluster.scheduler_address,
+                progress=stop,
+            )
+    run(Fall(), speeds, tmp_path / "out", block=4, scheduler=local_cluster.scheduler_address)
+
+    assert capfd.readouterr() == ("", "")
+
+
 def test_killed_worker(tmp_path: Path) -> None:
     """A row that kills its Dask worker is a row with a status; the cluster does the others."""
     design = full_factorial({"speed": np.arange(6.0)})

@@ -17,7 +17,7 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.errors import FileFormatError, OutputError
+from armwright.errors import ExitStatus, FileFormatError, OutputError
 from armwright.sweep import folder as folder_module
 from armwright.sweep.designs import Design, full_factorial
 from armwright.sweep.errors import SweepError
@@ -39,7 +39,7 @@ from sweep_tasks import Fall
 
 if __name__ == "__main__":
     design = full_factorial({"speed": range(40)}, units={"speed": "m/s"})
-    task = Fall(calls=Path(sys.argv[2]), seconds=0.15)
+    task = Fall(calls=Path(sys.argv[2]), seconds=0.4)
     run(task, design, sys.argv[1], block=2, workers=int(sys.argv[3]))
 """
 
@@ -75,6 +75,8 @@ def test_kill(how: signal.Signals, workers: int, speeds: Design, tmp_path: Path)
         [sys.executable, tmp_path / "script.py", out, calls, str(workers)],
         env={"PYTHONPATH": ":".join(sys.path)},
         stderr=subprocess.DEVNULL,  # Python counts what a killed process had
+        # A shell makes what it starts in the background deaf to Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - it takes no lock
     ) as process:
         until(lambda: len(blocks(out)) >= 3)
         # Meanwhile nobody else may use the folder.
@@ -156,16 +158,47 @@ def swap(path: Path) -> None:
     path.write_bytes(path.with_name("000002.npz").read_bytes())
 
 
-@pytest.mark.parametrize("damage", [cut, flip, swap, lambda path: path.write_bytes(b""), Path.unlink])
+def change(path: Path) -> None:
+    """A dimension of an array, where what is read is checked."""
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"'shape': (8,)", b"'shape': (9,)", 1))
+
+
+@pytest.mark.parametrize("damage", [cut, flip, swap, change, lambda path: path.write_bytes(b"")])
 def test_damaged_block(damage: Callable[[Path], Any], half: Path, speeds: Design, tmp_path: Path) -> None:
-    """A block that was damaged on the disk is found and made again, and only that."""
-    damage(half / "blocks" / "000001.npz")
+    """A block that was damaged on the disk is named and stays as it is; nothing is done before it has gone."""
+    block = half / "blocks" / "000001.npz"
+    damage(block)
+    broken = block.read_bytes()
+
+    for _ in range(2):
+        with pytest.raises(
+            FileFormatError, match=r"000001.npz: damaged: .*move it away .*its runs, 8 to 15,"
+        ) as caught:
+            run(Fall(calls=tmp_path / "calls"), speeds, half, workers=1)
+        assert caught.value.exit_status == ExitStatus.FILE
+    assert block.read_bytes() == broken
+    assert not (tmp_path / "calls").exists()
+
+
+def test_block_that_cannot_be_read(half: Path, speeds: Design) -> None:
+    """A folder in the place of a block is named like any other damage."""
+    (half / "blocks" / "000001.npz").unlink()
+    (half / "blocks" / "000001.npz").mkdir()
+
+    with pytest.raises(FileFormatError, match=r"000001.npz: damaged: it is not a file"):
+        run(Fall(), speeds, half, workers=1)
+
+
+def test_block_that_was_moved_away(half: Path, speeds: Design, tmp_path: Path) -> None:
+    """A block that has gone is done again, and only that."""
+    (half / "blocks" / "000001.npz").unlink()
     told: list[Progress] = []
 
     results = run(Fall(calls=tmp_path / "calls"), speeds, half, workers=1, progress=told.append)
 
     assert [row[0] for _, row in calls_of(tmp_path / "calls")] == [8.0, 24.0, 32.0]
-    assert (told[0].found, told[0].damaged) == (16, 0 if damage is Path.unlink else 1)
+    assert told[0].found == 16
     np.testing.assert_array_equal(results.depth, run(Fall(), speeds, tmp_path / "whole", workers=1).depth)
 
 
@@ -173,10 +206,12 @@ def test_halves_are_removed(half: Path, speeds: Design) -> None:
     """What a killed process had half written is gone after the next start."""
     for path in (half / "blocks" / "000004.npz.tmp.npz", half / "results.nc.tmp"):
         path.write_bytes(b"half")
+    mine = half / "blocks" / "000004-of-mine.npz.tmp.npz"
+    mine.write_bytes(b"half")
 
     run(Fall(), speeds, half, workers=1)
 
-    assert not [path for path in half.rglob("*") if ".tmp" in path.name]
+    assert [path for path in half.rglob("*") if ".tmp" in path.name] == [mine]
 
 
 OTHER: list[tuple[Fall, Callable[[Design], Design], str]] = [
@@ -209,7 +244,17 @@ def test_another_version(half: Path, speeds: Design) -> None:
         run(Fall(), speeds, half, workers=1)
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 7, "sweep": {}, "made": {}, "block": 1}'])
+MADE = '{"date": "", "armwright": ""}'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{", "[]", '{"format": 1}', f'{{"format": 7, "sweep": {{}}, "made": {MADE}, "block": 1}}'),
+        *(f'{{"format": 1, "sweep": {{}}, "made": {MADE}, "block": {block}}}' for block in ("0", "1.5", "true", "1e9")),
+        *(f'{{"format": 1, "sweep": {{}}, "made": {made}, "block": 1}}' for made in ("{}", '{"date": 1}')),
+    ],
+)
 def test_damaged_manifest(text: str, half: Path, speeds: Design) -> None:
     """A manifest that cannot be read is named; nothing is written over."""
     (half / "sweep.json").write_text(text, encoding="utf-8")
@@ -219,15 +264,26 @@ def test_damaged_manifest(text: str, half: Path, speeds: Design) -> None:
     assert len(blocks(half)) == 3
 
 
-@pytest.mark.parametrize("damaged", [lambda _: b"", lambda _: b"no results", lambda whole: whole[:-100]])
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        lambda _: b"",
+        lambda _: b"no results",
+        lambda whole: whole[:-100],
+        lambda whole: whole[:-9] + bytes([whole[-9] ^ 1]) + whole[-8:],
+    ],
+)
 def test_damaged_results(damaged: Callable[[bytes], bytes], speeds: Design, tmp_path: Path) -> None:
-    """Results that cannot be opened are named; they are made again of the blocks, none of which is done again."""
+    """Results that are not as they were written are named and stay; they are made again of the blocks once removed."""
     whole = run(Fall(), speeds, tmp_path / "out", workers=1).load()
     path = tmp_path / "out" / "results.nc"
-    path.write_bytes(damaged(path.read_bytes()))
+    broken = damaged(path.read_bytes())
+    path.write_bytes(broken)
 
-    with pytest.raises(FileFormatError, match=r"results.nc: damaged; remove this file and run the sweep again"):
-        run(Fall(), speeds, tmp_path / "out", workers=1)
+    for again in (lambda: run(Fall(), speeds, tmp_path / "out", workers=1), lambda: load(tmp_path / "out")):
+        with pytest.raises(FileFormatError, match=r"results.nc: damaged: .*; it stays as it is; move it away"):
+            again()
+    assert path.read_bytes() == broken
     path.unlink()
     again = run(Fall(calls=tmp_path / "calls"), speeds, tmp_path / "out", workers=1)
 
@@ -242,6 +298,64 @@ def test_folder_of_other_things(speeds: Design, tmp_path: Path) -> None:
     with pytest.raises(SweepError, match=r"holds no sweep, but other things \('thesis.tex'\)"):
         run(Fall(), speeds, tmp_path, workers=1)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("name", ["notes.tmp.txt", "draft.npz.tmp.npz", "sweep.json.old"])
+def test_files_with_names_like_ours(name: str, speeds: Design, tmp_path: Path) -> None:
+    """A file whose name only resembles those of a sweep is somebody else's."""
+    (tmp_path / name).write_text("draft")
+
+    with pytest.raises(SweepError, match=f"holds no sweep, but other things \\('{name}'\\)"):
+        run(Fall(), speeds, tmp_path, workers=1)
+    assert (tmp_path / name).read_text() == "draft"
+
+
+def test_lock_of_others(speeds: Design, tmp_path: Path) -> None:
+    """A file of the user's named lock is not written over, and neither is what a link of that name leads to."""
+    (tmp_path / "mine").write_text("precious")
+    for name, make in (
+        ("text", lambda lock: lock.write_text("precious")),
+        ("link", lambda lock: lock.symlink_to(tmp_path / "mine")),
+        ("pipe", os.mkfifo),
+    ):
+        out = tmp_path / name
+        out.mkdir()
+        make(out / "lock")
+
+        with pytest.raises((SweepError, OutputError)):
+            run(Fall(), speeds, out, workers=1)
+
+    assert (tmp_path / "text" / "lock").read_text() == "precious"
+    assert (tmp_path / "mine").read_text() == "precious"
+
+
+def test_link_in_the_place_of_a_half(speeds: Design, tmp_path: Path) -> None:
+    """What a link leads to is not written through it."""
+    (tmp_path / "mine").write_text("precious")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "sweep.json.tmp").symlink_to(tmp_path / "mine")
+
+    run(Fall(), speeds, tmp_path / "out", workers=1)
+
+    assert (tmp_path / "mine").read_text() == "precious"
+
+
+def test_manifest_that_never_ends(speeds: Design, tmp_path: Path) -> None:
+    """A manifest is a file: a pipe is not waited for."""
+    os.mkfifo(tmp_path / "sweep.json")
+
+    with pytest.raises(FileFormatError, match="expected a file, got a pipe"):
+        run(Fall(), speeds, tmp_path, workers=1)
+
+
+def test_compressed_block(half: Path, speeds: Design) -> None:
+    """A compressed block, which may be huge once it is unpacked, is not unpacked."""
+    block = half / "blocks" / "000001.npz"
+    with np.load(block) as file:
+        np.savez_compressed(block, **dict(file))
+
+    with pytest.raises(FileFormatError, match=r"damaged: .*compressed"):
+        run(Fall(), speeds, half, workers=1)
 
 
 def test_folder_that_is_a_file(speeds: Design, tmp_path: Path) -> None:

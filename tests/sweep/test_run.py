@@ -58,7 +58,13 @@ def test_labels(speeds: Design, tmp_path: Path) -> None:
     assert '"gravity": 1.62' in results.attrs["settings"]
     assert '"kind": "full factorial"' in results.attrs["design"]
     assert '"numpy"' in results.attrs["versions"]
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["blocks", "lock", "results.nc", "sweep.json"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "blocks",
+        "lock",
+        "results.nc",
+        "run.json",
+        "sweep.json",
+    ]
 
 
 def test_same_bits(local_cluster: Any, tmp_path: Path) -> None:
@@ -172,6 +178,7 @@ def test_wrong_tasks(number: int, tmp_path: Path) -> None:
     [
         ({"block": 0}, InvalidValueError, "block: expected a whole number not below 1, got 0"),
         ({"workers": 0}, InvalidValueError, "workers: expected a whole number not below 1, got 0"),
+        ({"workers": 10**30}, InvalidValueError, "workers: expected at most 1000 processes of this machine, got 1000"),
         ({"workers": 1.5}, KindError, "workers: expected a whole number, got 1.5"),
         ({"workers": 2, "scheduler": "tcp://127.0.0.1:1"}, InvalidValueError, "give one of them"),
         ({"design": [1, 2]}, KindError, "design: expected a Design, got list"),

@@ -147,6 +147,7 @@ def test_files_may_not_grow(tmp_path: Path) -> None:
     assert [start(tmp_path), start(tmp_path)] == ["0", "1"]
 
 
+@pytest.mark.share(0.034)
 def test_killed_while_compiling(tmp_path: Path, sample: Sample) -> None:
     """Whenever a process is killed, the next one finds a whole entry or none."""
     killed = 0

@@ -2,6 +2,9 @@
 
 import math
 import os
+import signal
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -13,7 +16,7 @@ from armwright.kinematics.inverse.closed_form import BRANCHES
 from armwright.kinematics.inverse.recognise import shoulder_of
 from armwright.kinematics.inverse.shoulder import first_three
 from armwright.tracing.emit import LANES, emit
-from armwright.tracing.kernel import Kernel
+from armwright.tracing.kernel import CalledOff, Kernel, on_cores_for_long
 from armwright.tracing.scalar import atan2, cos, sin
 from oracles.arms import random_arm, random_postures
 
@@ -153,3 +156,28 @@ def test_random_arm(rng: np.random.Generator) -> None:
     q, qd, qdd = random_postures(arm, rng, 90).reshape(3, 30, 4)
 
     np.testing.assert_allclose(kernel(q, qd, qdd), inverse_dynamics(arm, q, qd, qdd, drives=False), atol=1e-11)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_long_work_is_called_off(threads: int) -> None:
+    """A signal is heard while compiled code works, and no thread of it goes on afterwards."""
+    ended: list[int] = []
+
+    def work(first: int, _last: int, called_off: CalledOff) -> None:
+        until = time.monotonic() + 20
+        while not called_off[0] and time.monotonic() < until:
+            time.sleep(0.01)
+        if called_off[0]:
+            ended.append(first)
+
+    # Whoever started the tests may have made them deaf, as a shell does in the background.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    timer = threading.Timer(0.1, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            on_cores_for_long(work, threads * LANES, threads)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+    assert sorted(ended) == [i * LANES for i in range(threads)]

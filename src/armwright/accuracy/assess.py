@@ -7,7 +7,6 @@ import numpy as np
 
 from armwright.accuracy.compliance import StaticCompliance, static_compliance
 from armwright.accuracy.corner import corner_deviations
-from armwright.accuracy.cycles import TooFewError
 from armwright.accuracy.distance import distance_accuracy, distance_repeatability
 from armwright.accuracy.measurements import AnyTest, Cloud, PathTest, PoseTest
 from armwright.accuracy.measures import Measure, Result, measures_of
@@ -90,7 +89,7 @@ def assess(
     for test in tests:
         try:
             found = _results(test, tests, few=few, band=band, corners=corners)
-        except (InvalidValueError, TooFewError) as error:
+        except InvalidValueError as error:
             raise type(error)(f"{_title(test)}: {str(error).removeprefix(f'{test.kind}: ')}") from error
         results.append(found)
         for result in found:

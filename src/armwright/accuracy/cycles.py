@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
-from armwright.errors import ExitStatus, InvalidValueError
+from armwright.errors import TooFewError
 
 Kind: TypeAlias = Literal[
     "pose",
@@ -40,12 +40,6 @@ ASKED: dict[Kind, int] = {
 DIRECTIONS, ROBOTS, LOADS = 3, 5, 10
 
 
-class TooFewError(InvalidValueError):
-    """A test was repeated less often than the standard asks for; ``few`` takes it nevertheless."""
-
-    exit_status = ExitStatus.INFEASIBLE
-
-
 def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int, what: str = "cycles") -> int:
     """Return the smallest number of cycles of a test, if it is enough.
 
@@ -57,12 +51,11 @@ def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int, 
         what: how they are called in a message.
 
     Raises:
-        InvalidValueError: there are fewer than ``least``.
-        TooFewError: there are fewer than the standard asks for, without ``few``.
+        TooFewError: there are fewer than ``least``, or than the standard asks for without ``few``.
     """
     count = min(counts, default=0)
     if count < least:
-        raise InvalidValueError(f"{kind}: needs {least} {what} at least, got {count}")
+        raise TooFewError(f"{kind}: needs {least} {what} at least, got {count}")
     if count < ASKED[kind] and not few:
         raise TooFewError(f"{kind}: ISO 9283 asks for {ASKED[kind]} {what}, got {count}; few=True takes fewer")
     return count
@@ -72,10 +65,9 @@ def checked_parts(kind: Kind, count: int, asked: int, *, few: bool, what: str) -
     """Refuse too few parts of a test: directions of approach, robots, or loads.
 
     Raises:
-        InvalidValueError: there are fewer than two.
-        TooFewError: there are fewer than the standard asks for, without ``few``.
+        TooFewError: there are fewer than two, or than the standard asks for without ``few``.
     """
     if count < 2:
-        raise InvalidValueError(f"{kind}: needs 2 {what} at least, got {count}")
+        raise TooFewError(f"{kind}: needs 2 {what} at least, got {count}")
     if count < asked and not few:
         raise TooFewError(f"{kind}: ISO 9283 asks for {asked} {what}, got {count}; few=True takes fewer")

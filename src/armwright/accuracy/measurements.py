@@ -1,8 +1,8 @@
 """Tests out of tables: rows that belong together, what was commanded beside what was attained."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import attrs
 import numpy as np
@@ -12,7 +12,8 @@ from armwright.accuracy.measured import Trace
 from armwright.accuracy.scales import angles_question, lengths_question
 from armwright.accuracy.table import Row, read_table
 from armwright.arrays import Array
-from armwright.errors import FileFormatError, InvalidValueError
+from armwright.errors import InvalidValueError
+from armwright.files.limits import beyond, limit
 
 # Tests of which every row is one attained pose; of the others a cycle is a run of many rows.
 POSES: frozenset[Kind] = frozenset({"pose", "multidirectional", "distance", "drift", "exchangeability", "compliance"})
@@ -20,18 +21,9 @@ POSES: frozenset[Kind] = frozenset({"pose", "multidirectional", "distance", "dri
 _COMMANDED: frozenset[Kind] = frozenset(
     {"pose", "distance", "drift", "path", "reorientation", "cornering", "velocity", "weaving"}
 )
+# What tells the parts of a test apart, where it is not the name of the pose.
+_LABELS: Mapping[Kind, str] = {"multidirectional": "direction", "compliance": "direction", "exchangeability": "robot"}
 _TIMED: frozenset[Kind] = frozenset({"settling", "posing", "velocity", "weaving"})
-
-
-class Found(NamedTuple):
-    """A row, and the file in which it stands."""
-
-    path: Path
-    row: Row
-
-    def error(self, key: str, message: str) -> FileFormatError:
-        """Return the error that says ``message`` of this row."""
-        return FileFormatError(self.path, self.row.line, key, message)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -130,37 +122,49 @@ def read_measurements(paths: Path | str | Sequence[Path | str]) -> tuple[AnyTest
     files = [paths] if isinstance(paths, str | Path) else list(paths)
     if not files:
         raise InvalidValueError("measurements: expected one file at least, got none")
-    groups: dict[tuple[str, ...], list[Found]] = {}
+    groups: dict[tuple[str, ...], list[Row]] = {}
     for file in files:
-        table = read_table(file)
-        for row in table.rows:
+        for row in read_table(file).rows():
             # A distance takes two poses.
             name = "" if row.test == "distance" else row.name
-            groups.setdefault((row.test, name, row.condition), []).append(Found(table.path, row))
-    return tuple(_pose_test(rows) if rows[0].row.test in POSES else _path_test(rows) for rows in groups.values())
+            groups.setdefault((row.test, name, row.condition), []).append(row)
+    _refuse_many(groups)
+    return tuple(_pose_test(rows) if rows[0].test in POSES else _path_test(rows) for rows in groups.values())
 
 
-def _pose_test(rows: list[Found]) -> PoseTest:
+def _refuse_many(groups: Mapping[tuple[str, ...], Sequence[Row]]) -> None:
+    """Refuse more tests, and poses, instants and runs in them, than a laboratory measures: each is an object.
+
+    Raises:
+        FileFormatError: there are more.
+    """
+    parts: set[tuple[Any, ...]] = set()
+    most = limit("entries")
+    for group, rows in groups.items():
+        for one in rows:
+            parts.add((group, _part(one) if one.test in POSES else one.cycle))
+            if len(parts) > most:
+                raise one.error("test", f"too many tests, and poses and runs in them: {beyond('entries')}")
+
+
+def _pose_test(rows: list[Row]) -> PoseTest:
     _one_layout(rows)
-    first = rows[0].row
-    commanded: dict[str, Found] = {}
-    for one in (one for one in rows if one.row.cycle is None):
-        if one.row.name in commanded:
-            raise one.error("cycle", f"commanded is given twice, first in line {commanded[one.row.name].row.line}")
-        commanded[one.row.name] = one
-    clouds: dict[tuple[Any, ...], list[Found]] = {}
-    seen: dict[tuple[Any, ...], Found] = {}
-    for one in (one for one in rows if one.row.cycle is not None):
-        part, key = _part(one)
-        if (*part, *key) in seen:
-            twin = seen[*part, *key]
-            raise one.error("cycle", f"cycle {one.row.cycle} is there twice, first in line {twin.row.line}")
-        seen[*part, *key] = one
-        clouds.setdefault(part, []).append(one)
+    first = rows[0]
+    commanded: dict[str, Row] = {}
+    for one in (one for one in rows if one.cycle is None):
+        if one.name in commanded:
+            raise one.error("cycle", f"commanded is given twice, first in line {commanded[one.name].line}")
+        commanded[one.name] = one
+    clouds: dict[tuple[str, float | None], list[Row]] = {}
+    for one in (one for one in rows if one.cycle is not None):
+        _refuse_incomplete(one)
+        clouds.setdefault(_part(one), []).append(one)
+    for cloud in clouds.values():
+        _refuse_twins(cloud)
     if not clouds:
         raise rows[0].error("cycle", "there is what was commanded, but nothing that was attained")
     found = tuple(_cloud(part, commanded) for part in clouds.values())
-    names = list(dict.fromkeys(one.row.name for one in rows))
+    names = list(dict.fromkeys(one.name for one in rows))
     if first.test == "distance":
         found = _paired(rows, found, names)
     return PoseTest(
@@ -172,45 +176,59 @@ def _pose_test(rows: list[Found]) -> PoseTest:
     )
 
 
-def _part(one: Found) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """Return to which part of its test a row belongs, and what tells it from the others there."""
-    row = one.row
-    needed = {"multidirectional": "direction", "compliance": "direction", "exchangeability": "robot"}.get(row.test)
-    if needed and not getattr(row, needed):
-        raise one.error(needed, f"a test of {row.test} tells the {needed} of every row")
-    if row.test == "drift" and row.t is None:
+def _part(one: Row) -> tuple[str, float | None]:
+    """Return to which part of its test a row belongs: a direction, a robot or a pose, and for drift when."""
+    return getattr(one, _LABELS.get(one.test, "name")), one.t if one.test == "drift" else None
+
+
+def _refuse_incomplete(one: Row) -> None:
+    needed = _LABELS.get(one.test)
+    if needed and not getattr(one, needed):
+        raise one.error(needed, f"a test of {one.test} tells the {needed} of every row")
+    if one.test == "drift" and one.t is None:
         raise one.error("t_min", "a test of drift tells when every row was measured: t_s, t_min or t_h")
-    if row.test == "compliance" and row.load is None:
+    if one.test == "compliance" and one.load is None:
         raise one.error("load_n", "a test of compliance tells the load of every row")
-    label = getattr(row, needed) if needed else row.name
-    return (label, row.t if row.test == "drift" else None), (row.load, row.cycle)
 
 
-def _cloud(rows: list[Found], commanded: dict[str, Found]) -> Cloud:
-    first = rows[0].row
+def _refuse_twins(rows: Sequence[Row]) -> None:
+    """Refuse two rows of one part of a test that have the same cycle and load."""
+    cycles = np.fromiter((one.cycle or 0 for one in rows), dtype=np.int64, count=len(rows))
+    loads = np.fromiter((-np.inf if one.load is None else one.load for one in rows), np.float64, count=len(rows))
+    order = np.lexsort((loads, cycles))
+    same = (cycles[order][1:] == cycles[order][:-1]) & (loads[order][1:] == loads[order][:-1])
+    if same.any():
+        twins = order[1:][same]
+        which = int(twins.argmin())
+        one, first = rows[int(twins[which])], rows[int(order[:-1][same][which])]
+        raise one.error("cycle", f"cycle {one.cycle} is there twice, first in line {first.line}")
+
+
+def _cloud(rows: list[Row], commanded: dict[str, Row]) -> Cloud:
+    first = rows[0]
     goal = commanded.get(first.name)
     if goal is None and first.test in _COMMANDED:
         raise rows[0].error("cycle", f"what was commanded for {first.name} is not there: a row with cycle commanded")
-    places, angles = np.array([one.row.place for one in rows]), np.array([one.row.angles for one in rows])
+    places, angles = _stacked(rows, "place"), _stacked(rows, "angles")
     if goal is not None:
-        _ask(goal, np.array([goal.row.place]), places)
-        question = angles_question(np.array(goal.row.angles), angles)
+        _ask(goal, np.array([goal.place]), places)
+        question = angles_question(np.array(goal.angles), angles)
         if question:
             raise goal.error("cycle", question)
-    needed = {"multidirectional": first.direction, "compliance": first.direction, "exchangeability": first.robot}
+    label, t = _part(first)
     return Cloud(
-        label=needed.get(first.test, first.name),
-        t=first.t if first.test == "drift" else None,
-        cycles=tuple(one.row.cycle for one in rows if one.row.cycle is not None),
+        label=label,
+        t=t,
+        cycles=tuple(one.cycle for one in rows if one.cycle is not None),
         places=places,
         angles=angles,
-        loads=np.array([one.row.load for one in rows]) if first.test == "compliance" else None,
-        commanded=None if goal is None else np.array(goal.row.place),
-        commanded_angles=None if goal is None else np.array(goal.row.angles),
+        loads=np.array([one.load for one in rows]) if first.test == "compliance" else None,
+        commanded=None if goal is None else np.array(goal.place),
+        commanded_angles=None if goal is None else np.array(goal.angles),
     )
 
 
-def _paired(rows: list[Found], clouds: tuple[Cloud, ...], names: list[str]) -> tuple[Cloud, ...]:
+def _paired(rows: list[Row], clouds: tuple[Cloud, ...], names: list[str]) -> tuple[Cloud, ...]:
     """Return the two poses of a distance with their cycles in one order."""
     if len(clouds) != 2:
         raise rows[0].error("pose", f"a distance is that of two poses, got {len(clouds)}: {', '.join(names)}")
@@ -224,14 +242,14 @@ def _paired(rows: list[Found], clouds: tuple[Cloud, ...], names: list[str]) -> t
     )
 
 
-def _path_test(rows: list[Found]) -> PathTest:
+def _path_test(rows: list[Row]) -> PathTest:
     _one_layout(rows)
-    first = rows[0].row
-    path = [one for one in rows if one.row.cycle is None]
-    runs: dict[int, list[Found]] = {}
+    first = rows[0]
+    path = [one for one in rows if one.cycle is None]
+    runs: dict[int, list[Row]] = {}
     for one in rows:
-        if one.row.cycle is not None:
-            runs.setdefault(one.row.cycle, []).append(one)
+        if one.cycle is not None:
+            runs.setdefault(one.cycle, []).append(one)
     if not runs:
         raise rows[0].error("cycle", "there is what was commanded, but nothing that was attained")
     if not path and first.test in _COMMANDED:
@@ -241,7 +259,7 @@ def _path_test(rows: list[Found]) -> PathTest:
     if commanded is not None:
         for run, trace in zip(runs.values(), traces, strict=True):
             _ask(run[0], commanded.places, trace.places)
-    speeds = {one.row.speed for one in rows if one.row.speed is not None}
+    speeds = {one.speed for one in rows if one.speed is not None}
     if len(speeds) > 1:
         raise rows[0].error("speed", f"{first.test} {first.name} has different commanded speeds")
     if not speeds and first.test in {"velocity", "weaving"}:
@@ -257,47 +275,53 @@ def _path_test(rows: list[Found]) -> PathTest:
     )
 
 
-def _trace(rows: list[Found], *, timed: bool) -> Trace:
+def _trace(rows: list[Row], *, timed: bool) -> Trace:
     """Return one run, or the commanded path."""
     first = rows[0]
     if len(rows) < 2:
         raise first.error("cycle", f"a {'run' if timed else 'path'} has two rows at least, and this is its only one")
-    angles = [one.row.angles for one in rows]
     return Trace(
-        places=[one.row.place for one in rows],
+        places=_stacked(rows, "place"),
         times=_times(rows) if timed else None,
-        angles=np.array(angles) if angles[0] else None,
+        angles=_stacked(rows, "angles") if first.angles else None,
     )
 
 
-def _times(rows: list[Found]) -> list[float] | None:
+def _stacked(rows: Sequence[Row], what: str) -> Array:
+    """Return (n, k) coordinates or angles of rows of one layout."""
+    width = len(getattr(rows[0], what))
+    numbers = (number for one in rows for number in getattr(one, what))
+    return np.fromiter(numbers, dtype=np.float64, count=width * len(rows)).reshape(len(rows), width)
+
+
+def _times(rows: list[Row]) -> list[float] | None:
     """Return the times of a run; None where it tells none and needs none."""
     first = rows[0]
-    if first.row.t is None:
-        if first.row.test in _TIMED:
-            raise first.error("t_s", f"a test of {first.row.test} needs the time of every sample")
+    if first.t is None:
+        if first.test in _TIMED:
+            raise first.error("t_s", f"a test of {first.test} needs the time of every sample")
         return None
     times: list[float] = []
     for one in rows:
-        if one.row.t is None:
+        if one.t is None:
             raise one.error("t_s", "empty; expected a number, as in the rows before")
-        if times and not one.row.t > times[-1]:
-            raise one.error("t_s", f"samples are in order of time, and {one.row.t:g} s does not follow {times[-1]:g} s")
-        times.append(one.row.t)
+        if times and not one.t > times[-1]:
+            raise one.error("t_s", f"samples are in order of time, and {one.t:g} s does not follow {times[-1]:g} s")
+        times.append(one.t)
     return times
 
 
-def _ask(one: Found, commanded: Array, attained: Array) -> None:
+def _ask(one: Row, commanded: Array, attained: Array) -> None:
     question = lengths_question(commanded, attained)
     if question:
         raise one.error("cycle", question)
 
 
-def _one_layout(rows: Iterable[Found]) -> None:
+def _one_layout(rows: Iterable[Row]) -> None:
     """Refuse rows of one test of which some are in a plane and some in space, or have other angles."""
     first, *others = rows
     for one in others:
-        if (len(one.row.place), one.row.angle_names) != (len(first.row.place), first.row.angle_names):
+        if (len(one.place), one.angle_names) != (len(first.place), first.angle_names):
             raise one.error(
-                "x", f"{first.path}:{first.row.line} has other coordinates or angles of the same {first.row.test} test"
+                "x", f"{first.path}:{first.line} has other coordinates or angles of the same {first.test} test"
             )

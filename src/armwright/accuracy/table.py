@@ -1,6 +1,6 @@
 """Tables of measurements: CSV whose column names tell the units, read row by row into SI units."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -9,6 +9,7 @@ import attrs
 from armwright.accuracy.cycles import ASKED, Kind
 from armwright.accuracy.measured import ANGLES
 from armwright.errors import FileFormatError, closest, shown
+from armwright.files.columns import Columns
 from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, NOTE, Cells, number_in_cell, of_one_width, read_rows
 
 # SI values of the units that names of columns end in.
@@ -22,44 +23,109 @@ _UNITS: dict[str, Mapping[str, float]] = {
     "load": _LOADS,
     "speed": _SPEEDS,
 }
-_TEXTS = ("test", "pose", "path", "condition", "cycle", "direction", "robot")
+_WORDS = ("test", "pose", "path", "condition", "direction", "robot")
+_TEXTS = (*_WORDS, "cycle")
+# Every row tells them, where there is such a column.
+_ALWAYS = (*"xyz", *ANGLES)
+_KINDS: dict[str, Kind] = {kind: kind for kind in ASKED}
 COMMANDED = "commanded"
 # The number of a cycle has fewer.
 _CYCLE_DIGITS = 10
 
 
-class Row(NamedTuple):
-    """One line of a table, in SI units; what it does not tell is empty or None.
+class Row:
+    """One line of a table, in SI units; what it does not tell is empty or None."""
 
-    Attributes:
-        line: of the file.
-        test: name of the test.
-        name: of the pose or path.
-        condition: such as load and speed, in free words.
-        cycle: from 1; None for what was commanded.
-        direction: of approach, or of a force.
-        robot: which one.
-        t: time [s].
-        load: size of a force [N].
-        speed: commanded speed [m/s].
-        place: two or three coordinates [m].
-        angles: none to three [rad].
-        angle_names: about which of a, b, c each of them turns.
-    """
+    __slots__ = ("_at", "_table")
 
-    line: int
-    test: Kind
-    name: str
-    condition: str
-    cycle: int | None
-    direction: str
-    robot: str
-    t: float | None
-    load: float | None
-    speed: float | None
-    place: tuple[float, ...]
-    angles: tuple[float, ...]
-    angle_names: tuple[str, ...]
+    def __init__(self, table: "Table", at: int) -> None:
+        """Look at a row of a table, counted from 0."""
+        self._table, self._at = table, at
+
+    def error(self, key: str, message: str) -> FileFormatError:
+        """Return the error that says ``message`` of this row."""
+        return FileFormatError(self.path, self.line, key, message)
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._table.path
+
+    @property
+    def line(self) -> int:
+        """The line of the file."""
+        return self._table.columns.lines[self._at]
+
+    @property
+    def test(self) -> Kind:
+        """Name of the test."""
+        return _KINDS[self._word("test")]
+
+    @property
+    def name(self) -> str:
+        """Name of the pose or path."""
+        return self._word("pose") or self._word("path")
+
+    @property
+    def condition(self) -> str:
+        """Such as load and speed, in free words."""
+        return self._word("condition")
+
+    @property
+    def cycle(self) -> int | None:
+        """Number of the cycle, from 1; None for what was commanded."""
+        number = self._number("cycle")
+        return None if number is None else int(number)
+
+    @property
+    def direction(self) -> str:
+        """Direction of approach, or of a force."""
+        return self._word("direction")
+
+    @property
+    def robot(self) -> str:
+        """Which robot."""
+        return self._word("robot")
+
+    @property
+    def t(self) -> float | None:
+        """Time [s]."""
+        return self._number("t")
+
+    @property
+    def load(self) -> float | None:
+        """Size of a force [N]."""
+        return self._number("load")
+
+    @property
+    def speed(self) -> float | None:
+        """Commanded speed [m/s]."""
+        return self._number("speed")
+
+    @property
+    def place(self) -> tuple[float, ...]:
+        """Two or three coordinates [m]."""
+        return self._numbers(self._table.place_names)
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """None to three [rad]."""
+        return self._numbers(self.angle_names)
+
+    @property
+    def angle_names(self) -> tuple[str, ...]:
+        """About which of a, b, c each of the angles turns."""
+        return self._table.angle_names
+
+    def _word(self, name: str) -> str:
+        return self._table.columns.word(name, self._at)
+
+    def _number(self, name: str) -> float | None:
+        return self._table.columns.number(name, self._at)
+
+    def _numbers(self, names: tuple[str, ...]) -> tuple[float, ...]:
+        numbers = self._table.columns.numbers
+        return tuple(numbers[name][self._at] for name in names)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -68,13 +134,19 @@ class Table:
 
     Attributes:
         path: where it was read.
-        columns: their names.
-        rows: in the order of the file.
+        columns: its rows, in the order of the file.
+        place_names: x, y and, in space, z.
+        angle_names: those of a, b, c that it tells.
     """
 
     path: Path
-    columns: tuple[str, ...]
-    rows: tuple[Row, ...]
+    columns: Columns
+    place_names: tuple[str, ...]
+    angle_names: tuple[str, ...]
+
+    def rows(self) -> Iterator[Row]:
+        """Give its rows."""
+        return (Row(self, at) for at in range(len(self.columns)))
 
 
 class _Column(NamedTuple):
@@ -93,8 +165,16 @@ def read_table(path: Path | str) -> Table:
     path = Path(path)
     head, lines = read_rows(path)
     columns = _columns(path, head)
-    rows = tuple(_Line(path, one, columns).row() for one in of_one_width(path, head, lines))
-    return Table(path=path, columns=tuple(columns), rows=rows)
+    rows = Columns.of([one for one in (*_UNITS, "cycle") if one in columns], [one for one in _WORDS if one in columns])
+    for one in of_one_width(path, head, lines):
+        line = _Line(path, one, columns)
+        rows.add(one.line, line.numbers(), line.words())
+    return Table(
+        path=path,
+        columns=rows,
+        place_names=tuple(name for name in "xyz" if name in columns),
+        angle_names=tuple(name for name in ANGLES if name in columns),
+    )
 
 
 def _columns(path: Path, head: Cells) -> dict[str, _Column]:
@@ -157,32 +237,27 @@ class _Line:
         self._path, self._columns = path, columns
         self._line, self._cells = cells
 
-    def row(self) -> Row:
-        """Return what the line says, in SI units."""
+    def words(self) -> dict[str, str]:
+        """Return the words of the line, the test among them."""
         test = self._text("test").lower()
-        kinds: dict[str, Kind] = {kind: kind for kind in ASKED}
-        if test not in kinds:
-            near = closest(test, kinds)
+        if test not in _KINDS:
+            near = closest(test, _KINDS)
             hint = f" Did you mean '{near}'?" if near else ""
-            raise self._error("test", f"no test '{test}'.{hint} Known: {', '.join(kinds)}")
+            raise self._error("test", f"no test '{test}'.{hint} Known: {', '.join(_KINDS)}")
         name = "pose" if "pose" in self._columns else "path"
         if not self._text(name):
             raise self._error(name, "empty; every row belongs to one")
-        return Row(
-            line=self._line,
-            test=kinds[test],
-            name=self._text(name),
-            condition=self._text("condition"),
-            cycle=self._cycle(),
-            direction=self._text("direction"),
-            robot=self._text("robot"),
-            t=self._number("t"),
-            load=self._number("load"),
-            speed=self._number("speed"),
-            place=self._numbers("xyz"),
-            angles=self._numbers(ANGLES),
-            angle_names=tuple(name for name in ANGLES if name in self._columns),
-        )
+        return {**{one: self._text(one) for one in _WORDS}, "test": test}
+
+    def numbers(self) -> dict[str, float | None]:
+        """Return the numbers of the line in SI units, its cycle among them."""
+        numbers: dict[str, float | None] = {"cycle": self._cycle()}
+        for name in _UNITS:
+            if name in self._columns:
+                numbers[name] = self._number(name)
+                if numbers[name] is None and name in _ALWAYS:
+                    raise self._error(self._columns[name].header, "empty; expected a number")
+        return numbers
 
     def _text(self, name: str) -> str:
         return self._cells[self._columns[name].place] if name in self._columns else ""
@@ -195,16 +270,6 @@ class _Line:
         if not (text.isascii() and text.isdigit() and len(text) < _CYCLE_DIGITS and int(text) > 0):
             raise self._error("cycle", f"expected 1, 2, 3 ... or the word {COMMANDED}, got {shown(text)}")
         return int(text)
-
-    def _numbers(self, names: Iterable[str]) -> tuple[float, ...]:
-        values = []
-        for name in names:
-            if name in self._columns:
-                value = self._number(name)
-                if value is None:
-                    raise self._error(self._columns[name].header, "empty; expected a number")
-                values.append(value)
-        return tuple(values)
 
     def _number(self, name: str) -> float | None:
         """Return a value in SI units; None where there is none."""

@@ -19,7 +19,7 @@ import numpy as np
 from armwright.arm.tensors import ROUNDING, impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, content, exactly, number, read_only
-from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.errors import InvalidValueError, KindError, ShapeError, counted, shown
 from armwright.spatial.poses import one_pose
 
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
@@ -359,7 +359,7 @@ class Arm:
     def __repr__(self) -> str:
         """Say which arm it is; its tables are in its attributes, and in ``armwright show``."""
         kinds = "".join("R" if joint.revolute else "P" for joint in self.joints)
-        return f"<Arm '{self.name}': {self.n} joint{'s' if self.n > 1 else ''}, {kinds}>"
+        return f"<Arm '{self.name}': {counted(self.n, 'joint')}, {kinds}>"
 
     @property
     def n(self) -> int:

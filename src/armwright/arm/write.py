@@ -149,5 +149,9 @@ def _numbers(values: Mapping[str, float | Array]) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    """Write a text as TOML does: as JSON, but for the one control character that JSON lets stand."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+    """Write a text as TOML does: as JSON, but for the one control character that JSON lets stand.
+
+    Bytes of a file name that are no text, which Python keeps as half characters, are shown as escapes.
+    """
+    whole = text.encode("utf-8", "backslashreplace").decode("utf-8")
+    return json.dumps(whole, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -3,6 +3,10 @@
 Each is tried on top of what was kept before, and kept only if points that it has not seen are hit better: by more
 than chance makes of it, and by a part worth having. What was kept is left out again if what came later does without.
 
+Points that were held out to choose by are hit better for that by chance, too. So how good the whole is, choice
+included, is seen on points that no choice has seen: one part after the other is left out, and the others alone choose
+and fit.
+
 Source:
     Thesis, outlook of chapter 5; spec of the calibration.
 """
@@ -19,9 +23,9 @@ from armwright.arrays import Array, ArrayLike, Flags, joint_array, one_core
 from armwright.calibration.bending import gears, springs
 from armwright.calibration.chain import Bend
 from armwright.calibration.fitting import Calibration, calibrate_to
-from armwright.calibration.readings import Readings
-from armwright.calibration.validation import HeldOut, cross_validated, dealt
-from armwright.errors import InvalidValueError, MissingExtraError
+from armwright.calibration.readings import Numbers, Readings
+from armwright.calibration.validation import HeldOut, dealt, fitted_without, missed, postures
+from armwright.errors import ContradictionError, InvalidValueError, MissingExtraError, TooFewError
 
 # A gain that is so many times as large as chance makes it is one, if it is such a part of what there was. Four things
 # are tried, and chance is to be taken for any of them as rarely as two deviations are for one (Bonferroni).
@@ -62,7 +66,8 @@ class Beyond:
         learnt: what is added to where it has the tool; None where learning did not help.
         tried: everything that was tried, in order; the first is geometry alone.
         geometry: held out, of geometry alone.
-        held_out: of all that is kept.
+        held_out: of all that is kept, by which it was chosen.
+        unseen: held out of the choice, too; None where this was not asked for, or too few readings are left.
     """
 
     calibration: Calibration
@@ -70,6 +75,11 @@ class Beyond:
     tried: tuple[Tried, ...]
     geometry: HeldOut
     held_out: HeldOut
+    unseen: HeldOut | None
+
+    def missed(self, seen: Readings) -> HeldOut:
+        """Return by how much readings miss the arm."""
+        return _missed(self.calibration, self.learnt, seen)
 
     def predict(self, q: ArrayLike) -> Array:
         """Return (m, 3) where the arm has its tool, in the frame of the measurements [m]."""
@@ -95,6 +105,89 @@ class Learnt:
         return np.asarray(mean * self._scale, dtype=np.float64)
 
 
+def judged(name: str, before: Array, after: Array, posture: Numbers) -> Tried:
+    """Return whether held-out distances got smaller by more than chance makes of it.
+
+    Args:
+        name: of what was tried.
+        before: (p,) distances without it [m].
+        after: (p,) distances with it [m].
+        posture: (p,) of each by number; readings of one posture are off together, and count once.
+    """
+    gain = float((before - after).mean())
+    by_posture = np.bincount(np.unique(posture, return_inverse=True)[1], before - after - gain)
+    count = len(by_posture)
+    chance = float(np.sqrt(count / max(1, count - 1) * np.sum(by_posture**2)) / len(before))
+    sure, worth = gain > _SURE * chance, gain > _WORTH * float(before.mean())
+    if sure and worth:
+        why = "held-out points are hit better"
+    elif gain <= 0:
+        why = "held-out points are hit no better"
+    elif not sure:
+        why = "the gain may be chance"
+    else:
+        why = "the gain is not worth it"
+    return Tried(name, float(after.mean()), gain, chance, kept=sure and worth, why=why)
+
+
+class _Parts:
+    """Readings dealt out into parts, and what was fitted without some of them: each is fitted once."""
+
+    def __init__(self, arm: Arm, seen: Readings, *, folds: int, seed: int, base: Array | None) -> None:
+        self.arm, self.seen, self.seed, self.base = arm, seen, seed, base
+        self.away = dealt(seen.q, folds, seed)
+        self.points = seen.with_point & (seen.frame == 0)
+        self.posture = postures(seen.q)
+        self._fitted: dict[tuple[frozenset[int], tuple[str, ...]], Calibration] = {}
+        self._learnt: dict[tuple[frozenset[int], tuple[str, ...]], Learnt] = {}
+
+    def within(self, out: frozenset[int]) -> Flags:
+        """Return (m,) which readings are not in some parts."""
+        return ~np.any([self.away[part] for part in out], axis=0) if out else np.ones(len(self.seen), dtype=np.bool_)
+
+    def fitted(self, out: frozenset[int], bends: tuple[Bend, ...]) -> Calibration:
+        """Return the arm as calibrated without some parts."""
+        key = (out, tuple(bend.name for bend in bends))
+        if key not in self._fitted:
+            self._fitted[key] = (
+                fitted_without(self.arm, self.seen, ~self.within(out), self._called(out), base=self.base, bends=bends)
+                if out
+                else calibrate_to(self.arm, self.seen, base=self.base, bends=bends)
+            )
+        return self._fitted[key]
+
+    def _called(self, out: frozenset[int]) -> str:
+        return f"part {' and '.join(str(part + 1) for part in sorted(out))} of {len(self.away)}"
+
+    def learnt(self, out: frozenset[int], bends: tuple[Bend, ...]) -> "Learnt":
+        """Return what the same readings teach of what it leaves."""
+        key = (out, tuple(bend.name for bend in bends))
+        if key not in self._learnt:
+            found, train = self.fitted(out, bends), self.points & self.within(out)
+            q = self.seen.q[train]
+            self._learnt[key] = _learn(self.arm, q, self.seen.points[train] - found.predict(q), self.seed)
+        return self._learnt[key]
+
+    def held(self, out: frozenset[int], bends: tuple[Bend, ...], *, learn: bool = False) -> HeldOut:
+        """Return by how much readings miss arms that were fitted without their part, and without some others."""
+        held = HeldOut.unknown(len(self.seen))
+        for part in set(range(len(self.away))) - out:
+            without = out | {part}
+            found, away = self.fitted(without, bends), self.away[part]
+            held.put(away, _missed(found, self.learnt(without, bends) if learn else None, self.seen.take(away)))
+        return held
+
+
+class _Choice(NamedTuple):
+    """What held-out points chose."""
+
+    bends: tuple[Bend, ...]
+    learn: bool
+    geometry: HeldOut
+    held: HeldOut
+    tried: tuple[Tried, ...]
+
+
 def calibrate_beyond(
     arm: Arm,
     seen: Readings,
@@ -102,6 +195,7 @@ def calibrate_beyond(
     folds: int = 5,
     seed: int = 0,
     base: Array | None = None,
+    unseen: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Beyond:
     """Calibrate an arm, and try what is not geometry: springs, gears once and twice a turn, a learnt residual.
@@ -112,6 +206,7 @@ def calibrate_beyond(
         folds: parts in which postures are held out.
         seed: of the parts.
         base: see ``calibrate_to``.
+        unseen: whether to hold points out of the choice, too, which takes about three times as long.
         progress: told what is being done.
 
     Raises:
@@ -122,41 +217,78 @@ def calibrate_beyond(
         if progress is not None:
             progress(what)
 
-    points = seen.with_point & (seen.frame == 0)
-    if not points.any():
+    parts = _Parts(arm, seen, folds=folds, seed=seed, base=base)
+    if not parts.points.any():
         raise InvalidValueError("expected points in the measuring frame, on which what is left is seen; got none")
+    chosen = _chosen(parts, frozenset(), told)
+    told("fitting all that is kept")
+    found = parts.fitted(frozenset(), chosen.bends)
+    return Beyond(
+        calibration=found,
+        learnt=parts.learnt(frozenset(), chosen.bends) if chosen.learn else None,
+        tried=chosen.tried,
+        geometry=chosen.geometry,
+        held_out=chosen.held,
+        unseen=_unseen(parts, told) if unseen else None,
+    )
+
+
+def _unseen(parts: _Parts, told: Callable[[str], None]) -> HeldOut | None:
+    """Return by how much readings miss arms of which they chose nothing; None where too few are left to choose by."""
+    held = HeldOut.unknown(len(parts.seen))
+    for number, away in enumerate(parts.away):
+        out = frozenset({number})
+        told(f"holding points out of the choice, part {number + 1} of {len(parts.away)}")
+        try:
+            chosen = _chosen(parts, out, lambda _: None)
+        except (ContradictionError, InvalidValueError):
+            return None
+        found = parts.fitted(out, chosen.bends)
+        learnt = parts.learnt(out, chosen.bends) if chosen.learn else None
+        held.put(away, _missed(found, learnt, parts.seen.take(away)))
+    return held
+
+
+def _chosen(parts: _Parts, out: frozenset[int], told: Callable[[str], None]) -> _Choice:
+    """Return what the points outside of some parts confirm.
+
+    Args:
+        parts: the readings.
+        out: parts that are left out of everything.
+        told: is told what is being done.
+    """
+    if len(parts.away) - len(out) < 2:
+        raise TooFewError("two parts of the readings at least must be left to choose by")
+    points = parts.points & parts.within(out)
+    posture = parts.posture[points]
+
+    def of_points(name: str, before: HeldOut, after: HeldOut) -> Tried:
+        return judged(name, before.distance[points], after.distance[points], posture)
+
     told("holding points out: geometry")
-    held = geometry = cross_validated(arm, seen, folds=folds, seed=seed, base=base)
+    held = geometry = parts.held(out, ())
     tried = [Tried("geometry", float(held.distance[points].mean()), 0.0, 0.0, kept=True, why="")]
     bends, held = _kept_bends(
-        arm,
-        held,
-        points=points,
-        validated=lambda bends: cross_validated(arm, seen, folds=folds, seed=seed, base=base, bends=bends),
-        tried=tried,
-        told=told,
+        parts.arm, held, judged=of_points, validated=lambda bends: parts.held(out, bends), tried=tried, told=told
     )
-    told("fitting all that is kept")
-    found = calibrate_to(arm, seen, base=base, bends=bends)
     told("learning what is left")
+    name, learn = "what is left, learnt", False
     try:
-        better = _learnt_held_out(arm, seen, points, bends=bends, base=base, folds=folds, seed=seed)
+        better = parts.held(out, bends, learn=True)
     except MissingExtraError as error:
-        tried.append(Tried("what is left, learnt", None, 0.0, 0.0, kept=False, why=str(error)))
-        return Beyond(calibration=found, learnt=None, tried=tuple(tried), geometry=geometry, held_out=held)
-    tried.append(_judged("what is left, learnt", held.distance[points], better.distance[points]))
-    learnt = None
-    if tried[-1].kept:
-        held = better
-        learnt = _learn(arm, seen.q[points], seen.points[points] - found.predict(seen.q[points]), seed)
-    return Beyond(calibration=found, learnt=learnt, tried=tuple(tried), geometry=geometry, held_out=held)
+        tried.append(Tried(name, None, 0.0, 0.0, kept=False, why=str(error)))
+    else:
+        tried.append(of_points(name, held, better))
+        learn = tried[-1].kept
+        held = better if learn else held
+    return _Choice(bends, learn, geometry, held, tuple(tried))
 
 
 def _kept_bends(
     arm: Arm,
     held: HeldOut,
     *,
-    points: Flags,
+    judged: Callable[[str, HeldOut, HeldOut], Tried],
     validated: Callable[[tuple[Bend, ...]], HeldOut],
     tried: list[Tried],
     told: Callable[[str], None],
@@ -166,7 +298,7 @@ def _kept_bends(
     Args:
         arm: as it is said to be.
         held: of geometry alone.
-        points: (m,) which readings are judged by.
+        judged: says whether readings are hit better.
         validated: holds readings out, with some bends.
         tried: grows by what is tried here.
         told: is told what is being done.
@@ -182,10 +314,10 @@ def _kept_bends(
         told(f"holding points out: {name}")
         try:
             better = validated((*bends, *more))
-        except InvalidValueError as error:
+        except (ContradictionError, InvalidValueError) as error:
             tried.append(Tried(name, None, 0.0, 0.0, kept=False, why=str(error)))
             continue
-        tried.append(_judged(name, held.distance[points], better.distance[points]))
+        tried.append(judged(name, held, better))
         if tried[-1].kept:
             bends, held = (*bends, *more), better
             parts.append((len(tried) - 1, more))
@@ -194,7 +326,7 @@ def _kept_bends(
         told(f"holding points out: without {tried[number].name}")
         fewer = tuple(bend for bend in bends if bend not in part)
         less = validated(fewer)
-        if not _judged(tried[number].name, less.distance[points], held.distance[points]).kept:
+        if not judged(tried[number].name, less, held).kept:
             bends, held = fewer, less
             tried[number] = tried[number]._replace(kept=False, why="what was kept later does it too")
     return bends, held
@@ -204,35 +336,13 @@ def _not_there(name: str, arm: Arm) -> str:
     return f"{arm.name} has no masses" if "gravity" in name else f"no joint of {arm.name} turns"
 
 
-def _judged(name: str, before: Array, after: Array) -> Tried:
-    """Return whether held-out distances got smaller."""
-    gain, chance = float((before - after).mean()), float((before - after).std(ddof=1) / np.sqrt(len(before)))
-    sure, worth = gain > _SURE * chance, gain > _WORTH * float(before.mean())
-    if sure and worth:
-        why = "held-out points are hit better"
-    elif gain <= 0:
-        why = "held-out points are hit no better"
-    elif not sure:
-        why = "the gain may be chance"
-    else:
-        why = "the gain is not worth it"
-    return Tried(name, float(after.mean()), gain, chance, kept=sure and worth, why=why)
-
-
-def _learnt_held_out(
-    arm: Arm, seen: Readings, points: Flags, *, bends: tuple[Bend, ...], base: Array | None, folds: int, seed: int
-) -> HeldOut:
-    """Return by how much points miss when what is left is learnt from the others."""
-    held = HeldOut(np.full(len(seen), np.nan), np.full(len(seen), np.nan), np.full((len(seen), 3), np.nan))
-    for away in dealt(seen.q, folds, seed):
-        found = calibrate_to(arm, seen.take(~away), base=base, bends=bends)
-        train, test = points & ~away, points & away
-        learnt = _learn(arm, seen.q[train], seen.points[train] - found.predict(seen.q[train]), seed)
-        held.distance[away], held.turn[away] = found.model.off(seen.take(away), found.errors)
-        if test.any():
-            held.places[test] = found.predict(seen.q[test]) + learnt.shift(seen.q[test])
-            held.distance[test] = np.linalg.norm(held.places[test] - seen.points[test], axis=1)
-    return held
+def _missed(found: Calibration, learnt: "Learnt | None", seen: Readings) -> HeldOut:
+    """Return by how much readings miss a calibrated arm, with what was learnt added where they are points."""
+    off, points = missed(found, seen), seen.with_point & (seen.frame == 0)
+    if learnt is not None and points.any():
+        off.places[points] += learnt.shift(seen.q[points])
+        off.distance[points] = np.linalg.norm(off.places[points] - seen.points[points], axis=1)
+    return off
 
 
 def _learn(arm: Arm, q: Array, left: Array, seed: int) -> Learnt:

@@ -17,8 +17,8 @@ RPY = ("roll", "pitch", "yaw")
 QUATERNION = ("qw", "qx", "qy", "qz")
 DISTANCE = "distance"
 # Columns of words.
-_WORDS = (*NAMES, "set", "frame", "plane", "anchor", "to")
-_ALL = (*POINTS, *TARGETS, *OFFSETS, *RPY, *QUATERNION, DISTANCE, *_WORDS)
+WORDS = (*NAMES, "set", "frame", "plane", "anchor", "to")
+_ALL = (*POINTS, *TARGETS, *OFFSETS, *RPY, *QUATERNION, DISTANCE, *WORDS)
 _JOINT = re.compile(r"joint_([1-9]\d?)")
 
 
@@ -84,7 +84,7 @@ def _units(name: str, arm: Arm) -> Mapping[str, float]:
         return ANGLE_UNITS if arm.joints[int(joint[1]) - 1].revolute else LENGTH_UNITS
     if name in RPY:
         return ANGLE_UNITS
-    return {} if name in (*_WORDS, *QUATERNION) else LENGTH_UNITS
+    return {} if name in (*WORDS, *QUATERNION) else LENGTH_UNITS
 
 
 def _named(path: Path, line: int, header: str, arm: Arm) -> tuple[str, str]:
@@ -114,7 +114,7 @@ def _named(path: Path, line: int, header: str, arm: Arm) -> tuple[str, str]:
         *(f"{name}_deg" for name in RPY),
         *known,
         *QUATERNION,
-        *_WORDS,
+        *WORDS,
     ]
     near = closest(header, choices)
     hint = f" Did you mean '{near}'?" if near else ""
@@ -123,7 +123,7 @@ def _named(path: Path, line: int, header: str, arm: Arm) -> tuple[str, str]:
         line,
         header or "''",
         f"no such column.{hint} Known: {', '.join(choices[: arm.n + 3])}, x_t_mm ... z_dif_mm, roll_deg ... yaw_deg, "
-        f"qw ... qz, distance_mm, {', '.join(_WORDS)}; note... for what is for people",
+        f"qw ... qz, distance_mm, {', '.join(WORDS)}; note... for what is for people",
     )
 
 

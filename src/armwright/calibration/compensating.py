@@ -61,7 +61,8 @@ def compensated(found: Calibration | Beyond, goals: ArrayLike, near: ArrayLike) 
     own = [
         chain.names.index(f"joint{i}.{'theta' if one.revolute else 'd'}") for i, one in enumerate(chain.arm.joints, 1)
     ]
-    for step in range(_STEPS + 1):
+    best, least = q, np.full(len(q), np.inf)
+    for _ in range(_STEPS + 1):
         reached = chain.reach(q, known.own)
         shift = 0.0 if learnt is None else learnt.shift(q)
         off, J = places - reached.position - shift, reached.by_position[:, :, own]
@@ -70,8 +71,10 @@ def compensated(found: Calibration | Beyond, goals: ArrayLike, near: ArrayLike) 
             off = np.concatenate([off, turned], axis=1)
             J = np.concatenate([J, reached.by_turn[:, :, own]], axis=1)
         missed = np.linalg.norm(off, axis=1)
-        if step == _STEPS or np.all(missed < _MET):
+        # Near the edge of what can be reached a step may lead away from a goal again.
+        best, least = np.where((missed < least)[:, None], q, best), np.fmin(missed, least)
+        if np.all(least < _MET):
             break
         q = q + np.clip((np.linalg.pinv(J, rcond=_WEAK) @ off[:, :, None])[:, :, 0], -_FARTHEST, _FARTHEST)
     lower, upper = chain.arm.limit("lower"), chain.arm.limit("upper")
-    return Compensated(q, np.asarray(missed, dtype=np.float64), np.all((q >= lower) & (q <= upper), axis=1))
+    return Compensated(best, np.asarray(least, dtype=np.float64), np.all((best >= lower) & (best <= upper), axis=1))

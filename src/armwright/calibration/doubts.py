@@ -7,27 +7,29 @@ sign, makes readings outliers as soon as it moves. A robust fit then drops all o
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import mannwhitneyu
+from scipy.stats import chi2, mannwhitneyu
 
-from armwright.calibration.fitting import BELIEVED_ANGLE, BELIEVED_LENGTH, Calibration
+from armwright.calibration.fitting import BELIEVED_ANGLE, BELIEVED_LENGTH, CHECK, Calibration
 from armwright.calibration.readings import Readings
+from armwright.errors import InvalidValueError
 
-# Outliers share a joint when chance does it less often, and there are so many; so large a part of all is too many.
+# Outliers share a joint, or readings are too far off, when chance does it less often; so many outliers are looked at,
+# and so large a part of all is too many.
 _CHANCE, _FEWEST, _MANY = 1e-4, 5, 0.2
 # Errors of a link that are larger than what is believed by this factor are no errors of a link.
 _BEYOND = 3.0
-_CHECK = (
-    "check the units, the sign and the zero of the joint, the order of the columns, and whether a joint is coupled to "
-    "another (q3 = a2 q2 + q3, as on palletisers), which arm files cannot say"
-)
 
 
-def doubts(found: Calibration, seen: Readings) -> Iterator[str]:
+def doubts(found: Calibration, seen: Readings, noise: float | None = None) -> Iterator[str]:
     """Say what is doubtful of a calibration.
 
     Args:
         found: the calibration.
         seen: the readings that it was fitted to.
+        noise: standard deviation of a measured coordinate or distance, if it is stated [m].
+
+    Raises:
+        InvalidValueError: the noise is not above 0.
     """
     out = np.zeros(len(seen), dtype=np.bool_)
     out[list(found.outliers)] = True
@@ -35,13 +37,13 @@ def doubts(found: Calibration, seen: Readings) -> Iterator[str]:
     if shared:
         names = " and ".join(f"joint {i + 1}" for i in shared)
         yield (
-            f"DOUBTFUL: the {int(out.sum())} readings that do not count are those in which {names} is elsewhere "
-            f"than in the {int((~out).sum())} that do; what is left says nothing of it: {_CHECK}"
+            f"the {int(out.sum())} readings that do not count are those in which {names} is elsewhere "
+            f"than in the {int((~out).sum())} that do; what is left says nothing of it: {CHECK}"
         )
     elif out.mean() > _MANY:
         yield (
-            f"DOUBTFUL: {int(out.sum())} of {len(seen)} readings do not count, and a fit that leaves out so many "
-            f"praises the rest: {_CHECK}"
+            f"{int(out.sum())} of {len(seen)} readings do not count, and a fit that leaves out so many "
+            f"praises the rest: {CHECK}"
         )
     lengths = dict(zip(found.model.names, found.model.is_length, strict=True))
     far = [
@@ -50,7 +52,26 @@ def doubts(found: Calibration, seen: Readings) -> Iterator[str]:
         if name.startswith("joint") and abs(value) > _BEYOND * (BELIEVED_LENGTH if lengths[name] else BELIEVED_ANGLE)
     ]
     if far:
-        yield f"DOUBTFUL: {', '.join(far)}: no link is made so badly; {_CHECK}"
+        yield f"{', '.join(far)}: no link is made so badly; {CHECK}"
+
+    if noise is not None:
+        yield from _too_far(found, seen, noise)
+
+
+def _too_far(found: Calibration, seen: Readings, noise: float) -> Iterator[str]:
+    """Say if what is left is more than the noise that is stated makes of it."""
+    if not 0 < noise < np.inf:
+        raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
+    rows = found.model.rows(seen, found.errors)
+    # Of the numbers that are to spare lengths have their share.
+    freedom = max(1.0, found.freedom * float(np.mean(~rows.turning)))
+    by_chance = float(chi2.sf(freedom * (found.noise.length / noise) ** 2, freedom))
+    if by_chance < _CHANCE:
+        yield (
+            f"what is left is {found.noise.length * 1e3:.3g} mm per coordinate, {found.noise.length / noise:.3g} times "
+            f"the {noise * 1e3:.3g} mm that are stated, which comes by chance in {100 * by_chance:.2g} % of cases: the "
+            f"geometry of this arm does not explain the readings; --beyond tries what else may"
+        )
 
 
 def _shared(q: np.ndarray, out: np.ndarray) -> list[int]:

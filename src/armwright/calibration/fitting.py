@@ -9,6 +9,7 @@ Source:
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import attrs
 import numpy as np
@@ -18,12 +19,20 @@ from scipy.stats import t as student
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.calibration.chain import Bend, Chain
-from armwright.calibration.identifying import KNOWN_ANGLE, KNOWN_LENGTH, Held, Identified, identify, preferred
+from armwright.calibration.identifying import (
+    KNOWN_ANGLE,
+    KNOWN_LENGTH,
+    Held,
+    Identified,
+    identify,
+    is_enough,
+    preferred,
+)
 from armwright.calibration.model import Model, Off
 from armwright.calibration.noise import TYPICAL, Noise, estimated, remaining, trust, weights
 from armwright.calibration.readings import Readings, readings
 from armwright.calibration.starting import started
-from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
+from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError, UnknownNameError
 
 _ROUNDS, _WEIGHINGS = 8, 30
 # Rounds end when one finds the noise no smaller than this part of what the last found: outliers then weigh what they
@@ -41,6 +50,11 @@ _STEPS = 100
 BELIEVED_LENGTH, BELIEVED_ANGLE = 0.02, 0.05
 # Bends of joints are a twentieth of that: gears run true to an arc minute or a few.
 _BENDS = 0.05
+# What may be wrong where an arm and its readings do not belong together.
+CHECK = (
+    "check the units, the sign and the zero of the joint, the order of the columns, and whether a joint is coupled to "
+    "another (q3 = a2 q2 + q3, as on palletisers), which arm files cannot say"
+)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -147,7 +161,8 @@ def calibrate(
 
     Raises:
         ShapeError: joint positions and points are not as many.
-        InvalidValueError: there are fewer numbers than errors, or the points are those of another arm.
+        ContradictionError: the points are those of another arm.
+        TooFewError: there are fewer numbers than errors.
         UnknownNameError: ``only`` or ``without`` names what there is not.
     """
     seen = readings(q, points)
@@ -180,8 +195,8 @@ def calibrate_to(
 
     Raises:
         ShapeError: the readings are of arms with another number of joints.
-        InvalidValueError: there are fewer numbers than errors, the readings are those of another arm, or what is left
-            of them hides every error.
+        ContradictionError: the readings are those of another arm, or what is left of them hides every error.
+        TooFewError: there are fewer numbers than errors.
         UnknownNameError: ``only`` or ``without`` names what there is not.
     """
     if seen.q.shape[1] != arm.n:
@@ -217,6 +232,13 @@ def _chosen(model: Model, only: Sequence[str] | None, without: Sequence[str]) ->
     return [*sorted(around), *preferred(names)], allowed
 
 
+def _no_more(found: Identified, before: Identified) -> Identified:
+    """Return what was fitted before; what else seems to be told is held."""
+    why = "so few readings leave nothing over to tell it from noise"
+    more = (Held(found.names[i], why, ()) for i in found.kept if i not in before.kept)
+    return attrs.evolve(before, held=(*found.held, *more))
+
+
 def _rounds(
     model: Model,
     seen: Readings,
@@ -229,7 +251,7 @@ def _rounds(
     first, allowed = chosen
     known = np.where(model.is_length, KNOWN_LENGTH, KNOWN_ANGLE) * _parts(model)
     errors, kept = np.zeros(len(model.names)), tuple[int, ...]()
-    found: Identified | None = None
+    tried: list[tuple[Identified, Array, Noise]] = []
     # Before anything is fitted, what is left says nothing of the noise.
     start = remaining(model.rows(seen), 0)
     noise = before = Noise(*map(min, start, TYPICAL))
@@ -238,17 +260,22 @@ def _rounds(
         J = rows.by * weights(rows, noise)[:, None]
         # What is fitted already comes first: of two that are nearly one, one would displace the other and run away.
         order = list(dict.fromkeys([*kept, *first]))
-        found = identify(model.names, J, model.is_length, noise.length, first=order, allowed=allowed, known=known)
+        identified = partial(identify, model.names, J, model.is_length, noise.length, first=order, known=known)
+        found = identified(allowed=allowed)
+        if kept and not is_enough(len(rows.off), len(found.kept)):
+            # What so few readings leave is next to nothing, and seems to tell what it does not: noise.
+            found = _no_more(found, identified(allowed=set(kept)))
         if found.kept == kept and all(now > _SETTLED * then for now, then in zip(noise, before, strict=True)):
+            tried[-1:] = [(found, errors, noise)]
             break
         if not found.kept:
-            raise InvalidValueError(
+            raise ContradictionError(
                 f"what {model.chain.arm.name} misses its readings by, {noise.length * 1e3:.3g} mm, hides every error "
-                f"that it may have: are these its readings?"
+                f"that it may have: are these its readings? If so, {CHECK}"
             )
         kept, before = found.kept, noise
-        if len(kept) >= len(rows.off):
-            raise InvalidValueError(
+        if not is_enough(len(rows.off), len(kept)):
+            raise TooFewError(
                 f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more, "
                 f"or fit fewer errors"
             )
@@ -256,8 +283,10 @@ def _rounds(
             progress(f"fitting {len(kept)} errors to {len(seen)} readings")
         errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)
         noise = remaining(model.rows(seen, errors), len(kept))
-    assert found is not None  # noqa: S101 - there is a first round
-    return found, errors, noise
+        tried.append((found, errors, noise))
+    # What is left hides errors, and what is not fitted is left: rounds may lead away, and the last is not the best.
+    best = min(tried, key=lambda one: one[2].length)
+    return best if best[2].length < _SETTLED * noise.length else tried[-1]
 
 
 def _fitted(

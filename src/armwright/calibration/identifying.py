@@ -102,6 +102,11 @@ def identify(
     )
 
 
+def is_enough(numbers: int, errors: int) -> bool:
+    """Whether so many measured numbers are enough for so many errors: one more, or nothing tells noise from them."""
+    return numbers > errors
+
+
 def preferred(names: Sequence[str]) -> list[int]:
     """Return the numbers of those errors that are taken before all others: base, tool, joint offsets.
 

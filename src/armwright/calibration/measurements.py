@@ -13,7 +13,7 @@ names the rows. Units may be left out of the names and stated.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -31,11 +31,13 @@ from armwright.calibration.columns import (
     QUATERNION,
     RPY,
     TARGETS,
+    WORDS,
     Column,
     read_columns,
 )
 from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import FileFormatError, closest, one_of
+from armwright.files.columns import Columns
 from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, Cells, number_in_cell, of_one_width, read_rows
 from armwright.spatial.rotations import rotation_from_quaternion
 
@@ -48,6 +50,10 @@ _BEYOND = 20.0
 _RADIANS = 2 * math.pi
 # How many lines a warning names.
 _SHOWN = 5
+# Rows that are compared at once.
+_AT_ONCE = 10_000
+# SI values of units; a quaternion has none.
+_SCALES = {**LENGTH_UNITS, **ANGLE_UNITS, "": 1.0}
 # A unit quaternion that is written with four digits.
 _WRITTEN = 1e-3
 
@@ -103,11 +109,10 @@ def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | No
     )
     head, below = read_rows(path)
     named = read_columns(path, head, arm, stated)
-    rows = tuple(of_one_width(path, head, below))
-    table = _Table(path, rows, named)
+    table = _stored(path, named, of_one_width(path, head, below))
     joints = [f"joint_{i + 1}" for i in range(arm.n)]
     readings = _readings(table, table.numbers(joints, needed=True))
-    lines = [row.line for row in rows]
+    lines = table.rows.lines
     columns = [table.columns[joint] for joint in joints]
     _refuse_other_units(path, arm, readings.q, lines, columns)
     return Measurements(
@@ -125,42 +130,52 @@ def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | No
 @attrs.frozen(eq=False)
 class _Table:
     path: Path
-    rows: Sequence[Cells]
+    rows: Columns
     columns: Mapping[str, Column]
 
     def numbers(self, names: Sequence[str], *, needed: bool) -> Array:
         """Return (m, k) numbers in SI units; NaN in rows where all are empty, if they are not needed."""
-        wanted = [self.columns[name] for name in names]
-        scales = [{**LENGTH_UNITS, **ANGLE_UNITS, "": 1.0}[one.unit] for one in wanted]
-        none = [math.nan] * len(wanted)
-        table = np.array(
-            [
-                none
-                if not needed and not any(row.cells[one.place] for one in wanted)
-                else [number_in_cell(self.path, row.line, one.header, row.cells[one.place]) for one in wanted]
-                for row in self.rows
-            ],
-            dtype=np.float64,
-        )
-        return np.asarray(table * scales, dtype=np.float64)
+        found = self.rows.stacked(names)
+        empty = np.isnan(found)
+        wrong = empty if needed else empty & ~empty.all(axis=1, keepdims=True)
+        if wrong.any():
+            row = int(wrong.any(axis=1).argmax())
+            raise self.error(row, names[int(wrong[row].argmax())], "empty; expected a number")
+        return found
 
-    def words(self, name: str) -> tuple[str, ...]:
+    def words(self, name: str) -> Sequence[str]:
         """Return the words of a column; empty ones where there is none."""
-        if name not in self.columns:
-            return ("",) * len(self.rows)
-        place = self.columns[name].place
-        return tuple(row.cells[place] for row in self.rows)
+        return self.rows.words[name] if name in self.columns else [""] * len(self.rows)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the rows; their lines where the file names none."""
         label = next((name for name in NAMES if name in self.columns), None)
-        return self.words(label) if label else tuple(str(row.line) for row in self.rows)
+        return tuple(self.words(label)) if label else tuple(map(str, self.rows.lines))
 
     def error(self, number: int, name: str, text: str) -> FileFormatError:
         """Return the error that says something of a cell."""
         header = self.columns[name].header if name in self.columns else name
-        return FileFormatError(self.path, self.rows[number].line, header, text)
+        return FileFormatError(self.path, self.rows.lines[number], header, text)
+
+
+def _stored(path: Path, columns: Mapping[str, Column], rows: Iterable[Cells]) -> _Table:
+    """Read the rows into columns, numbers in SI units.
+
+    Raises:
+        FileFormatError: what should be a number is none.
+    """
+    words = [name for name in columns if name in WORDS]
+    scales = {name: _SCALES[one.unit] for name, one in columns.items() if name not in WORDS}
+    table = Columns.of(scales, words)
+    for line, cells in rows:
+        numbers: dict[str, float | None] = {}
+        for name, scale in scales.items():
+            place, _, header = columns[name]
+            text = cells[place]
+            numbers[name] = number_in_cell(path, line, header, text) * scale if text else None
+        table.add(line, numbers, {name: cells[columns[name].place] for name in words})
+    return _Table(path, table, columns)
 
 
 def _readings(table: _Table, q: Array) -> Readings:
@@ -176,8 +191,8 @@ def _readings(table: _Table, q: Array) -> Readings:
     plane, planes = _numbered(table.words("plane"))
     distances = table.numbers([DISTANCE], needed=False)[:, 0] if DISTANCE in columns else np.full(m, np.nan)
     anchor, anchors = _numbered(table.words("anchor"))
-    for i, word in enumerate(table.words("frame")):
-        if "frame" in columns and not word and np.isfinite(points[i, 0]):
+    for i, word in enumerate(table.words("frame") if "frame" in columns else ()):
+        if not word and np.isfinite(points[i, 0]):
             raise table.error(i, "frame", "empty; where one point tells its frame all do")
     other = _others(table, q, distances, anchor)
     told = np.isfinite(points[:, 0]) | (plane >= 0) | np.isfinite(distances)
@@ -213,14 +228,13 @@ def _numbered(
 
 def _rotations(table: _Table, points: Array) -> Array:
     """Return (m, 3, 3) how the tool was turned; NaN where that was not measured."""
-    m = len(points)
-    rotations = np.full((m, 3, 3), np.nan)
     if QUATERNION[0] in table.columns:
         numbers = table.numbers(QUATERNION, needed=False)
     elif RPY[0] in table.columns:
         numbers = table.numbers(RPY, needed=False)
     else:
-        return rotations
+        return np.broadcast_to(np.nan, (len(points), 3, 3))
+    rotations = np.full((len(points), 3, 3), np.nan)
     for i in np.flatnonzero(np.isfinite(numbers[:, 0])):
         if not np.isfinite(points[i, 0]):
             raise table.error(int(i), "", "the row tells how the tool was turned, and not where it was")
@@ -237,24 +251,18 @@ def _rotations(table: _Table, points: Array) -> Array:
 
 def _others(table: _Table, q: Array, distances: Array, anchor: Numbers) -> Array:
     """Return (m, n) the postures that distances are from; NaN where they are from an anchor, or none are told."""
+    if not {DISTANCE, "anchor", "to"} & table.columns.keys():
+        return np.broadcast_to(np.nan, q.shape)
     other, names = np.full(q.shape, np.nan), table.names
-    called: dict[str, list[int]] = {}
+    called: dict[str, list[int]] = {to: [] for to in table.words("to")}
     for k, name in enumerate(names):
-        called.setdefault(name, []).append(k)
+        if name in called:
+            called[name].append(k)
     for i, to in enumerate(table.words("to")):
-        given = int(bool(to)) + int(anchor[i] >= 0)
-        if not np.isfinite(distances[i]):
-            if given:
-                raise table.error(i, DISTANCE, "empty; the row tells from where a distance is, and not how far")
-            continue
-        if given != 1:
-            both = "both an anchor and another row" if given else "neither an anchor nor another row"
-            raise table.error(i, DISTANCE, f"expected one place to be so far from; the row tells {both}")
-        if distances[i] < 0:
-            raise table.error(i, DISTANCE, f"expected a distance, got {distances[i]:g} m")
+        _refuse_half_a_distance(table, i, float(distances[i]), to=bool(to), anchor=bool(anchor[i] >= 0))
         if not to:
             continue
-        rows = called.get(to, [])
+        rows = called[to]
         if len(rows) != 1:
             near = closest(to, names)
             hint = f"; did you mean {near}?" if near and not rows else ""
@@ -263,6 +271,19 @@ def _others(table: _Table, q: Array, distances: Array, anchor: Numbers) -> Array
             raise table.error(i, "to", "a row is not away from itself")
         other[i] = q[rows[0]]
     return other
+
+
+def _refuse_half_a_distance(table: _Table, row: int, distance: float, *, to: bool, anchor: bool) -> None:
+    """Refuse a distance from nothing or from two places, no distance from one, and one below 0."""
+    if math.isnan(distance):
+        if to or anchor:
+            raise table.error(row, DISTANCE, "empty; the row tells from where a distance is, and not how far")
+        return
+    if to == anchor:
+        both = "both an anchor and another row" if to else "neither an anchor nor another row"
+        raise table.error(row, DISTANCE, f"expected one place to be so far from; the row tells {both}")
+    if distance < 0:
+        raise table.error(row, DISTANCE, f"expected a distance, got {distance:g} m")
 
 
 def _checks(table: _Table) -> Flags:
@@ -298,7 +319,7 @@ def _refuse_other_units(path: Path, arm: Arm, q: Array, lines: Sequence[int], co
                 path,
                 lines[worst],
                 column.header,
-                f"joint {i + 1} of {arm.name} stands at {q[worst, i]:.4g} m, and its limits are {lower:.4g} to "
+                f"{arm.called(i)} of {arm.name} stands at {q[worst, i]:.4g} m, and its limits are {lower:.4g} to "
                 f"{upper:.4g} m; are the units right?",
             )
 
@@ -310,13 +331,13 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], columns: Seque
         scale, unit = {**LENGTH_UNITS, **ANGLE_UNITS}[column.unit], column.unit
         if len(q) > 1 and np.ptp(q[:, i]) < _MOVED:
             texts.append(
-                f"joint {i + 1} never moved: it stands at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. What it "
+                f"{arm.called(i)} never moved: it stands at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. What it "
                 f"and its neighbours are off by cannot be told apart"
             )
         beyond = (q[:, i] < joint.limits.lower - _MOVED) | (q[:, i] > joint.limits.upper + _MOVED)
         if beyond.any():
             texts.append(
-                f"joint {i + 1} is beyond its limits of {joint.limits.lower / scale:.6g} to "
+                f"{arm.called(i)} is beyond its limits of {joint.limits.lower / scale:.6g} to "
                 f"{joint.limits.upper / scale:.6g} {unit} in {_in_lines(np.flatnonzero(beyond).tolist(), lines)}"
             )
     turning = [i for i, (joint, column) in enumerate(zip(arm.joints, columns, strict=True)) if joint.revolute]
@@ -330,12 +351,20 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], columns: Seque
 
 def _copies(readings: Readings, lines: Sequence[int]) -> list[str]:
     """Return a warning of rows that say the same to the last digit, which no second measurement does."""
+    told = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
+
+    def said(rows: slice) -> list[bytes]:
+        return [row.tobytes() for row in np.hstack([part[rows] for part in told]) + 0.0]  # -0.0 + 0.0 is 0.0
+
+    # Whole rows are compared where their hashes agree alone: those of a million rows take little room.
+    blocks = (slice(start, start + _AT_ONCE) for start in range(0, len(readings), _AT_ONCE))
+    hashes = np.fromiter((hash(row) for rows in blocks for row in said(rows)), dtype=np.int64, count=len(readings))
+    _, place, count = np.unique(hashes, return_inverse=True, return_counts=True)
     first: dict[bytes, int] = {}
     copies: list[int] = []
     originals: list[int] = []
-    told = [readings.q, readings.points, readings.plane[:, None], readings.distances[:, None], readings.other]
-    for i, row in enumerate(np.hstack(told) + 0.0):  # -0.0 + 0.0 is 0.0
-        original = first.setdefault(row.tobytes(), i)
+    for i in np.flatnonzero(count[place] > 1).tolist():
+        original = first.setdefault(said(slice(i, i + 1))[0], i)
         if original != i:
             copies.append(i)
             originals.append(original)

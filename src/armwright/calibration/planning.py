@@ -4,6 +4,7 @@ Source:
     Borm & Menq (1991); Driels & Pathre (1990); Nahvi, Hollerbach, Hayward (1994); Nahvi & Hollerbach (1996).
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -13,7 +14,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import ranges
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.calibration.chain import Chain, chain_of
-from armwright.calibration.identifying import identify, preferred
+from armwright.calibration.identifying import identify, is_enough, preferred
 from armwright.errors import InvalidValueError, one_of
 
 Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
@@ -117,11 +118,11 @@ def plan_poses(
     told = identify(chain.names, J, chain.is_length, _USUAL_NOISE, first=preferred(chain.names))
     kept = list(told.kept)
     numbers, poses = slopes.shape[1], count + len(before)
-    # One number more than errors, or nothing tells noise from them.
-    if numbers * poses <= len(kept):
+    if not is_enough(numbers * poses, len(kept)):
+        fewest = next(more for more in itertools.count(1) if is_enough(numbers * more, len(kept)))
         raise InvalidValueError(
             f"count: {arm.name} has {len(kept)} errors that {'poses' if turns else 'points'} can tell; "
-            f"expected {len(kept) // numbers + 1 - len(before)} poses or more, got {count}"
+            f"expected {fewest - len(before)} poses or more, got {count}"
         )
     rows, fixed = slopes[:, :, kept], list(range(candidates, len(slopes)))
     taken = _greedy(rows, count, fixed, progress)

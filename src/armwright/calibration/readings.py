@@ -25,6 +25,11 @@ def _no_numbers(m: int, *shape: int) -> Array:
     return np.full((m, *shape), np.nan)
 
 
+def _told(array: Array) -> Array:
+    """Return a copy that cannot be written to; of what no reading tells there is one NaN, which takes no room."""
+    return np.broadcast_to(np.nan, array.shape) if np.isnan(array).all() else read_only(array)
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Readings:
     """Measurements of an arm of n joints, m of them. What a reading does not tell is NaN, or -1.
@@ -44,13 +49,13 @@ class Readings:
     """
 
     q: Array = attrs.field(converter=read_only)
-    points: Array = attrs.field(converter=read_only)
-    rotations: Array = attrs.field(converter=read_only)
+    points: Array = attrs.field(converter=_told)
+    rotations: Array = attrs.field(converter=_told)
     frame: Numbers = attrs.field(converter=read_only)
     plane: Numbers = attrs.field(converter=read_only)
-    distances: Array = attrs.field(converter=read_only)
+    distances: Array = attrs.field(converter=_told)
     anchor: Numbers = attrs.field(converter=read_only)
-    other: Array = attrs.field(converter=read_only)
+    other: Array = attrs.field(converter=_told)
     frames: tuple[str, ...] = ()
     planes: tuple[str, ...] = ()
     anchors: tuple[str, ...] = ()

@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.calibration.chain import Bend, Chain, chain_of
 from armwright.calibration.model import Model, Plane
 from armwright.calibration.readings import Readings
-from armwright.errors import InvalidValueError
+from armwright.errors import ContradictionError, TooFewError
 from armwright.spatial.poses import one_pose, pose
 from armwright.spatial.rotations import nearest_rotation, rotation_vector
 
@@ -43,8 +43,9 @@ def started(arm: Arm, readings: Readings, *, base: Array | None = None, bends: t
         bends: of its joints.
 
     Raises:
-        InvalidValueError: the readings are those of another arm, told otherwise or in other units; there are too few of
-            a frame, a plane or an anchor to find it; ``base`` has no rotation in it.
+        ContradictionError: the readings are those of another arm, told otherwise or in other units.
+        TooFewError: there are too few readings of a frame, a plane or an anchor to find it.
+        InvalidValueError: ``base`` has no rotation in it.
         ShapeError: ``base`` is not (4, 4).
     """
     given = base is not None
@@ -68,14 +69,14 @@ def started(arm: Arm, readings: Readings, *, base: Array | None = None, bends: t
     off = model.off(readings)
     far = float(np.median(off.distance))
     if far > _FARTHEST:
-        raise InvalidValueError(
+        raise ContradictionError(
             f"the points lie {far * 1e3:.0f} mm from where {arm.name} would have its tool, wherever it stands: are "
             f"these its joints, in this order and these units?"
         )
     turns = off.turn[readings.with_rotation]
     # Points on a line leave a turn of the base about it free, which the fit finds.
     if len(turns) and np.median(turns) > _FARTHEST_TURN and (given or not _on_a_line(readings.points[first])):
-        raise InvalidValueError(
+        raise ContradictionError(
             f"half of the poses are turned {np.degrees(np.median(turns)):.0f} degrees or more from where {arm.name} "
             f"would have its hand, however the measured frame is fixed to it: are these its turns, in this order and "
             f"these units?"
@@ -110,7 +111,7 @@ def _refuse_other_units(chain: Chain, readings: Readings, first: Array) -> None:
         ratio = float(seen) / max(float(nominal), 1e-12)
         for factor, word in _UNITS:
             if 0.8 < ratio / factor < 1.25:
-                raise InvalidValueError(
+                raise ContradictionError(
                     f"the {what} {ratio:.4g} times as far as {chain.arm.name} reaches in these postures: "
                     f"are they {word}?"
                 )
@@ -137,7 +138,7 @@ def _frame(chain: Chain, readings: Readings, number: int) -> Array:
     if not which.any():
         return np.eye(4)  # nothing is read in it here
     if _on_a_line(seen):
-        raise InvalidValueError(
+        raise TooFewError(
             f"frame {name}: {len(seen)} points"
             f"{' on a line' if len(seen) > 2 else ''} do not tell where it stands; measure 3 or more that are not "
             f"on a line"
@@ -185,4 +186,4 @@ def _anchor(chain: Chain, readings: Readings, number: int) -> Array:
 
 def _refuse_few(what: str, name: str, count: int, of: str) -> None:
     if count < 4:
-        raise InvalidValueError(f"{what} {name}: {count} {of} only tell where it is; measure 4 or more")
+        raise TooFewError(f"{what} {name}: {count} {of} only tell where it is; measure 4 or more")

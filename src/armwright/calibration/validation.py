@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.calibration.chain import Bend, chain_of
-from armwright.calibration.fitting import calibrate_to
+from armwright.calibration.fitting import Calibration, calibrate_to
 from armwright.calibration.readings import Numbers, Readings, refuse_not_fitted
-from armwright.errors import InvalidValueError
+from armwright.errors import ContradictionError, InvalidValueError, TooFewError
 
 # Postures whose joints differ by less are one [rad], [m].
 _SAME = 1e-4
@@ -31,6 +31,54 @@ class HeldOut(NamedTuple):
     distance: Array
     turn: Array
     places: Array
+
+    @classmethod
+    def unknown(cls, m: int) -> "HeldOut":
+        """Return that of m readings none is known yet."""
+        return cls(np.full(m, np.nan), np.full(m, np.nan), np.full((m, 3), np.nan))
+
+    def put(self, rows: Flags, known: "HeldOut") -> None:
+        """Take note of those of some rows (m,)."""
+        for mine, more in zip(self, known, strict=True):
+            mine[rows] = more
+
+
+def missed(found: Calibration, seen: Readings) -> HeldOut:
+    """Return by how much readings miss a calibrated arm."""
+    off = found.model.off(seen, found.errors)
+    return HeldOut(off.distance, off.turn, found.predict(seen.q))
+
+
+def fitted_without(
+    arm: Arm,
+    seen: Readings,
+    away: Flags,
+    which: str,
+    *,
+    base: Array | None = None,
+    bends: tuple[Bend, ...] = (),
+    without: Sequence[str] = (),
+) -> Calibration:
+    """Return the arm as calibrated without some readings.
+
+    Args:
+        arm: as it is said to be, with n joints.
+        seen: m readings of it.
+        away: (m,) those that are held out.
+        which: what they are called in a message, such as ``part 2 of 5``.
+        base: see ``calibrate_to``.
+        bends: see ``calibrate_to``.
+        without: see ``calibrate_to``.
+
+    Raises:
+        ContradictionError: the others alone are readings of another arm; see ``calibrate_to``.
+        InvalidValueError: they are too few, or all readings of a frame, a plane or an anchor are held out.
+    """
+    try:
+        refuse_not_fitted(seen.take(~away), seen.take(away))
+        return calibrate_to(arm, seen.take(~away), base=base, bends=bends, without=without)
+    except (ContradictionError, InvalidValueError) as error:
+        raise type(error)(f"with {which} held out: {error}") from error
 
 
 def cross_validated(
@@ -61,19 +109,16 @@ def cross_validated(
         progress: told how many folds are done.
 
     Raises:
+        ContradictionError: a part alone leaves readings of another arm; see ``calibrate_to``.
         InvalidValueError: there are not as many postures as folds, or too few for the errors of the arm; all readings
             of a frame, a plane or an anchor are in one fold.
     """
-    held = HeldOut(np.zeros(len(seen)), np.zeros(len(seen)), np.zeros((len(seen), 3)))
+    held = HeldOut.unknown(len(seen))
     parts = regions_of(arm, seen.q, folds) if regions else dealt(seen.q, folds, seed)
     for fold, away in enumerate(parts, 1):
-        try:
-            refuse_not_fitted(seen.take(~away), seen.take(away))
-            found = calibrate_to(arm, seen.take(~away), base=base, bends=bends, without=without)
-        except InvalidValueError as error:
-            raise InvalidValueError(f"with part {fold} of {folds} held out: {error}") from error
-        held.distance[away], held.turn[away] = found.model.off(seen.take(away), found.errors)
-        held.places[away] = found.predict(seen.q[away])
+        which = f"part {fold} of {folds}"
+        found = fitted_without(arm, seen, away, which, base=base, bends=bends, without=without)
+        held.put(away, missed(found, seen.take(away)))
         if progress is not None:
             progress(fold)
     return held
@@ -88,7 +133,7 @@ def dealt(q: Array, folds: int, seed: int) -> list[Flags]:
     posture = postures(q)
     count = int(posture.max()) + 1
     if count < 2:
-        raise InvalidValueError(
+        raise TooFewError(
             f"folds: {len(q)} readings of one posture leave none to hold out; measure in several postures"
         )
     if not 2 <= folds <= count:

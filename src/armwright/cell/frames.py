@@ -148,13 +148,12 @@ class FrameTree:
 
         A frame that hangs rigidly takes its parent along, and that its own, up to ``leader``.
         """
+        X = of_shape(X_WF, (4, 4), "pose")
+        while (node := self.nodes.get(name)) is not None and node.rigid and node.relation is not None:
+            X, name = X @ turned_over(node.relation), node.parent
         if name == WORLD:
             raise InvalidValueError("the frame WORLD is the root and cannot be placed")
-        node = self.nodes.get(name)
-        if node is not None and node.rigid and node.relation is not None:
-            return self.place(node.parent, of_shape(X_WF, (4, 4), "pose") @ turned_over(node.relation))
         parent = WORLD if node is None else node.parent
-        X = of_shape(X_WF, (4, 4), "pose")
         relation = X if parent == WORLD else _kept(turned_over(self.world(parent)) @ X)
         return self._with(name, Node(parent=parent, relation=relation))
 

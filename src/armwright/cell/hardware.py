@@ -54,6 +54,12 @@ class Hardware(Protocol):
     def force(self, arm: str, now: float) -> Array:
         """Return the force (3,) on what the arm moves, or stands pressed with, along the axes of the world [N]."""
 
+    def wrenches(self, arm: str, now: float) -> Array:
+        """Return what pushes on the tool of an arm, (k, 6), on this servo tick and those after it; the last one stays.
+
+        Force [N] and moment [N m] at the tool point, along the axes of the base, by the motion begun last.
+        """
+
     def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:
         """Close or open the fingers of an arm, wholly or to a width [m]; return the time it takes.
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from scipy.optimize import brentq
 
 from armwright.arrays import Array
 from armwright.cell.hardware import DeviceError, Press
@@ -124,6 +123,25 @@ class Simulator:
         depth = max((self._depth(arm, tip, now) for tip in self._runs[arm].tips), default=0.0)
         return np.array([0.0, 0.0, depth * self._cell.contact_stiffness])
 
+    def wrenches(self, arm: str, now: float) -> Array:
+        """Return what the plane does to the tool of an arm, (k, 6), on this servo tick and those after it.
+
+        Force [N] and moment [N m] at the tool point, along the axes of the base; the last one stays. The plane pushes
+        on what is deepest in it.
+        """
+        run, place, period = self._runs[arm], self._cell.arms[arm], self._cell.period
+        if not run.depths().any():
+            return np.zeros((1, 6))
+        depths = np.stack([tip.depths() for tip in run.tips])[:, round(run.local(now) / period) :]
+        found, deepest = np.zeros((depths.shape[1], 6)), depths.argmax(axis=0)
+        for ticks in _pieces(np.flatnonzero(depths.any(axis=0))):
+            t = np.minimum(run.local(now) + ticks * period, run.trajectory.duration)
+            levers = np.stack([tip.pose[:3, 3] for tip in run.tips])[deepest[ticks]]
+            arms = (forward(place.arm, run.trajectory(t))[:, :3, :3] @ levers[..., None])[..., 0]
+            up = place.base[2, :3] * (depths.max(axis=0)[ticks] * self._cell.contact_stiffness)[:, None]
+            found[ticks] = np.concatenate([up, np.cross(arms, up)], axis=1)
+        return found
+
     def _depth(self, arm: str, tip: _Tip, now: float) -> float:
         """Return how deep one tip presses on the plane [m]."""
         local, period, plane = self._runs[arm].local(now), self._cell.period, self._cell.contact_height
@@ -160,12 +178,16 @@ class Simulator:
         def above(t: float) -> float:
             return float(self._heights(arm, trajectory, tip, np.array([t]))[0]) - plane
 
-        return begin if above(begin) <= 0 else float(brentq(above, begin, end, xtol=1e-14))
+        if above(begin) <= 0:
+            return begin
+        from scipy.optimize import brentq  # noqa: PLC0415 - half of what a run would import, and few touch anything
+
+        return float(brentq(above, begin, end, xtol=1e-14))
 
     def _heights(self, arm: str, trajectory: Trajectory, tip: Array, t: Array) -> Array:
         place = self._cell.arms[arm]
-        pieces = np.array_split(t, -(-len(t) // _AT_ONCE))
-        return np.concatenate([(place.base @ forward(place.arm, trajectory(one)) @ tip)[:, 2, 3] for one in pieces])
+        heights = [(place.base @ forward(place.arm, trajectory(one)) @ tip)[:, 2, 3] for one in _pieces(t)]
+        return np.concatenate(heights)
 
     def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below
         """Close or open the fingers of an arm; return the time it takes [s].
@@ -218,3 +240,8 @@ class Simulator:
     def running(self) -> frozenset[str]:
         """Return the devices that are on."""
         return frozenset(self._on)
+
+
+def _pieces(values: np.ndarray) -> list[np.ndarray]:
+    """Cut values into pieces that are worked out together."""
+    return np.array_split(values, max(1, -(-len(values) // _AT_ONCE)))

@@ -1,8 +1,9 @@
 """Paths that a linkage with play follows to the right places: nodes, or the whole path, moved against the error.
 
 Correcting is a fixed point, not a search: where the tip comes out by e beside its goal, the path is told to go by e the
-other way, and one or two simulations later the goal is met. When the clearances are known as a distribution, the mean
-error over it is what is taken away.
+other way, and one or two simulations later the goal is met. What is taken away is the mean error over runs that nobody
+can tell apart, since after some impacts a single one is left to chance; where the clearances are known as a
+distribution, the mean over that.
 
 Source:
     Spec of the clearance, 4.5; thesis, 5.3.
@@ -18,6 +19,7 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.ideal import ideal_motion, sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, hermite
+from armwright.clearance.predictability import perturbed
 from armwright.clearance.preparing import assembled, followed, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, Status, simulate
@@ -25,6 +27,10 @@ from armwright.errors import InvalidValueError, ShapeError
 
 # Corrections beyond this belong to another fault than play [m].
 _LARGEST = 0.02
+# Of the shift of a whole path: closer together than a simulation is sampled they tell nothing more.
+_MOST_KNOTS = 1000
+# The error falls to a millionth within three; what is left then is chance.
+_MOST_ROUNDS = 100
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -34,8 +40,9 @@ class Correction:
     Attributes:
         path: what to tell the linkage, of the best round.
         nodes: (k, 2) of the path as told [m].
-        before: (..., j) error at the goals of the path as it was [m].
-        after: (..., j) error there of the corrected one [m].
+        before: (r, j) error at the goals of the path as it was, of r runs: those of the samples of the clearances, or
+            where these are known, sixteen that nobody can tell apart [m].
+        after: (r, j) error there of the corrected one; what it differs by from run to run is chance [m].
         history: mean error at the goals before the first and after each round [m].
         best: number of the round whose path this is; 0 for the path as it was.
     """
@@ -62,7 +69,7 @@ def correct_nodes(
     Args:
         linkage: with p pins.
         wanted: the path whose nodes are the goals.
-        clearances: (p,) known, or (s, p) samples of what is known; then the mean error is taken away [m].
+        clearances: (p,) known, or (s, p) samples of what is known [m].
         settings: how it is simulated.
         rounds: how often the nodes are moved.
         progress: told the mean error after each simulation [m].
@@ -100,10 +107,10 @@ def correct_path(
         progress: told the mean error after each simulation [m].
 
     Raises:
-        InvalidValueError: the linkage diverges, there are too few knots, or more than 20 mm would be needed.
+        InvalidValueError: the linkage diverges, the number of knots cannot be, or more than 20 mm would be needed.
     """
-    if knots < 2:
-        raise InvalidValueError(f"knots: expected 2 or more, got {knots}")
+    if not 2 <= knots <= _MOST_KNOTS:
+        raise InvalidValueError(f"knots: expected 2 to {_MOST_KNOTS}, got {knots}")
     times = np.linspace(0.0, wanted.duration, knots)
     timed = attrs.evolve(wanted, targets=tuple(times.tolist()))
     goals = wanted.at(times).at
@@ -207,21 +214,22 @@ def _corrected(  # noqa: PLR0917 - what both kinds of corrections have in common
     rounds: int,
     progress: Callable[[float], None] | None,
 ) -> Correction:
-    if rounds < 0:
-        raise InvalidValueError(f"rounds: expected 0 or more, got {rounds}")
+    if not 0 <= rounds <= _MOST_ROUNDS:
+        raise InvalidValueError(f"rounds: expected 0 to {_MOST_ROUNDS}, got {rounds}")
     c = floats(clearances, "clearances")
     if c.ndim not in (1, 2):
         raise ShapeError(f"clearances: expected one row or several, got shape {c.shape}")
+    runs = perturbed(c) if c.ndim == 1 else c
     tried: list[tuple[Array, Array]] = []
     history: list[float] = []
     for turn in range(rounds + 1):
-        missing = misses(simulate(prepare(linkage, told(nodes), settings), c), goals)
+        missing = misses(simulate(prepare(linkage, told(nodes), settings), runs), goals)
         tried.append((nodes, np.asarray(np.linalg.norm(missing, axis=-1), dtype=np.float64)))
         history.append(float(tried[-1][1].mean()))
         if progress is not None:
             progress(history[-1])
         if turn < rounds:
-            nodes = nodes - missing.reshape(-1, *goals.shape).mean(axis=0)
+            nodes = nodes - missing.mean(axis=0)
             if np.abs(nodes - goals).max() > _LARGEST:
                 raise InvalidValueError(
                     f"{linkage.name}: a correction of {np.abs(nodes - goals).max() * 1e3:.1f} mm would be needed; "

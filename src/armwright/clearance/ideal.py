@@ -13,7 +13,7 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.equations import drive_weights, free_forces, mass_matrix
 from armwright.clearance.linkage import Linkage, Place
 from armwright.clearance.placement import Placement, Point
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, ShapeError, counted
 from armwright.tracing.scalar import Scalar
 
 # Newton's iteration ends when no coordinate moves by more [rad, m].
@@ -269,8 +269,7 @@ def _closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of 
         freedoms = n - 2 * len(linkage.pins)
         what = "a place of the tip tells 2" if by_tip else f"its drives tell {len(linkage.drives)}"
         raise InvalidValueError(
-            f"{linkage.name}: with its pins closed it has {freedoms} freedom{'s' if freedoms != 1 else ''}, "
-            f"and {what}; expected as many"
+            f"{linkage.name}: with its pins closed it has {counted(freedoms, 'freedom')}, and {what}; expected as many"
         )
     return A
 

@@ -20,15 +20,19 @@ Control: TypeAlias = Literal["effort", "pd+ff"]
 INTEGRATORS: tuple[Integrator, ...] = ("rk4", "semi-implicit")
 CONTROLS: tuple[Control, ...] = ("effort", "pd+ff")
 
+# After so many steps a simulation looks whether it is called off.
+_LOOK = 1024
+
 _SOURCE = """{head}{helpers}
 {functions}
 SIGNATURE = types.void(
     int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True),
     types.Array(float64, 1, "C", readonly=True), types.Array(int64, 1, "C", readonly=True),
     types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
+    types.Array(int64, 1, "C"),
 )
 
-def simulate(first, last, start, contacts, gains, table, lengths, kept, samples, counts, peaks):
+def simulate(first, last, start, contacts, gains, table, lengths, kept, samples, counts, peaks, called_off):
     steps = table.shape[0]
     x = np.zeros({inputs} * {lanes})
     y = np.zeros({outputs} * {lanes})
@@ -53,6 +57,8 @@ def simulate(first, last, start, contacts, gains, table, lengths, kept, samples,
                 counts[row[k], i] = 0
         y[:] = 0.0
         for step in range(steps + 1):
+            if step % {look} == 0 and called_off[0] != 0:
+                return
             now = min(step, steps - 1)
             h = lengths[now]
             for stage in range({stages}):
@@ -220,6 +226,7 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
         helpers=body.helpers,
         outputs=body.outputs,
         advance=_filled(_RK4 if integrator == "rk4" else _SEMI_IMPLICIT, sizes),
+        look=_LOOK,
         matrix='types.Array(float64, 2, "C", readonly=True)',
         **parts,
         **sizes,

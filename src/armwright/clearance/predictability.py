@@ -1,13 +1,14 @@
 """Until when a run can be predicted: impacts magnify what nobody knows, until two runs have nothing in common.
 
-A run is made again with clearances that differ by a nanometre, which no workshop and no instrument tells, and with half
-the step. Until all of them are still together the run is a prediction; afterwards only their mean and their spread are.
+A run is made again with clearances that differ by a nanometre, which no workshop and no instrument tells, and with a
+half and a third of the step. Until all of them are still together the run is a prediction; afterwards only their mean
+and their spread are.
 
 Source:
     Spec of the clearance, 1.6: after the first impacts trajectories are chaotic.
 """
 
-from collections.abc import Sequence
+import contextlib
 
 import attrs
 import numpy as np
@@ -19,9 +20,10 @@ from armwright.errors import InvalidValueError
 
 # By how much the clearances of runs differ that nobody can tell apart [m], and how many runs fill a vector.
 PERTURBATION, TWINS = 1e-9, 15
-# Runs that are farther from one another have parted [m]. Runs with half the step must be nearer by this factor: after
-# an impact the error of a step is of first order, twice what halving it changes, and chance doubles that.
-APART, FINER = 1e-5, 4.0
+# Runs that are farther from one another have parted [m]. With smaller steps they must be nearer by a factor: after an
+# impact the error of a step is of first order, half as much again as what a third of it changes, and chance more than
+# doubles that. One of them may meet an impact at the same part of its step as the whole one, and hardly both.
+APART, PARTS, FINER = 1e-5, (2, 3), 4.0
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -29,19 +31,19 @@ class Outlook:
     """How far ahead a run tells what would happen.
 
     Attributes:
-        until: the last time at which all runs beside it are within ``APART`` of it, and those with half the step within
-            a quarter of that [s].
+        until: the last time at which all runs beside it are within ``APART`` of it, and those with smaller steps
+            within a quarter of that [s].
         mean: (s, 2) mean error of the tip over all of them [m].
         spread: (s, 2) its standard deviation over them [m].
         to_the_end: whether the whole run is a prediction.
-        halved: whether runs with half the step are among them.
+        finer: whether runs with a half and a third of the step are among them.
     """
 
     until: float
     mean: Array
     spread: Array
     to_the_end: bool
-    halved: bool
+    finer: bool
 
 
 def perturbed(clearances: Array, count: int = TWINS) -> Array:
@@ -69,16 +71,15 @@ def with_outlook(
     """
     rows = perturbed(np.asarray(clearances, dtype=np.float64))
     own = simulate(task, rows, frictions=friction, threads=threads)
-    errors = [own.error]
-    try:
-        finer = attrs.evolve(task.settings, step=task.h / 2, sample=task.stride * task.h)
-        halved = prepare(task.linkage, task.path, finer, guess=task.ideal.q[0])
-        errors.append(simulate(halved, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
-    except InvalidValueError:
-        # Twice as many steps as are ever made.
-        halved = None
-    together = [one for one in errors if one.shape == own.error.shape]
-    return taken(own, 0), _outlook(own.time, together)
+    finer = []
+    for parts in PARTS:
+        settings = attrs.evolve(task.settings, step=task.h / parts, sample=task.stride * task.h)
+        # There may be more steps than are ever made.
+        with contextlib.suppress(InvalidValueError):
+            again = prepare(task.linkage, task.path, settings, guess=task.ideal.q[0])
+            finer.append(simulate(again, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
+    known = len(finer) == len(PARTS) and all(error.shape == own.error.shape for error in finer)
+    return taken(own, 0), _outlook(own.time, own.error, np.concatenate(finer) if known else None)
 
 
 def taken(simulation: Simulation, number: int) -> Simulation:
@@ -91,19 +92,34 @@ def taken(simulation: Simulation, number: int) -> Simulation:
     )
 
 
-def _outlook(time: Array, errors: Sequence[Array]) -> Outlook:
-    all_of_them = np.concatenate(errors)
+def together_until(time: Array, errors: Array, within: float) -> Array:
+    """Return (...) the last time up to which runs stay together [s].
+
+    Args:
+        time: (s,) of the samples [s].
+        errors: (r, ..., s, 2) of r runs; those of the first are what the others are held against [m].
+        within: how far they may be from it [m].
+    """
     with np.errstate(invalid="ignore", over="ignore"):
-        apart = [np.linalg.norm(one - all_of_them[0], axis=-1).max(axis=0) for one in errors]
-        within = [one <= limit for one, limit in zip(apart, (APART, APART / FINER), strict=False)]
-        parted = np.flatnonzero(~np.all(within, axis=0))
+        apart = np.linalg.norm(errors - errors[0], axis=-1).max(axis=0)
+        # What is infinite or no number is not near.
+        near = apart <= within
+    first = np.where(near.all(axis=-1), len(time), np.argmin(near, axis=-1))
+    return np.asarray(time[np.maximum(first - 1, 0)], dtype=np.float64)
+
+
+def _outlook(time: Array, own: Array, finer: Array | None) -> Outlook:
+    """Return what runs (r, s, 2) say of the first of them, and those with smaller steps, if there are any."""
+    until, all_of_them = together_until(time, own, APART), own
+    if finer is not None:
+        all_of_them = np.concatenate([own, finer])
+        until = np.minimum(until, together_until(time, np.concatenate([own[:1], finer]), APART / FINER))
+    with np.errstate(invalid="ignore", over="ignore"):
         mean, spread = all_of_them.mean(axis=0), all_of_them.std(axis=0)
-    first = int(parted[0]) if len(parted) else len(time)
     return Outlook(
-        # The last moment at which all were together.
-        until=float(time[max(first - 1, 0)]),
+        until=float(until),
         mean=np.asarray(mean, dtype=np.float64),
         spread=np.asarray(spread, dtype=np.float64),
-        to_the_end=first == len(time),
-        halved=len(errors) > 1,
+        to_the_end=float(until) == float(time[-1]),
+        finer=finer is not None,
     )

@@ -1,5 +1,7 @@
 """Making a path ready to be simulated many times: what the linkage without play does, and what its drives give."""
 
+import math
+
 import attrs
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +16,8 @@ from armwright.errors import InvalidValueError, ShapeError
 
 # So many places of a path are solved one after the other; all between them at once, from there.
 _COARSE = 60
+# A path that takes less time is none, and nothing could be worked out on it [s].
+_SHORTEST = 1e-9
 # A coordinate that changes by more between two moments has jumped [rad, m].
 _JUMP = 0.05
 
@@ -63,6 +67,8 @@ def prepare(linkage: Linkage, path: Path, settings: Settings | None = None, *, g
         ShapeError: it has not as many axes as there are drives.
     """
     settings = settings or Settings()
+    if not _SHORTEST <= path.duration < math.inf:
+        raise InvalidValueError(f"path {path.name}: expected a duration from {_SHORTEST:g} s, got {path.duration:g} s")
     axes = 2 if path.of == "tip" else len(linkage.drives)
     if path.pieces.shape[1] != axes:
         raise ShapeError(f"path {path.name}: expected {axes} axes for the {path.of}, got {path.pieces.shape[1]}")

@@ -72,10 +72,11 @@ class Settings:
         Raises:
             InvalidValueError: more than anybody means.
         """
-        steps = max(1, int(np.ceil(duration / self.step - 1e-9)))
+        count = duration / self.step - 1e-9
+        steps = max(1, int(np.ceil(min(count, 2.0 * _MOST_STEPS))))
         if steps > _MOST_STEPS:
             raise InvalidValueError(
-                f"{duration:g} s would take {steps:.3g} steps of {self.step:g} s; at most {_MOST_STEPS:,} are made"
+                f"{duration:g} s would take {count:.3g} steps of {self.step:g} s; at most {_MOST_STEPS:,} are made"
             )
         return steps
 

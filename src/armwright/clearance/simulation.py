@@ -23,7 +23,7 @@ from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import check_step, contact_stiffness
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled
-from armwright.tracing.kernel import on_cores
+from armwright.tracing.kernel import on_cores_for_long
 
 # A tip that is farther off than this has left its path for good [m].
 _LOST = 1.0
@@ -174,8 +174,8 @@ def _run(task: Task, layout: Layout, start: Array, contacts: Array, threads: int
     gains = np.tile(task.settings.gains, (runs, len(task.linkage.drives) if layout.gains else 0))
     run = _simulator(layout, task.settings.integrator)
     lengths = task.lengths[:rows]
-    on_cores(
-        lambda first, last: run(first, last, start, contacts, gains, task.table, lengths, kept, *record),
+    on_cores_for_long(
+        lambda a, b, called_off: run(a, b, start, contacts, gains, task.table, lengths, kept, *record, called_off),
         runs,
         threads,
     )

@@ -1,73 +1,19 @@
 """The command ``armwright``: its commands, and what becomes of errors."""
 
+import os
 import sys
 import warnings
+from collections.abc import Collection
 from typing import Annotated
 
 import typer
 
-from armwright.cli.arms import arms
-from armwright.cli.calibrate import calibrate
-from armwright.cli.check import check
-from armwright.cli.clearance import clearance
-from armwright.cli.code import code
-from armwright.cli.convert import convert
-from armwright.cli.debug import debug
-from armwright.cli.explain import explain
+from armwright.cli.commands import COMPLETE, NAME, App
+from armwright.cli.completing import Shell, install, limits, prepare, script
 from armwright.cli.failures import Commands, run_and_exit
-from armwright.cli.fix import fix
-from armwright.cli.fmt import fmt
-from armwright.cli.forward import forward, jacobian
-from armwright.cli.inverse import inverse
-from armwright.cli.iso9283 import iso9283
-from armwright.cli.kernel import kernel
-from armwright.cli.lsp import lsp
-from armwright.cli.move import move
-from armwright.cli.plan_poses import plan_poses
-from armwright.cli.repl import repl
-from armwright.cli.run import run
-from armwright.cli.show import show
-from armwright.cli.simulate import simulate
-from armwright.cli.singularity import singularity
-from armwright.cli.study import study
-from armwright.cli.terminal import clean_output
-from armwright.cli.torque import torque
+from armwright.cli.listed import register
+from armwright.cli.terminal import bound_widths, clean_output
 from armwright.version import __version__
-
-app = typer.Typer(
-    name="armwright",
-    cls=Commands,
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command()(run)
-app.command()(check)
-app.command()(explain)
-app.command()(repl)
-app.command()(debug)
-app.command()(fmt)
-app.command()(fix)
-app.command()(lsp)
-app.command()(code)
-app.command()(arms)
-app.command()(show)
-app.command()(convert)
-app.command()(forward)
-app.command()(inverse)
-app.command()(jacobian)
-app.command()(torque)
-app.command()(singularity)
-app.command()(simulate)
-app.command()(move)
-app.command()(iso9283)
-app.command()(calibrate)
-app.command("plan-poses")(plan_poses)
-app.add_typer(clearance)
-app.command()(study)
-app.command()(kernel)
 
 
 def _version(wanted: bool) -> None:
@@ -76,10 +22,20 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+def _show_completion(shell: Shell | None) -> None:
+    if shell is not None:
+        print(script(shell))
+        raise typer.Exit
+
+
+def _install_completion(shell: Shell | None) -> None:
+    if shell is not None:
+        print(f"completion for {shell}: {install(shell)}; it works in every {shell} that is started from now on")
+        raise typer.Exit
+
+
 def _raise_limits(texts: list[str]) -> list[str]:
     """Let this command, and the processes that it starts, read more of what a limit bounds."""
-    import os
-
     from armwright.errors import ArmwrightError
     from armwright.files.limits import VARIABLE, parsed
 
@@ -94,7 +50,6 @@ def _raise_limits(texts: list[str]) -> list[str]:
     return texts
 
 
-@app.callback()
 def root(
     _limits: Annotated[
         list[str] | None,
@@ -102,7 +57,30 @@ def root(
             "--raise",
             help="Read more than is usual, such as table_rows=10000000 (docs/limits.md lists the limits).",
             metavar="NAME=NUMBER",
+            autocompletion=limits,
             callback=lambda texts: _raise_limits(texts or []),
+            show_default=False,
+        ),
+    ] = None,
+    _show: Annotated[
+        Shell | None,
+        typer.Option(
+            "--show-completion",
+            help="Print what bash, zsh, fish or powershell reads to complete commands, options and names.",
+            metavar="SHELL",
+            callback=_show_completion,
+            is_eager=True,
+            show_default=False,
+        ),
+    ] = None,
+    _install: Annotated[
+        Shell | None,
+        typer.Option(
+            "--install-completion",
+            help="Add that to the start-up files of the shell.",
+            metavar="SHELL",
+            callback=_install_completion,
+            is_eager=True,
             show_default=False,
         ),
     ] = None,
@@ -116,11 +94,42 @@ def root(
     """
 
 
+def application(words: Collection[str] | None = None) -> App:
+    """Return the command line.
+
+    Args:
+        words: that will be called with; only the commands among them are made. None: all are.
+    """
+    made = App(
+        name=NAME,
+        cls=Commands,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="markdown",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    register(made, words)
+    made.callback()(root)
+    return made
+
+
+def __getattr__(name: str) -> App:
+    """Return ``app``, the whole command line, for who looks at all of it."""
+    if name == "app":
+        made = globals()[name] = application()
+        return made
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
 def main() -> None:
     """Run the command line; an error ends it with one message and the exit status of its kind."""
+    bound_widths()
     clean_output()
+    prepare()
     warnings.showwarning = _warn
-    run_and_exit(app)
+    # A shell that asks what may follow is told of all.
+    run_and_exit(application(None if COMPLETE in os.environ else sys.argv[1:]))
 
 
 def _warn(message: Warning | str, category: type[Warning], *where: object, **_more: object) -> None:

@@ -5,19 +5,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armwright.cli.failures import outcome
 from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
-from armwright.cli.options import Json, Quiet
+from armwright.cli.options import ArmName, Json, Quiet
 from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
 from armwright.cli.results import warn_of_stray, write_results
+from armwright.errors import DoubtfulError
 
 if TYPE_CHECKING:
     from armwright.report.calibrated import Calibrated
 
 
 def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
-    arm: Annotated[str, typer.Argument(help="Name in the catalogue, an arm file or a URDF.", show_default=False)],
+    arm: ArmName,
     measured: Annotated[
         Path, typer.Argument(help="CSV of joints and what was measured (docs/calibration.md).", show_default=False)
     ],
@@ -31,6 +33,13 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
         bool,
         typer.Option("--beyond", help="Also try springs in the joints, gears out of true, and learning what is left."),
     ] = False,
+    noise_um: Annotated[
+        float | None,
+        typer.Option(
+            help="Standard deviation of a measured coordinate: then it is said if what is left is more.",
+            show_default=False,
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Folder for the arm (TOML, URDF, tables), errors, report and figures."),
@@ -41,7 +50,8 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     """Find the errors of an arm from what its tool was measured at, and write the corrected arm.
 
     Points, poses, touched planes and distances, alone or together. Prints which errors were found and how well, which
-    cannot be told and why, and how far held-out readings are off before and after.
+    cannot be told and why, and how far held-out readings are off before and after. Readings that contradict the arm
+    end with status 3: those of another arm at once, doubtful ones with the reasons when all is told and written.
 
     **Example:** `armwright calibrate puma560-seed examples/puma_points.csv -o out/calibrated`
     """
@@ -55,16 +65,20 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     warn_of_stray(measured)
     measurements = read_measurements(measured, model, units=units_of(units))
     with waiting("calibrating", quiet=quiet or as_json) as told, one_core():
-        found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, progress=told)
+        noise = None if noise_um is None else noise_um * 1e-6
+        found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, noise=noise, progress=told)
     if output is not None:
         title = f"{model.name}, {measured.name}"
         write_results(output, calibrated_files(found, title=title, command=command_line()))
+    doubtful = DoubtfulError(f"the readings contradict the arm: {'; '.join(found.doubts)}") if found.doubts else None
     if as_json:
-        print_json(as_data(found))
+        print_json({**outcome(doubtful), **as_data(found)})
     elif not quiet:
         _print(found)
         if output is not None:
             print(f"report: {output / 'report.html'}")
+    if doubtful is not None:
+        raise doubtful
 
 
 def _print(found: "Calibrated") -> None:

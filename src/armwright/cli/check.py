@@ -88,7 +88,8 @@ def _found(given: list[Path]) -> list[Path]:
     """
     paths: dict[Path, None] = {}
     for path in given:
-        inside = sorted(path.rglob(f"*{_SUFFIX}")) if path.is_dir() else [path]
+        # A pipe that nobody named is no program.
+        inside = sorted(one for one in path.rglob(f"*{_SUFFIX}") if one.is_file()) if path.is_dir() else [path]
         if not inside:
             raise FileFormatError(str(path), None, "", f"there is no program in this folder; expected files *{_SUFFIX}")
         paths |= dict.fromkeys(inside)
@@ -106,15 +107,17 @@ def _print(compiled: "Compilation", emit: Emit | None) -> None:
 
 def _counted(compiled: "list[Compilation]") -> str:
     """Return the last line of a report on several programs."""
+    from armwright.program.messages.diagnostics import counts_text
+
     errors = sum(one.is_error for program in compiled for one in program.diagnostics)
-    counts = [(errors, "error"), (sum(len(program.diagnostics) for program in compiled) - errors, "warning")]
-    said = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
-    return f"{len(compiled)} programs: {', '.join(said) or 'no errors'}"
+    warnings = sum(len(program.diagnostics) for program in compiled) - errors
+    return f"{len(compiled)} programs: {counts_text(errors, warnings)}"
 
 
 def _together(several: list[dict[str, Any]], paths: list[Path]) -> dict[str, Any]:
     """Return what is wrong with several programs as plain data, each with its path."""
     return {
+        "exit_status": max(one["exit_status"] for one in several),
         "errors": sum(one["errors"] for one in several),
         "warnings": sum(one["warnings"] for one in several),
         "programs": [{"path": path.as_posix(), **one} for one, path in zip(several, paths, strict=True)],

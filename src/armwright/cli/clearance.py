@@ -1,14 +1,14 @@
 """``armwright clearance``: linkages whose pins have play."""
 
-import typer
-
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
 from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
+from armwright.cli.commands import App, Group
 
-clearance = typer.Typer(
+clearance = App(
     name="clearance",
+    cls=Group,
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.completing import paths
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
 from armwright.cli.printing import json_text, plain_console, print_json, print_table, table
@@ -18,11 +19,15 @@ if TYPE_CHECKING:
 
 # So many linkages stand for what is known of one; the least play of any [m].
 _DRAWS, _SMALLEST = 32, 1e-6
+# No clearance, and no coefficient of friction, is larger; more is in another unit, or of another file.
+_LARGEST = 10.0
 
 
 def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
-    path: Annotated[str, typer.Option(help="pick-and-place, or a test path x1 to x10, y1 to y14.")] = "pick-and-place",
+    path: Annotated[
+        str, typer.Option(help="pick-and-place, or a test path x1 to x10, y1 to y14.", autocompletion=paths)
+    ] = "pick-and-place",
     clearance: Annotated[
         list[str] | None,
         typer.Option(help="Of one pin in mm, as estimated: J2=0.34; may be repeated.", show_default=False),
@@ -31,8 +36,8 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
         Path | None,
         typer.Option(help="What `clearance estimate --json` printed: then the mean error over what is known goes."),
     ] = None,
-    knots: Annotated[int, typer.Option(help="Places at which a whole path is moved.")] = 20,
-    rounds: Annotated[int, typer.Option(help="How often the path is moved.")] = 3,
+    knots: Annotated[int, typer.Option(help="Places at which a whole path is moved, at most 1000.")] = 20,
+    rounds: Annotated[int, typer.Option(help="How often the path is moved, at most 100 times.")] = 3,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     output: Annotated[
@@ -43,8 +48,9 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Move a path against the error that play makes, until the tip comes to where it is wanted.
 
-    Of pick-and-place the three nodes are moved; of another path the whole, smoothly. Each round is one simulation, and
-    the path of the best is told.
+    Of pick-and-place the three nodes are moved; of another path the whole, smoothly. Each round simulates sixteen runs
+    that nobody can tell apart, or 32 of an estimate, and takes their mean error away; the path of the best round is
+    told, and what is left of the error with its spread over the runs.
 
     **Example:** `armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483`
     """
@@ -90,8 +96,14 @@ def _summary(model: "Linkage", path: str, found: "Correction", clearances: "Arra
         "clearances": dict(zip(model.clearances, usual.tolist(), strict=True)),
         "times": list(found.path.targets),
         "nodes": found.nodes.tolist(),
-        "before": np.atleast_2d(found.before).mean(axis=0).tolist(),
-        "after": np.atleast_2d(found.after).mean(axis=0).tolist(),
+        "before": found.before.mean(axis=0).tolist(),
+        "before_spread": found.before.std(axis=0, ddof=1).tolist(),
+        "after": found.after.mean(axis=0).tolist(),
+        "after_spread": found.after.std(axis=0, ddof=1).tolist(),
+        "runs": len(found.after),
+        "of": "with clearances drawn from the estimate"
+        if clearances.ndim > 1
+        else "whose clearances nobody can tell apart",
         "mean errors": list(found.history),
         "round": found.best,
     }
@@ -114,14 +126,14 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
     Raises:
         FileFormatError: the file is not what `clearance estimate --json` prints, or of another linkage.
         ContradictionError: what was measured contradicts the model.
-        InvalidValueError: a clearance is not told.
+        TooFewError: a clearance is not identified.
     """
     import json
 
     import numpy as np
 
     from armwright.clearance.estimating.misfit import refuse_contradiction
-    from armwright.errors import FileFormatError, InvalidValueError
+    from armwright.errors import FileFormatError, TooFewError
     from armwright.files.reading import read_text
 
     warn_of_stray(estimate)
@@ -133,20 +145,31 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
         mean, deviation = (np.array([one[key] for one in parameters.values()]) for key in ("mean", "deviation"))
         names = list(parameters)
         picked = [names.index(name) for name in model.clearances]
+        _refuse_impossible(np.array([mean, deviation]))
         covariance = correlation * np.outer(deviation, deviation)
         drawn = np.random.default_rng(0).multivariate_normal(mean, covariance, _DRAWS, check_valid="raise")[:, picked]
-    except (AttributeError, KeyError, TypeError, ValueError, np.linalg.LinAlgError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError, np.linalg.LinAlgError) as error:
         text = f"expected what `armwright clearance estimate --json` prints for {model.name}"
         raise FileFormatError(estimate, None, "", text) from error
     refuse_contradiction(misfit, [], [])
     unknown = [name for name in model.clearances if not told_of[name]]
     if unknown:
-        raise InvalidValueError(
+        raise TooFewError(
             f"{estimate}: the measurement does not tell {', '.join(unknown)}; a path cannot be corrected for what is "
             f"not known: measure more poses or paths, or give --clearance"
         )
     # Contact needs some play.
     return np.maximum(drawn, _SMALLEST)
+
+
+def _refuse_impossible(numbers: "Array") -> None:
+    """Refuse numbers that no clearance and no coefficient of friction has; what is NaN is none, either.
+
+    Raises:
+        ValueError: there are such.
+    """
+    if not (abs(numbers) <= _LARGEST).all():
+        raise ValueError
 
 
 def _files(
@@ -178,15 +201,17 @@ def _files(
 
 
 def _print(summary: dict[str, Any]) -> None:
-    nodes = zip(summary["times"], summary["nodes"], summary["before"], summary["after"], strict=True)
+    columns = (summary[name] for name in ("before", "before_spread", "after", "after_spread"))
     rows = (
-        (f"{t:.4g}", *(f"{x * 1e3:z.4f}" for x in node), f"{before * 1e3:.4f}", f"{after * 1e3:.5f}")
-        for t, node, before, after in nodes
+        (f"{t:.4g}", *(f"{x * 1e3:z.4f}" for x in node), *(f"{x * 1e3:.4f}" for x in errors))
+        for t, node, *errors in zip(summary["times"], summary["nodes"], *columns, strict=True)
     )
-    print_table(plain_console(), table(("at s", "told x mm", "y mm", "error before mm", "after mm"), rows, words=()))
+    heads = ("at s", "told x mm", "y mm", "error before mm", "± mm", "after mm", "± mm")
+    print_table(plain_console(), table(heads, rows, words=()))
+    print(f"errors are means over {summary['runs']} runs {summary['of']}, ± their standard deviation")
     late = [t for t in summary["times"] if t > summary["predictable_until"] + 1e-9]
     if late:
         print(
-            f"predictable until t = {summary['predictable_until']:.4g} s: what the path comes to at the {len(late)} "
-            f"later times is one of many runs that nobody can tell apart, and no correction can be relied on there"
+            f"predictable until t = {summary['predictable_until']:.4g} s: at the {len(late)} later times the mean "
+            f"error over these runs is corrected, and a single run is off by their spread"
         )

@@ -1,7 +1,7 @@
 """``armwright clearance estimate``: the clearances that measurements tell, and how well."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,12 +13,15 @@ from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
     from armwright.clearance.estimating.measured import PathsMeasured, RestMeasured
+    from armwright.clearance.estimating.on_paths import Learnt
     from armwright.clearance.estimating.static import Estimate
     from armwright.clearance.linkage import Linkage
 
 # What of an error curve is compared.
 _FEATURES = ("slope", "intercept", "amp_dc", "offset_x", "offset_y")
 _LEVEL = 0.9
+# How a fault of the model is told by its unit: times so much, in what, and a usual size of it.
+_SHOWN_AS = {"1": (1e2, "%", 10.0), "m": (1e3, "mm", 0.1), "rad": (180 / math.pi, "deg", 0.01)}
 
 
 def estimate(
@@ -59,6 +62,7 @@ def estimate(
 
 
 def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) -> dict[str, Any]:
+    from armwright.clearance.estimating.blind import faults
     from armwright.clearance.estimating.misfit import widening
     from armwright.errors import InvalidValueError
 
@@ -66,6 +70,7 @@ def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) ->
         raise InvalidValueError(f"--noise-um: expected a number above 0, got {noise * 1e6:g}")
     found = measured.estimate(model, noise)
     interval, told = found.interval(_LEVEL), found.identifiable(float(found.values.max()))
+    wrong = faults(model, measured.poses, found, noise_is_known=bool(noise or measured.noise))
     return {
         "by": "rest",
         "parameters": {
@@ -80,11 +85,24 @@ def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) ->
         "correlation": found.correlation.tolist(),
         "misfit": float(found.misfit),
         "widening": float(widening(found.square, found.spare)),
+        "wrong_models": [
+            {
+                "what": one.name,
+                "unit": one.unit,
+                "refused_from": one.seen if math.isfinite(one.seen) else None,
+                "shifts": dict(zip(found.names, one.shifts.tolist(), strict=True)),
+            }
+            for one in wrong
+        ],
         "notes": [
-            f"{len(measured.names)} poses, {sum(measured.readings)} readings; {found.residual * 1e6:.3g} µm are left",
+            (
+                f"{len(measured.names)} poses, {sum(measured.readings)} readings; "
+                f"residual {found.residual * 1e6:.3g} µm (rms)"
+            ),
             f"singular values of the equations: {', '.join(f'{x:.3g}' for x in found.singular_values)}",
             *([] if noise or measured.noise else [_no_noise(found)]),
             *_told_of_fit(float(found.misfit), float(widening(found.square, found.spare))),
+            *_told_of_friction(model.material.friction, float(found.values.max())),
             *(
                 f"{name} is at its bound, 0 mm: the readings would have it below nothing"
                 for name, ends in zip(found.names, found.at_bound, strict=True)
@@ -106,22 +124,26 @@ def _no_noise(found: "Estimate") -> str:
 
 def _told_of_fit(misfit: float, wider: float) -> list[str]:
     """Say how well the model explains the data."""
-    told = [f"data as far off as these come by chance in {100 * misfit:.3g} % of cases"]
+    told = [f"where the model holds, residuals are as large or larger in {100 * misfit:.3g} % of cases"]
     if wider > 1:
-        told.append(f"more is left than the noise explains: deviations and intervals are {wider:.3g} times as wide")
+        told.append(f"residuals are {wider:.3g} times the noise: deviations and intervals are widened by as much")
     return told
 
 
+def _told_of_friction(friction: float, clearance: float) -> Iterator[str]:
+    """Say how far from where it is taken to lie a journal may stay at rest."""
+    if friction:
+        aside = math.atan(friction) * clearance * 1e6
+        yield (
+            f"friction ({friction:g}) may hold a journal {aside:.2g} µm to either side of where it is taken to lie; "
+            f"the intervals do not include that"
+        )
+
+
 def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, noise: float | None) -> dict[str, Any]:
-    import json
-
-    import numpy as np
-
-    from armwright.clearance.estimating.kriging import learn
+    from armwright.clearance.estimating.on_paths import learnt_from
     from armwright.clearance.estimating.posterior import posterior
-    from armwright.clearance.sweeping import is_sweep_of
     from armwright.errors import InvalidValueError
-    from armwright.sweep.results import load
 
     if folder is None:
         raise typer.BadParameter(
@@ -129,26 +151,10 @@ def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, 
         )
     if noise is None or not 0 < noise < math.inf:
         raise InvalidValueError("--noise-um: expected the standard deviation of a measured coordinate, above 0")
-    with load(folder) as data:
-        if not is_sweep_of(json.loads(data.attrs["settings"]), model):
-            raise InvalidValueError(f"{folder}: the sweep is of another linkage than {model.name}; sweep this one")
-        names = tuple(f"{path}_{feature}" for path in measured.times for feature in _FEATURES)
-        missing = sorted({name.partition("_")[0] for name in names if name not in data})
-        if missing:
-            raise InvalidValueError(
-                f"{folder}: the sweep has no path {', '.join(missing)}; sweep the paths that were measured"
-            )
-        parameters = tuple(name for name in map(str, data.coords) if name.startswith("c_") or name == "friction")
-        points = np.stack([data[name].to_numpy() for name in parameters], axis=-1)
-        values = np.stack([np.where(data["status"] == 0, data[name], np.nan) for name in names], axis=-1)
-        told = json.loads(data.attrs["design"])["ranges"]
-    # The two bounds of a design by chance, or the levels of a full factorial.
-    ranges = [(min(told[name]), max(told[name])) for name in parameters] if set(parameters) <= set(told) else None
-    with waiting(f"learning from {len(points)} simulations") as told_of:
-        surrogate = learn(parameters, points, names, values, ranges=ranges, progress=told_of)
-    features = measured.features()
-    seen = [float(getattr(features[path], feature)) for path in measured.times for feature in _FEATURES]
-    found = posterior(surrogate, seen, measured.noise_of(names, noise)).checked()
+    with waiting(f"learning from the simulations in {folder}") as told_of:
+        learnt = learnt_from(folder, model, tuple(measured.times), _FEATURES, told_of)
+    names = learnt.surrogate.features
+    found = posterior(learnt.surrogate, measured.seen(names), measured.noise_of(names, noise)).checked()
     interval = found.interval(_LEVEL)
     return {
         "by": "paths",
@@ -164,17 +170,34 @@ def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, 
         "correlation": found.correlation.tolist(),
         "misfit": found.misfit,
         "widening": found.widening,
+        "left_out": list(learnt.chance),
+        "predictable_until": dict(learnt.until),
         "notes": [
-            f"{len(names)} features of {len(measured.times)} paths, learnt from {len(points)} simulations",
+            f"{len(names)} features of {len(measured.times)} paths, learnt from {learnt.runs} simulations",
+            *_told_of_chance(learnt),
             *_told_of_fit(found.misfit, found.widening),
             *(
                 f"{name.removeprefix('c_')} lies at the end of what was swept, "
                 f"{end if name == 'friction' else end * 1e3:g}{'' if name == 'friction' else ' mm'}, or beyond: "
-                f"it is not told; sweep further"
+                f"it is not identified; sweep further"
                 for name, end in found.bounds.items()
             ),
         ],
     }
+
+
+def _told_of_chance(learnt: "Learnt") -> list[str]:
+    """Say until when the paths are predictions, and which features are left out since they are chance."""
+    if not learnt.until:
+        return ["the sweep has no runs beside each (--twins 0): what is chance is known from the scatter of its runs"]
+    until = ", ".join(f"{path} {t:.3g} s" for path, t in learnt.until.items())
+    told = [f"predictable until, in half of the simulations: {until}; what chance does later counts as noise"]
+    if learnt.chance:
+        told.append(
+            f"left out, since runs that nobody can tell apart differ by more than the clearances change them: "
+            f"{', '.join(learnt.chance)}"
+        )
+    return told
 
 
 def _print(told: Mapping[str, Any]) -> None:
@@ -194,8 +217,34 @@ def _print(told: Mapping[str, Any]) -> None:
             )
         )
     console = plain_console()
-    print_table(
-        console, table(("", "mean mm", "± mm", "90 % interval mm", "told", *(f"r {one}" for one in names)), rows)
-    )
+    first = "parameter" if "friction" in names else "pin"
+    heads = (first, "mean mm", "± mm", "90 % interval mm", "identified", *(f"r {one}" for one in names))
+    print_table(console, table(heads, rows))
     for note in told["notes"]:
         console.print(note)
+    if told.get("wrong_models"):
+        _print_wrong_models(told["wrong_models"])
+
+
+def _print_wrong_models(wrong: Sequence[Mapping[str, Any]]) -> None:
+    """Print which errors of the model the readings would contradict, and what smaller ones do to the estimates."""
+    rows = []
+    for one in wrong:
+        (scale, unit, usual), least = _SHOWN_AS[one["unit"]], one["refused_from"]
+        if least is None:
+            seen = "never"
+        elif one["unit"] == "1" and least > 1:
+            # No small change, for which alone all this is worked out.
+            seen = "beyond 100 %"
+        else:
+            seen = f"{least * scale:.2g} {unit}"
+        shifts = (f"{x * usual / scale * 1e6:+z.1f}" for x in one["shifts"].values())
+        rows.append((one["what"], seen, f"{usual:g} {unit}", *shifts))
+    heads = ("error of the model", "refused from", "shift per", *(f"{pin} µm" for pin in wrong[0]["shifts"]))
+    console = plain_console()
+    print_table(console, table(heads, rows, words=(0,)))
+    console.print(
+        "Where the model is in error by as much as stands under `refused from`, these readings are refused in 9 of 10 "
+        "cases. Smaller errors pass for clearance: they shift the estimates in proportion, and the intervals do not "
+        "include that."
+    )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.completing import paths, setting
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
@@ -28,7 +29,10 @@ _SAMPLES, _SAMPLE = 2500, 1e-4
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     path: Annotated[
-        str | None, typer.Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", show_default=False)
+        str | None,
+        typer.Option(
+            help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths, show_default=False
+        ),
     ] = None,
     speed_rpm: Annotated[
         float | None, typer.Option(help="Instead: turn the one drive at so many rev/min.", show_default=False)
@@ -44,13 +48,21 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     friction: Annotated[
         float | None, typer.Option(help="Coefficient; that of the linkage without it.", show_default=False)
     ] = None,
-    friction_law: Annotated[str, typer.Option(help="linear, tanh or lugre.")] = "linear",
+    friction_law: Annotated[
+        str, typer.Option(help="linear, tanh or lugre.", autocompletion=setting("FRICTION_LAWS"))
+    ] = "linear",
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     law: Annotated[
-        str, typer.Option(help="Of impact: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...")
+        str,
+        typer.Option(
+            help="Of impact: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...",
+            autocompletion=setting("IMPACT_LAWS"),
+        ),
     ] = "lankarani-nikravesh",
-    integrator: Annotated[str, typer.Option(help="rk4 or semi-implicit.")] = "rk4",
+    integrator: Annotated[
+        str, typer.Option(help="rk4 or semi-implicit.", autocompletion=setting("INTEGRATORS"))
+    ] = "rk4",
     step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
     locate: Annotated[
         bool, typer.Option("--locate", help="Cut a step in two where a journal comes to its wall.")
@@ -58,8 +70,12 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     sample: Annotated[
         float | None, typer.Option(help="Time between samples, in s; 1e-4 or less without it.", show_default=False)
     ] = None,
-    control: Annotated[str, typer.Option(help="effort: open loop, or pd+ff: with a controller.")] = "effort",
-    start: Annotated[str, typer.Option(help="At rest on elastic walls, on rigid ones, or centred.")] = "rest",
+    control: Annotated[
+        str, typer.Option(help="effort: open loop, or pd+ff: with a controller.", autocompletion=setting("CONTROLS"))
+    ] = "effort",
+    start: Annotated[
+        str, typer.Option(help="At rest on elastic walls, on rigid ones, or centred.", autocompletion=setting("STARTS"))
+    ] = "rest",
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Folder for report.html, samples.csv, summary.json and figures (SVG)."),

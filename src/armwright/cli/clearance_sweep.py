@@ -1,16 +1,20 @@
 """``armwright clearance sweep``: the features of many linkages with other clearances, kept in a folder."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.completing import one_of
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
 from armwright.cli.options import Quiet
 from armwright.cli.printing import print_json
 from armwright.cli.progress import sweep_bar, waiting
 
 if TYPE_CHECKING:
+    from xarray import Dataset
+
+    from armwright.arrays import Array
     from armwright.clearance.sweeping import FeatureSweep
     from armwright.sweep.designs import Design
 
@@ -19,7 +23,12 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder of this sweep alone.", show_default=False)],
     paths: Annotated[str, typer.Option(help="Test paths, with commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
-    design: Annotated[str, typer.Option(help="factorial, lhs (Latin hypercube) or sobol.")] = "sobol",
+    design: Annotated[
+        str,
+        typer.Option(
+            help="factorial, lhs (Latin hypercube) or sobol.", autocompletion=one_of("factorial", "lhs", "sobol")
+        ),
+    ] = "sobol",
     from_mm: Annotated[float, typer.Option(help="Smallest clearance.")] = 0.1,
     to_mm: Annotated[float, typer.Option(help="Largest clearance.")] = 0.5,
     levels: Annotated[int, typer.Option(help="Of each clearance, for factorial: 9 are the thesis' 729 runs.")] = 9,
@@ -31,6 +40,9 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
+    twins: Annotated[
+        int, typer.Option(help="Runs beside each that nobody can tell from it, 0 to 15: they tell what is chance.")
+    ] = 3,
     seed: Annotated[int, typer.Option(help="Of lhs and sobol.")] = 0,
     workers: Annotated[
         int | None, typer.Option(help="Processes; as many as there are cores without it.", show_default=False)
@@ -43,8 +55,10 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Simulate a linkage with many clearances on several paths and keep the features of the error curves.
 
-    A sweep that was stopped goes on where it was when the same command is given again. `armwright clearance estimate`
-    learns from the folder what an error curve says of the clearances.
+    Beside each linkage a few are simulated whose clearances differ by a nanometre: features are means over them, with
+    their spread, and it is said until when the runs are predictions. A sweep that was stopped goes on where it was when
+    the same command is given again. `armwright clearance estimate` learns from the folder what an error curve says of
+    the clearances.
 
     **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
     """
@@ -59,6 +73,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         paths=tuple(dict.fromkeys(name.strip() for name in paths.split(","))),
         settings_of=settings_of(friction_velocity, threshold_mm_s, step=step),
         with_friction=to_friction is not None,
+        twins=twins,
     )
     plan = _plan(task, design, (from_mm * 1e-3, to_mm * 1e-3), to_friction, levels=levels, runs=runs, seed=seed)
     # Whatever is wrong with a path is said now, and a step too long for the least play; and the simulation is compiled
@@ -71,14 +86,51 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         except BaseException as error:
             error.add_note(f"what is finished is kept in '{output}', and the same command goes on from there")
             raise
-    failed = int((found["status"] != 0).sum())
-    found.close()
+    with found:
+        failed = int((found["status"] != 0).sum())
+        chaos = _chaos(task, found)
     if as_json:
         summary = {"runs": len(plan.points), "failed": failed, "paths": list(task.paths), "folder": str(output)}
-        print_json(summary)
+        print_json({**summary, "chaos": chaos})
     elif not quiet:
         said = f", {failed} of them came to nothing" if failed else ""
         print(f"{len(plan.points)} linkages on {', '.join(task.paths)}{said}: {output}")
+        for path, one in chaos.items():
+            left = f"; nothing but chance: {', '.join(one['chance'])}" if one["chance"] else ""
+            print(
+                f"{path}: predictable until t = {one['until']:.4g} s in half of the runs, {one['earliest']:.4g} s in "
+                f"all, of {one['duration']:.4g} s{left}"
+            )
+
+
+def _chaos(task: "FeatureSweep", found: "Dataset") -> dict[str, dict[str, Any]]:
+    """Return by path until when its runs are predictions [s], and which features are left to chance."""
+    import numpy as np
+
+    from armwright.clearance.features import Features
+    from armwright.clearance.paths import thesis_path
+    from armwright.clearance.sweeping import is_chance
+
+    done = found["status"].to_numpy() == 0
+    if not task.twins or not done.any():
+        return {}
+
+    def numbers(name: str) -> "Array":
+        return np.asarray(found[name].to_numpy()[done])
+
+    return {
+        path: {
+            "until": float(np.median(numbers(f"{path}_until"))),
+            "earliest": float(numbers(f"{path}_until").min()),
+            "duration": thesis_path(path).duration,
+            "chance": [
+                name
+                for name in Features._fields
+                if is_chance(numbers(f"{path}_{name}"), numbers(f"{path}_{name}_spread"), task.twins + 1)
+            ],
+        }
+        for path in task.paths
+    }
 
 
 def _plan(

@@ -8,6 +8,7 @@ import typer
 
 from armwright.cli.options import ArmName
 from armwright.cli.printing import print_json
+from armwright.errors import counted
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -53,7 +54,7 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         said = {"written": str(output), "name": model.name, "joints": model.n, "notes": notes, "lost": lost}
         print_json(said)
         return
-    print(f"{model.name}: {model.n} joint{'s' if model.n > 1 else ''} written to {output}")
+    print(f"{model.name}: {counted(model.n, 'joint')} written to {output}")
     for sentence in (*notes, *lost):
         print(f"  {sentence}")
 
@@ -70,6 +71,8 @@ def _held(path: str, text: str | None) -> "dict[str, float]":
             position = float(value)
         except ValueError:
             raise typer.BadParameter(f"expected J1,J2=30, got {value!r} for {name}", param_hint="--lock") from None
+        if name in held:
+            raise typer.BadParameter(f"{name} is given twice; expected each joint once", param_hint="--lock")
         held[name] = position * 1e-3 if kinds.get(name) == "prismatic" else math.radians(position)
     return held
 

@@ -45,7 +45,8 @@ def debug(
     except LoadError as error:
         print(error.page, end="")
         raise typer.Exit(error.status) from None
-    Terminal(loaded).run()
+    if status := Terminal(loaded).run():
+        raise typer.Exit(status)
 
 
 def _serve() -> None:
@@ -116,7 +117,8 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
         command="armwright debug",
         options={"std": launch.std.value, "strict": launch.strict},
     )
-    diagnostics = (*loaded.diagnostics, *warnings(recording))
+    failed = () if recording.failure is None else (recording.failure.diagnostic,)
+    diagnostics = (*loaded.diagnostics, *warnings(recording), *failed)
     made = (recording, loaded.code, diagnostics, origin)
     write_folder(launch.output, result_files(*made), run_record(*made))
-    return f"report: {launch.output / 'report.html'}"
+    return f"report{' up to the failure' if failed else ''}: {launch.output / 'report.html'}"

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, ExitStatus
 
 if TYPE_CHECKING:
     from armwright.program.debugging.debugger import Command
@@ -41,6 +41,7 @@ _WHOLE_WORDS = {
 # Lines shown around the present one.
 _AROUND = 5
 _SLICE = 0.05
+_ALL_OF_IT = "`armwright run -o FOLDER` keeps all in events.jsonl"
 
 
 class Terminal:
@@ -71,18 +72,19 @@ class Terminal:
             "help": lambda _: print(_HELP),
         }
 
-    def run(self) -> None:
-        """Read commands until the user leaves."""
+    def run(self) -> ExitStatus:
+        """Read commands until the user leaves; return how the program has ended, or that it has not."""
         self._debugger.begin()
         self._finish()
         while True:
             try:
                 line = input("(rlo) ").strip()
             except EOFError:
-                return
+                break
             if line in {"q", "quit", "exit"}:
-                return
+                break
             self._do(line or self._last)
+        return ExitStatus.DONE if self._debugger.stop is None else self._debugger.stop.status
 
     def _do(self, line: str) -> None:
         word, _, rest = line.partition(" ")
@@ -120,13 +122,15 @@ class Terminal:
         self._tell()
 
     def _work(self) -> "Stop":
+        from armwright.program.running.excerpt import ON_A_TERMINAL, listed
+
         debugger = self._debugger
         with self._interruptible():
             while True:
                 stop = debugger.work(_SLICE)
-                for effect in debugger.news():
-                    if effect.kind not in {"PLACE", "LOCK"}:
-                        print(f"{effect.t1:9.3f} s  {effect.text}")
+                news = [one for one in debugger.news() if one.kind not in {"PLACE", "LOCK"}]
+                for text in listed([f"{one.t1:9.3f} s  {one.text}" for one in news], ON_A_TERMINAL, _ALL_OF_IT):
+                    print(text)
                 if self._interrupted and debugger.running:
                     stop = debugger.pause()
                 if stop is not None and not debugger.running:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.completing import codes
 from armwright.cli.printing import print_json
 
 if TYPE_CHECKING:
@@ -26,7 +27,11 @@ _BLANK = "\N{NO-BREAK SPACE}"
 def explain(
     code: Annotated[
         str | None,
-        typer.Argument(help="Of a message, such as E206; without one all codes are listed.", show_default=False),
+        typer.Argument(
+            help="Of a message, such as E206; without one all codes are listed.",
+            autocompletion=codes,
+            show_default=False,
+        ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
@@ -67,9 +72,9 @@ def _list(*, as_json: bool) -> None:
         ]
         print_json(rows)
         return
-    for number, (name, codes) in enumerate(ranges().items()):
+    for number, (name, about) in enumerate(ranges().items()):
         print(f"{chr(10) if number else ''}{name}")
-        for code in codes:
+        for code in about:
             print(f"  {code}  {explanation(code).title}")
 
 

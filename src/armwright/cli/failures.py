@@ -1,5 +1,6 @@
 """How a command ends that could not do what was asked: one message, or one JSON document, and its exit status."""
 
+import contextlib
 import itertools
 import os
 import signal
@@ -9,15 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
-from typer.core import TyperGroup
 
+from armwright.cli.commands import NAME, Group
 from armwright.cli.printing import print_json
-from armwright.cli.results import WRITTEN
 from armwright.cli.terminal import cleaned
-from armwright.errors import ArmwrightError, CheckFailedError, ExitStatus, FileFormatError
+from armwright.errors import ArmwrightError, CheckFailedError, DoubtfulError, ExitStatus, FileFormatError, shortened
+from armwright.files.output import WRITTEN
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from types import FrameType
 
 # Set to anything, an error of our own shows where it arose.
@@ -44,7 +45,7 @@ class _Raised(BaseException):
         self.error = error
 
 
-class Commands(TyperGroup):
+class Commands(Group):
     """All commands; what they raise arrives in ``main`` whatever it is."""
 
     def make_context(self, *arguments: Any, **settings: Any) -> Any:
@@ -54,6 +55,20 @@ class Commands(TyperGroup):
             return super().make_context(*arguments, **settings)
         except _CallError as error:
             raise _harmless(error) from None
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write what can be asked for, without Rich, which takes longer than all else."""
+        self.format_usage(ctx, formatter)
+        for paragraph in (self.help or "").split("\n\n"):
+            formatter.write_paragraph()
+            with formatter.indentation():
+                formatter.write_text(paragraph.replace("**", "").replace("`", ""))
+        self.format_options(ctx, formatter)
+
+    def format_commands(self, _ctx: Any, formatter: Any) -> None:
+        """Write the commands, each with the whole of its first sentence."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, (self.commands[name].help or "").split("\n\n")[0]) for name in self.commands])
 
     def invoke(self, ctx: Any) -> Any:
         """Call the command that was asked for."""
@@ -84,11 +99,7 @@ def _harmless(error: Exception) -> Exception:
 
 def run_and_exit(app: "Callable[..., Any]") -> None:
     """Run the command line and end with its status; an error becomes a message, under ``--json`` a document."""
-    for number in _SIGNALS:
-        # What `nohup` made deaf stays so.
-        if number is not signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _interrupt)
-    as_json = "--json" in sys.argv[1:]
+    as_json = _read_by_a_program(sys.argv[1:])
     try:
         status = _status(app, as_json=as_json)
         sys.stdout.flush()
@@ -103,6 +114,11 @@ def run_and_exit(app: "Callable[..., Any]") -> None:
     sys.exit(status)
 
 
+def _read_by_a_program(words: list[str]) -> bool:
+    """Whether JSON is asked for."""
+    return "--json" in words or "--format=json" in words or ("--format", "json") in itertools.pairwise(words)
+
+
 def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
     """Run the command line; return its exit status, what is wrong having been told.
 
@@ -111,7 +127,8 @@ def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
     """
     try:
         # Typer shows a wrong call itself, with the usage of the command, unless a program reads along.
-        return int(app(standalone_mode=not as_json) or ExitStatus.DONE)
+        with _interruptible():
+            return int(app(standalone_mode=not as_json, prog_name=NAME) or ExitStatus.DONE)
     except SystemExit as end:
         if isinstance(end.__context__, BrokenPipeError):
             # Rich has met it, and ended with a status of its own.
@@ -124,8 +141,8 @@ def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
     if isinstance(error, OSError) and not isinstance(error, ArmwrightError) and error.filename is None:
         raise error
     status, message = _judged(error)
-    # Of a check that failed the document is printed already: what was found.
-    if as_json and not isinstance(error, CheckFailedError):
+    # Of a check that failed, and of a doubtful result, the document is printed already: what was found.
+    if as_json and not isinstance(error, CheckFailedError | DoubtfulError):
         print_json(failure_data(status, error, message))
     else:
         print(f"armwright: {message}", file=sys.stderr)
@@ -163,8 +180,15 @@ def failure_data(status: int, error: BaseException, message: str) -> dict[str, A
     """
     details: dict[str, Any] = {"class": type(error).__name__, "message": message}
     if isinstance(error, FileFormatError):
-        details |= {"file": str(error.path), "line": error.line, "key": error.key or None}
+        details |= {"file": str(error.path), "line": error.line, "key": shortened(error.key) or None}
     return {"exit_status": int(status), "error": details}
+
+
+def outcome(error: ArmwrightError | None) -> dict[str, Any]:
+    """Return how a command ends that prints a result as JSON: its status, and what is wrong with the result."""
+    if error is None:
+        return {"exit_status": int(ExitStatus.DONE)}
+    return failure_data(error.exit_status, error, str(error))
 
 
 def _our_fault(error: BaseException) -> str:
@@ -178,6 +202,21 @@ def _our_fault(error: BaseException) -> str:
         f"a defect of armwright, not of what was given: {said} (in {last.name}, {Path(last.filename).name}:"
         f"{last.lineno}); please report it with the command and its files; {DEBUG}=1 shows more"
     )
+
+
+@contextlib.contextmanager
+def _interruptible() -> "Iterator[None]":
+    """Let signals interrupt a command; before and after it there is nothing to clear up, and they end the process."""
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    # What `nohup` made deaf stays so.
+    heard = [number for number in _SIGNALS if number is not signal.SIGHUP or before[number] is not signal.SIG_IGN]
+    for number in heard:
+        signal.signal(number, _interrupt)
+    try:
+        yield
+    finally:
+        for number in heard:
+            signal.signal(number, before[number] or signal.SIG_DFL)
 
 
 def _interrupt(number: int, _frame: "FrameType | None") -> None:

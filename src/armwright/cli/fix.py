@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.failures import failure_data
 from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
-from armwright.errors import ArmwrightError, ExitStatus
+from armwright.errors import ArmwrightError, ExitStatus, counted
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def fix(
             if result.cures and not diff:
                 write_back(path, result.text)
         except ArmwrightError as error:
-            rows.append({"program": str(path), "exit_status": error.exit_status, "errors": 1, "error": str(error)})
+            rows.append({"program": str(path), "errors": 1, **failure_data(error.exit_status, error, str(error))})
             if not as_json:
                 print(f"armwright: {error}", file=sys.stderr)
             continue
@@ -88,7 +89,7 @@ def _print(result: "Fixed", *, done: str) -> None:
         place = f"{source.name}:{source.line(start)}:{source.column(start)}"
         print(f"{place}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.what}")
     count = len(result.cures)
-    slips = f"{count} slip{'s' if count > 1 else ''} {done}" if count else "nothing to cure"
+    slips = f"{counted(count, 'slip')} {done}" if count else "nothing to cure"
     print(f"{result.compilation.source.name}: {slips}")
     if result.compilation.diagnostics:
         print_diagnostics(result.compilation.diagnostics, result.compilation.source)

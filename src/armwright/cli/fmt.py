@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.failures import failure_data
 from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
 from armwright.errors import ArmwrightError, ExitStatus
@@ -33,7 +34,8 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Lay RLO programs out: one statement a line, indented, words of the language in upper case, comments kept.
 
-    A program with a slip of syntax is left alone and told of; the others are written all the same.
+    A program with a slip of syntax is left alone and told of, for behind a slip nobody knows where a block was meant to
+    end; the others are written all the same. In an editor the language server lays out what stands around the slips.
 
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
@@ -52,7 +54,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
             if row["changed"] and not (check or diff or stdout or path == INPUT):
                 write_back(path, after)
         except ArmwrightError as error:
-            row |= {"exit_status": error.exit_status, "error": str(error)}
+            row |= failure_data(error.exit_status, error, str(error))
             if not as_json:
                 print(f"armwright: {error}", file=sys.stderr)
             continue

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armwright.cli.completing import one_of
 from armwright.cli.options import ArmName, Json, Posture, Rows
 
 if TYPE_CHECKING:
@@ -29,16 +30,19 @@ def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Js
         if as_json:
             print(json.dumps({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()}))
             continue
+        print("  ".join(f"{name:>10}" for name in ("n", "o", "a")), f"  {'p mm':>12}")
         for *turn, place in X[:3].tolist():
             numbers = "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in turn)
-            print(numbers, f"  {round(place * 1e3, 3) + 0.0:12.3f} mm")
+            print(numbers, f"  {round(place * 1e3, 3) + 0.0:12.3f}")
 
 
 def jacobian(
     arm: ArmName,
     posture: Posture = None,
     csv: Rows = None,
-    frame: Annotated[str, typer.Option(help="Whose axes: base or tool.")] = "base",
+    frame: Annotated[
+        str, typer.Option(help="Whose axes: base or tool.", autocompletion=one_of("base", "tool"))
+    ] = "base",
     as_json: Json = False,
 ) -> None:
     """Print the Jacobian of the tool point: three linear rows, then three angular, in SI units and radians.
@@ -58,8 +62,14 @@ def jacobian(
         if as_json:
             print(json.dumps({"q": q.tolist(), "frame": frame, "jacobian": J.tolist()}))
             continue
+        print("  ", "  ".join(f"{name:>10}" for name in _per_rate(model)))
         for name, row in zip(("vx", "vy", "vz", "wx", "wy", "wz"), J, strict=True):
             print(name, "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in row.tolist()))
+
+
+def _per_rate(model: "Arm") -> list[str]:
+    """Return what one unit of speed is, joint by joint, for the head of a Jacobian."""
+    return [f"j{i} {'rad/s' if joint.revolute else 'm/s'}" for i, joint in enumerate(model.joints, 1)]
 
 
 def postures(model: "Arm", posture: str | None, csv: Path | None) -> "list[Array]":

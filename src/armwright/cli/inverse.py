@@ -54,7 +54,9 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
             }
             for branch in solution
         ]
-        print_json({"answer": solution.answer, "distance": solution.distance, "branches": branches})
+        status = ExitStatus.DONE if solution.allowed else ExitStatus.INFEASIBLE
+        said = {"exit_status": status, "answer": solution.answer, "distance": solution.distance}
+        print_json({**said, "branches": branches})
     else:
         _print(model, solution)
         if solution.answer == "out of reach":
@@ -95,9 +97,11 @@ def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
 
 
 def _print(model: "Arm", solution) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
-    from armwright.cli.joints import units
+    from armwright.cli.joints import unit_names, units
 
     print(f"{solution.answer}" + ("" if solution.allowed else f": {solution.explain()}"))
+    if solution.branches:
+        print("  ".join(f"{name:>9}" for name in unit_names(model)) + "   branch")
     for branch in solution:
         values = "  ".join(f"{x:z9.3f}" for x in branch.q / units(model))
         remarks = [f"joints {', '.join(map(str, branch.free))} free together"] if branch.free else []

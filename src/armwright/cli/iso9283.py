@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.numbers import Named, named_number
+from armwright.cli.failures import outcome
+from armwright.cli.numbers import Named, named_numbers
 from armwright.cli.options import Json, Quiet
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table
 from armwright.cli.results import write_results
-from armwright.errors import CheckFailedError
+from armwright.errors import CheckFailedError, TooFewError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,14 +54,15 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     plain = _plain(found)
     if output is not None:
         write_results(output, _files(found, files, plain))
+    exceeded = CheckFailedError(_exceeded(found.exceeded)) if found.exceeded else None
     if as_json:
-        print_json(plain)
+        print_json({**outcome(exceeded), **plain})
     elif not quiet:
         _print(found)
         if output is not None:
             print(f"report: {output / 'report.html'}")
-    if found.exceeded:
-        raise CheckFailedError(_exceeded(found.exceeded))
+    if exceeded is not None:
+        raise exceeded
 
 
 def _exceeded(measures: "Sequence[Measure]") -> str:
@@ -81,7 +83,6 @@ def _assessed(
 ) -> "Assessment":
     """Read the files and work out all measures."""
     from armwright.accuracy.assess import assess
-    from armwright.accuracy.cycles import TooFewError
     from armwright.accuracy.measurements import read_measurements
     from armwright.cli.results import warn_of_stray
 
@@ -91,7 +92,7 @@ def _assessed(
     ):
         if not valid:
             raise typer.BadParameter(f"expected a number above 0, got {value:g}", param_hint=name)
-    bounds = {bound.name: bound for bound in map(_bound, limits)}
+    bounds = _bounds(limits)
     for path in files:
         warn_of_stray(path)
     tests = read_measurements(files)
@@ -102,13 +103,14 @@ def _assessed(
         raise TooFewError(str(error).replace("few=True takes", "--few takes")) from error
 
 
-def _bound(text: str) -> Named:
-    """Read a limit such as ``RP=0.05mm``."""
+def _bounds(texts: list[str]) -> dict[str, Named]:
+    """Read limits such as ``RP=0.05mm``, by symbol."""
     expected = "a symbol and a number with its unit, RP=0.05mm"
-    bound = named_number(text, None, expected, "--limit")
-    if not 0 <= bound.value < float("inf"):
-        raise typer.BadParameter(f"expected {expected}, got {text}", param_hint="--limit")
-    return bound
+    bounds = named_numbers(texts, None, expected, "--limit")
+    for text, bound in zip(texts, bounds.values(), strict=True):
+        if not 0 <= bound.value < float("inf"):
+            raise typer.BadParameter(f"expected {expected}, got {text}", param_hint="--limit")
+    return bounds
 
 
 def _in_si(found: "Assessment", symbol: str, value: float, unit: str) -> float:
@@ -167,14 +169,14 @@ def _print(found: "Assessment") -> None:
     for (test, name, condition), measures in groupby(found.measures, lambda one: (one.test, one.name, one.condition)):
         title = f"{test} {name}{f', {condition}' if condition else ''}"
         table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-        table.add_column("", min_width=5)
+        table.add_column("symbol", min_width=6)
         table.add_column("measure", min_width=27, overflow="fold")
-        table.add_column("", min_width=10, justify="right", no_wrap=True)
-        table.add_column("", min_width=4)
+        table.add_column("value", min_width=10, justify="right", no_wrap=True)
+        table.add_column("unit", min_width=4)
         table.add_column("n", min_width=2, justify="right")
         if bounded:
             table.add_column("limit", justify="right")
-        table.add_column("", overflow="fold")
+        table.add_column("remark", overflow="fold")
         for one in measures:
             table.add_row(*_row(one, bounded=bounded))
         print_table(console, table)

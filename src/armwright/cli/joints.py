@@ -26,6 +26,11 @@ def units(arm: "Arm") -> "Array":
     return np.array([math.pi / 180 if joint.revolute else 1e-3 for joint in arm.joints])
 
 
+def unit_names(arm: "Arm") -> list[str]:
+    """Return, per joint, what ``units`` counts in, for the head of a table: ``j1 deg``, ``j3 mm``."""
+    return [f"j{i} {'deg' if joint.revolute else 'mm'}" for i, joint in enumerate(arm.joints, 1)]
+
+
 def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     """Read columns such as q1 … qn, qd1 … qdn of a CSV file in SI units, such as motion.csv; others are passed over.
 

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.completing import quantities
 from armwright.cli.options import ArmName
 from armwright.cli.printing import print_json
 
@@ -13,7 +14,9 @@ def kernel(
     quantity: Annotated[
         str,
         typer.Argument(
-            help="Such as forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics.", show_default=False
+            help="Such as forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics.",
+            autocompletion=quantities,
+            show_default=False,
         ),
     ],
     count: Annotated[bool, typer.Option("--count", help="Print the operation count only.")] = False,

@@ -4,17 +4,25 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from armwright.cli.numbers import named_number
+from armwright.cli.completing import linkages, setting
+from armwright.cli.numbers import named_numbers
 
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
     from armwright.clearance.settings import Settings
 
 LinkageName: TypeAlias = Annotated[
-    str, typer.Argument(help="Name in the catalogue, or a TOML file (docs/clearance.md).", show_default=False)
+    str,
+    typer.Argument(
+        help="Name in the catalogue, or a TOML file (docs/clearance.md).", autocompletion=linkages, show_default=False
+    ),
 ]
 FrictionVelocity: TypeAlias = Annotated[
-    str, typer.Option(help="Which speed slides: of the surface, or of the centre as the thesis has it.")
+    str,
+    typer.Option(
+        help="Which speed slides: of the surface, or of the centre as the thesis has it.",
+        autocompletion=setting("SLIP_SPEEDS"),
+    ),
 ]
 Threshold: TypeAlias = Annotated[float, typer.Option(help="Sliding speed below which friction fades.")]
 
@@ -31,9 +39,8 @@ def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float
         BadParameter: a text is something else.
     """
     found = {} if clearance_mm is None else dict.fromkeys(model.clearances, clearance_mm * 1e-3)
-    for text in clearances:
-        one = named_number(text, ("", "mm"), "a pin and its clearance in mm, J2=0.5", "--clearance")
-        found[one.name] = one.value * 1e-3
+    given = named_numbers(clearances, ("", "mm"), "a pin and its clearance in mm, J2=0.5", "--clearance")
+    found |= {name: one.value * 1e-3 for name, one in given.items()}
     return model.with_clearances(found)
 
 

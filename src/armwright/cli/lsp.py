@@ -19,6 +19,9 @@ def lsp(
     **Example**, in a configuration of Neovim:
     `vim.lsp.config("rlo", { cmd = { "armwright", "lsp" }, filetypes = { "rlo" } })`
     """
+    import os
+    import sys
+
     from armwright.errors import MissingExtraError
 
     try:
@@ -28,4 +31,7 @@ def lsp(
             raise
         text = "the language server needs pygls; install it by: pip install 'armwright[lsp]'"
         raise MissingExtraError(text) from error
-    serve()
+    status = serve()
+    sys.stderr.flush()
+    # A program may still be looked at, and the input be read from, which would keep the process alive.
+    os._exit(status)

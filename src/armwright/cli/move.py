@@ -93,6 +93,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright move joint puma560 examples/puma_poses.toml -o out/joint`
     """
+    from armwright.motion.certificate import slower
     from armwright.motion.limit_use import limit_use, slowing_for_limits
 
     _check_options(kind, orientation=orientation, deviation_mm=deviation_mm, around=around, servo_ms=servo_ms)
@@ -102,7 +103,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     notes = list(file.notes)
     factor, because = slowing_for_limits(planned.arm, planned.trajectory)
     if because is not None and factor > 1 + _ROUNDING:
-        what = f"{factor:.2f} times slower, for the {because[0]} of joint {because[1] + 1}"
+        what = slower(planned.arm, factor, because)
         notes.append(f"run {what}" if keep_limits else f"the limits would hold {what}: --keep-limits does that")
         planned = planned.slowed(factor) if keep_limits else planned
     for note in notes:
@@ -268,12 +269,10 @@ def _certificate(found: "Certificate") -> dict[str, Any]:
 def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> None:
     from rich.text import Text
 
-    from armwright.cli.joints import units
+    from armwright.cli.joints import unit_names, units
 
     console = plain_console()
-    revolute = [joint.revolute for joint in planned.arm.joints]
-    names = [f"j{i + 1} {'deg' if turns else 'mm'}" for i, turns in enumerate(revolute)]
-    shown = table(("pose", "s", *names, *(["missed mm"] if planned.hand else [])))
+    shown = table(("pose", "s", *unit_names(planned.arm), *(["missed mm"] if planned.hand else [])))
     scale = units(planned.arm)
     for i, pose in enumerate(file.names):
         postures = [f"{q:z.1f}" for q in planned.postures[i] / scale]

@@ -1,13 +1,14 @@
 """Numbers on the command line: lists of them, numbers with a name, bounds."""
 
-import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import typer
 
-_NAMED = re.compile(r"(?P<name>[^=]+)=(?P<number>[^=a-z%/]+)(?P<unit>[a-zA-Z%/]*)")
+# Digits are given back to nothing else: a text that is no number is refused in the time of its length.
+_NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
+_NAMED = re.compile(rf"(?P<name>[^=]+)=(?P<number>{_NUMBER})(?P<unit>[a-zA-Z%/]*)")
 
 
 def numbers(text: str, count: int, option: str) -> list[float]:
@@ -56,24 +57,31 @@ class Named(NamedTuple):
     unit: str
 
 
-def named_number(text: str, units: Sequence[str] | None, expected: str, option: str) -> Named:
-    """Read a number with a name.
+def named_numbers(texts: Iterable[str], units: Sequence[str] | None, expected: str, option: str) -> dict[str, Named]:
+    """Read numbers with names, each name once.
 
     Args:
-        text: such as ``J2=0.3``.
-        units: what may stand behind it; anything without them.
+        texts: such as ``J2=0.3`` or ``J2=1e-3mm``.
+        units: what may stand behind a number; anything without them.
         expected: what should have been given, in words.
-        option: whose value it is.
+        option: whose values they are.
+
+    Returns:
+        By name, in the order in which they were given.
 
     Raises:
-        BadParameter: it is something else.
+        BadParameter: one is something else, or a name is given twice.
     """
-    match = _NAMED.fullmatch(text.replace(" ", ""))
-    if match is not None and _is_number(match["number"]) and (units is None or match["unit"] in units):
-        value = float(match["number"])
-        if not math.isnan(value):
-            return Named(match["name"], value, match["unit"])
-    raise typer.BadParameter(f"expected {expected}, got {text}", param_hint=option)
+    found: dict[str, Named] = {}
+    for text in texts:
+        match = _NAMED.fullmatch(text.replace(" ", ""))
+        if match is None or (units is not None and match["unit"] not in units):
+            raise typer.BadParameter(f"expected {expected}, got {text}", param_hint=option)
+        one = Named(match["name"], float(match["number"]), match["unit"])
+        if one.name in found:
+            raise typer.BadParameter(f"{one.name} is given twice; expected each name once", param_hint=option)
+        found[one.name] = one
+    return found
 
 
 def within(value: float, bounds: tuple[float, float], option: str) -> float:

@@ -5,8 +5,11 @@ from typing import Annotated, TypeAlias
 
 import typer
 
+from armwright.cli.completing import arms
+
 ArmName: TypeAlias = Annotated[
-    str, typer.Argument(help="Name in the catalogue, or path of an arm file.", show_default=False)
+    str,
+    typer.Argument(help="Name in the catalogue, or path of an arm file.", autocompletion=arms, show_default=False),
 ]
 Posture: TypeAlias = Annotated[
     str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)

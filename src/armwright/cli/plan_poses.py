@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.completing import one_of
 from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
-from armwright.cli.options import Json
+from armwright.cli.options import ArmName, Json
 from armwright.cli.printing import plain_console, print_json, print_table, table
 
 if TYPE_CHECKING:
@@ -16,9 +17,15 @@ if TYPE_CHECKING:
 
 
 def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
-    arm: Annotated[str, typer.Argument(help="Name in the catalogue, an arm file or a URDF.", show_default=False)],
+    arm: ArmName,
     count: Annotated[int, typer.Option("-n", "--count", help="How many poses.")] = 30,
-    index: Annotated[str, typer.Option(help="What is to be large: O1 to O5 (docs/calibration.md).")] = "O1",
+    index: Annotated[
+        str,
+        typer.Option(
+            help="What is to be large: O1 to O5 (docs/calibration.md).",
+            autocompletion=one_of("O1", "O2", "O3", "O4", "O5"),
+        ),
+    ] = "O1",
     seed: Annotated[int, typer.Option(min=0, help="Of the candidates.")] = 0,
     turns: Annotated[bool, typer.Option("--turns", help="Turns are measured too, not places alone.")] = False,
     after: Annotated[

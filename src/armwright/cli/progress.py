@@ -111,6 +111,4 @@ def progress_text(now: "Progress") -> str:
         words.append(f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d} left")
     if now.failed:
         words.append(f"{now.failed} failed")
-    if now.damaged:
-        words.append(f"{now.damaged} damaged blocks made again")
     return ", ".join(words)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.failures import failure_data
 from armwright.cli.programs import CellFile, Std
 from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.text.words import Standard
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from armwright.cli.repl_commands import Commands
     from armwright.cli.repl_lines import Lines
     from armwright.program.interactive.session import Answer, Session
+    from armwright.program.running.recording import Effect
+
+_DIM = "dim"
+_ALL_OF_IT = "`:report DIR` keeps all in events.jsonl"
 
 
 def repl(
@@ -147,13 +152,12 @@ class _Talk:
         """Show what was done, in order, and then what is wrong."""
         from armwright.cli.programs import print_diagnostics
         from armwright.program.interactive.taken_back import SILENT
+        from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more
 
         self.status = max(self.status, answer.status)
-        for effect in answer.effects:
-            if effect.kind == "PRINT":
-                self._console.print(effect.data["printed"])
-            elif effect.kind not in SILENT:
-                self._console.print(f"{effect.t1:9.3f}  {effect.text}", style="dim")
+        found = excerpt([one for one in answer.effects if one.kind not in SILENT], ON_A_TERMINAL).mapped(_shown)
+        for text, style in found.joined((more(found.left_out, _ALL_OF_IT), _DIM)):
+            self._console.print(text, style=style)
         if answer.diagnostics:
             print_diagnostics(answer.diagnostics, answer.source)
         for remark in answer.remarks:
@@ -177,6 +181,15 @@ class _Talk:
         self._console.print("interrupted; the statement under way was taken back", style="yellow")
 
 
+def _shown(effect: "Effect") -> tuple[str, str]:
+    """Return what is shown of an effect, and how it looks."""
+    from armwright.program.running.excerpt import one_line
+
+    if effect.kind == "PRINT":
+        return one_line(effect.data["printed"], _ALL_OF_IT), ""
+    return f"{effect.t1:9.3f}  {one_line(effect.text, _ALL_OF_IT)}", _DIM
+
+
 class _Json(_Talk):
     """Gives programs one line of JSON for each input."""
 
@@ -196,7 +209,7 @@ class _Json(_Talk):
             reply = commands.run(line)
         except ArmwrightError as error:
             self.status = max(self.status, error.exit_status)
-            self._give({**data, "ok": False, "exit_status": error.exit_status, "error": str(error)})
+            self._give({**data, "ok": False, **failure_data(error.exit_status, error, str(error))})
             return
         entered = {} if reply.answer is None else _as_data(reply.answer)
         if reply.answer is not None:
@@ -208,10 +221,12 @@ class _Json(_Talk):
 
 
 def _as_data(answer: "Answer") -> dict[str, Any]:
+    from armwright.cli.programs import error_data
     from armwright.program.messages.diagnostics import to_json
 
     return {
         "ok": not answer.is_wrong,
+        **error_data(answer.diagnostics, answer.source),
         "exit_status": answer.status,
         "printed": list(answer.printed),
         "effects": [

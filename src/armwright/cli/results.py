@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from armwright.files.output import Content
 
-# What this process has written: an interruption afterwards says so.
-WRITTEN: list[Path] = []
-
 
 def write_results(folder: Path, files: "Mapping[str, Content]", record: Mapping[str, Any] | None = None) -> None:
     """Write the results of a command into a folder, all of them or none.
@@ -29,7 +26,6 @@ def write_results(folder: Path, files: "Mapping[str, Content]", record: Mapping[
 
     own = {"command": command_line(), "versions": {"armwright": __version__}}
     write_folder(folder, files, own if record is None else record)
-    WRITTEN.append(folder)
 
 
 def warn_of_stray(path: Path) -> None:

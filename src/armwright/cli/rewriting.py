@@ -47,9 +47,25 @@ def print_difference(source: "Source", after: str) -> None:
 def write_back(path: Path, text: str) -> None:
     """Write a program where it was read: all of it or nothing; a link stays one, and who may read it may go on.
 
+    Lines end as most of them did, and a mark of byte order stays.
+
     Raises:
+        FileFormatError: it cannot be read any more.
         OutputError: it cannot be written; the text says why.
     """
     from armwright.files.output import write_file
 
-    write_file(path, text)
+    mark, end = _ways(path) if path.is_file() else ("", "\n")
+    write_file(path, mark + text.replace("\n", end))
+
+
+def _ways(path: Path) -> tuple[str, str]:
+    """Return what a file begins with before its text, and how most of its lines end."""
+    from codecs import BOM_UTF8
+
+    from armwright.files.reading import read_bytes
+
+    data = read_bytes(path, "program_mb")
+    pairs = data.count(b"\r\n")
+    mark = "\ufeff" if data.startswith(BOM_UTF8) else ""
+    return mark, "\r\n" if 2 * pairs > data.count(b"\n") else "\n"

@@ -12,7 +12,7 @@ from armwright.cli.options import JsonSummary, QuietButWarnings
 from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, given_cell
 from armwright.cli.progress import waiting
-from armwright.errors import ExitStatus
+from armwright.errors import ExitStatus, counted
 from armwright.program.text.words import Standard
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from armwright.program.intermediate.code import Code
     from armwright.program.messages.diagnostics import Diagnostic
     from armwright.program.running.interpret import Limits, RunError
-    from armwright.program.running.recording import Recording, RunStage
+    from armwright.program.running.recording import Effect, Recording, RunStage
     from armwright.report.files import Origin
 
 
@@ -136,6 +136,7 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
     """Write what a run has left, also one that failed, and say how it went."""
     from armwright.cli.programs import print_diagnostics
     from armwright.cli.results import write_results
+    from armwright.program.running.excerpt import KEPT, NOT_KEPT
     from armwright.program.running.interpret import warnings
     from armwright.report.files import ending, left_out, result_files, run_record, summary
 
@@ -146,11 +147,10 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
         made = (recording, code, diagnostics, origin)
         write_results(output, result_files(*made), run_record(*made))
     if as_json:
-        where = {"output": str(output)} if output else {}
+        told = summary(recording, code, diagnostics, KEPT if output else NOT_KEPT)
+        folder = {"output": str(output)} if output else {}
         frames = {"time": error.time, "frames": _places(error)} if error else {}
-        print_json(
-            {**ending(recording, code), **summary(recording, code, diagnostics), **where, "left_out": notes, **frames}
-        )
+        print_json({**ending(recording, code), **told, **folder, "left_out": notes, **frames})
     else:
         if diagnostics:
             print_diagnostics(diagnostics, code.source)
@@ -159,7 +159,7 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
         if error is not None:
             _print_moment(error, code)
         elif not quiet:
-            _print_summary(recording, code)
+            _print_summary(recording, code, KEPT if output else NOT_KEPT)
         if output is not None and (error is not None or not quiet):
             # On a line of its own and never wrapped, so that it can be clicked or copied.
             print(f"report{' up to the failure' if error else ''}: {output / 'report.html'}")
@@ -242,48 +242,59 @@ def _places(error: "RunError") -> dict[str, list[float] | None]:
     return {name: tree.world(name)[:3, 3].tolist() if tree.has_value(name) else None for name in tree}
 
 
-def _print_summary(recording: "Recording", code: "Code") -> None:
+def _print_summary(recording: "Recording", code: "Code", where: str) -> None:
+    from armwright.program.running.excerpt import ON_A_TERMINAL, listed
+
     console = plain_console()
-    print_table(console, _trace_table(recording, code))
+    print_table(console, _trace_table(recording, code, where))
     if recording.stages:
-        print_table(console, _stage_table(recording, code))
-    for stage in recording.stages:
-        if stage.stage.slowed:
-            line = code.source.line(stage.span.start)
-            console.print(f"line {line}: {stage.stage.kind} to {stage.to[-1]} runs {stage.stage.slowed}")
+        print_table(console, _stage_table(recording, code, where))
+    slowed = [
+        f"line {code.source.line(one.span.start)}: {one.stage.kind} to {one.to[-1]} runs {one.stage.slowed}"
+        for one in recording.stages
+        if one.stage.slowed
+    ]
+    for text in listed(slowed, ON_A_TERMINAL, where):
+        console.print(text)
     moves = sum(effect.kind == "MOVE" for effect in recording.effects)
     console.print(
-        f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {moves} moves, "
-        f"{len(recording.stages)} stages, {len(recording.streams[0].t) if recording.streams else 0} servo ticks"
+        f"{code.source.name}: {recording.duration:.3f} s in {recording.cell.name}, {counted(moves, 'move')}, "
+        f"{counted(len(recording.stages), 'stage')}, "
+        f"{counted(len(recording.streams[0].t) if recording.streams else 0, 'servo tick')}"
     )
     console.print("Collisions are not looked for.")
 
 
-def _trace_table(recording: "Recording", code: "Code") -> "Table":
+def _trace_table(recording: "Recording", code: "Code", where: str) -> "Table":
     from rich.text import Text
 
-    processes = recording.processes
-    rows: list[tuple[str | Text, ...]] = []
-    for one in recording.effects:
-        if one.kind == "PLACE":
-            continue
+    from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more, one_line
+
+    several = len(recording.processes) > 1
+
+    def row(one: "Effect") -> "tuple[str | Text, ...]":
         line, end = Text(str(code.source.line(one.span.start)), style="dim"), f"{one.t1:.3f}" if one.t1 > one.t0 else ""
-        who = (one.process,) if len(processes) > 1 else ()
-        rows.append((line, f"{one.t0:.3f}", end, *who, one.text))
-    if len(processes) > 1:
-        return table(("line", "from s", "to s", "process", "what happened"), rows, words=(3, 4))
-    return table(("line", "from s", "to s", "what happened"), rows, words=(3,))
+        return (line, f"{one.t0:.3f}", end, *((one.process,) if several else ()), one_line(one.text, where))
+
+    found = excerpt([one for one in recording.effects if one.kind != "PLACE"], ON_A_TERMINAL)
+    names = ("line", "from s", "to s", *(("process",) if several else ()), "what happened")
+    rest = (*[""] * (len(names) - 1), more(found.left_out, where))
+    return table(names, found.mapped(row).joined(rest), words=range(3, len(names)))
 
 
-def _stage_table(recording: "Recording", code: "Code") -> "Table":
-    rows: list[tuple[str | Text, ...]] = []
-    for stage in recording.stages:
+def _stage_table(recording: "Recording", code: "Code", where: str) -> "Table":
+    from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more
+
+    def row(stage: "RunStage") -> "tuple[str | Text, ...]":
         off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
         line = str(code.source.line(stage.span.start))
         what = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}{', stopped' if stage.stopped else ''}"
         start, duration, length = f"{stage.t0:.3f}", f"{stage.duration:.3f}", f"{stage.length * 1e3:.0f}"
-        rows.append((line, what, start, duration, length, off, *_peaks(stage, recording)))
-    return table(("line", "stage", "from s", "s", "mm", "off mm", "peak speed", "peak effort"), rows, words=(1,))
+        return (line, what, start, duration, length, off, *_peaks(stage, recording))
+
+    found = excerpt(recording.stages, ON_A_TERMINAL).mapped(row)
+    names = ("line", "stage", "from s", "s", "mm", "off mm", "peak speed", "peak effort")
+    return table(names, found.joined(("", more(found.left_out, where), *[""] * 6)), words=(1,))
 
 
 def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
@@ -304,16 +315,17 @@ def _print_moment(error: "RunError", code: "Code") -> None:
     """Show where every frame was when a program could not go on."""
     from armwright.cell.frames import WORLD
     from armwright.cli.terminal import console
+    from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more
 
-    rows = []
-    for name in error.tree:
-        if name == WORLD or name.endswith(".BASE"):
-            continue
+    def row(name: str) -> tuple[str, ...]:
         parent = (error.tree.parent(name) or WORLD).removesuffix(".BASE")
         place = "no value yet"
         if error.tree.has_value(name):
             place = ", ".join(f"{x * 1e3:z.1f}" for x in error.tree.world(name)[:3, 3])
-        rows.append((code.spelled(name), "its base" if parent == name else code.spelled(parent), place))
+        return code.spelled(name), "its base" if parent == name else code.spelled(parent), place
+
+    found = excerpt([name for name in error.tree if name != WORLD and not name.endswith(".BASE")], ON_A_TERMINAL)
+    rest = (more(found.left_out, "all in frames.json of `-o FOLDER`"), "", "")
     columns = ("frame", "hangs on", "x, y, z in the world, mm")
-    shown = table(columns, rows, title=f"frames at {error.time:.3f} s", words=(0, 1))
+    shown = table(columns, found.mapped(row).joined(rest), title=f"frames at {error.time:.3f} s", words=(0, 1))
     console(stderr=True).print(shown)

@@ -101,12 +101,12 @@ def _print(model: "Arm", found: "Simulation") -> None:
     for i, joint in enumerate(model.joints):
         unit = "deg" if joint.revolute else "mm"
         start, end, speed = (values[i] / per_unit[i] for values in (found.q[0], found.q[-1], found.qd[-1]))
-        print(f"  joint {i + 1}: from {start:z9.3f} to {end:z9.3f} {unit}, at {speed:z9.3f} {unit}/s")
+        print(f"  {model.called(i)}: from {start:z9.3f} to {end:z9.3f} {unit}, at {speed:z9.3f} {unit}/s")
     for name, value in _account(found).items():
         print(f"  {name.replace('_', ' '):<18}{value:z12.6g} J")
     shown = found.events[:_EVENTS]
     for event in shown:
-        print(f"  {event.t:.4f} s: joint {event.joint + 1} {_word(event.before)}, then {_word(event.after)}")
+        print(f"  {event.t:.4f} s: {model.called(event.joint)} {_word(event.before)}, then {_word(event.after)}")
     if len(found.events) > len(shown):
         print(f"  ... and {len(found.events) - len(shown)} changes more")
 

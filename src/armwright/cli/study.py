@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.completing import one_of
 from armwright.cli.printing import json_text, plain_console, print_json, print_table
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
@@ -24,7 +25,11 @@ _WITH_BARS = {"five-bar-clearance"}
 def study(
     name: Annotated[
         str,
-        typer.Argument(help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.", show_default=False),
+        typer.Argument(
+            help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.",
+            autocompletion=one_of(*_STUDIES),
+            show_default=False,
+        ),
     ],
     output: Annotated[
         Path | None,

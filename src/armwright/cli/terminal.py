@@ -5,8 +5,10 @@ as ``\u001b``. These are JSON's own, so that JSON stays JSON and says the same.
 """
 
 import io
+import os
 import re
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -22,6 +24,10 @@ _HIDDEN = re.compile(
     "\u2060-\u206f\u3164\ufe00-\ufe0f\ufeff\uffa0\ufff0-\ufffb\U0001bca0-\U0001bca3\U0001d173-\U0001d17a"
     "\U000e0000-\U000e0fff]"
 )
+
+
+# No terminal has more columns, or lines.
+_MOST_COLUMNS = 10_000
 
 
 def cleaned(text: str) -> str:
@@ -91,13 +97,24 @@ class _Verbatim:
         return getattr(self._stream, name)
 
 
+def bound_widths() -> None:
+    """Take what the environment says of the size of a terminal only where it is the size of one."""
+    for name in ("COLUMNS", "LINES", "TERMINAL_WIDTH"):
+        told = os.environ.get(name, "")
+        if told and not (told.isascii() and told.isdigit() and len(told) < 10 and 0 < int(told) <= _MOST_COLUMNS):
+            del os.environ[name]
+
+
 def clean_output() -> None:
-    """Let nothing reach standard and error output uncleaned from now on."""
+    """Let nothing reach standard and error output uncleaned from now on; what is said to a closed one is lost."""
     sys.stdout, sys.stderr = _clean(sys.stdout), _clean(sys.stderr)
 
 
 def _clean(stream: Any) -> Any:
-    if stream is None or isinstance(stream, CleanStream | CleanProxy):
+    if stream is None:
+        # Otherwise errors would be printed to the other of the two, among the results.
+        stream = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - it stays as long as the process
+    if isinstance(stream, CleanStream | CleanProxy):
         return stream
     if stream not in (sys.__stdout__, sys.__stderr__) or not isinstance(stream, io.TextIOWrapper):
         return CleanProxy(stream)

@@ -33,7 +33,7 @@ Function: TypeAlias = Callable[..., Any]
 def compile_arm(arm: Arm) -> "CompiledArm":
     """Return an arm whose quantities are compiled, each when it is first asked for.
 
-    A first compilation takes some seconds and is kept on disk: see ``armwright.tracing.cache.cache_folder``.
+    A first compilation takes some seconds and is kept on disk: see ``armwright.files.store.cache_folder``.
     """
     return CompiledArm(arm=arm)
 

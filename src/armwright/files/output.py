@@ -6,23 +6,34 @@ the hashes tell which files are not of the run that the folder speaks of.
 """
 
 import contextlib
+import errno
 import fcntl
 import hashlib
 import json
 import os
+import re
 import stat
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from armwright.errors import OutputError
-from armwright.files.staging import PREFIX, signals_held, staging
+from armwright.files.exchange import exchange, overwrite
+from armwright.files.staging import KEPT, PREFIX, signals_held, staging
 
 Content: TypeAlias = str | bytes | Iterable[str]
 
+# What this process has written, in order, as it was named: who is interrupted afterwards says so.
+WRITTEN: dict[Path, None] = {}
 # What a folder holds, and the word by which it is known for one of armwright's.
 RECORD = "run.json"
 FORMAT = "armwright results 1"
+# What results are called: a record is data, and only what has such a name is ever removed because a record names it.
+_NAMES = re.compile(
+    r"(motion|samples|path|dh_\w+)\.csv|events\.jsonl|(frames|move|errors|measures|tables|summary)\.json|report\.html|"
+    r"arm\.(toml|urdf)|move\.(gif|mp4)|(figure[\w.-]*|\d\d+-[\w -]+|joints|hand|paths?|residuals|distances|workspace|"
+    r"verification|bearings|error|spectrum|forces|energy)\.svg"
+)
 # A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
 _LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20
 
@@ -32,7 +43,8 @@ def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str
 
     They are made beside the folder, or in it where it is a mount point or where nothing can be made beside it, and
     moved in when all are whole; signals wait meanwhile. An error, a full disk or an interruption leaves what was there
-    before. Files of older results that are not written anew go; other files in the folder stay.
+    before. Files of older results that are not written anew go; other files in the folder stay, those that a record
+    of somebody else's names too.
 
     Args:
         folder: made where it is missing, with its parents.
@@ -42,31 +54,29 @@ def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str
     Raises:
         OutputError: the folder or a file cannot be written; the text says which and why.
     """
-    folder = _resolved(folder)
+    named, folder = folder, _resolved(folder)
     made = _make_parents(folder)
     left: dict[str, str] = {}
-    moved = False
     try:
         with staging(_staged_in(folder), folder, lambda dead: left.update(_recorded(dead))) as new:
             hashes = {name: _write(new / name, content) for name, content in files.items()}
-            said = {"format": FORMAT, **(record or {}), "files": hashes}
-            _write(new / RECORD, json.dumps(said, indent=2, ensure_ascii=False) + "\n")
+            _write(new / RECORD, record_text(hashes, record or {}))
             with signals_held():
                 _replace(folder, new, [*files, RECORD], left)
-                moved = True
+                WRITTEN[named] = None
     except OSError as error:
         _remove(made)
         raise OutputError(f"cannot write to '{folder}': {reason(error, folder)}; nothing was written") from error
-    except BaseException as error:
-        if moved:
-            error.add_note(f"the results are written: '{folder}'")
-        else:
-            _remove(made)
+    except BaseException:
+        _remove(made)
         raise
 
 
 def write_file(path: Path, text: str | Iterable[str]) -> None:
     """Write one file, or leave what was there before. A link stays one, and so does who may read the file.
+
+    A file that cannot be replaced is written where it stands: one that is mounted by itself, as into a container, or
+    one that the user may write to in a folder where nothing can be made.
 
     Args:
         path: its folder is made where it is missing, with its parents. A device or a pipe is written to as it is.
@@ -75,26 +85,60 @@ def write_file(path: Path, text: str | Iterable[str]) -> None:
     Raises:
         OutputError: it cannot be written; the text says why.
     """
-    path = _resolved(path)
+    named, path = path, _resolved(path)
     made = _make_parents(path)
     try:
         mode = path.stat().st_mode if path.exists() else None
         if mode is not None and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
             with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as stream:
                 stream.writelines([text] if isinstance(text, str) else text)
-            return
-        with staging(path.parent, path) as new:
-            _write(new / path.name, text)
-            if mode is not None:
-                (new / path.name).chmod(stat.S_IMODE(mode))
+        elif mode is not None and os.access(path, os.W_OK) and not os.access(path.parent, os.W_OK | os.X_OK):
+            data = b"".join(_encoded(text))
             with signals_held():
-                (new / path.name).replace(path)
+                overwrite(path, data)
+                WRITTEN[named] = None
+        else:
+            _write_beside(path, named, text, mode)
     except OSError as error:
         _remove(made)
         raise OutputError(f"cannot write '{path}': {error.strerror or error}; nothing was written") from error
     except BaseException:
         _remove(made)
         raise
+
+
+def _write_beside(path: Path, named: Path, text: str | Iterable[str], mode: int | None) -> None:
+    """Write a file beside its place, and move it there.
+
+    Args:
+        path: where it goes.
+        named: how the user calls it.
+        text: what is in it.
+        mode: of the file that is there; None where there is none.
+    """
+    with staging(path.parent, path) as new:
+        made = new / path.name
+        _write(made, text)
+        if mode is not None:
+            made.chmod(stat.S_IMODE(mode))
+        with signals_held():
+            try:
+                made.replace(path)
+            except OSError as error:
+                if error.errno != errno.EBUSY or mode is None:
+                    raise
+                overwrite(path, made.read_bytes())
+            WRITTEN[named] = None
+
+
+def record_text(hashes: Mapping[str, str], said: Mapping[str, Any]) -> str:
+    """Return the text of ``run.json``.
+
+    Args:
+        hashes: SHA-256 of every file of the results, by name.
+        said: what else it says.
+    """
+    return json.dumps({"format": FORMAT, **said, "files": dict(hashes)}, indent=2, ensure_ascii=False) + "\n"
 
 
 def strays(folder: Path) -> tuple[str, ...]:
@@ -106,13 +150,33 @@ def strays(folder: Path) -> tuple[str, ...]:
     Returns:
         Their names, sorted; empty where all is as it was written, or where the folder holds no results of armwright.
     """
-    return tuple(sorted(name for name, digest in _recorded(folder).items() if _hash(folder / name) != digest))
+    return tuple(sorted(name for name, digest in _recorded(folder).items() if sha256(folder / name) != digest))
 
 
 def is_stray(path: Path) -> bool:
-    """Whether a file stands in a folder of results, and is not what the run of that folder has written."""
+    """Whether a file stands in a folder of results, and is not what the run of that folder has written.
+
+    One that the run has not written at all is somebody's own, unless files of the run are missing or changed: then it
+    may be of another run, which was killed before it wrote its record.
+    """
     digest = _recorded(path.parent).get(path.name)
-    return digest is not None and _hash(path) != digest
+    if digest is None:
+        return path.name != RECORD and path.exists() and bool(strays(path.parent))
+    return sha256(path) != digest
+
+
+def sha256(path: Path) -> str | None:
+    """Return the SHA-256 hash of a file; None where there is no such file."""
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode):
+            return None
+        digest = hashlib.sha256()
+        with path.open("rb") as file:
+            while piece := file.read(_PIECE):
+                digest.update(piece)
+    except OSError:
+        return None
+    return digest.hexdigest()
 
 
 def reason(error: OSError, folder: Path) -> str:
@@ -153,13 +217,18 @@ def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str])
         new.replace(folder)
         return
     with _alone(folder):
+        recorded = _recorded(folder)
         _refuse_what_cannot_be_replaced(folder, names)
-        for name, digest in (*_recorded(folder).items(), *left.items()):
-            # What somebody has changed since is theirs.
-            if name not in names and _hash(folder / name) == digest:
-                (folder / name).unlink()
-        for name in names:
-            (new / name).replace(folder / name)
+        _refuse_what_others_made(folder, names, {*recorded, *left})
+        # What somebody has changed since is theirs.
+        gone = {
+            name
+            for name, digest in (*recorded.items(), *left.items())
+            if name not in names and _NAMES.fullmatch(name) and sha256(folder / name) == digest
+        }
+        kept = new.with_name(KEPT)
+        kept.mkdir()
+        exchange(folder, new, kept, names, gone)
         _sync(folder)
 
 
@@ -185,52 +254,51 @@ def _sync(folder: Path) -> None:
             os.close(place)
 
 
-def _recorded(folder: Path) -> dict[str, str]:
-    """Return the hashes of the files that the record of a folder names; none where it is no record of ours."""
+def _said(folder: Path) -> dict[str, Any] | None:
+    """Return what the record of a folder says; None where there is none of ours."""
     path = folder / RECORD
     try:
         state = path.lstat()
         if not stat.S_ISREG(state.st_mode) or state.st_size > _LARGEST_RECORD:
-            return {}
+            return None
         said = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
-        return {}
-    files = said.get("files") if isinstance(said, dict) and said.get("format") == FORMAT else None
-    if not isinstance(files, dict):
-        return {}
-    # A record is data: it names files of its own folder, and nothing else.
-    return {
-        name: digest
-        for name, digest in files.items()
-        if isinstance(digest, str) and name == Path(name).name and not name.startswith(PREFIX)
-    }
-
-
-def _hash(path: Path) -> str | None:
-    """Return the SHA-256 hash of a file; None where there is no such file."""
-    try:
-        if not stat.S_ISREG(path.lstat().st_mode):
-            return None
-        digest = hashlib.sha256()
-        with path.open("rb") as file:
-            while piece := file.read(_PIECE):
-                digest.update(piece)
-    except OSError:
         return None
-    return digest.hexdigest()
+    ours = isinstance(said, dict) and said.get("format") == FORMAT and isinstance(said.get("files"), dict)
+    return said if ours else None
+
+
+def _recorded(folder: Path) -> dict[str, str]:
+    """Return the hashes of the files that the record of a folder names; none where it is no record of ours."""
+    files = (_said(folder) or {}).get("files", {})
+    # A record is data: it names files of its own folder, and nothing else.
+    return {name: digest for name, digest in files.items() if isinstance(digest, str) and _names_a_file(name)}
+
+
+def _names_a_file(name: str) -> bool:
+    """Whether a text is the name of a file in a folder, and not of one in which results are made."""
+    try:
+        os.fsencode(name)
+    except UnicodeEncodeError:
+        return False
+    return name not in ("", "..") and name == Path(name).name and "\0" not in name and not name.startswith(PREFIX)
 
 
 def _write(path: Path, content: Content) -> str:
     """Write a file to the disk and return its SHA-256 hash."""
     digest = hashlib.sha256()
     with path.open("wb") as file:
-        for piece in [content] if isinstance(content, str | bytes) else content:
-            data = piece if isinstance(piece, bytes) else piece.encode("utf-8", errors="backslashreplace")
+        for data in _encoded(content):
             digest.update(data)
             file.write(data)
         file.flush()
         os.fsync(file.fileno())
     return digest.hexdigest()
+
+
+def _encoded(content: Content) -> Iterator[bytes]:
+    for piece in [content] if isinstance(content, str | bytes) else content:
+        yield piece if isinstance(piece, bytes) else piece.encode("utf-8", errors="backslashreplace")
 
 
 def _make_parents(folder: Path) -> list[Path]:
@@ -255,6 +323,17 @@ def _refuse_what_cannot_be_replaced(folder: Path, files: Iterable[str]) -> None:
     for name in files:
         if (folder / name).is_dir():
             raise IsADirectoryError(0, f"'{name}' in it is a folder")
+
+
+def _refuse_what_others_made(folder: Path, files: Iterable[str], known: Collection[str]) -> None:
+    """Fail where a file of the user's, which no run has written, has the name of one of the results."""
+    ours = {*known, RECORD} if _said(folder) is not None else known
+    for name in files:
+        if name not in ours and os.path.lexists(folder / name):
+            raise FileExistsError(
+                errno.EEXIST,
+                f"'{name}' in it is not of a run of armwright, and would be lost: move it away, or name another folder",
+            )
 
 
 def _remove(folders: Iterable[Path]) -> None:

@@ -1,6 +1,7 @@
 """Reading files, never more of one than its limit allows, and never what is no file where data name it."""
 
 import codecs
+import hashlib
 import io
 import itertools
 import os
@@ -22,6 +23,8 @@ _KINDS = {
 }
 # Names of a folder among which the nearest to a missing one is looked for.
 _MOST_NAMES = 1000
+# The SHA-256 hash of what was read last of every file: the file may be another by now, or a pipe, which is empty then.
+_READ: dict[Path, str] = {}
 
 
 def regular(path: Path) -> Path:
@@ -54,15 +57,21 @@ def pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
     """
     path, most, got = Path(path), limit(bound) * MEGABYTE, 0
     try:
-        with path.open("rb", buffering=0) as file:
-            size = os.fstat(file.fileno()).st_size
+        # Who refuses a row stops asking for pieces; a bare handle is closed with this generator, and never before it.
+        # A file such as those of /proc may make its reader wait for ever though it is a regular one; a pipe shall wait.
+        waits = 0 if not stat.S_ISREG(path.stat().st_mode) else os.O_NONBLOCK
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | waits)
+        try:
+            size = os.fstat(handle).st_size
             if size > most:
                 raise _too_large(path, bound, size)
-            while piece := file.read(_PIECE):
+            while piece := os.read(handle, _PIECE):
                 got += len(piece)
                 if got > most:
                     raise _too_large(path, bound, None)
                 yield piece
+        finally:
+            os.close(handle)
     except FileNotFoundError:
         near = closest(path.name, _names_in(path.parent))
         hint = f"; did you mean '{path.parent / near}'?" if near else ""
@@ -87,7 +96,14 @@ def read_bytes(path: Path | str, bound: str = "file_mb") -> bytes:
     Raises:
         FileFormatError: it is missing (the nearest name in its folder is told), a folder, or larger than the limit.
     """
-    return b"".join(pieces(path, bound))
+    data = b"".join(pieces(path, bound))
+    _READ[Path(path)] = hashlib.sha256(data).hexdigest()
+    return data
+
+
+def hash_read(path: Path) -> str | None:
+    """Return the SHA-256 hash of what this process has read last of a file; None where it has not read it."""
+    return _READ.get(path)
 
 
 def read_text(path: Path | str, bound: str = "file_mb") -> str:
@@ -125,11 +141,13 @@ def read_lines(path: Path | str, bound: str = "table_mb") -> Iterator[str]:
         # What follows the last line feed waits for its end; where there is none, carriage returns may end lines.
         whole = len(text) if not piece else max(text.rfind("\n"), text.rfind("\r", 0, -1)) + 1
         rest = text[whole:]
-        if len(rest) > longest:
-            raise FileFormatError(path, number + 1, "", f"a line is too long: {beyond('line_characters')}")
         for line_text in io.StringIO(text[:whole], newline=""):
             number += 1
+            if len(line_text) > longest:
+                raise _line_too_long(path, number)
             yield line_text
+        if len(rest) > longest:
+            raise _line_too_long(path, number + 1)
 
 
 def read_program(path: Path | str) -> str:
@@ -176,6 +194,10 @@ def not_utf8(path: Path | str, line: int, byte: int) -> FileFormatError:
 def _too_large(path: Path, bound: str, size: int | None) -> FileFormatError:
     got = None if size is None else f"{size / MEGABYTE:,.1f}"
     return FileFormatError(path, None, "", f"too large: {beyond(bound, got)}")
+
+
+def _line_too_long(path: Path | str, line: int) -> FileFormatError:
+    return FileFormatError(path, line, "", f"a line is too long: {beyond('line_characters')}")
 
 
 def _names_in(folder: Path) -> list[str]:

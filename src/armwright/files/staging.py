@@ -7,6 +7,7 @@ and goes with the next results that are written beside it.
 import contextlib
 import fcntl
 import os
+import re
 import secrets
 import shutil
 import signal
@@ -17,9 +18,11 @@ from pathlib import Path
 from typing import Any
 
 PREFIX = ".armwright-"
-_LOCK, NEW = "lock", "new"
+_DIGITS = 16
+_NAME = re.compile(rf"{re.escape(PREFIX)}[0-9a-f]{{{_DIGITS}}}")
+_LOCK, NEW, KEPT = "lock", "new", "kept"
 # What is in a staging folder; a folder of that name with anything else in it is somebody else's.
-_OWN = {_LOCK, NEW}
+_OWN = {_LOCK, NEW, KEPT}
 _LONGEST_PATH = 65536
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -50,20 +53,20 @@ def staging(parent: Path, target: Path, found: Callable[[Path], None] | None = N
 @contextlib.contextmanager
 def _made(parent: Path, target: Path) -> Iterator[Path]:
     while True:
-        folder = parent / f"{PREFIX}{secrets.token_hex(8)}"
+        folder = parent / f"{PREFIX}{secrets.token_hex(_DIGITS // 2)}"
         folder.mkdir()
         # Somebody who cleans up may take the folder for abandoned before it is locked; then there is another.
         with contextlib.suppress(FileNotFoundError):
             lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o600)
             if _locked(lock) is not False and (folder / _LOCK).exists():
-                os.write(lock, os.fsencode(target))
                 break
             os.close(lock)
     try:
+        os.write(lock, os.fsencode(target))
         yield folder
     finally:
         with signals_held():
-            shutil.rmtree(folder, ignore_errors=True)
+            _remove(folder)
             os.close(lock)
 
 
@@ -83,20 +86,27 @@ def remove_abandoned(parent: Path, target: Path | None = None, found: Callable[[
 
 def _remove_if_abandoned(folder: Path, target: Path | None, found: Callable[[Path], None] | None) -> None:
     state = folder.lstat()
-    if not stat.S_ISDIR(state.st_mode) or state.st_uid != os.geteuid():
+    if not stat.S_ISDIR(state.st_mode) or state.st_uid != os.geteuid() or not _NAME.fullmatch(folder.name):
         return
     inside = {path.name for path in folder.iterdir()}
     if not inside:
         folder.rmdir()
     elif _LOCK in inside and inside <= _OWN:
-        lock = os.open(folder / _LOCK, os.O_RDWR | os.O_NOFOLLOW)
+        lock = os.open(folder / _LOCK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
         try:
-            if _locked(lock):
+            if stat.S_ISREG(os.fstat(lock).st_mode) and _locked(lock):
                 if found is not None and target is not None and os.read(lock, _LONGEST_PATH) == os.fsencode(target):
                     found(folder / NEW)
-                shutil.rmtree(folder, ignore_errors=True)
+                _remove(folder)
         finally:
             os.close(lock)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a staging folder, its lock last: whoever is killed meanwhile leaves one that is known for abandoned."""
+    for name in _OWN - {_LOCK}:
+        shutil.rmtree(folder / name, ignore_errors=True)
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _locked(file: int) -> bool | None:

@@ -76,8 +76,6 @@ class Store:
         if self.folder is None:
             return False
         try:
-            if self.folder.is_file():  # in the way of the folder, whose name is ours
-                self.folder.unlink()
             make_private(self.folder)
             _clear(self.folder)
             _replace(self.folder / key, _MARK + _digest(key, data) + data)

@@ -88,13 +88,16 @@ class Certificate:
         lines = [within, seen]
         uses = [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
         if uses:
-            lines.append("; ".join(f"joint {j + 1} uses {part:.0%} of its {name}" for name, j, part in uses))
+            lines.append("; ".join(f"{self.arm.called(j)} uses {part:.0%} of its {name}" for name, j, part in uses))
         if self.because is not None:
-            name, joint = self.because
-            lines.append(
-                f"{self.factor:.2f} times slower than the tool speed has it, for the {name} of joint {joint + 1}"
-            )
+            lines.append(slower(self.arm, self.factor, self.because, " than the tool speed has it"))
         return "\n".join(lines)
+
+
+def slower(arm: Arm, factor: float, because: tuple[LimitName, int], than: str = "") -> str:
+    """Say how many times slower a motion is, and for which limit of which joint, from 0."""
+    limit, joint = because
+    return f"{factor:.2f} times slower{than}, for the {limit} of {arm.called(joint)}"
 
 
 def checked_deviation(deviation: float) -> float:

@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
-from armwright.kinematics.inverse.numeric import next_posture
-from armwright.kinematics.inverse.turns import nearest_turn, travel
+from armwright.kinematics.inverse.numeric import next_postures
+from armwright.kinematics.inverse.turns import nearest_turn, travels
 from armwright.motion.solver import Solver
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
@@ -18,6 +19,9 @@ MET, _TURN_MET = 1e-8, 1e-6
 _JUMP = 1.0
 # A posture this far from the one the arm has at the start of the path is another one [rad] or [m].
 _OTHER = 1e-6
+# Without a closed form every so many poses are solved one after the other. Those between are off the straight way by no
+# more than this part of it, or by this [rad] or [m].
+_STRIDE, _STRAIGHT, _CLOSE = 4, 0.25, 0.02
 # A step is halved at most so often; no hand has to keep nearer to its way than this [m], [rad].
 _HALVINGS, _CLOSEST = 16, (1e-6, 5e-6)
 
@@ -65,8 +69,10 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
     q = np.empty((len(X), solver.arm.n))
     q[:] = q_start
     if solver.inverse_branches is None:
+        if (several := _several_at_once(solver, X, q_start)) is not None:
+            return several, None
         for k in range(1, len(X)):
-            q[k] = next_posture(solver.arm, X[k], q[k - 1])
+            q[k] = _nearest(solver, X[k], q[k - 1])
             if missed(solver, q[k], X[k]):
                 break
     else:
@@ -77,6 +83,25 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
             q[k] = _nearest(solver, X[k], q[k - 1], None if singular[k].any() else found[k])
     off = np.flatnonzero(missed(solver, q, X))
     return q, int(off[0]) if len(off) else None
+
+
+def _several_at_once(solver: Solver, X: Array, q_start: Array) -> Array | None:
+    """Solve some poses of a path one after the other and those between them at once, from straight ways between.
+
+    Returns:
+        (k, n) postures; None where one is not met, or is so far from the straight way that the arm may have jumped.
+    """
+    some = np.append(np.arange(0, len(X) - 1, _STRIDE), len(X) - 1)
+    q = [q_start]
+    for k in some[1:]:
+        q.append(_nearest(solver, X[k], q[-1]))
+        if missed(solver, q[-1], X[k]):
+            return None
+    steps = np.abs(np.diff(q, axis=0)).max(axis=1)
+    straight = np.stack([np.interp(np.arange(len(X)), some, joint) for joint in np.transpose(q)], axis=-1)
+    found, off = beside(solver, X, straight)
+    room = np.append(np.repeat(np.maximum(_STRAIGHT * steps, _CLOSE), np.diff(some)), _CLOSE)
+    return found if off is None and (np.abs(found - straight).max(axis=1) <= room).all() else None
 
 
 def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
@@ -91,7 +116,10 @@ def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
 
 def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
     """Solve poses (k, 4, 4) each by the posture nearest to its guide (k, n); returns what ``chain`` does."""
-    q = np.array([_nearest(solver, X_k, near) for X_k, near in zip(X, guide, strict=True)])
+    if solver.inverse_branches is None:
+        q = next_postures(solver.arm, X, guide)
+    else:
+        q = _nearest_of(solver.arm, solver.inverse_branches(X, guide)[0], guide)
     off = np.flatnonzero(missed(solver, q, X))
     return q, int(off[0]) if len(off) else None
 
@@ -140,10 +168,17 @@ def _astray(X: Array, X_asked: Array, room: Room) -> bool:
 def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None) -> Array:
     """Return the posture (n,) at a pose that is nearest to ``q``, of ``candidates`` (k, n) where they are known."""
     if solver.inverse_branches is None:
-        return next_posture(solver.arm, X, q)
+        return np.asarray(next_postures(solver.arm, X[None], q[None])[0])
     if candidates is None:
         candidates = solver.inverse_branches(X, q)[0]
-    return min(nearest_turn(solver.arm, candidates, q), key=lambda posture: travel(solver.arm, q, posture))
+    return _nearest_of(solver.arm, candidates, q)
+
+
+def _nearest_of(arm: Arm, candidates: Array, q: Array) -> Array:
+    """Return of candidates (..., k, n) those that are reached soonest from postures (..., n)."""
+    turned = nearest_turn(arm, candidates, q[..., None, :])
+    nearest = travels(arm, q[..., None, :], turned).argmin(axis=-1)
+    return np.asarray(np.take_along_axis(turned, nearest[..., None, None], axis=-2)[..., 0, :])
 
 
 def _along_one_branch(solver: Solver, found: Array, singular: Array, q: Array) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, Flags
-from armwright.errors import InvalidValueError, one_of
+from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import clean_pose
@@ -123,8 +123,8 @@ def line_or_detour(
 
     Raises:
         PathError: there is no way round either; what stopped the line itself, with place and cause.
-        InvalidValueError: ``by``, deviation, speed or damping are none, or gravity alone takes more than a joint may
-            give.
+        InvalidValueError: ``by``, deviation, speed or damping are none.
+        IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
     """
     one_of("way round", by, ("via", "damped"))
     solver = solver_of(arm)
@@ -168,7 +168,8 @@ def _crawl(asked: Line, line: CertifiedLine) -> PathError:
     worst = int(line.trajectory.segment_peaks(order)[:, because[1]].argmax())
     time = line.trajectory.times[worst] / line.trajectory.duration * asked.duration
     s = float(asked.fractions(np.array([time]))[0])
-    reason = f"for the {because[0]} of joint {because[1] + 1} the line would have to be run {factor:.0f} times slower"
+    joint = line.certificate.arm.called(because[1])
+    reason = f"for the {because[0]} of {joint} the line would have to be run {factor:.0f} times slower"
     return PathError("singular", 0, s, f"near {at_place(asked, s)} {reason}", joint=because[1] + 1, reason=reason)
 
 
@@ -182,7 +183,7 @@ def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation
                 at_via = there.trajectory(there.trajectory.duration)
                 back = certified(arm, at_via, line.B, deviation=deviation, speed=speed, closely=False)
             # A leg on which gravity alone takes more than a joint may give is no way either.
-            except (PathError, InvalidValueError):
+            except (PathError, IncapableArmError):
                 continue
             motion = join([there.trajectory, back.trajectory])
             place, turn = _apart(line, via)
@@ -280,7 +281,7 @@ def _damped(arm: AnyArm, line: Line, q: Array, damping: float, obstacle: PathErr
     off = deviation_of(solver.arm, solver.forward, ways, spline, allowed=1e-3, allowed_turn=TURN_PER_METRE * 1e-3)
     try:
         factor, _ = slowing_for_limits(arm, trajectory)
-    except InvalidValueError:  # where gravity alone takes more than a joint may give there is no way either
+    except IncapableArmError:  # where gravity alone takes more than a joint may give there is no way either
         return None
     trajectory = trajectory.slowed(factor)
     price = Price(distance=float(off.place.max()), turn=float(off.turn.max()), time=trajectory.duration - line.duration)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.errors import IncapableArmError, KindError, ShapeError, shown
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.trajectory import Trajectory
@@ -121,7 +121,7 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     Raises:
         KindError: ``trajectory`` is no trajectory.
         ShapeError: it is of another number of joints.
-        InvalidValueError: gravity and dry friction alone take more than a joint may give, so that no slowing helps.
+        IncapableArmError: gravity and dry friction alone take more than a joint may give, so that no slowing helps.
     """
     solver = solver_of(arm)
     checked(solver.arm, trajectory)
@@ -133,7 +133,7 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     for _ in range(_ROUNDS):
         shares = _shares(solver, trajectory, looks)
         _check_lasting(solver.arm, shares.lasting, looks.times(trajectory))
-        part, binding = _largest_part(shares, limits)
+        part, binding = _largest_part(solver.arm, shares, limits)
         if binding is not None and part < u:
             u, joint, time = part, binding[1], float(looks.times(trajectory)[binding[0]])
         # What lies between the looks is looked at as well, where the efforts are largest: places stay when slowed.
@@ -158,10 +158,10 @@ def checked(arm: Arm, trajectory: Trajectory, what: str = "trajectory") -> None:
         raise ShapeError(f"{what}: expected one of {arm.n} joints, as '{arm.name}' has, got one of {joints}")
 
 
-def refuse_lasting(arm: Arm, joint: int, effort: float, place: str) -> InvalidValueError:
+def refuse_lasting(arm: Arm, joint: int, effort: float, place: str) -> IncapableArmError:
     """Return the error for a place where holding the arm takes more than a joint, from 0, may give."""
     unit = "N m" if arm.joints[joint].revolute else "N"
-    return InvalidValueError(
+    return IncapableArmError(
         f"{place} gravity and dry friction alone ask {arm.called(joint)} for {abs(effort):.4g} {unit}, "
         f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: no slowing helps"
     )
@@ -260,7 +260,7 @@ def _check_lasting(arm: Arm, lasting: Array, times: Array) -> None:
         raise refuse_lasting(arm, joint, float(lasting[k, joint]), f"at {times[k]:.3f} s")
 
 
-def _largest_part(shares: _Shares, limits: Array) -> tuple[float, tuple[int, int] | None]:
+def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tuple[int, int] | None]:
     """Return at which part of its speed, 1 at most, a motion keeps the limits, and which look and joint decide."""
     u, binding = 1.0, None
     while True:
@@ -278,6 +278,6 @@ def _largest_part(shares: _Shares, limits: Array) -> tuple[float, tuple[int, int
         worst = int(below.argmin())
         u, binding = min(float(below[worst]), u * (1 - _ROUNDING)), (int(k[worst]), int(j[worst]))
         if u < _CRAWL:
-            raise InvalidValueError(
-                f"joint {binding[1] + 1} would have to move {1 / u:.3g} times slower to keep its effort"
+            raise IncapableArmError(
+                f"{arm.called(binding[1])} would have to move {1 / u:.3g} times slower to keep its effort"
             )

@@ -1,6 +1,7 @@
 """Joints that carry the hand along a path planned in time, on one branch, with a bounded deviation."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -19,7 +20,17 @@ from armwright.motion.hand_path import HandPath
 from armwright.motion.polynomials import evaluate
 from armwright.motion.postures import Posture
 from armwright.motion.solver import Solver
-from armwright.motion.stops import SLOWEST, Cause, Guide, cause_of, changing, idlest, look_closely, nearest_singularity
+from armwright.motion.stops import (
+    SLOWEST,
+    Cause,
+    Guide,
+    at_speed,
+    cause_of,
+    changing,
+    idlest,
+    look_closely,
+    nearest_singularity,
+)
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline import smooth_weight, xspline
 
@@ -27,10 +38,13 @@ Counts: TypeAlias = npt.NDArray[np.intp]
 
 # Knots to begin with: so far apart [s], and so many on each blend and each straight way at least and at most.
 _STEP, _FEWEST, _ENOUGH = 0.02, 4, 500
-# The same for a path whose time is a mere parameter: only the deviation tells how many it takes.
-_WIDE_STEP = 0.1
+# The same for a path whose time is a mere parameter. The deviation tells how many it takes; there are some more, for
+# the accelerations of the joints, which are not as near to those of the path as the positions, decide on the timing.
+_WIDE_STEP, _MORE = 0.1, 8
 # Rounds of putting knots where they are missing; the deviation falls with the fourth power of the step.
-_ROUNDS, _CLOSER, _MOST = 8, 1.1, 500_000
+_ROUNDS, _CLOSER = 8, 1.1
+# Knots at most: of a motion whose time is given, and of one whose time is a mere parameter.
+_MOST, _MOST_ON = 500_000, 4_000
 # Whole turns; a limit passed by this part of one is not passed.
 _TURN, _NONE = 2 * math.pi, 1e-9
 # What the bound may add to what was seen, in parts of what is allowed; looks between two knots for it, at most.
@@ -71,6 +85,26 @@ class Strays(NamedTuple):
     looks: int
 
 
+class _Manner(NamedTuple):
+    """How a branch is followed.
+
+    Attributes:
+        ends: whether the joints rest at both ends or run.
+        deviation: allowed distance of the hand from where it is planned to be [m].
+        room: how far off the hand may be where it is looked for what stops the arm [m].
+        turns: whether joints may be turned by whole turns at the start, to be inside their limits later.
+        fastest: how many times as fast as it may a joint may have to be.
+        most: knots.
+    """
+
+    ends: Ends
+    deviation: float
+    room: float
+    turns: bool = True
+    fastest: float = SLOWEST
+    most: int = _MOST
+
+
 class _Stop(NamedTuple):
     """What stops a branch: why, which joint, from 1, if it is one, and at which time [s]."""
 
@@ -99,10 +133,10 @@ def carry(solver: Solver, hand: HandPath, times: Array, near: Array, *, ends: En
         PathError: no branch carries through: what stops each of them, where.
     """
     arm = solver.arm
-    t = _first_knots(hand, _STEP)
+    t = _first_knots(hand, _STEP, _FEWEST)
     stops: dict[str, _Stop] = {}
     for start in _starts(arm, hand(0.0), near):
-        found = _carried(solver, hand, t, start, ends=ends, deviation=deviation)
+        found = _carried(solver, hand, t, start, _Manner(ends, deviation, deviation))
         if isinstance(found, Carried):
             return found
         stops[start.label] = found
@@ -113,7 +147,16 @@ def carry(solver: Solver, hand: HandPath, times: Array, near: Array, *, ends: En
     raise PathError(first.cause, way, fraction, message, joint=first.joint, reason=first.why)
 
 
-def carry_on(solver: Solver, hand: HandPath, times: Array, q_start: Array, *, deviation: float, room: float) -> Carried:
+def carry_on(
+    solver: Solver,
+    hand: HandPath,
+    times: Array,
+    q_start: Array,
+    *,
+    deviation: float,
+    room: float,
+    fastest: float = SLOWEST,
+) -> Carried:
     """Solve a path of the hand for the joints from the posture that the arm has.
 
     Args:
@@ -123,13 +166,16 @@ def carry_on(solver: Solver, hand: HandPath, times: Array, q_start: Array, *, de
         q_start: (n,) joint positions at its start.
         deviation: as for ``carry``.
         room: how far off the hand may be where it is looked for what stops the arm [m].
+        fastest: how many times as fast as it may a joint may have to be; infinite where whoever times the motion sees
+            to that.
 
     Raises:
         PathError: what stops the arm, where.
     """
     start = Posture("", q_start)
-    t = _first_knots(hand, _WIDE_STEP)
-    found = _carried(solver, hand, t, start, ends="running", deviation=deviation, room=room)
+    t = _first_knots(hand, _WIDE_STEP, _MORE)
+    manner = _Manner("running", deviation, room, turns=False, fastest=fastest, most=_MOST_ON)
+    found = _carried(solver, hand, t, start, manner)
     if isinstance(found, Carried):
         return found
     way, fraction = _on_the_way(times, found.time)
@@ -152,9 +198,9 @@ def _starts(arm: Arm, X: Array, near: Array) -> list[Posture]:
     return sorted(starts, key=lambda posture: travel(arm, near, posture.q))
 
 
-def _first_knots(hand: HandPath, step: float) -> Array:
+def _first_knots(hand: HandPath, step: float, fewest: int) -> Array:
     lengths = np.diff(hand.knots)
-    parts = np.clip(np.ceil(lengths / step), _FEWEST, _ENOUGH).astype(np.intp)
+    parts = np.clip(np.ceil(lengths / step), fewest, _ENOUGH).astype(np.intp)
     return _divided(hand.knots, parts)
 
 
@@ -165,79 +211,67 @@ def _divided(times: Array, parts: Counts) -> Array:
     return np.append(np.repeat(times[:-1], parts) + place * h, times[-1])
 
 
-def _carried(
-    solver: Solver,
-    hand: HandPath,
-    t: Array,
-    start: Posture,
-    *,
-    ends: Ends,
-    deviation: float,
-    room: float | None = None,
-) -> Carried | _Stop:
-    """Follow one branch: what it comes to, or what really stops it.
-
-    With ``room``, see ``carry_on``, no joint is turned by whole turns at the start to be inside its limits later.
-    """
-    turns = room is None
-    found = _knotted(solver, hand, t, start, ends=ends, deviation=deviation, turns=turns)
+def _carried(solver: Solver, hand: HandPath, t: Array, start: Posture, manner: _Manner) -> Carried | _Stop:
+    """Follow one branch: what it comes to, or what really stops it."""
+    found = _knotted(solver, hand, t, start, manner)
     if isinstance(found, Carried) or found.cause == "reach":  # a pose out of reach is so for every posture
         return found
-    wide = deviation if room is None else room
+    wide = manner.room
     look = look_closely(solver, hand(t), t, start.q, Room(wide, TURN_PER_METRE * wide), poses_only=True)
     if look is None:
         return found
     times = np.interp(look.places, np.arange(len(t)), t)
-    q = _turned_inside(solver.arm, look.q, None) if turns else look.q
+    q = _turned_inside(solver.arm, look.q, None) if manner.turns else look.q
     beyond = _stopped(solver.arm, q, None, hand(times), times)
     if beyond is None and look.stop is not None:
         beyond = _Stop(look.stop.cause, look.stop.reason, look.stop.joint, float(times[-1]))
     if beyond is not None:
         return found if (found.cause, found.joint) == (beyond.cause, beyond.joint) else beyond
-    return _knotted(solver, hand, t, start, ends=ends, deviation=deviation, turns=turns, guide=Guide(t, look))
+    return _knotted(solver, hand, t, start, manner, guide=Guide(t, look))
 
 
 def _knotted(
-    solver: Solver,
-    hand: HandPath,
-    t: Array,
-    start: Posture,
-    *,
-    ends: Ends,
-    deviation: float,
-    turns: bool,
-    guide: Guide | None = None,
+    solver: Solver, hand: HandPath, t: Array, start: Posture, manner: _Manner, *, guide: Guide | None = None
 ) -> Carried | _Stop:
     """Put knots on one branch until the hand stays within the deviation."""
-    arm = solver.arm
+    arm, still = solver.arm, np.zeros(solver.arm.n)
+    postures: Callable[[Array], Array] | None = None if guide is None else guide.postures
     for _ in range(_ROUNDS):
         X = hand(t)
-        q, missed = chain(solver, X, start.q) if guide is None else beside(solver, X, guide.postures(t))
-        q = _turned_inside(arm, q, missed) if turns else q
+        q, missed = chain(solver, X, start.q) if postures is None else beside(solver, X, postures(t))
+        q = _turned_inside(arm, q, missed) if manner.turns else q
         if (stop := _stopped(arm, q, missed, X, t)) is not None:
             return stop
-        still = np.zeros(arm.n)
-        rates = (still, still) if ends == "rest" else (_rate(t, q), _rate(t[::-1], q[::-1]))
+        rates = (still, still) if manner.ends == "rest" else (_rate(t, q), _rate(t[::-1], q[::-1]))
         trajectory = xspline(t, q, *rates, b=smooth_weight(t))
         speed, acceleration = cubic_peaks(trajectory.coefficients, np.diff(t))
         bounds = hand_bounds(arm, trajectory.coefficients, np.diff(t), speed, acceleration)
-        strays = _strays(solver, hand, trajectory, bounds, deviation)
-        excess = np.maximum(strays.place, strays.turn / TURN_PER_METRE) / deviation
+        strays = _strays(solver, hand, trajectory, bounds, manner.deviation)
+        excess = np.maximum(strays.place, strays.turn / TURN_PER_METRE) / manner.deviation
         if excess.max() <= 1:
             return _swings_out(arm, trajectory) or Carried(start.label, trajectory, strays)
         # Where a joint rushes past a singularity, more knots do not help.
-        if (speed / arm.limit("speed")).max() > SLOWEST:
+        if (speed / arm.limit("speed")).max() > manner.fastest:
             break
         parts = np.where(excess > 1, np.clip(np.ceil(_CLOSER * excess**0.25), 2, 8), 1).astype(np.intp)
-        if parts.sum() > _MOST:
+        if parts.sum() > manner.most:
             break
         t = _divided(t, parts)
+        if solver.inverse_branches is None:  # from where they nearly are already they are found at once
+            postures = trajectory
     worst = int(excess.argmax())
-    joint = int((speed[worst] / arm.limit("speed")).argmax())
-    rush = float(speed[worst, joint] / arm.limit("speed")[joint])
-    why = f"joint {joint + 1} would have to move {rush:.0f} times as fast as it may"
-    near = nearest_singularity(arm, q[worst])
-    return _Stop("singular", f"the arm is singular ({near}): {why}" if near else why, joint + 1, float(t[worst]))
+    return _too_far(arm, q[worst], speed[worst] / arm.limit("speed"), float(t[worst]), manner.deviation)
+
+
+def _too_far(arm: Arm, q: Array, rushes: Array, time: float, deviation: float) -> _Stop:
+    """Say why the hand cannot be kept on its path at a posture (n,), with how fast joints are there by limits (n,)."""
+    joint = int(rushes.argmax())
+    if rushes[joint] > SLOWEST:
+        why = at_speed(arm, joint + 1, float(rushes[joint]))
+    else:
+        why = f"the hand cannot be kept within {deviation * 1e3:.3g} mm of its path"
+    near = nearest_singularity(arm, q)
+    return _Stop("singular", f"the arm is singular ({near}): {why}" if near else why, joint + 1, time)
 
 
 def _turned_inside(arm: Arm, q: Array, missed: int | None) -> Array:
@@ -271,7 +305,7 @@ def _beyond(fault: Violation, arm: Arm, q: Array) -> str:
     j = fault.joint - 1
     past = max(float(q[:, j].max() - arm.limit("upper")[j]), float(arm.limit("lower")[j] - q[:, j].min()))
     unit, scale = ("deg", math.degrees(1.0)) if fault.revolute else ("mm", 1e3)
-    return f"joint {fault.joint} would pass its limit {fault.limit * scale:.1f} {unit}, by {past * scale:.1f} {unit}"
+    return f"{arm.called(j)} would pass its limit {fault.limit * scale:.1f} {unit}, by {past * scale:.1f} {unit}"
 
 
 def _swings_out(arm: Arm, trajectory: Trajectory) -> _Stop | None:
@@ -291,8 +325,10 @@ def _strays(solver: Solver, hand: HandPath, trajectory: Trajectory, bounds: Hand
     greatest acceleration; that of the difference is no greater than those of hand and path together.
     """
     h = np.diff(trajectory.times)
-    pull = bounds.pull + hand.acceleration()
-    path_spin, path_change = hand.spin()
+    middles = (trajectory.times[1:] + trajectory.times[:-1]) / 2
+    on_path = np.clip(np.searchsorted(hand.knots, middles, side="right") - 1, 0, len(hand.knots) - 2)
+    pull = bounds.pull + hand.acceleration()[on_path]
+    path_spin, path_change = (bound[on_path] for bound in hand.spin())
     # The second derivative of the vector part of a unit quaternion: half the acceleration, a quarter of the speed².
     spin = (bounds.spin_change + path_change + bounds.spin * path_spin) / 2 + (bounds.spin + path_spin) ** 2 / 4
     wanted = np.sqrt(np.maximum(pull, 2 * spin / TURN_PER_METRE) / (8 * _ADDED * allowed)) * h

@@ -44,66 +44,61 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) ->
     Source:
         Pham & Pham, "A new approach to time-optimal path parameterization based on reachability analysis" (2018).
     """
-    count = len(lengths)
-    sides = [_sides(*rows) for rows in zip(*bounds, strict=True)]
-    reachable = np.zeros(count + 1)
+    sides = _sides(bounds)
+    twice = 2 * lengths
+    reachable = np.zeros(len(lengths) + 1)
     reachable[-1] = MOST if rests[1] else 0.0
-    for i in reversed(range(count)):
-        reachable[i] = _largest(sides[i], 2 * float(lengths[i]), float(reachable[i + 1]))
-    x = np.zeros(count + 1)
+    for i in reversed(range(len(lengths))):
+        reachable[i] = _largest(sides, i, twice[i], reachable[i + 1])
+    x = np.zeros(len(lengths) + 1)
     x[0] = reachable[0] if rests[0] else 0.0
-    for i, (most, at, lean) in enumerate((side.most, side.at, side.lean) for side in sides):
-        u = float((at[:most] - lean[:most] * x[i]).min(initial=math.inf))
-        x[i + 1] = max(0.0, min(reachable[i + 1], x[i] + 2 * lengths[i] * u))
+    for i in range(len(lengths)):
+        u = (sides.upper[i, 1:] - sides.lean[i, 1:] * x[i]).min()
+        x[i + 1] = max(0.0, min(reachable[i + 1], x[i] + twice[i] * u))
     return x
 
 
 class _Sides(NamedTuple):
-    """Bounds of one interval: at - lean x, of which the first ``most`` bound u from above and the rest from below.
+    """Bounds lower - lean x <= u <= upper - lean x on N intervals, (N, rows + 1) each, and x <= top, (N,).
 
-    Attributes:
-        at: (k,) bounds of u at x = 0.
-        lean: (k,) by how much they fall with x.
-        most: how many are from above.
-        top: what bounds x alone.
+    The first column is kept for what comes after an interval. A row that does not bound u is infinite.
     """
 
-    at: Array
+    upper: Array
+    lower: Array
     lean: Array
-    most: int
-    top: float
+    top: Array
 
 
-def _sides(a: Array, b: Array, c: Array) -> _Sides:
-    weight = np.abs(a).max(initial=0.0)
-    on_u = np.abs(a) > _NONE * weight
-    steep = np.abs(b[~on_u]) > 0
-    b_alone, c_alone = b[~on_u][steep], c[~on_u][steep]
-    top = float(((1 - np.sign(b_alone) * c_alone) / np.abs(b_alone)).min(initial=MOST))
-    a, b, c = a[on_u], b[on_u], c[on_u]
+def _sides(bounds: Bounds) -> _Sides:
+    a, b, c = (np.pad(each, ((0, 0), (1, 0))) for each in bounds)
+    on_u = np.abs(a) > _NONE * np.abs(a).max(axis=1, keepdims=True)
     side = np.sign(a)
-    upper, lower, lean = (side - c) / a, (-side - c) / a, b / a
-    return _Sides(np.concatenate([upper, lower]), np.concatenate([lean, lean]), len(a), top)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        upper, lower = np.where(on_u, (side - c) / a, np.inf), np.where(on_u, (-side - c) / a, -np.inf)
+        tops = np.where(on_u | (b == 0), MOST, (1 - np.sign(b) * c) / np.abs(b))
+        lean = np.where(on_u, b / a, 0.0)
+    return _Sides(upper, lower, lean, np.minimum(tops.min(axis=1), MOST))
 
 
-def _largest(sides: _Sides, twice: float, reachable: float) -> float:
+def _largest(sides: _Sides, i: int, twice: float, reachable: float) -> float:
     """Return the largest x of an interval from which some u leads to an x between 0 and ``reachable`` at its end.
 
     The room for u, between its least upper and its greatest lower bound, is a concave function of x that is 0 or more
     at x = 0: Newton's steps from the right never pass its root.
     """
-    most = sides.most
-    upper, upper_lean = np.append(sides.at[:most], reachable / twice), np.append(sides.lean[:most], 1 / twice)
-    lower, lower_lean = np.append(sides.at[most:], 0.0), np.append(sides.lean[most:], 1 / twice)
-    x = sides.top
+    upper, lower, lean = sides.upper[i], sides.lower[i], sides.lean[i]
+    upper[0], lower[0], lean[0] = reachable / twice, 0.0, 1 / twice
+    x = float(sides.top[i])
     for _ in range(_ROUNDS):
-        highs, lows = upper - upper_lean * x, lower - lower_lean * x
-        i, j = int(highs.argmin()), int(lows.argmax())
-        room, size = float(highs[i] - lows[j]), abs(highs[i]) + abs(lows[j])
-        slope = float(upper_lean[i] - lower_lean[j])
+        by_x = lean * x
+        highs, lows = upper - by_x, lower - by_x
+        j, k = int(highs.argmin()), int(lows.argmax())
+        room, size = float(highs[j] - lows[k]), float(abs(highs[j]) + abs(lows[k]))
+        slope = float(lean[j] - lean[k])
         if room >= -_ROUNDING * size or slope <= 0:
             break
-        x = min(x, max(0.0, float(upper[i] - lower[j]) / slope))
+        x = min(x, max(0.0, float(upper[j] - lower[k]) / slope))
     return x
 
 

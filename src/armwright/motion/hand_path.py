@@ -4,9 +4,10 @@ from typing import Literal, TypeAlias
 
 import attrs
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.motion.blends import BlendPlan, Ends, blend_plan, blended
+from armwright.motion.blends import PEAK_ACCELERATION, BlendPlan, Ends, blend_plan, blended
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
 from armwright.spatial.poses import pose
@@ -50,18 +51,19 @@ class HandPath:
             angles=None if self.angles is None else self.angles.slowed(factor),
         )
 
-    def acceleration(self) -> float:
-        """Return an upper bound of the acceleration of the place [m/s²]."""
-        return float(np.linalg.norm(self.place.peaks(2)))
+    def acceleration(self) -> Array:
+        """Return upper bounds (m,) of the acceleration of the place on each interval between ``knots`` [m/s²]."""
+        return np.asarray(np.linalg.norm(self.place.segment_peaks(2), axis=-1))
 
-    def spin(self) -> tuple[float, float]:
-        """Return upper bounds of the angular speed [rad/s] and of the angular acceleration [rad/s²]."""
+    def spin(self) -> tuple[Array, Array]:
+        """Return upper bounds (m,) of angular speed [rad/s] and acceleration [rad/s²] on each interval."""
         if self.turns is not None:
-            return self.turns.spin()
+            return self.turns.spin((self.knots[1:] + self.knots[:-1]) / 2)
         assert self.angles is not None  # noqa: S101 - one of the two is there
-        phi, theta, psi = self.angles.peaks(1)
+        phi, theta, psi = self.angles.segment_peaks(1).T
         # Each angle turns about an axis of length 1 that the angles before it carry round.
-        return phi + theta + psi, float(self.angles.peaks(2).sum() + phi * theta + phi * psi + theta * psi)
+        change = self.angles.segment_peaks(2).sum(axis=-1) + phi * theta + phi * psi + theta * psi
+        return phi + theta + psi, np.asarray(change)
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -79,12 +81,17 @@ class Turns:
     R: Array
     plan: BlendPlan
 
+    def _nearest(self, t: Array) -> npt.NDArray[np.intp]:
+        """Return the numbers (...) of the poses whose blends, and the ways beside them, times (...) belong to."""
+        c, b = self.plan.centres, self.plan.blend
+        handed_over = (c[:-1] + b[:-1] + c[1:] - b[1:]) / 2
+        return np.asarray(np.searchsorted(handed_over, t), dtype=np.intp)
+
     def __call__(self, t: Array) -> Array:
         """Return rotations (..., 3, 3) at times (...)."""
         c, b = self.plan.centres, self.plan.blend
         inside = np.clip(t, 0.0, self.plan.end)
-        handed_over = (c[:-1] + b[:-1] + c[1:] - b[1:]) / 2
-        i = np.searchsorted(handed_over, inside)
+        i = self._nearest(inside)
         since, width = (inside - c[i])[..., None], b[i][..., None]
         before, after = self.plan.before[i], self.plan.after[i]
         h = np.clip(since + width, 0.0, 2 * width)
@@ -101,14 +108,20 @@ class Turns:
         )
         return Turns(R=self.R, plan=slow)
 
-    def spin(self) -> tuple[float, float]:
-        """Return upper bounds of the angular speed [rad/s] and of the angular acceleration [rad/s²]."""
-        rates = np.linalg.norm(np.concatenate([self.plan.before, self.plan.after]), axis=-1)
-        change = np.linalg.norm(self.plan.after - self.plan.before, axis=-1)
-        blend = self.plan.blend
-        peak = np.where(blend > 0, 0.75 * change / np.where(blend > 0, blend, 1.0), 0.0)
+    def spin(self, t: Array) -> tuple[Array, Array]:
+        """Return upper bounds (m,) of angular speed [rad/s] and acceleration [rad/s²] around times (m,).
+
+        They hold in all of the blend that a time is in; between two blends, in all of the way.
+        """
+        plan, i = self.plan, self._nearest(t)
+        since, width = t - plan.centres[i], plan.blend[i]
+        before, after = (np.linalg.norm(rates[i], axis=-1) for rates in (plan.before, plan.after))
+        change = np.linalg.norm(plan.after[i] - plan.before[i], axis=-1)
+        blending = np.abs(since) < width
+        rate = np.where(blending, np.maximum(before, after), np.where(since < 0, before, after))
         # The angular velocity is T(v) v' of the rotation vector v, where T shrinks, and changes by less than |v'|.
-        return float(rates.max()), float(peak.max() + rates.max() ** 2)
+        peak = PEAK_ACCELERATION * change / np.where(blending, width, 1.0) + rate**2
+        return rate, np.where(blending, peak, 0.0)
 
 
 def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, orientation: Orientation) -> HandPath:

@@ -48,7 +48,7 @@ def slowing_for_limits(arm: AnyArm, trajectory: Trajectory) -> tuple[float, tupl
     Raises:
         KindError: ``trajectory`` is no trajectory.
         ShapeError: it is of another number of joints.
-        InvalidValueError: gravity and dry friction alone take more than a joint may give, so that no slowing helps.
+        IncapableArmError: gravity and dry friction alone take more than a joint may give, so that no slowing helps.
     """
     model = solver_of(arm).arm
     checked(model, trajectory)

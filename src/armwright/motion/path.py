@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, of_shape
-from armwright.errors import InvalidValueError
+from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.certificate import checked_deviation
 from armwright.motion.quintic import TOP_SPEED, check_speed
 from armwright.spatial.poses import between
@@ -68,7 +68,11 @@ class Knots:
 
     def poses(self, path: Path) -> Array:
         """Return the poses of the knots, (m, 4, 4)."""
-        return np.stack([path.at(i, s) for i, s in zip(self.segments, self.fractions, strict=True)])
+        segments, fractions = np.array(self.segments), np.array(self.fractions)
+        X = np.empty((len(segments), 4, 4))
+        for i in np.unique(segments):
+            X[segments == i] = path.at(i, fractions[segments == i])
+        return X
 
 
 def closest_to_axis(A: ArrayLike, B: ArrayLike) -> float:
@@ -119,13 +123,14 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
         finer: how many times more steps than the rule asks.
 
     Raises:
-        InvalidValueError: deviation or speed are out of range, or the arm has no reach or tool speed.
+        InvalidValueError: deviation or speed are out of range.
+        IncapableArmError: the arm has no reach or tool speed.
 
     Source:
         TR-83-008, "straight line motion" step 5 and "continuous motion".
     """
     if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
-        raise InvalidValueError(
+        raise IncapableArmError(
             f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
         )
     checked_deviation(deviation)

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError
+from armwright.errors import IncapableArmError
 from armwright.motion.efforts import dry_frictions, refuse_lasting
 from armwright.motion.forward_backward import MOST, Bounds, by_toppra, largest_squares
 from armwright.motion.joint_path import Grid
@@ -91,7 +91,7 @@ def fastest(
         by: who solves it.
 
     Raises:
-        InvalidValueError: no run however slow keeps the efforts, or any run however fast.
+        IncapableArmError: no run however slow keeps the efforts, or any run however fast.
         MissingExtraError: toppra is not installed.
     """
     solve = by_toppra if by == "toppra" else largest_squares
@@ -99,7 +99,7 @@ def fastest(
     bounds = rows.without_viscous()
     x = solve(bounds, grid.lengths, rests)
     for k in np.flatnonzero(x[1:-1] > MOST / 2):
-        raise InvalidValueError(f"{place(float(grid.origins[k + 1]))} nothing limits how fast the joints may be")
+        raise IncapableArmError(f"{place(float(grid.origins[k + 1]))} nothing limits how fast the joints may be")
     before = 0.0
     for _ in range(_ROUNDS if rows.viscous.any() else 0):
         bounds = rows.by_tangent(x, grid.lengths)

@@ -8,11 +8,11 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
-from armwright.errors import ArmwrightError, InvalidValueError
+from armwright.errors import ArmwrightError, IncapableArmError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.turns import images, travel
-from armwright.motion.certificate import LimitName
+from armwright.motion.certificate import slower
 from armwright.motion.detour import By, Detour, line_or_detour
 from armwright.motion.follow import PathError, follow
 from armwright.motion.path import Path
@@ -107,8 +107,9 @@ class Stage:
         knots: number of poses that were solved.
         deviation: largest distance from the path that was found [m]; None for point to point.
         slowed: why it runs slower than asked, or empty.
-        obstacle: what stopped the straight line; None where it is run.
-        detour: the way round it, and its price; None where there is no obstacle.
+        obstacle: what stopped the straight line; of a SPLINE what kept the arm from rounding its corners, so that it
+            stops at every frame; None where there is nothing of the kind.
+        detour: the way round it, and its price; None where there is no obstacle, and of a SPLINE.
     """
 
     kind: StageKind
@@ -155,6 +156,7 @@ def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manne
         StageError: a stage cannot be made from any posture; it names the first obstacle of the nearest one, on a
             straight line also where a way round was looked for in vain.
         InvalidValueError: speed or deviation are out of range.
+        IncapableArmError: the arm cannot make such a motion, wherever it leads.
     """
     q = joint_array(q_start, arm.n, "q_start")
     try:
@@ -220,7 +222,7 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
     yield Stage(
         kind=goal.kind,
         trajectory=whole_ticks(found.trajectory, manner.period),
-        length=_length(path.poses),
+        length=_length(path.poses) if goal.kind == "LINE" else hand_length(arm, found.trajectory),
         knots=found.knots,
         deviation=found.deviation,
         slowed=found.slowed,
@@ -234,10 +236,11 @@ def _rounded(arm: Arm, path: Path, q: Array, goal: StageGoal, manner: Manner) ->
     return Stage(
         kind=goal.kind,
         trajectory=whole_ticks(run.trajectory, manner.period),
-        length=_length(path.poses),
+        length=hand_length(arm, run.trajectory),
         knots=run.knots,
         deviation=run.deviation,
         slowed=run.slowed,
+        obstacle=None if run.stopped_by is None else _on_the_way(arm, path, run.stopped_by),
     )
 
 
@@ -270,7 +273,7 @@ def _way_round(arm: Arm, q: Array, goal: StageGoal, manner: Manner, obstacle: Ob
     X, Y = forward(arm, q), goal.poses[0]
     try:
         detour = line_or_detour(arm, q, Y, by=manner.around, deviation=manner.deviation, speed=manner.speed)
-    except (PathError, InvalidValueError):
+    except (PathError, IncapableArmError):
         # No way was found, or none on which the joints could hold the arm up.
         return None
     trajectory = whole_ticks(detour.trajectory, manner.period)
@@ -285,14 +288,10 @@ def _way_round(arm: Arm, q: Array, goal: StageGoal, manner: Manner, obstacle: Ob
         knots=sum(leg.knots for leg in legs) or len(trajectory.times),
         # The via pose is as far from the line as any place of the legs that meet in it.
         deviation=detour.price.distance + (max(leg.deviation for leg in legs) if taken and legs else 0.0),
-        slowed="" if slowest is None or slowest.because is None else _slower(slowest.factor, slowest.because),
+        slowed="" if slowest is None or slowest.because is None else slower(arm, slowest.factor, slowest.because),
         obstacle=obstacle if taken else None,
         detour=detour if taken else None,
     )
-
-
-def _slower(factor: float, because: tuple[LimitName, int]) -> str:
-    return f"{factor:.2f} times slower, for the {because[0]} of joint {because[1] + 1}"
 
 
 def _length(poses: Array) -> float:

@@ -80,6 +80,24 @@ def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
     return lowest, highest
 
 
+def peaks(terms: Array, lengths: Array) -> Array:
+    """Return the largest magnitude (n,) of all segments.
+
+    Only segments whose Bernstein coefficients go beyond the largest value at an end of any can hold a larger one.
+
+    Args:
+        terms: (m, k, n) coefficients.
+        lengths: (m,) of the segments.
+    """
+    at_ends = np.maximum(np.abs(terms[:, 0]), np.abs(evaluate(terms, lengths[:, None]))).max(axis=0)
+    scaled = terms * (lengths[:, None] ** np.arange(terms.shape[1]))[..., None]
+    control = np.abs(np.swapaxes(scaled, 1, 2) @ _bernstein(terms.shape[1] - 1))
+    higher = (control.max(axis=2) > at_ends).any(axis=1)
+    lowest, highest = extremes(terms[higher], lengths[higher])
+    inside = np.maximum(np.abs(lowest), np.abs(highest)).max(axis=0, initial=0.0)
+    return np.asarray(np.maximum(at_ends, inside))
+
+
 def turning_times(terms: Array, lengths: Array) -> list[Array]:
     """Return times (m, n) inside the segments among which are all at which a polynomial turns back.
 

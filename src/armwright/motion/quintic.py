@@ -7,7 +7,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, joint_array, number
-from armwright.errors import InvalidValueError
+from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.knots import NOWHERE, check_duration, two_ends
 from armwright.motion.trajectory import Trajectory, hold
 
@@ -64,8 +64,8 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
     Raises:
         KindError: ``arm`` is no arm, or an argument something else than real numbers.
         ShapeError: the positions are not (n,).
-        InvalidValueError: a number is NaN or infinite, the speed is out of range, or the arm has neither speed nor
-            acceleration limits.
+        InvalidValueError: a number is NaN or infinite, or the speed is out of range.
+        IncapableArmError: no joint that moves has a limit of speed or acceleration.
 
     Source:
         TR-83-008, "point to point motion"; the meaning of 120 from its section on MOVE.
@@ -77,7 +77,9 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
         return hold(start, 0.0)
     shortest = shortest_duration(arm, way)
     if shortest == 0:
-        raise InvalidValueError(f"arm '{arm.name}' has no speed and no acceleration limit, so a move has no duration")
+        raise IncapableArmError(
+            f"arm '{arm.name}': no joint that moves has a limit of speed or acceleration, so the move has no duration"
+        )
     return quintic(start, goal, shortest * TOP_SPEED / speed)
 
 

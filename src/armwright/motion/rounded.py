@@ -8,7 +8,7 @@ so a bound of that bounds the width. The joints are solved along this path, whic
 it one.
 """
 
-from functools import partial
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,15 +17,18 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.errors import InvalidValueError
+from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.blends import MISS
+from armwright.motion.certificate import slower
 from armwright.motion.chain import chain
 from armwright.motion.efforts import slowing_for_efforts
-from armwright.motion.follow import TURN_PER_METRE, Followed, PathError, check_ends, follow
+from armwright.motion.follow import COARSE, TURN_PER_METRE, Followed, PathError, check_ends, follow
 from armwright.motion.follow_hand import Carried, carry_on
 from armwright.motion.hand_path import hand_path
+from armwright.motion.leg_distance import farthest_from_legs
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
-from armwright.motion.solver import Solver, solver_of
+from armwright.motion.solver import solver_of
+from armwright.motion.stops import SLOWEST
 from armwright.motion.timing_law import Timed, timed
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.motion.trapezoid import shortest_trapezoid
@@ -34,6 +37,8 @@ from armwright.spatial.rotations import rotation_vector
 # The joints keep the hand so many times nearer to the rounded path than to a single line: a line may be off by its
 # deviation anywhere, a path with corners only at these.
 _CLOSER = 50.0
+# Nearer than this they are kept only where the corners ask for it [m]: no encoder tells so little.
+_NEAREST = 1e-7
 # In the middle third of a leg the hand is no farther from it than this [m], and than this part of the corner.
 _MIDDLE, _MIDDLE_PART = 5e-4, 0.1
 # Poses nearer to the one before than this part of what a corner may miss are passed with it.
@@ -41,6 +46,7 @@ _TOGETHER = 0.0125
 # Where a rounded corner meets what stops the arm, which the legs may not meet, it is made so much tighter, so often.
 _TIGHTER, _TRIES = 8.0, 2
 _HALVINGS = 40
+_WITH_STOPS = "with a stop at every frame: {}"
 # So that rounding does not carry what is just allowed beyond it.
 _HAIR = 1e-9
 # A blend needs some width before and after each pose; nothing is rounded at the ends.
@@ -58,6 +64,7 @@ class Rounded:
         knots: number of poses that were solved.
         slowed: why it runs slower than asked, or empty.
         stops: whether it stops at every pose, because no run without a stop was as fast.
+        stopped_by: what keeps the arm from following rounded corners, where it stops at every pose for that.
     """
 
     trajectory: Trajectory
@@ -66,6 +73,7 @@ class Rounded:
     knots: int
     slowed: str
     stops: bool = False
+    stopped_by: PathError | None = None
 
     @property
     def duration(self) -> float:
@@ -93,6 +101,32 @@ class _Legs(NamedTuple):
     twist: Array
 
 
+class _Task(NamedTuple):
+    """What is to be planned.
+
+    Attributes:
+        arm: the arm.
+        path: as it was given.
+        legs: the straight legs of it.
+        widths: (k - 2,) half-widths of the blends at the corners [m].
+        q_start: (n,) present joint positions.
+        deviation: of a single line [m].
+        speed: 1 to 120.
+        closer: how near the joints keep the hand to its rounded path [m].
+        off: how far the path may be off besides what the corners ask for [m].
+    """
+
+    arm: Arm
+    path: Path
+    legs: _Legs
+    widths: Array
+    q_start: Array
+    deviation: float
+    speed: float
+    closer: float
+    off: float
+
+
 def rounded_move(
     arm: Arm,
     path: Path,
@@ -112,13 +146,17 @@ def rounded_move(
         arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
         path: begins where the hand is at ``q_start``; equal poses one after the other count once.
         q_start: (n,) present joint positions.
-        deviation: what a single line may be off [m]; here the joints keep the hand 50 times nearer to its path.
+        deviation: what a single line may be off [m]; here the joints keep the hand 50 times nearer to its path. No
+            more than ``COARSE`` is used.
         speed: 1 to 120, 100 is normal.
         corner: how far the hand may be from the straight legs, and pass a pose, at most [m]; the orientation may be
             off by ``TURN_PER_METRE`` times as many radians. In the middle third of a leg it is within a tenth of
             that, and within 0.5 mm. Such a run is never slower than the legs one by one.
-        blend: instead of it, how far from a pose its rounding may begin [m]; where a leg is short, at its middle. The
-            efforts are kept as well then.
+        blend: instead of it, how far from a pose its rounding may begin [m]; where a leg is short, at its middle.
+
+    Returns:
+        The run. It is slowed for the limits of the efforts where that helps, with ``corner`` no further than the legs
+        one by one take.
 
     Raises:
         PathError: the arm cannot follow it from where it stands, however tight the corners.
@@ -131,35 +169,45 @@ def rounded_move(
     kept = _apart(path.poses, together)
     if Path(poses=path.poses[kept]).lengths().max() <= NEGLIGIBLE:
         return Rounded(trajectory=hold(q_start, 0.0), deviation=0.0, turn_deviation=0.0, knots=1, slowed="")
-    check_ends(arm, path)
-    legs, solver = _legs(arm, path, kept, speed), solver_of(arm)
-    closer = min(deviation, deviation if corner is None else corner) / _CLOSER
+    check_ends(solver_of(arm), path, q_start)
+    deviation = min(deviation, COARSE[-1])
+    legs = _legs(arm, path, kept, speed)
+    allowed = deviation if corner is None else corner
+    closer = max(min(deviation, allowed), min(_CLOSER * _NEAREST, allowed)) / _CLOSER
     off = closer + (together if len(kept) < 1 + (path.lengths() > NEGLIGIBLE).sum() else 0.0)
     half = np.minimum(legs.lengths[:-1], legs.lengths[1:]) / 2
     widths = np.minimum(half, np.inf if blend is None else blend)
     if corner is not None:
         widths = _widths(legs, half, corner, off)
-    stopping = partial(_with_stops, arm, path, legs, q_start, deviation=deviation, speed=speed)
+    task = _Task(arm, path, legs, widths, q_start, deviation, speed, closer, off)
+    return _without_stop(task) if corner is None else _never_slower(task)
+
+
+def _without_stop(task: _Task) -> Rounded:
+    """Return the run past the corners."""
+    rounded, run, _ = _tightened(task, SLOWEST)
+    return _inside_efforts(task, rounded, run.factor, None)
+
+
+def _never_slower(task: _Task) -> Rounded:
+    """Return the run past the corners, or that with stops where it is faster or the only one.
+
+    Beside a singularity a joint may rush: the timing slows the hand there, no further than stops would.
+    """
+    stops = _Stops(task)
     try:
-        carried, run, widths = _tightened(solver, legs, widths, q_start, closer)
-    except PathError:
-        stopped = None if corner is None else stopping()
-        if stopped is None:
+        rounded, run, rush = _tightened(task, np.inf)
+    except PathError as error:
+        if stops.run is None:
             raise
-        return stopped
-    rounded = Rounded(
-        trajectory=run.trajectory,
-        deviation=off + float((MISS * widths * legs.bend).max(initial=0.0)),
-        turn_deviation=TURN_PER_METRE * off + float((MISS * widths * legs.twist).max(initial=0.0)),
-        knots=len(carried.trajectory.times),
-        slowed="" if run.because is None else _slower(run.factor, *run.because),
-    )
-    if corner is None:
-        return _inside_efforts(arm, rounded, run.factor)
-    if rounded.duration <= _shortest_with_stops(solver, legs, q_start):
-        return rounded
-    stopped = stopping()
-    return rounded if stopped is None or rounded.duration <= stopped.duration else stopped
+        return attrs.evolve(
+            stops.run, slowed=_WITH_STOPS.format("the arm cannot follow rounded corners"), stopped_by=error
+        )
+    if rush > SLOWEST and stops.run is None:
+        return _without_stop(task)
+    if rounded.duration > stops.least and stops.run is not None and stops.run.duration < rounded.duration:
+        return stops.run
+    return _inside_efforts(task, rounded, run.factor, stops)
 
 
 def _apart(poses: Array, together: float) -> list[int]:
@@ -203,46 +251,58 @@ def _widths(legs: _Legs, half: Array, corner: float, off: float) -> Array:
     # From the beginning of a blend of half-width r on, the path leaves its leg as u³ / 4 r² - u⁴ / 16 r³.
     allowed = min(_MIDDLE, _MIDDLE_PART * corner) / 2
     thirds = np.stack([legs.lengths[:-1], legs.lengths[1:]]) / 3
-    low, high = np.minimum(widths, thirds.min(axis=0)), widths.copy()
-    for _ in range(_HALVINGS):
-        u = np.maximum(high - thirds, 0.0)
-        far = (change * (u**3 / (4 * high**2) - u**4 / (16 * high**3))).max(axis=0) > allowed
-        if not far.any():
-            break
-        high = np.where(far, (low + high) / 2, high)
-    else:
-        high = low
-    return np.asarray(high)
+    low, high = np.minimum(widths, thirds.min(axis=0)), widths
+    for width in (high, *[None] * _HALVINGS):
+        middle = (low + high) / 2 if width is None else width
+        u = np.maximum(middle - thirds, 0.0)
+        far = (change * (u**3 / (4 * middle**2) - u**4 / (16 * middle**3))).max(axis=0) > allowed
+        low, high = np.where(far, low, middle), np.where(far, middle, high)
+    return np.asarray(low)
 
 
-def _tightened(
-    solver: Solver, legs: _Legs, widths: Array, q_start: Array, closer: float
-) -> tuple[Carried, Timed, Array]:
-    """Return the joints along the rounded path, their run, and the widths of the corners that they can follow."""
+def _tightened(task: _Task, fastest: float) -> tuple[Rounded, Timed, float]:
+    """Return the run past corners as wide as the joints can follow, its timing, and how fast they would have to be.
+
+    Args:
+        task: what is to be planned.
+        fastest: how many times as fast as it may a joint may have to be at the full speed of the hand.
+    """
     for attempt in range(_TRIES):
-        tighter = widths / _TIGHTER**attempt
+        widths = task.widths / _TIGHTER**attempt
         try:
-            return *_run(solver, legs, tighter, q_start, closer), tighter
+            carried, run = _run(task, widths, fastest)
         except PathError as error:
             last = error
+            continue
+        off = task.off + float((MISS * widths * task.legs.bend).max(initial=0.0))
+        rounded = Rounded(
+            trajectory=run.trajectory,
+            deviation=min(off, farthest_from_legs(solver_of(task.arm), carried.trajectory, task.path.poses[:, :3, 3])),
+            turn_deviation=TURN_PER_METRE * task.off + float((MISS * widths * task.legs.twist).max(initial=0.0)),
+            knots=len(carried.trajectory.times),
+            slowed="" if run.because is None else slower(task.arm, run.factor, run.because),
+        )
+        return rounded, run, float((carried.trajectory.peaks(1) / task.arm.limit("speed")).max())
     raise last
 
 
-def _run(solver: Solver, legs: _Legs, widths: Array, q_start: Array, closer: float) -> tuple[Carried, Timed]:
+def _run(task: _Task, widths: Array, fastest: float) -> tuple[Carried, Timed]:
     """Return the joints along the rounded path over the time at full speed, and their run."""
+    legs, solver = task.legs, solver_of(task.arm)
     top = float(legs.speeds.max())
     times = np.concatenate([[0.0], np.cumsum(legs.lengths)]) / top
     blends = np.concatenate([[_NO_BLEND], widths / top, [_NO_BLEND]])
     hand = hand_path(legs.poses, times, blends, ends="running", orientation="geodesic")
+    room = _CLOSER * task.closer
     try:
-        carried = carry_on(solver, hand, times, q_start, deviation=closer, room=_CLOSER * closer)
+        carried = carry_on(solver, hand, times, task.q_start, deviation=task.closer, room=room, fastest=fastest)
     except PathError as error:
         segment = legs.numbers[error.segment + 1] - 1
         raise PathError(
             error.cause, segment, error.fraction, str(error), joint=error.joint, reason=error.reason
         ) from error
     caps = _caps(carried.trajectory.times, times, widths / top, legs.speeds / top)
-    return carried, timed(solver.arm, carried.trajectory, caps)
+    return carried, timed(task.arm, carried.trajectory, caps)
 
 
 def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
@@ -258,45 +318,68 @@ def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
     return caps
 
 
-def _inside_efforts(arm: Arm, rounded: Rounded, factor: float) -> Rounded:
-    """Return a run slowed as much as the efforts ask for."""
-    found = slowing_for_efforts(arm, rounded.trajectory)
+def _inside_efforts(task: _Task, rounded: Rounded, factor: float, stops: "_Stops | None") -> Rounded:
+    """Return a run slowed as much as the efforts ask for, or as the same legs with stops allow.
+
+    Where weight alone asks for more than a joint has no slowing helps, and the legs with stops fare no better.
+    """
+    try:
+        found = slowing_for_efforts(task.arm, rounded.trajectory)
+    except IncapableArmError:
+        if stops is None:
+            raise
+        return rounded
     if found.joint is None:
         return rounded
-    slowed = _slower(factor * found.factor, "effort", found.joint)
-    return attrs.evolve(rounded, trajectory=rounded.trajectory.slowed(found.factor), slowed=slowed)
-
-
-def _with_stops(arm: Arm, path: Path, legs: _Legs, q_start: Array, *, deviation: float, speed: float) -> Rounded | None:
-    """Return the straight lines one by one, with a stop at every pose; None where they cannot be run."""
-    lines: list[Followed] = []
-    q = q_start
-    for first, last in pairwise(legs.numbers):
-        try:
-            line = follow(arm, Path(poses=path.poses[[first, last]]), q, deviation=deviation, speed=speed)
-        except PathError:
-            return None
-        lines.append(line)
-        q = line.trajectory(line.trajectory.duration)
-    return Rounded(
-        trajectory=join([line.trajectory for line in lines]),
-        deviation=max(line.deviation for line in lines),
-        turn_deviation=max(line.turn_deviation for line in lines),
-        knots=sum(line.knots for line in lines),
-        slowed="with a stop at every frame: rounded corners would take longer, or the arm cannot follow them",
-        stops=True,
+    by = found.factor if stops is None else stops.longest(rounded.duration * found.factor) / rounded.duration
+    return attrs.evolve(
+        rounded, trajectory=rounded.trajectory.slowed(by), slowed=slower(task.arm, factor * by, ("effort", found.joint))
     )
 
 
-def _shortest_with_stops(solver: Solver, legs: _Legs, q_start: Array) -> float:
-    """Return a time that no run with a stop at every pose is shorter than; 0 where it is not known."""
-    limits = solver.arm.limit("speed"), solver.arm.limit("acceleration")
-    q, missed = chain(solver, legs.poses, q_start)
-    if missed is not None or not np.isfinite(limits[1]).all():
-        return 0.0
-    by_joints = [shortest_trapezoid(way, *limits) for way in np.diff(q, axis=0)]
-    return float(np.maximum(legs.lengths / legs.speeds, by_joints).sum())
+class _Stops:
+    """The same legs as straight lines one by one, worked out where it matters."""
 
+    def __init__(self, task: _Task) -> None:
+        """Remember the legs."""
+        self._task = task
 
-def _slower(factor: float, limit: str, joint: int) -> str:
-    return f"{factor:.2f} times slower, for the {limit} of joint {joint + 1}"
+    def longest(self, wanted: float) -> float:
+        """Return how long a run may take that should take ``wanted``, and not longer than with stops [s]."""
+        if wanted <= self.least or self.run is None:
+            return wanted
+        return min(wanted, self.run.duration)
+
+    @cached_property
+    def least(self) -> float:
+        """A time that no run with a stop at every pose is shorter than [s]; 0 where it is not known."""
+        task = self._task
+        limits = task.arm.limit("speed"), task.arm.limit("acceleration")
+        q, missed = chain(solver_of(task.arm), task.legs.poses, task.q_start)
+        if missed is not None or not np.isfinite(limits[1]).all():
+            return 0.0
+        by_joints = [shortest_trapezoid(way, *limits) for way in np.diff(q, axis=0)]
+        return float(np.maximum(task.legs.lengths / task.legs.speeds, by_joints).sum())
+
+    @cached_property
+    def run(self) -> Rounded | None:
+        """The lines, with a stop at every pose; None where they cannot be run."""
+        task, q = self._task, self._task.q_start
+        lines: list[Followed] = []
+        for first, last in pairwise(task.legs.numbers):
+            leg = Path(poses=task.path.poses[[first, last]])
+            try:
+                line = follow(task.arm, leg, q, deviation=task.deviation, speed=task.speed)
+            except PathError:
+                return None
+            lines.append(line)
+            q = line.trajectory(line.trajectory.duration)
+        run = join([line.trajectory for line in lines])
+        return Rounded(
+            trajectory=run,
+            deviation=farthest_from_legs(solver_of(task.arm), run, task.path.poses[:, :3, 3]),
+            turn_deviation=max(line.turn_deviation for line in lines),
+            knots=sum(line.knots for line in lines),
+            slowed=_WITH_STOPS.format("rounded corners would take longer"),
+            stops=True,
+        )

@@ -98,10 +98,10 @@ def cause_of(solution: InverseSolution) -> Cause:
     return "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
 
 
-def at_speed(joint: int, factor: float) -> str:
+def at_speed(arm: Arm, joint: int, factor: float) -> str:
     """Say that a joint, from 1, would have to move so many times as fast as it may."""
     how = "at once" if factor > _AT_ONCE else f"{factor:.0f} times as fast as it may"
-    return f"joint {joint} would have to move {how}"
+    return f"{arm.called(joint - 1)} would have to move {how}"
 
 
 def changing(arm: Arm, q: Array) -> str:
@@ -155,7 +155,7 @@ def _stop(solver: Solver, before: Step, step: Step, times: Array, *, poses_only:
         near = nearest_singularity(
             arm, min((before.q, step.q), key=lambda q: float(singularities(arm, q).singular_values[-1]))
         )
-        reason = f"{at_speed(joint, factor)}: the arm is nearly singular there ({near})"
+        reason = f"{at_speed(arm, joint, factor)}: the arm is nearly singular there ({near})"
         blamed = tuple((np.flatnonzero(rush > _BLAMED * rush.max()) + 1).tolist())
         return Stop("singular", place, joint, reason, rush=factor, near=near, blamed=blamed)
     for fault in violations(arm, step.q):

@@ -9,7 +9,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, number
-from armwright.errors import InvalidValueError
+from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.judge import clean_pose
 from armwright.kinematics.inverse.solution import Answer, violations
@@ -124,8 +124,8 @@ def straight_line(
     Raises:
         PathError: a pose of the line is out of reach, a joint passes a limit, the posture would have to change on the
             way, or a singularity keeps the hand from staying within the deviation; with the place and the cause.
-        InvalidValueError: deviation, turn or speed are out of range, or gravity alone takes more than a joint may
-            give.
+        InvalidValueError: deviation, turn or speed are out of range.
+        IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
     """
     return certified(arm, q_start, X_goal, deviation=deviation, turn=turn, speed=speed, period=period, closely=True)
 
@@ -218,7 +218,7 @@ def _slowing(
     if because is not None and because[0] == "speed" and factor > SLOWEST:
         time = trajectory.times[found.speed[:, because[1]].argmax()]
         s = float(line.fractions(np.array([time]))[0])
-        raise _singular(line, s, nearest_singularity(arm, trajectory(time)), joint=because[1] + 1, factor=factor)
+        raise _singular(arm, line, s, nearest_singularity(arm, trajectory(time)), joint=because[1] + 1, factor=factor)
     return factor, because
 
 
@@ -250,7 +250,7 @@ def timed_line(arm: Arm, A: Array, B: Array, speed: float) -> Line | None:
     if length <= NEGLIGIBLE:
         return None
     if not (math.isfinite(arm.reach) and math.isfinite(arm.tool_speed)):
-        raise InvalidValueError(
+        raise IncapableArmError(
             f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
         )
     return Line(A, B, turn, length / report_speed(arm, A[:3, 3], B[:3, 3], speed) / (1 - _RAMP))
@@ -276,14 +276,14 @@ def _planned(
             place = float(np.interp(look.stop.place, np.arange(len(s)), s))
             if look.stop.agrees(error.cause, error.joint, error.reason, abs(place - error.fraction)):
                 raise
-            raise _stopped(line, place, look.stop) from error
+            raise _stopped(solver.arm, line, place, look.stop) from error
         return _refined(solver, line, times, q_start, room, guide=Guide(s, look))
 
 
-def _stopped(line: Line, s: float, stop: Stop) -> PathError:
+def _stopped(arm: Arm, line: Line, s: float, stop: Stop) -> PathError:
     """Return the error for what a close look found at a fraction of the way."""
     if stop.rush is not None and stop.joint is not None:
-        return _singular(line, s, stop.near, joint=stop.joint, factor=stop.rush)
+        return _singular(arm, line, s, stop.near, joint=stop.joint, factor=stop.rush)
     return PathError(
         stop.cause, 0, s, f"on the line near {at_place(line, s)} {stop.reason}", joint=stop.joint, reason=stop.reason
     )
@@ -315,7 +315,7 @@ def _refined(
     worst = int(excess.argmax())
     joint = int(np.abs(q[worst + 1] - q[worst]).argmax())
     near = nearest_singularity(solver.arm, q[worst])
-    raise _singular(line, float(s[worst]), near, joint=joint + 1, factor=math.inf)
+    raise _singular(solver.arm, line, float(s[worst]), near, joint=joint + 1, factor=math.inf)
 
 
 def _check_rush(arm: Arm, line: Line, found: Deviation, lengths: Array, q: Array) -> None:
@@ -324,12 +324,14 @@ def _check_rush(arm: Arm, line: Line, found: Deviation, lengths: Array, q: Array
     if rush.max() > SLOWEST:
         worst, joint = np.unravel_index(int(rush.argmax()), rush.shape)
         s = float(line.fractions(np.cumsum(lengths)[worst : worst + 1])[0])
-        raise _singular(line, s, nearest_singularity(arm, q[worst]), joint=int(joint) + 1, factor=float(rush.max()))
+        raise _singular(
+            arm, line, s, nearest_singularity(arm, q[worst]), joint=int(joint) + 1, factor=float(rush.max())
+        )
 
 
-def _singular(line: Line, s: float, near: str, *, joint: int, factor: float) -> PathError:
+def _singular(arm: Arm, line: Line, s: float, near: str, *, joint: int, factor: float) -> PathError:
     """Return the error for a place where the arm is singular, so that a joint, from 1, would have to rush."""
-    why = f"the arm is singular there ({near}), {at_speed(joint, factor)}"
+    why = f"the arm is singular there ({near}), {at_speed(arm, joint, factor)}"
     message = f"the hand cannot stay on the line near {at_place(line, s)}: {why}"
     return PathError("singular", 0, s, message, joint=joint, reason=f"the hand cannot stay on the line: {why}")
 

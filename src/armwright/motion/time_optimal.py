@@ -11,7 +11,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
-from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, shown
+from armwright.errors import IncapableArmError, InvalidValueError, KindError, ShapeError, one_of, shown
 from armwright.kinematics.inverse.solution import violations
 from armwright.motion.certificate import LIMITS, LimitName
 from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
@@ -75,7 +75,7 @@ class TimeOptimal:
         before = "" if self.duration_before is None else f" instead of {self.duration_before:.3f} s"
         stops = f", with {self.stops} stops on the way" if self.stops else ""
         lines = [f"{self.trajectory.duration:.3f} s{before}{stops}"]
-        lines += [f"{one.share:.0%} of the time: {one.limit} of joint {one.joint + 1}" for one in self.bindings]
+        lines += [f"{one.share:.0%} of the time: {one.limit} of {self.arm.called(one.joint)}" for one in self.bindings]
         return "\n".join(lines)
 
 
@@ -108,8 +108,9 @@ def time_optimal(
     Raises:
         KindError: the path is neither a trajectory nor numbers.
         ShapeError: it is not one of n joints, or there are fewer than two knots.
-        InvalidValueError: a joint passes its range or jumps, two knots are the same; a joint that moves has no
-            limit that counts; gravity and dry friction alone take more than a joint may give.
+        InvalidValueError: a joint passes its range or jumps, two knots are the same.
+        IncapableArmError: a joint that moves has no limit that counts; gravity and dry friction alone take more than
+            a joint may give.
         UnknownNameError: nobody of that name finds it.
         ArmwrightError: toppra gave up.
         MissingExtraError: toppra was asked for and is not installed.
@@ -182,7 +183,7 @@ def _check_path(arm: Arm, path: Trajectory, *, efforts: bool) -> None:
     counting = LIMITS if efforts else LIMITS[:2]
     limited = np.any([np.isfinite(arm.limit(name)) for name in counting if name != "speed"], axis=0)
     for j in np.flatnonzero(~limited & (np.ptp(path.extremes(0), axis=0) > 0)):
-        raise InvalidValueError(
+        raise IncapableArmError(
             f"arm '{arm.name}': {arm.called(int(j))} moves and has no limit of {' or '.join(counting[1:])}, so there "
             "is no fastest run"
         )

@@ -5,6 +5,10 @@ the fastest run on a grid is found, whose s'' is constant from one place of the 
 over a moving window of time, which leaves a cubic on each piece and makes s'' continuous, from rest to rest. Where
 averaging has carried the joints over a limit, the limit is drawn tighter there and the run is found again. The result
 q(s(t)) is a polynomial on each piece, of exactly the same path.
+
+What averaging costs grows with the window. The window is as long as a small part of the shortest time allows, and the
+run takes just that part more: so the duration depends on the path as the shortest one does, and not on how well a
+window happens to fit.
 """
 
 import math
@@ -22,11 +26,15 @@ from armwright.motion.trajectory import Trajectory
 
 # From rest to the full speed of the path takes no less than this, whatever the joints can do [s].
 _RAMP = 0.05
-# Windows that are tried, the smoothest first [s]; a shorter one is taken where the run is shorter by this part.
-_WINDOWS = tuple(0.08 * 2.0**-k for k in range(12))
-_WORTH = 0.01
-# Rounds of drawing limits tighter where they are passed; what is left, less than this, is taken off by slowing all.
-_ROUNDS, _PASSED = 4, 0.02
+# What averaging may cost, in parts of the shortest time and at most [s]; no window is longer than that.
+_COST, _LONGEST = 0.01, 0.08
+# Windows that are tried: where one costs too much, the next is shorter in that proportion and by a little more.
+_WINDOWS, _LESS, _LEAST_STEP = 8, 0.9, 1 / 16
+# Rounds of drawing limits tighter where they are passed.
+_ROUNDS = 4
+# The grid has so many intervals for each one between two knots of the path, on which its curvature hardly changes: the
+# more, the fewer knots there are, so that there are some so many in all.
+_FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are looked at.
 _PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
 # Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed.
@@ -49,19 +57,56 @@ class Timed(NamedTuple):
     because: tuple[LimitName, int] | None
 
 
+class _Grid(NamedTuple):
+    """A path cut into intervals.
+
+    Attributes:
+        arm: the arm.
+        path: of its joints, a cubic on each of m intervals.
+        caps: (m,) the largest s' on each.
+        bounds: on each.
+        shortest: the time of the fastest run whose s'' is constant on each [s].
+    """
+
+    arm: Arm
+    path: Trajectory
+    caps: Array
+    bounds: Bounds
+    shortest: float
+
+    @property
+    def allowed(self) -> float:
+        """How long a run may take [s]."""
+        return _allowed(self.shortest)
+
+    @property
+    def lengths(self) -> Array:
+        """Of the intervals in s, (m,)."""
+        return np.diff(self.path.times)
+
+
 class _Run(NamedTuple):
     """A run of which the limits have been looked at.
 
     Attributes:
-        trajectory: of the joints.
-        intervals: (p,) on which interval of the path each of its p pieces is.
+        path: of the joints.
+        times: (p + 1,) when its p pieces begin, and the last one ends [s].
+        intervals: (p,) on which interval of the path each is.
+        law: (p, 4) coefficients of the way on that interval by the time since the piece began.
         uses: (p, 1 + 2 n) the largest part of its limits that each piece uses: the speed on the path, the speeds and
             the roots of the accelerations of the joints.
     """
 
-    trajectory: Trajectory
+    path: Trajectory
+    times: Array
     intervals: npt.NDArray[np.intp]
+    law: Array
     uses: Array
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Of the joints."""
+        return Trajectory(times=self.times, coefficients=composed(self.path.coefficients[self.intervals], self.law))
 
     @property
     def slowing(self) -> float:
@@ -71,7 +116,7 @@ class _Run(NamedTuple):
     @property
     def duration(self) -> float:
         """How long it takes, slowed to keep the limits [s]."""
-        return self.trajectory.duration * self.slowing
+        return float(self.times[-1]) * self.slowing
 
 
 def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
@@ -82,25 +127,35 @@ def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
         path: cubics with continuous second derivatives.
         caps: (m,) the largest s' on each of its m segments.
     """
-    bounds = _bounds(arm, path, caps)
-    best: _Run | None = None
-    for window in _WINDOWS:
-        run = _smoothed(arm, path, caps, bounds, window)
-        if best is not None and run.duration > best.duration * (1 - _WORTH):
-            break
-        best = run
-    assert best is not None  # noqa: S101 - there are windows
-    trajectory = best.trajectory
+    grid = _gridded(arm, path, caps)
+    run = _smooth(grid)
+    trajectory = run.trajectory
     over = max(
         float((trajectory.peaks(1) / arm.limit("speed")).max()),
         math.sqrt(float((trajectory.peaks(2) / arm.limit("acceleration")).max())),
-        float(best.uses[:, 0].max()),
-        1.0,
+        float(run.uses[:, 0].max()),
+        grid.allowed / trajectory.duration,
     )
-    free = float((np.diff(path.times) / caps).sum()) + _RAMP + _WINDOWS[0]
     trajectory = trajectory.slowed(over)
-    factor = trajectory.duration / free
-    return Timed(trajectory, factor, _binding(arm.n, best) if factor > 1 else None)
+    factor = trajectory.duration / _allowed(float((grid.lengths / grid.caps).sum()) + _RAMP)
+    return Timed(trajectory, factor, _binding(arm.n, run) if factor > 1 else None)
+
+
+def _allowed(shortest: float) -> float:
+    """Return how long a run may take whose shortest time is given [s]."""
+    return shortest + min(_COST * shortest, _LONGEST)
+
+
+def _gridded(arm: Arm, path: Trajectory, caps: Array) -> _Grid:
+    """Return a path with every segment cut into equal parts."""
+    finer = min(max(math.ceil(_ENOUGH / len(caps)), 1), _FINER)
+    starts = (np.diff(path.times)[:, None] * (np.arange(finer) / finer)).ravel()
+    coefficients = shifted(np.repeat(path.coefficients, finer, axis=0), starts)
+    times = np.append(np.repeat(path.times[:-1], finer) + starts, path.times[-1])
+    fine, caps = Trajectory(times=times, coefficients=coefficients), np.repeat(caps, finer)
+    bounds, lengths = _bounds(arm, fine, caps), np.diff(times)
+    speeds = np.sqrt(largest_squares(bounds, lengths, (False, False)))
+    return _Grid(arm, fine, caps, bounds, float(_steps(lengths, speeds).sum()))
 
 
 def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
@@ -123,23 +178,37 @@ def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
     return Bounds(on_u, on_x, np.zeros_like(on_u))
 
 
-def _smoothed(arm: Arm, path: Trajectory, caps: Array, bounds: Bounds, window: float) -> _Run:
+def _smooth(grid: _Grid) -> _Run:
+    """Return the fastest run averaged over as long a window as may be, or the fastest of those that were tried."""
+    most = grid.allowed - grid.shortest
+    window, runs = most, []
+    for _ in range(_WINDOWS):
+        runs.append(_averaged_within(grid, window))
+        cost = runs[-1].duration - grid.shortest
+        if cost <= most:
+            break
+        window *= max(_LESS * most / cost, _LEAST_STEP)
+    return min(runs, key=lambda run: run.duration)
+
+
+def _averaged_within(grid: _Grid, window: float) -> _Run:
     """Return the fastest run averaged over a window, with bounds drawn tighter where that passes limits."""
-    lengths = np.diff(path.times)
-    tighter = np.ones((len(lengths), 1))
-    best: _Run | None = None
+    bounds, lengths = grid.bounds, grid.lengths
+    tighter, runs = np.ones((len(lengths), 1)), []
     for _ in range(_ROUNDS):
         x = largest_squares(bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter), lengths, (False, False))
-        run = _looked_at(arm, path, caps, *_averaged(lengths, np.sqrt(x), window))
-        if best is None or run.duration < best.duration:
-            best = run
-        if run.slowing <= 1 + _PASSED:
+        runs.append(_looked_at(grid, *_averaged(lengths, np.sqrt(x), window)))
+        if runs[-1].duration <= grid.allowed:
             break
         worst = np.ones(len(lengths))
-        np.maximum.at(worst, run.intervals, run.uses.max(axis=1))
+        np.maximum.at(worst, runs[-1].intervals, runs[-1].uses.max(axis=1))
         tighter = tighter * worst[:, None] ** 2
-    assert best is not None  # noqa: S101 - there is a round
-    return best
+    return min(runs, key=lambda run: run.duration)
+
+
+def _steps(lengths: Array, speeds: Array) -> Array:
+    """Return how long the intervals take whose lengths (m,) and speeds at the ends (m + 1,) are given, (m,) [s]."""
+    return 2 * lengths / (speeds[1:] + speeds[:-1])
 
 
 def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Array]:
@@ -150,7 +219,7 @@ def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Arra
         speeds: (m + 1,) s' at their ends; s'' is constant on each.
         window: [s].
     """
-    steps = 2 * lengths / (speeds[1:] + speeds[:-1])
+    steps = _steps(lengths, speeds)
     t = np.concatenate([[0.0], np.cumsum(steps)])
     # The integral of s(t), on each interval, before the start and after the end.
     integral = np.zeros((len(lengths) + 2, 4))
@@ -171,17 +240,13 @@ def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Arra
     return breaks, (ahead - behind) / window
 
 
-def _looked_at(arm: Arm, path: Trajectory, caps: Array, breaks: Array, law: Array) -> _Run:
+def _looked_at(grid: _Grid, breaks: Array, law: Array) -> _Run:
     """Return q(s(t)), cut where s(t) passes a knot of the path, and what it uses of the limits."""
+    arm, path, caps = grid.arm, grid.path, grid.caps
     knots = path.times[1:-1]
     begins = np.maximum.accumulate(law[:, 0])
     piece = np.clip(np.searchsorted(begins, knots, side="right") - 1, 0, len(law) - 1)
-    low, high = np.zeros(len(knots)), np.diff(breaks)[piece]
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        below = evaluate(law[piece][..., None], middle[:, None])[:, 0] < knots
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    times = _apart(np.concatenate([breaks, breaks[piece] + low]))
+    times = _apart(np.concatenate([breaks, breaks[piece] + _when(law[piece], np.diff(breaks)[piece], knots)]))
     middles = (times[1:] + times[:-1]) / 2
     piece = np.clip(np.searchsorted(breaks, middles, side="right") - 1, 0, len(law) - 1)
     inner = shifted(law[piece][..., None], times[:-1] - breaks[piece])
@@ -190,21 +255,39 @@ def _looked_at(arm: Arm, path: Trajectory, caps: Array, breaks: Array, law: Arra
         np.clip(np.searchsorted(path.times, there, side="right") - 1, 0, len(caps) - 1), dtype=np.intp
     )
     inner[:, 0, 0] -= path.times[interval]
-    trajectory = Trajectory(times=times, coefficients=composed(path.coefficients[interval], inner[..., 0]))
-    terms, steps = trajectory.coefficients, np.diff(times)
-    uses = np.zeros((len(steps), 1 + 2 * arm.n))
+    outer, steps = path.coefficients[interval], np.diff(times)
+    rates, bends = derivative(inner, 1), derivative(inner, 2)
+    slopes, curves = derivative(outer, 1), derivative(outer, 2)
+    along, speed, acceleration = np.zeros((len(steps), 1)), *np.zeros((2, len(steps), arm.n))
     for part in _SEEN:
         at = (part * steps)[:, None]
-        along = evaluate(derivative(inner, 1), at) / caps[interval][:, None]
-        speed = np.abs(evaluate(derivative(terms, 1), at)) / arm.limit("speed")
-        acceleration = np.abs(evaluate(derivative(terms, 2), at)) / arm.limit("acceleration")
-        uses = np.maximum(uses, np.concatenate([along, speed, np.sqrt(acceleration)], axis=1))
-    return _Run(trajectory, interval, uses)
+        s, sd, sdd = evaluate(inner, at), evaluate(rates, at), evaluate(bends, at)
+        slope = evaluate(slopes, s)
+        np.maximum(along, sd, out=along)
+        np.maximum(speed, np.abs(slope * sd), out=speed)
+        np.maximum(acceleration, np.abs(evaluate(curves, s) * sd**2 + slope * sdd), out=acceleration)
+    uses = [
+        along / caps[interval][:, None],
+        speed / arm.limit("speed"),
+        np.sqrt(acceleration / arm.limit("acceleration")),
+    ]
+    return _Run(path, times, interval, inner[..., 0], np.concatenate(uses, axis=1))
+
+
+def _when(law: Array, steps: Array, knots: Array) -> Array:
+    """Return when cubics s(t) (k, 4), which never fall, pass knots (k,), from 0 to ``steps`` (k,) [s]."""
+    terms = law[..., None]
+    low, high = np.zeros(len(knots)), steps
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        below = evaluate(terms, middle[:, None])[:, 0] < knots
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return low
 
 
 def _binding(joints: int, run: _Run) -> tuple[LimitName, int]:
     """Return which limit of which joint binds for the longest time."""
-    steps, of_joints = np.diff(run.trajectory.times), run.uses[:, 1:]
+    steps, of_joints = np.diff(run.times), run.uses[:, 1:]
     fullest = of_joints.argmax(axis=1)
     near = of_joints.max(axis=1) >= _BINDS * of_joints.max()
     counts = np.bincount(fullest[near], weights=steps[near], minlength=2 * joints)

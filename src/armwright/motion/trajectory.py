@@ -11,7 +11,7 @@ import numpy as np
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, number, read_only
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import one_way
-from armwright.motion.polynomials import derivative, extremes, shifted
+from armwright.motion.polynomials import derivative, extremes, peaks, shifted
 
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
 _MOST_SAMPLES = 100_000_000
@@ -135,8 +135,14 @@ class Trajectory:
         return np.maximum(np.abs(lowest), np.abs(highest))
 
     def peaks(self, order: int) -> Array:
-        """Return the largest magnitude of a derivative for every joint, (n,), exactly and not by sampling."""
-        return np.asarray(self.segment_peaks(order).max(axis=0))
+        """Return the largest magnitude of a derivative for every joint, (n,), exactly and not by sampling.
+
+        Raises:
+            KindError: the order is no whole number.
+            InvalidValueError: it is below 0.
+        """
+        _check_order(order)
+        return peaks(derivative(self.coefficients, order), np.diff(self.times))
 
     def slowed(self, factor: float) -> "Trajectory":
         """Return the same path run ``factor`` times slower; faster below 1.
@@ -305,5 +311,38 @@ def whole_ticks(trajectory: Trajectory, period: float) -> Trajectory:
     period = _period(period)
     if trajectory.duration == 0:
         return trajectory
-    ticks = max(1, math.ceil(trajectory.duration / period - _HAIR))
-    return trajectory.retimed(ticks * period)
+    return trajectory.retimed(_ticks(trajectory.duration, period) * period)
+
+
+def slowed_together(trajectories: Sequence[Trajectory], duration: float, period: float) -> list[Trajectory]:
+    """Return trajectories slowed alike, so that they take a duration together, rounded up to a tick.
+
+    Each ends on a tick, and so is slowed by a tick more or less than the others; none is run faster.
+
+    Args:
+        trajectories: one after the other, each a whole number of servo periods long.
+        duration: that all should take [s]; they take as long as they do where that is longer.
+        period: of the servo [s].
+
+    Raises:
+        KindError: the period is no number.
+        InvalidValueError: it is not above 0.
+    """
+    period = _period(period)
+    ends = np.cumsum([round(each.duration / period) for each in trajectories])
+    least = int(ends[-1])
+    if least == 0:
+        return list(trajectories)
+    wanted = max(least, _ticks(duration, period))
+    # In whole numbers, so that nobody gets less than it has.
+    slow_ends = [(2 * int(end) * wanted + least) // (2 * least) for end in ends]
+    counts = np.diff([0, *slow_ends])
+    return [
+        each.retimed(count * period) if count else each
+        for each, count in zip(trajectories, counts.tolist(), strict=True)
+    ]
+
+
+def _ticks(duration: float, period: float) -> int:
+    """Return how many servo periods a motion takes that lasts no shorter, one at least."""
+    return max(1, math.ceil(duration / period - _HAIR))

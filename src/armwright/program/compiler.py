@@ -7,7 +7,8 @@ from functools import cache
 
 import attrs
 
-from armwright.errors import ArmwrightError
+from armwright.errors import ArmwrightError, InvalidValueError
+from armwright.files.limits import beyond, limit
 from armwright.program.following import flow
 from armwright.program.following.flow import Flow
 from armwright.program.intermediate.code import Code
@@ -93,6 +94,24 @@ def no_collection() -> Iterator[None]:
             gc.enable()
 
 
+def _bounded(read_import: ReadImport) -> ReadImport:
+    """Return what reads imports, and refuses more files than the limit, or more frames in all of them."""
+    frames: dict[str, int] = {}
+
+    def read(name: str) -> Imported:
+        if name not in frames and len(frames) >= limit("imports"):
+            raise InvalidValueError(f"too many files: {beyond('imports')}")
+        frames.setdefault(name, 0)
+        brought = read_import(name)
+        frames[name] = len(brought.frames)
+        together = sum(frames.values())
+        if together > limit("frames"):
+            raise InvalidValueError(f"too many frames in all files together: {beyond('frames', together)}")
+        return brought
+
+    return read
+
+
 def _imported(program: tree.Program, read_import: ReadImport) -> KnownCell | None:
     """Return the first cell with arms that a program imports; None without one."""
     for header in program.headers:
@@ -112,7 +131,7 @@ def _compile(
     scanned = scan(source, text, std)
     program, slips = parse(source, scanned.tokens, std)
     if read_import is not None:
-        read_import = cache(read_import)
+        read_import = cache(_bounded(read_import))
         cell = _imported(program, read_import) if cell is None else cell
     symbols, wrong, imports = check.check(program, cell, std=std, read_import=read_import)
     spelling = {token.key: token.text for token in reversed(scanned.tokens) if token.kind is TokenKind.NAME}

@@ -19,7 +19,7 @@ from armwright.calibration.measurements import Measurements
 from armwright.calibration.model import Off
 from armwright.calibration.readings import refuse_not_fitted
 from armwright.calibration.validation import HeldOut, cross_validated
-from armwright.errors import InvalidValueError
+from armwright.errors import ContradictionError, InvalidValueError
 from armwright.spatial.euler import to_rpy
 
 # Turns about y, which a Denavit-Hartenberg table has no number for.
@@ -49,6 +49,7 @@ class Calibrated:
         accuracy: AP and AD of the arm as said, with its base moved, and calibrated (held out); None without points.
         repeatability: RP of postures that were measured more than once; None where none was.
         beyond: what beyond geometry was tried; None where nothing was.
+        doubts: by what the readings contradict the arm that was fitted to them; empty where they do not.
         notes: what is worth a sentence.
     """
 
@@ -64,6 +65,7 @@ class Calibrated:
     accuracy: dict[str, Accuracy] | None
     repeatability: Repeatability | None
     beyond: Beyond | None
+    doubts: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -74,6 +76,7 @@ def calibrated(
     folds: int = 5,
     seed: int = 0,
     beyond: bool = False,
+    noise: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Calibrated:
     """Calibrate an arm with and without turns about y, and hold readings out.
@@ -84,6 +87,8 @@ def calibrated(
         folds: parts in which postures are held out.
         seed: of the parts.
         beyond: whether to try what is not geometry.
+        noise: standard deviation of a measured coordinate; where it is stated, readings that are farther off than it
+            explains make the calibration doubtful [m].
         progress: told what is being done.
 
     Raises:
@@ -101,13 +106,13 @@ def calibrated(
     refuse_not_fitted(seen, measurements.readings.take(~fit))
     full = calibrate_to(arm, seen, progress=progress)
     table = full if not any(name.endswith(_TILTS) for name in full.names) else calibrate_to(arm, seen, without=_TILTS)
-    tried = calibrate_beyond(arm, seen, folds=folds, seed=seed, progress=progress) if beyond else None
+    tried = calibrate_beyond(arm, seen, folds=folds, seed=seed, unseen=True, progress=progress) if beyond else None
     told("holding points out: all errors")
     held_out = tried.geometry if tried else cross_validated(arm, seen, folds=folds, seed=seed)
     told("holding regions out")
     try:
         held_out_region = cross_validated(arm, seen, folds=folds, regions=True)
-    except InvalidValueError:
+    except (ContradictionError, InvalidValueError):
         # A frame, a plane or an anchor lies in one region, or too few readings are left.
         held_out_region = None
     held_out_table = held_out
@@ -124,8 +129,9 @@ def calibrated(
     if not len(raw) or np.median(raw) > _ELSEWHERE:
         raw = raw[:0]
         del places["as said"]
-    if tried:
-        places["beyond geometry, held out"] = tried.held_out.places
+    if tried and tried.unseen:
+        places["beyond geometry, held out"] = tried.unseen.places
+    doubtful = tuple(doubts(full, seen, noise))
     words = {name: accuracy(seen, place) for name, place in places.items()}
     return Calibrated(
         arm=arm,
@@ -140,7 +146,13 @@ def calibrated(
         accuracy={name: one for name, one in words.items() if one is not None} or None,
         repeatability=repeatability(seen),
         beyond=tried,
-        notes=(*doubts(full, seen), *_notes(full, measurements), *_which_to_believe(held_out, held_out_region)),
+        doubts=doubtful,
+        notes=(
+            *(f"DOUBTFUL: {one}" for one in doubtful),
+            *_notes(full, measurements),
+            *_which_to_believe(held_out, held_out_region),
+            *_of_the_choice(tried),
+        ),
     )
 
 
@@ -177,17 +189,36 @@ def _which_to_believe(held_out: HeldOut, region: HeldOut | None) -> Iterator[str
     )
 
 
+def _of_the_choice(tried: Beyond | None) -> Iterator[str]:
+    """Say of which points the figures beyond geometry are."""
+    if tried is None:
+        return
+    if tried.unseen is None:
+        yield (
+            "beyond geometry was chosen by all points that were held out, and so few leave none to see how good the "
+            "choice is: measure more, or keep rows to check with"
+        )
+        return
+    yield (
+        f"beyond geometry, held out ({tried.unseen.distance.mean() * 1e3:.4g} mm) is of points that neither fit nor "
+        f"choice has seen; the table of what was tried has those that chose"
+    )
+
+
 def distances(found: Calibrated) -> dict[str, Array]:
     """Return by name the distances by which readings miss the arm [m]."""
+    none = np.zeros(0)
+    kept = found.measurements.readings.take(found.measurements.check)
     kinds = {
         "arm and base as said": found.raw,
         "base moved to fit": found.full.before.distance,
         "calibrated, held out": found.held_out.distance,
-        "calibrated, region held out": found.held_out_region.distance if found.held_out_region else np.zeros(0),
+        "calibrated, region held out": found.held_out_region.distance if found.held_out_region else none,
         "calibrated, all readings": found.full.after.distance,
         "arm file, held out": found.held_out_table.distance,
-        "beyond geometry, held out": found.beyond.held_out.distance if found.beyond else np.zeros(0),
+        "beyond geometry, held out": found.beyond.unseen.distance if found.beyond and found.beyond.unseen else none,
         "calibrated, kept to check": found.checked.distance,
+        "beyond geometry, kept to check": found.beyond.missed(kept).distance if found.beyond else none,
     }
     return {name: x for name, x in kinds.items() if len(x)}
 
@@ -248,6 +279,7 @@ def as_data(found: Calibrated) -> dict[str, Any]:
             **{name: one._asdict() for name, one in (found.accuracy or {}).items()},
             "repeatability": found.repeatability._asdict() if found.repeatability else None,
         },
+        "doubts": list(found.doubts),
         "notes": list(found.notes),
     }
     if found.beyond:

@@ -76,7 +76,7 @@ def result_tables(found: Calibrated) -> Iterator[Table]:
     )
     if found.beyond:
         yield Table(
-            title="Beyond geometry, on points held out",
+            title="What was tried beyond geometry, on the held-out points that chose",
             heads=("", "mean mm", "gain mm", "±", "kept"),
             rows=[
                 (
@@ -84,11 +84,13 @@ def result_tables(found: Calibrated) -> Iterator[Table]:
                     *(
                         ("", "", "")
                         if one.held_out is None
+                        else (f"{one.held_out * 1e3:.4f}", "", "")
+                        if number == 0
                         else (f"{one.held_out * 1e3:.4f}", f"{one.gain * 1e3:+z.4f}", f"{one.chance * 1e3:.4f}")
                     ),
                     f"{'yes' if one.kept else 'no'}{': ' if one.why else ''}{one.why}",
                 )
-                for one in found.beyond.tried
+                for number, one in enumerate(found.beyond.tried)
             ],
             numbers=(1, 2, 3),
         )

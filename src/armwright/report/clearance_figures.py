@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.report.figures import empty_figure, svg_text
+from armwright.report.figures import empty_figure, literal, svg_text
 
 
 def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> str:
@@ -27,7 +27,7 @@ def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> 
     X, Y = np.meshgrid(x, y, indexing="ij")
     axis.plot_surface(X, Y, z, cmap="viridis", alpha=0.85, linewidth=0.3, edgecolor="0.35")
     axis.scatter(X.ravel(), Y.ravel(), z.ravel(), s=5, color="0.15", depthshade=False)
-    axis.set(title=title, xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
+    axis.set(title=literal(title), xlabel=labels[0], ylabel=labels[1], zlabel=labels[2])
     axis.locator_params(nbins=5)
     axis.view_init(elev=24, azim=-128)
     axis.set_box_aspect(None, zoom=0.88)
@@ -59,12 +59,12 @@ def marked_curves(
     figure = empty_figure((7.2, 4.2))
     axis = figure.subplots()
     for name, y in lines.items():
-        axis.plot(x, y, linewidth=1.3, label=name)
+        axis.plot(x, y, linewidth=1.3, label=literal(name))
     for name, (at, values) in (fits or {}).items():
-        axis.plot(at, values, "k--", linewidth=1.4, label=name)
+        axis.plot(at, values, "k--", linewidth=1.4, label=literal(name))
     for low, high in spans:
         axis.axvspan(low, high, color="0.88", zorder=0)
-    axis.set(title=title, xlabel=labels[0], ylabel=labels[1], xlim=(float(x[0]), float(x[-1])))
+    axis.set(title=literal(title), xlabel=labels[0], ylabel=labels[1], xlim=(float(x[0]), float(x[-1])))
     axis.grid(visible=True, alpha=0.3)
     if len(lines) + len(fits or {}) > 1:
         axis.legend(fontsize="small")
@@ -88,11 +88,11 @@ def lines_of_spectrum(title: str, frequencies: Array, spectra: Mapping[str, Arra
     for axis, (name, values) in zip(panels, spectra.items(), strict=True):
         axis.vlines(frequencies, 0, values, color="C0", linewidth=1.6)
         axis.plot(frequencies, values, "o", color="C0", markersize=3)
-        axis.set(title=name, ylabel=f"amplitude, {unit}")
+        axis.set(title=literal(name), ylabel=f"amplitude, {unit}")
         axis.set_ylim(bottom=0)
         axis.grid(visible=True, alpha=0.3)
     panels[-1].set_xlabel("frequency, Hz")
-    figure.suptitle(title)
+    figure.suptitle(literal(title))
     return svg_text(figure)
 
 
@@ -113,7 +113,7 @@ def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array)
     for i, (name, lines) in enumerate(panels.items()):
         axis = figure.add_subplot(grid[0, i * near : (i + 1) * near])
         _plane(axis, lines, targets)
-        axis.set(title=name, xlabel="x, mm", ylabel="y, mm")
+        axis.set(title=literal(name), xlabel="x, mm", ylabel="y, mm")
         axis.set_aspect("equal", adjustable="datalim")
         axis.legend(fontsize="small", loc="lower center")
         for k, target in enumerate(targets):
@@ -126,7 +126,7 @@ def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array)
             )
             close.set_aspect("equal")
             close.tick_params(labelsize="x-small")
-    figure.suptitle(title)
+    figure.suptitle(literal(title))
     return svg_text(figure)
 
 
@@ -136,6 +136,6 @@ _CLOSE = 1.5
 
 def _plane(axis: Any, lines: Mapping[str, Array], targets: Array) -> None:
     for style, (name, places) in zip(("k--", "C0-", "C1-"), lines.items(), strict=False):
-        axis.plot(*places.T, style, linewidth=1.2, label=name)
+        axis.plot(*places.T, style, linewidth=1.2, label=literal(name))
     axis.plot(*targets.T, "r+", markersize=9, label="targets")
     axis.grid(visible=True, alpha=0.3)

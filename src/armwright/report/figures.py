@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Line styles in the order of the curves: the first is the reference, the others are told apart without colour too.
 _STYLES = ("-", "--", "-.", ":")
+# Of a name or a title so many characters are shown.
+_LONGEST = 40
 
 
 class Drawing(NamedTuple):
@@ -57,8 +59,8 @@ def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_
     figure = empty_figure((7, 4.2))
     axes = figure.subplots()
     for i, (name, y) in enumerate(lines.items()):
-        axes.plot(x, y, _STYLES[i % len(_STYLES)], label=name, linewidth=1.6)
-    axes.set(title=title, xlabel=x_label, ylabel=y_label, xlim=(float(x[0]), float(x[-1])))
+        axes.plot(x, y, _STYLES[i % len(_STYLES)], label=literal(name), linewidth=1.6)
+    axes.set(title=literal(title), xlabel=x_label, ylabel=y_label, xlim=(float(x[0]), float(x[-1])))
     axes.grid(visible=True, alpha=0.3)
     if len(lines) > 1:
         axes.legend()
@@ -84,8 +86,8 @@ def bars(
     axes = figure.subplots()
     width = 0.8 / len(values)
     for i, (name, heights) in enumerate(values.items()):
-        axes.bar([k + (i + 0.5) * width - 0.4 for k in range(len(names))], heights, width, label=name)
-    axes.set(title=title, ylabel=y_label, xticks=range(len(names)), xticklabels=names)
+        axes.bar([k + (i + 0.5) * width - 0.4 for k in range(len(names))], heights, width, label=literal(name))
+    axes.set(title=literal(title), ylabel=y_label, xticks=range(len(names)), xticklabels=names)
     if logarithmic:
         axes.set_yscale("log")
     axes.grid(visible=True, axis="y", alpha=0.3)
@@ -144,5 +146,11 @@ def svg_text(figure: "Figure") -> str:
 
 
 def literal(text: str) -> str:
-    """Return a text in which no dollar begins a formula."""
-    return text.replace("$", r"\$")
+    """Return a text of a user's as figures show it: no dollar begins a formula, and every character is a letter.
+
+    Tabs and ends of lines become blanks, other characters that no font has become marks, and of a page its beginning
+    is shown.
+    """
+    text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+    letters = (one if one.isprintable() else " " if one.isspace() else "\N{REPLACEMENT CHARACTER}" for one in text)
+    return "".join(letters).replace("$", r"\$")

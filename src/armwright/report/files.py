@@ -1,6 +1,5 @@
 """The files of a run: motion, events, frames, what made them, and the page."""
 
-import hashlib
 import json
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -13,12 +12,15 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.errors import ExitStatus
+from armwright.files.output import sha256
+from armwright.files.reading import hash_read
 from armwright.motion.plan import Stage
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic, to_json
+from armwright.program.running.excerpt import IN_A_LIST, KEPT, Excerpt, excerpt, listed, more
 from armwright.program.running.machine import RunError
-from armwright.program.running.recording import Recording, RunStage, motion_rows
-from armwright.report.page import run_page
+from armwright.program.running.recording import Effect, Recording, RunStage, motion_rows
+from armwright.report.page import COLLISIONS, run_page
 from armwright.report.recorded import page_of
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
@@ -107,13 +109,20 @@ def ending(recording: Recording, code: Code) -> dict[str, Any]:
     return {"ended": "failed", "exit_status": int(RunError.exit_status), "error": error}
 
 
-def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic]) -> dict[str, Any]:
-    """Return a run in short, as plain data in SI units."""
+def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], where: str = KEPT) -> dict[str, Any]:
+    """Return a run in short, as plain data in SI units.
+
+    Args:
+        recording: what happened.
+        code: the program that ran.
+        diagnostics: warnings of translation and run, and what ended it.
+        where: what is said of the lines of a trace that is too long.
+    """
     found = {
         "program": code.source.name,
         "cell": recording.cell.name,
         "duration": recording.duration,
-        "trace": recording.trace(),
+        "trace": listed(recording.trace(), IN_A_LIST, where),
         "contacts": [
             {
                 "line": code.source.line(one.span.start),
@@ -122,14 +131,18 @@ def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic])
                 "t1": one.t1,
                 **one.data["contact"],
             }
-            for one in recording.effects
-            if "contact" in one.data
+            for one in _contacts(recording).joined()
         ],
-        "collisions": "not looked for",
+        "collisions": COLLISIONS,
         "stages": [_stage(stage, recording, code) for stage in recording.stages],
         "diagnostics": [to_json(one, code.source) for one in diagnostics],
     }
     return {name: rounded(value) for name, value in found.items()}
+
+
+def _contacts(recording: Recording) -> Excerpt[Effect]:
+    # Where an arm is braked its STOP has the contact too.
+    return excerpt([one for one in recording.effects if one.kind == "MOVE" and "contact" in one.data], IN_A_LIST)
 
 
 def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
@@ -214,23 +227,26 @@ def left_out(recording: Recording, most_rows: int) -> tuple[str, ...]:
         recording: what happened.
         most_rows: of ``motion.csv``.
     """
-    rows, kept = sum(len(one.t) for one in recording.streams), _kept(recording, most_rows)
+    rows, contacts = sum(len(one.t) for one in recording.streams), _contacts(recording).left_out
+    more_contacts = (f"run.json lists the first and the last contacts: {more(contacts)}",) if contacts else ()
     if rows <= most_rows:
-        return ()
-    ticks = len(recording.streams[0].t)
+        return more_contacts
+    ticks, kept = len(recording.streams[0].t), _kept(recording, most_rows)
     first, end, _ = kept.indices(ticks)
     part = "last" if first else "first"
     text = (
         f"motion.csv holds the {part} {(end - first) * recording.cell.period:.3f} s of {recording.duration:.3f} s: "
         f"{(end - first) * len(recording.streams)} of {rows} rows; `--motion-rows {rows}` keeps all"
     )
-    return (text,)
+    return (text, *more_contacts)
 
 
 def _kept(recording: Recording, most_rows: int) -> slice:
     """Return the ticks that ``motion.csv`` holds: the first ones, or the last ones before a failure."""
     ticks = most_rows // max(len(recording.streams), 1)
-    return slice(0, ticks) if recording.failure is None else slice(-ticks, None)
+    if recording.failure is None or not recording.streams:
+        return slice(0, ticks)
+    return slice(max(0, len(recording.streams[0].t) - ticks), None)
 
 
 def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
@@ -260,8 +276,8 @@ def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnosti
     }
 
 
-def _file(path: Path) -> dict[str, str]:
-    return {"path": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
+def _file(path: Path) -> dict[str, str | None]:
+    return {"path": str(path), "sha256": hash_read(path) or sha256(path)}
 
 
 def _numbers(values: Array) -> list[float]:

@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.motion.hand_path import zyz_angles
 from armwright.motion.trajectory import Samples
-from armwright.report.figures import empty_figure, equal_scales, spread, svg_text
+from armwright.report.figures import empty_figure, equal_scales, literal, spread, svg_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,10 +58,10 @@ def panels(
         for name, moment in (marks or {}).items():
             # Above the name of the panel.
             above = {"xytext": (0, 17), "textcoords": "offset points", "ha": "center", "va": "bottom", "color": "0.4"}
-            axis.annotate(name, (moment, 1), xycoords=("data", "axes fraction"), **above)
+            axis.annotate(literal(name), (moment, 1), xycoords=("data", "axes fraction"), **above)
     for axis in grid[-1]:
         axis.set_xlabel("time, s")
-    figure.suptitle(title)
+    figure.suptitle(literal(title))
     return svg_text(figure)
 
 
@@ -78,7 +78,7 @@ def path_in_space(title: str, X: Array, marks: Mapping[str, Array]) -> str:
     """
     figure = empty_figure((6.4, 5.6))
     draw_path(figure.add_subplot(projection="3d"), X, marks)
-    figure.suptitle(title)
+    figure.suptitle(literal(title))
     return svg_text(figure)
 
 
@@ -101,7 +101,7 @@ def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapp
         draw_curves(axis, t, panel)
         axis.set_xlabel("time, s")
     draw_path(figure.add_subplot(2, 2, 4, projection="3d"), X, marks)
-    figure.suptitle(title)
+    figure.suptitle(literal(title))
     return svg_text(figure)
 
 
@@ -144,9 +144,9 @@ def _rate(values: Array, t: Array) -> Array:
 def draw_curves(axis: "Axes", t: Array, panel: Panel) -> None:
     """Draw the curves of a panel."""
     for (name, values), style in zip(panel.lines.items(), _STYLES * 4, strict=False):
-        axis.plot(t, values, linestyle=style, label=name, linewidth=1.4)
+        axis.plot(t, values, linestyle=style, label=literal(name), linewidth=1.4)
     axis.set(ylabel=panel.unit, xlim=(float(t[0]), float(t[-1])))
-    axis.set_title(panel.title, loc="left", fontsize="medium")
+    axis.set_title(literal(panel.title), loc="left", fontsize="medium")
     axis.grid(visible=True, alpha=0.3)
     axis.legend(loc="center left", bbox_to_anchor=(1.005, 0.5), fontsize="small", frameon=False)
 
@@ -162,7 +162,7 @@ def draw_path(axis: Any, X: Array, marks: Mapping[str, Array]) -> None:
     for name, place in marks.items():
         x, y, z = place * 100
         axis.plot([x], [y], [z], "o", color="C3", markersize=5)
-        axis.text(x, y, z, f"  {name}", color="C3")
+        axis.text(x, y, z, f"  {literal(name)}", color="C3")
     tips = p[some] + a
     low, high = np.minimum(p.min(axis=0), tips.min(axis=0)), np.maximum(p.max(axis=0), tips.max(axis=0))
     equal_scales(axis, low, high, least=1e-3)

@@ -22,6 +22,9 @@ StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"
 TextKind: TypeAlias = Literal["Program", "Poses"]
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
 
+# What is said of collisions wherever a motion is reported, until they are looked for.
+COLLISIONS = "not looked for"
+
 _SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "joint_charts.js", "lists.js", "run.js")
 _SAME = attrs.cmp_using(eq=np.array_equal)
 
@@ -330,4 +333,5 @@ def _facts(data: RunPage) -> Iterator[tuple[str, str]]:
     if data.cell_name:
         yield "Cell", data.cell_name
     yield data.text_kind, data.program_name
+    yield "Collisions", COLLISIONS
     yield "Command", data.command

@@ -222,8 +222,8 @@ def _outlook_in_words(run: Run) -> Iterator[str]:
     one = run.outlook
     if one is None:
         return
-    what = f"clearances a nanometre away{' or half the step' if one.halved else ''}"
-    apart = f"{APART * 1e6:g} µm{f' ({APART / FINER * 1e6:g} µm for half the step)' if one.halved else ''}"
+    what = f"clearances a nanometre away{' or a smaller step' if one.finer else ''}"
+    apart = f"{APART * 1e6:g} µm{f' ({APART / FINER * 1e6:g} µm for a smaller step)' if one.finer else ''}"
     if one.to_the_end:
         yield f"predictable to the end: runs with {what} stay within {apart}"
         return

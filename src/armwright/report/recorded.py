@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TypeVar
 
+import attrs
 import numpy as np
 
 from armwright.arrays import Array
@@ -12,6 +13,7 @@ from armwright.cell.model import Cell, CellArm, base_name
 from armwright.kinematics.forward import link_poses
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.running.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
 from armwright.program.running.obstacles import note_of
 from armwright.program.running.recording import Effect as RunEffect
 from armwright.program.running.recording import Recording, RunStage, Stream
@@ -32,8 +34,8 @@ from armwright.version import __version__
 # Enough for a screen: instants of the animation.
 _FRAMES_PER_SECOND = 30.0
 _MOST_INSTANTS = 1200
-# What a browser can list without delay.
-_MOST_ITEMS = 4000
+# Frames that the view draws: more hide one another, and each has a pose at every instant.
+_MOST_FRAMES = 400
 _T = TypeVar("_T")
 
 
@@ -54,12 +56,14 @@ def page_of(
         left_out: what other files leave out, as it is said there.
     """
     source, cell, failure = code.source, recording.cell, recording.failure
-    effects, fewer = _fewer(recording.effects, "lines of what happened")
-    processes = recording.processes
-    stages, fewer_stages = _fewer(recording.stages, "stages")
+    stages, fewer_stages = _fewer(recording.stages, IN_A_LIST, "stages", "all in run.json")
+    animation, fewer_frames = _animation(recording, code)
     status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
     why = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
-    said = sorted(diagnostics, key=lambda one: not one.is_error)
+    said, fewer = _fewer(
+        sorted(diagnostics, key=lambda one: not one.is_error), IN_A_LIST, "messages", "all in run.json"
+    )
+    notes = (*why, *left_out, *fewer, *fewer_stages, *fewer_frames)
     return RunPage(
         title=f"{source.name} in {cell.name}" + ("" if failure is None else ": failed"),
         status=status,
@@ -73,30 +77,32 @@ def page_of(
             Message(severity=one.severity.value, code=one.code, line=source.line(one.span.start), text=one.message)
             for one in said
         ]
-        + [Message(severity="note", text=text) for text in (*why, *left_out, *fewer, *fewer_stages)],
-        effects=[
-            Effect(
-                t0=one.t0,
-                t1=one.t1,
-                line=source.line(one.span.start),
-                text=one.text,
-                process=one.process if len(processes) > 1 else "",
-            )
-            for one in effects
-        ],
+        + [Message(severity="note", text=text) for text in notes],
+        effects=_effects(recording, code),
         stages=[_stage(one, source.line(one.span.start)) for one in stages],
         arms=[_record(one, cell) for one in recording.streams],
-        animation=_animation(recording, code),
+        animation=animation,
     )
 
 
-def _fewer(items: Sequence[_T], what: str) -> tuple[Sequence[_T], list[str]]:
-    """Return as many as a page can hold, the first and the last, and a note where that is not all."""
-    if len(items) <= _MOST_ITEMS:
-        return items, []
-    half = _MOST_ITEMS // 2
-    text = f"this page shows the first and the last {half} of {len(items)} {what}; events.jsonl and run.json have all"
-    return (*items[:half], *items[-half:]), [text]
+def _fewer(items: Sequence[_T], most: int, what: str, where: str = KEPT) -> tuple[list[_T], list[str]]:
+    """Return as many items as a page can hold, the first and the last, and a note where that is not all."""
+    found = excerpt(items, most)
+    text = f"this page shows the first and the last {len(found.first):,} of {len(items):,} {what}; {where}"
+    return found.joined(), [text] if found.left_out else []
+
+
+def _effects(recording: Recording, code: Code) -> list[Effect]:
+    """Return what happened, in place of what a page cannot hold a line that says so."""
+    several = len(recording.processes) > 1
+    found = excerpt(recording.effects, IN_A_LIST)
+
+    def shown(one: RunEffect) -> Effect:
+        number, process = code.source.line(one.span.start), one.process if several else ""
+        return Effect(t0=one.t0, t1=one.t1, line=number, text=one_line(one.text), process=process)
+
+    rest = [attrs.evolve(shown(found.first[-1]), text=more(found.left_out))] if found.left_out else []
+    return found.mapped(shown).joined(*rest)
 
 
 def _stage(run: RunStage, line: int) -> Stage:
@@ -132,19 +138,24 @@ def _record(stream: Stream, cell: Cell) -> ArmRecord:
     )
 
 
-def _animation(recording: Recording, code: Code) -> Animation:
+def _animation(recording: Recording, code: Code) -> tuple[Animation, list[str]]:
+    """Return what the view shows, and notes of what it leaves out."""
     fps = min(_FRAMES_PER_SECOND, _MOST_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms = recording.cell.arms
     links = {one.arm: _poses_in_world(arms[one.arm], _sampled(one, t)) for one in recording.streams}
     hands = {name: poses[:, -1] for name, poses in links.items()}
-    return Animation(
+    seen = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
+    names, fewer_frames = _fewer(seen, _MOST_FRAMES, "frames", "all in frames.json")
+    changes, fewer_changes = _fewer([*_tree_changes(recording, code, t)], IN_A_LIST, "changes of the tree of frames")
+    animation = Animation(
         fps=fps,
         t=t,
         arms={name: sticks(arms[name].arm, poses, _grip(recording.effects, name, t)) for name, poses in links.items()},
-        frames=_tracks(recording, code, t, hands),
-        tree=_tree_changes(recording, code),
+        frames=_tracks(recording, code, t, hands, names),
+        tree=changes,
     )
+    return animation, [*fewer_frames, *fewer_changes]
 
 
 def _sampled(stream: Stream, t: Array) -> Array:
@@ -166,19 +177,15 @@ def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
     return np.interp(t, times, values)
 
 
-def _tracks(recording: Recording, code: Code, t: Array, hands: dict[str, Array]) -> Iterator[FrameTrack]:
-    names = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
+def _tracks(
+    recording: Recording, code: Code, t: Array, hands: dict[str, Array], names: Sequence[str]
+) -> Iterator[FrameTrack]:
     poses = {name: np.tile(np.eye(4), (len(t), 1, 1)) for name in names}
     first: dict[str, int] = {}
-    for rows, tree in _reigns(recording, t):
-        # Parents come before children, so each place is the parent's and one step more.
+    for _, rows, tree in _reigns(recording, t):
         places: dict[str, Array] = {WORLD: np.eye(4), **{arm: hand[rows] for arm, hand in hands.items()}}
-        for name in tree:
-            node = tree.nodes.get(name)
-            if name in places or node is None or node.relation is None or node.parent not in places:
-                continue
-            places[name] = places[node.parent] @ node.relation
-            if name in poses:
+        for name in names:
+            if _found(name, tree, places):
                 poses[name][rows] = places[name]
                 first.setdefault(name, rows.start)
     for name in names:
@@ -186,19 +193,38 @@ def _tracks(recording: Recording, code: Code, t: Array, hands: dict[str, Array])
             yield FrameTrack(name=code.spelled(name), poses=to_noap(poses[name]), visible_from=first[name])
 
 
-def _reigns(recording: Recording, t: Array) -> Iterator[tuple[slice, FrameTree]]:
-    """Give the rows of ``t`` during which each frame tree holds, and the tree."""
+def _found(name: str, tree: FrameTree, places: dict[str, Array]) -> bool:
+    """Work out where a frame is, and whatever it hangs on; return whether it is anywhere."""
+    way = []
+    while name not in places:
+        node = tree.nodes.get(name)
+        if node is None or node.relation is None:
+            return False
+        way.append((name, node.relation))
+        name = node.parent
+    X = places[name]
+    for below, relation in reversed(way):
+        places[below] = X = X @ relation
+    return True
+
+
+def _reigns(recording: Recording, t: Array) -> Iterator[tuple[float, slice, FrameTree]]:
+    """Give since when each frame tree holds [s], the rows of ``t`` during which it does, and the tree.
+
+    Trees that hold at none of these instants are passed over.
+    """
     starts = [time for time, _ in recording.trees]
     rows = [int(np.searchsorted(t, time - 1e-9)) for time in starts] + [len(t)]
-    for i, (_, tree) in enumerate(recording.trees):
+    for i, (start, tree) in enumerate(recording.trees):
         if rows[i] < rows[i + 1]:
-            yield slice(rows[i], rows[i + 1]), tree
+            yield start, slice(rows[i], rows[i + 1]), tree
 
 
-def _tree_changes(recording: Recording, code: Code) -> Iterator[TreeChange]:
+def _tree_changes(recording: Recording, code: Code, t: Array) -> Iterator[TreeChange]:
+    """Give the changes of the tree that can be seen at the instants of the view."""
     before: Mapping[str, Node] = {}
     shown: dict[str, str] = {}
-    for time, tree in recording.trees:
+    for time, _, tree in _reigns(recording, t):
         for name, node in tree.nodes.items():
             if node is before.get(name) or node.relation is None or name.endswith(".BASE"):
                 continue

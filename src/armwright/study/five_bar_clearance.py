@@ -139,8 +139,8 @@ def arm() -> Linkage:
 
 
 def feature_sweep() -> FeatureSweep:
-    """Return the task whose 729 points the thesis simulates."""
-    return FeatureSweep(linkage=arm(), paths=PATHS, settings_of=SETTINGS)
+    """Return the task whose 729 points the thesis simulates, once each as it does."""
+    return FeatureSweep(linkage=arm(), paths=PATHS, settings_of=SETTINGS, twins=0)
 
 
 def learnt(progress: Callable[[str, float], None] | None = None, *, levels: Sequence[float] = LEVELS) -> Learnt:

@@ -10,7 +10,7 @@ import multiprocessing
 import pickle
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Future, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Protocol
 
 from armwright.arrays import Array
@@ -184,6 +184,8 @@ class Cluster:
             SweepError: there is no worker, or one cannot load the task.
         """
         self._client, self._address = client, address
+        self._arriving: set[asyncio.Future[Any]] = set()
+        self._over = False
         self._payload = pickled(task, extra("cloudpickle").dumps)  # workers need not have the script that sweeps
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
@@ -205,18 +207,22 @@ class Cluster:
         """Begin a piece, known to the cluster by what it is: asked for twice at a time, it is done once."""
         future: Future[Rows] = Future()
         remote = self._client.submit(work, __version__, self._payload, points, pure=True)
-        remote.add_done_callback(lambda ended: self._hand_over(ended, future))
+        self._client.loop.add_callback(self._hand_over, remote, future)
         return future
 
-    def _hand_over(self, remote: Any, future: Future[Rows]) -> None:
-        """Say with the words of ``concurrent.futures`` how a future of Dask ended."""
+    async def _hand_over(self, remote: Any, future: Future[Rows]) -> None:
+        """Say with the words of ``concurrent.futures`` how a future of Dask ended.
+
+        It waits on the loop of its own client and ends with that. Dask's callbacks of all clients share one thread: one
+        that asks for rows while its client is closed would wait there for ever, and all others behind it.
+        """
         from distributed import KilledWorker  # noqa: PLC0415 - a library of the extra
 
         try:
-            rows = remote.result()
+            rows = await self._rows(remote)
         except KilledWorker as error:
             future.set_exception(BrokenExecutor(str(error)))
-        except (CancelledError, OSError) as error:
+        except (CancelledError, asyncio.CancelledError, OSError) as error:
             text = f"the Dask cluster at '{self._address}' went away: {error}; start again to go on"
             future.set_exception(SweepError(text))
         except BaseException as error:  # noqa: BLE001 - it is raised where it is waited for
@@ -224,8 +230,29 @@ class Cluster:
         else:
             future.set_result(rows)
 
+    async def _rows(self, remote: Any) -> Rows:
+        """Wait for rows and fetch them, unless nobody wants them any more."""
+        await remote.exception()
+        if self._over:
+            raise CancelledError
+        arriving = asyncio.ensure_future(remote.result())
+        self._arriving.add(arriving)
+        arriving.add_done_callback(self._arriving.discard)
+        rows: Rows = await arriving
+        return rows
+
     def renew(self) -> None:
         """Do nothing: a cluster replaces its own workers."""
+
+    def end(self) -> None:
+        """Fetch no more rows, and let those arrive that are on their way: a scheduler whose client goes complains."""
+        with suppress(TimeoutError, RuntimeError):
+            self._client.sync(self._arrived, callback_timeout=PATIENCE)
+
+    async def _arrived(self) -> None:
+        self._over = True
+        if self._arriving:
+            await asyncio.wait(self._arriving)
 
 
 @contextmanager
@@ -239,7 +266,11 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
     _refuse_silence(address)
     with _client(distributed.Client, address) as client, extra("threadpoolctl").threadpool_limits(1):
         # Where the workers are threads of this process, its threads are theirs.
-        yield Cluster(client, address, task)
+        crew = Cluster(client, address, task)
+        try:
+            yield crew
+        finally:
+            crew.end()
 
 
 @contextmanager

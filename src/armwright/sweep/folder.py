@@ -3,9 +3,11 @@
     sweep.json          what the sweep is of, and with which versions it was begun
     blocks/000007.npz   the rows of one block, with a checksum
     results.nc          the results, made of the blocks when all are finished
+    run.json            the SHA-256 hash of the results
     lock                held by the process at work
 
-Every file is written under another name and moved when it is whole and on the disk.
+Every file is written under another name and moved when it is whole and on the disk. What is read back is checked; what
+is damaged is named and left as it is, for its numbers may have taken hours.
 """
 
 import contextlib
@@ -15,7 +17,10 @@ import hashlib
 import json
 import os
 import platform
+import re
+import stat
 import sys
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,6 +31,8 @@ import numpy as np
 import scipy
 
 from armwright.errors import FileFormatError, KindError, OutputError, shown
+from armwright.files.output import RECORD
+from armwright.files.reading import read_text, regular
 from armwright.sweep.designs import Design
 from armwright.sweep.errors import SweepError
 from armwright.sweep.task import Rows, Task
@@ -34,6 +41,12 @@ from armwright.version import __version__
 _FORMAT = 1
 MANIFEST, _BLOCKS, RESULTS, _LOCK = "sweep.json", "blocks", "results.nc", "lock"
 _HALF = ".tmp"
+# What a process that was killed may have left half written. Other names in the folder are not ours.
+_HALVES = (*(f"{name}{_HALF}" for name in (MANIFEST, RESULTS, RECORD)), f"{_BLOCKS}/*.npz{_HALF}.npz")
+_HALF_BLOCK = re.compile(rf"[0-9]{{6,}}\.npz{re.escape(_HALF)}\.npz")
+# What the lock says begins with this; an empty one was just made.
+_HOLDER = "process "
+_LONGEST_HOLDER = 1000
 
 
 def identity(task: Task, design: Design) -> dict[str, Any]:
@@ -116,21 +129,37 @@ class Folder:
         write_whole(self._block(number), write, suffix=f"{_HALF}.npz")
 
     def kept(self, number: int) -> Rows | None:
-        """Return a block as it was written; None if it is not there or damaged."""
+        """Return a block as it was written; None if it is not there.
+
+        Raises:
+            FileFormatError: it is damaged; its file stays as it is.
+        """
+        path = self._block(number)
+        if path.exists() and not path.is_file():
+            raise self._damaged(number, "it is not a file")
         try:
-            with self._block(number).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
+                _refuse_compressed(file.zip)
                 arrays = {name: file[name] for name in file.files}
             checksum = str(arrays.pop("checksum"))
-        except Exception:  # noqa: BLE001 - damaged, zip files and arrays fail in many ways
+        except FileNotFoundError:
             return None
+        except Exception as error:  # zip files and arrays fail in many ways
+            raise self._damaged(number, shown(error)) from error
         if checksum != self._checksum(number, arrays):
-            return None
+            raise self._damaged(number, "its checksum is not that of its numbers, or of another block")
         values = {name: arrays[f"output_{name}"] for name in self.task.outputs}
         return Rows(values, arrays["status"], tuple(arrays["message"].tolist()))
 
-    def is_there(self, number: int) -> bool:
-        """Whether a block has a file, damaged or not."""
-        return self._block(number).exists()
+    def _damaged(self, number: int, why: str) -> FileFormatError:
+        rows = self.rows_of(number)
+        return FileFormatError(
+            self._block(number),
+            None,
+            "",
+            f"damaged: {why}; it stays as it is; move it away or delete it and start again: only its runs, "
+            f"{rows.start} to {rows.stop - 1}, are done again",
+        )
 
     def _block(self, number: int) -> Path:
         return self.path / _BLOCKS / f"{number:06d}.npz"
@@ -163,8 +192,7 @@ def held(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]
     path = path.absolute()
     try:
         path.mkdir(parents=True, exist_ok=True)
-        _refuse_other_things(path)
-        lock = (path / _LOCK).open("a+", encoding="utf-8")
+        lock = _lock(path)
     except OSError as error:
         reason = "it is a file, and a folder is needed" if path.is_file() else error.strerror or error
         raise OutputError(f"cannot write to '{path}': {reason}") from error
@@ -174,8 +202,8 @@ def held(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]
         folder = Folder(
             path=path, sweep=sweep, block=told["block"], made=told["made"], task=task, runs=design.points.shape[0]
         )
-        for half in (*path.glob(f"*{_HALF}*"), *path.glob(f"{_BLOCKS}/*{_HALF}*")):
-            half.unlink(missing_ok=True)  # of a process that was killed
+        for half in _halves(path):
+            half.unlink(missing_ok=True)
         yield folder
 
 
@@ -187,13 +215,21 @@ def _begun(path: Path, sweep: dict[str, Any], block: int) -> dict[str, Any]:
         _compare(path, told["sweep"], sweep)
         return told
     told = {"format": _FORMAT, "block": block, "made": _versions(), "sweep": sweep}
-    text = json.dumps(told, indent=2, ensure_ascii=False) + "\n"
+    write_text_whole(manifest, json.dumps(told, indent=2, ensure_ascii=False) + "\n")
+    return told
+
+
+def write_text_whole(path: Path, text: str) -> None:
+    """Write a text whole and onto the disk, or leave what was there before.
+
+    Raises:
+        OutputError: it cannot be written; the text says why.
+    """
 
     def write(half: Path) -> None:
         half.write_text(text, encoding="utf-8")
 
-    write_whole(manifest, write)
-    return told
+    write_whole(path, write)
 
 
 def write_whole(path: Path, write: Callable[[Path], None], suffix: str = _HALF) -> None:
@@ -211,6 +247,7 @@ def write_whole(path: Path, write: Callable[[Path], None], suffix: str = _HALF) 
     try:
         try:
             path.parent.mkdir(exist_ok=True)
+            half.unlink(missing_ok=True)  # a link of that name would be written through
             write(half)
             _onto_disk(half)
             half.replace(path)
@@ -237,22 +274,41 @@ def _onto_disk(path: Path) -> None:
         os.close(handle)
 
 
+def _lock(path: Path) -> IO[str]:
+    """Open the lock of a folder, which holds a sweep or nothing; a link or a file of somebody else's is left alone."""
+    _refuse_other_things(path)
+    handle = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+    lock = os.fdopen(handle, "r+", encoding="utf-8", errors="replace")
+    says = lock.read(_LONGEST_HOLDER) if stat.S_ISREG(os.fstat(handle).st_mode) else None
+    if says is None or (says and not says.startswith(_HOLDER)):
+        lock.close()
+        raise SweepError(f"'{path / _LOCK}' is not the lock of a sweep; give the sweep a folder of its own")
+    return lock
+
+
 def _take(lock: IO[str], path: Path) -> None:
     """Lock a folder for this process; the lock ends with the process, however it ends."""
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         lock.seek(0)
-        holder = lock.read().strip() or "another process"
+        holder = lock.read(_LONGEST_HOLDER).strip() or "another process"
         raise SweepError(f"'{path}' is in use: {holder} works on it; wait until it is done") from error
-    lock.truncate(0)
-    lock.write(f"process {os.getpid()} on {platform.node()}, since {_now()}\n")
+    lock.seek(0)
+    lock.truncate()
+    lock.write(f"{_HOLDER}{os.getpid()} on {platform.node()}, since {_now()}\n")
     lock.flush()
 
 
+def _halves(path: Path) -> list[Path]:
+    """Return the files that a process left half written."""
+    found = [half for pattern in _HALVES for half in path.glob(pattern) if half.is_symlink() or half.is_file()]
+    return [half for half in found if half.parent == path or _HALF_BLOCK.fullmatch(half.name)]
+
+
 def _refuse_other_things(path: Path) -> None:
-    ours = (_LOCK, MANIFEST)
-    strange = sorted(one.name for one in path.iterdir() if one.name not in ours and _HALF not in one.name)
+    ours = {path / _LOCK, path / MANIFEST, *_halves(path)}
+    strange = sorted(one.name for one in path.iterdir() if one not in ours)
     if strange and not (path / MANIFEST).exists():
         raise SweepError(
             f"'{path}' holds no sweep, but other things ('{strange[0]}'); give the sweep a folder of its own"
@@ -261,12 +317,18 @@ def _refuse_other_things(path: Path) -> None:
 
 def _read_manifest(path: Path) -> dict[str, Any]:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
-        sound = isinstance(told["sweep"], dict) and isinstance(told["made"], dict) and told["block"] >= 1
-    except (ValueError, KeyError, TypeError) as error:
+        told = json.loads(read_text(regular(path)))
+        sound = isinstance(told["sweep"], dict) and type(told["block"]) is int and told["block"] >= 1
+        sound = sound and all(isinstance(told["made"][name], str) for name in ("date", "armwright"))
+        form = told["format"]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        if isinstance(error, FileFormatError):
+            raise
         raise FileFormatError(path, None, "", f"damaged: {shown(error)}") from error
-    if not sound or told["format"] != _FORMAT:
-        raise FileFormatError(path, None, "format", f"expected {_FORMAT}, got {shown(told.get('format'))}")
+    if form != _FORMAT:
+        raise FileFormatError(path, None, "format", f"expected {_FORMAT}, got {shown(form)}")
+    if not sound:
+        raise FileFormatError(path, None, "", "damaged: block, made or sweep is not as a sweep writes it")
     return dict(told)
 
 
@@ -286,6 +348,12 @@ def _differences(key: str, there: Any, here: Any) -> Iterator[str]:
             yield from _differences(f"{key}.{name}" if key else name, there.get(name), here.get(name))
     elif there != here:
         yield f"{key} is {shown(there)} there, {shown(here)} here"
+
+
+def _refuse_compressed(file: zipfile.ZipFile) -> None:
+    """Refuse a compressed block: ours are not, and one of another origin may be huge once it is unpacked."""
+    if any(part.compress_type != zipfile.ZIP_STORED for part in file.infolist()):
+        raise ValueError("it is compressed, and blocks are not")
 
 
 def _as_json(value: Any, what: str) -> Any:

@@ -14,7 +14,6 @@ class Progress:
         done: runs that are finished, those that failed too.
         found: runs of these that an earlier start had finished.
         failed: runs of those finished that failed.
-        damaged: blocks of an earlier start that were damaged and are made again.
         seconds: since this start [s].
     """
 
@@ -22,7 +21,6 @@ class Progress:
     done: int
     found: int
     failed: int
-    damaged: int
     seconds: float
 
     @property
@@ -39,9 +37,9 @@ class Progress:
 class Counter:
     """Counts finished runs; the only part of a sweep with a clock."""
 
-    def __init__(self, runs: int, found: int, failed: int = 0, damaged: int = 0) -> None:
+    def __init__(self, runs: int, found: int, failed: int = 0) -> None:
         """Begin to count where an earlier start ended."""
-        self._runs, self._found, self._damaged = runs, found, damaged
+        self._runs, self._found = runs, found
         self._done, self._failed = found, failed
         self._began = time.monotonic()
 
@@ -57,6 +55,5 @@ class Counter:
             done=self._done,
             found=self._found,
             failed=self._failed,
-            damaged=self._damaged,
             seconds=time.monotonic() - self._began,
         )

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator
-from functools import partial
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from armwright.errors import FileFormatError, InvalidValueError
+from armwright.errors import FileFormatError, InvalidValueError, shown
+from armwright.files.output import RECORD, is_stray, record_text, sha256
+from armwright.files.reading import regular
 from armwright.sweep.designs import Design
 from armwright.sweep.errors import SweepError
 from armwright.sweep.extras import extra
-from armwright.sweep.folder import MANIFEST, RESULTS, Folder, write_whole
+from armwright.sweep.folder import MANIFEST, RESULTS, Folder, write_text_whole, write_whole
 from armwright.sweep.netcdf import LONGEST, Variable, Writer
 from armwright.sweep.task import Rows, Status, Task, shapes
 
@@ -42,17 +43,19 @@ def load(folder: Path | str) -> "xarray.Dataset":
     """
     xr = extra("xarray")
     path = Path(folder) / RESULTS
+    damaged = "it stays as it is; move it away or delete it and run the sweep again: it is made again of the blocks"
     if not path.exists():
         state = "is not finished; run it again to go on" if path.with_name(MANIFEST).exists() else "is not there"
         raise SweepError(f"'{folder}': the sweep {state}")
+    if is_stray(regular(path)):
+        raise FileFormatError(path, None, "", f"damaged: its hash is not that in {RECORD}; {damaged}")
     try:
         # Units such as "hours" are those of a quantity, not of a calendar.
         dataset: xarray.Dataset = xr.open_dataset(
             path, engine="scipy", decode_times=False, decode_timedelta=False, mask_and_scale=False
         )
     except Exception as error:
-        text = "damaged; remove this file and run the sweep again: the blocks beside it are not done again"
-        raise FileFormatError(path, None, "", text) from error
+        raise FileFormatError(path, None, "", f"damaged: {shown(error)}; {damaged}") from error
     return dataset
 
 
@@ -79,9 +82,17 @@ def gather(folder: Folder, design: Design) -> None:
 
     Raises:
         OutputError: they cannot be written; the blocks stay.
-        SweepError: a block is damaged.
+        FileFormatError: a block is damaged.
+        SweepError: a block has gone since it was done.
     """
-    write_whole(folder.results, partial(_write, folder, design))
+
+    def write(half: Path) -> None:
+        _write(folder, design, half)
+        # The record comes first: results that it does not fit are never found, results without it could not be checked.
+        text = record_text({RESULTS: sha256(half) or ""}, {"versions": dict(folder.made)})
+        write_text_whole(folder.path / RECORD, text)
+
+    write_whole(folder.results, write)
 
 
 def _write(folder: Folder, design: Design, path: Path) -> None:
@@ -108,7 +119,7 @@ def _blocks(folder: Folder) -> Iterator[tuple[int, Rows]]:
     for number in range(folder.blocks):
         rows = folder.kept(number)
         if rows is None:
-            raise SweepError(f"'{folder.path}': block {number} was damaged just now; start again to go on")
+            raise SweepError(f"'{folder.path}': block {number} has gone just now; start again to go on")
         yield number * folder.block, rows
 
 

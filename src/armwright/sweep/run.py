@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Rows per block: some lanes of simulations side by side, and some seconds of work.
 BLOCK = 64
+# Processes of one machine; a number beyond is a slip.
+_MOST_WORKERS = 1000
 
 
 def run(
@@ -52,7 +54,7 @@ def run(
         dataset: see ``load``. A run that failed is a row of NaN with its ``status`` and ``message``.
 
     Raises:
-        FileFormatError: a file of the folder other than a block is damaged.
+        FileFormatError: a file of the folder is damaged; it stays as it is, and the text says what to do.
         InvalidValueError: a number is out of range, names of the task and the design are the same, or an output has
             more than 4 GiB.
         KindError: an argument is of the wrong kind, or the task cannot be sent to workers.
@@ -69,6 +71,10 @@ def run(
     block = whole(block, "block", least=1)
     if workers is not None:
         workers = whole(workers, "workers", least=1)
+        if workers > _MOST_WORKERS:
+            raise InvalidValueError(
+                f"workers: expected at most {_MOST_WORKERS} processes of this machine, got {workers}"
+            )
         if scheduler is not None:
             raise InvalidValueError("workers are processes of this machine, a scheduler has its own: give one of them")
     with held(Path(folder), task, design, block) as sweep:
@@ -88,7 +94,7 @@ def _finish(
     scheduler: str | None,
     progress: Callable[[Progress], None] | None,
 ) -> None:
-    """Do the blocks that are missing or damaged."""
+    """Do the blocks that are missing."""
     missing, found, failed = [], 0, 0
     for number in range(sweep.blocks):
         rows = sweep.kept(number)
@@ -96,7 +102,7 @@ def _finish(
             missing.append(number)
         else:
             found, failed = found + len(rows.status), failed + failures(rows)
-    counter = Counter(sweep.runs, found, failed, damaged=sum(map(sweep.is_there, missing)))
+    counter = Counter(sweep.runs, found, failed)
     tell = progress or (lambda _: None)
     tell(counter.now())
     with closing(_done(sweep, missing, design.points, workers, scheduler)) as done:  # workers end on an error too

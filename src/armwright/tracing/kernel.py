@@ -3,14 +3,15 @@
 import math
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache, cached_property, reduce
 from itertools import pairwise
 from operator import or_
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import attrs
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arrays import LARGEST, Array, ArrayLike, cores, floats
 from armwright.errors import InvalidValueError, ShapeError
@@ -19,6 +20,8 @@ from armwright.tracing.cache import compiled
 from armwright.tracing.emit import LANES, MEANINGLESS, UNUSUAL, Emitted, Shape
 
 T = TypeVar("T")
+# One number, which is 0 until work in progress is to end without a result.
+CalledOff: TypeAlias = npt.NDArray[np.int64]
 
 # Below this many rows a second thread costs more than it saves.
 _ROWS_PER_THREAD = 4096
@@ -243,13 +246,38 @@ def on_cores(work: Callable[[int, int], T], rows: int, threads: int | None, *, m
         threads: how many cores to use; all when None.
         most: no more than this are worth it; as many as there are blocks when left out.
     """
-    blocks = -(-rows // LANES)
-    count = min(cores() if threads is None else threads, blocks if most is None else most)
-    if count <= 1:
+    parts = _parts(rows, threads, most)
+    if len(parts) == 1:
         return [work(0, rows)]
-    cuts = [min(round(blocks * i / count) * LANES, rows) for i in range(count + 1)]
-    jobs = [_pool().submit(work, a, b) for a, b in pairwise(cuts)]
+    jobs = [_pool().submit(work, a, b) for a, b in parts]
     return [job.result() for job in jobs]
+
+
+def on_cores_for_long(work: Callable[[int, int, CalledOff], object], rows: int, threads: int | None) -> None:
+    """Do parts of many rows whose work takes long, so that a signal is heard meanwhile: it is waited for, not done.
+
+    Args:
+        work: does rows ``first`` to ``last`` without holding the interpreter, and looks now and then whether it is
+            called off.
+        rows: how many there are.
+        threads: how many cores to use; all when None.
+    """
+    called_off = np.zeros(1, dtype=np.int64)
+    jobs = [_pool().submit(work, a, b, called_off) for a, b in _parts(rows, threads, None)]
+    try:
+        for job in jobs:
+            job.result()
+    except BaseException:
+        called_off[0] = 1
+        wait(jobs)
+        raise
+
+
+def _parts(rows: int, threads: int | None, most: int | None) -> list[tuple[int, int]]:
+    """Cut rows into parts for the cores between blocks of lanes: where each begins and ends."""
+    blocks = -(-rows // LANES)
+    count = max(1, min(cores() if threads is None else threads, blocks if most is None else most))
+    return list(pairwise(min(round(blocks * i / count) * LANES, rows) for i in range(count + 1)))
 
 
 @cache

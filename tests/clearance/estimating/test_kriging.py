@@ -87,6 +87,22 @@ def test_what_surfaces_miss_together(rng: np.random.Generator) -> None:
     assert found.chosen(("g",)).correlation.shape == (1, 1)
 
 
+def test_spread_of_single_runs_is_that_of_neighbours() -> None:
+    """Where runs that nobody can tell apart differ, a single one is known no better; far from there it is."""
+    points = design(256)
+    late = points[:, 0] > 3e-4
+    spreads = np.where(late, 0.1, 0.0)[:, None] * [1.0, 0.0]
+
+    found = learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads)
+    _, deviation = found.predict(np.array([[1e-4, 0.1], [5e-4, 0.1]]))
+
+    np.testing.assert_allclose(deviation[1], (0.1, 0.0), rtol=0.05, atol=1e-3)
+    assert deviation[0].max() < 0.02
+    assert found.chosen(("g",)).predict(points)[1].max() < 1e-3
+    with pytest.raises(ShapeError, match=r"spreads: expected \(256, 2\), as the values, got \(256, 1\)"):
+        learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads[:, :1])
+
+
 def test_inverse(known: Surrogate, rng: np.random.Generator) -> None:
     """Features of a known function tell the parameters that they are of."""
     true = rng.uniform(*np.array(list(BOUNDS.values())).T, (20, 2))

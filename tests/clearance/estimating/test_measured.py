@@ -58,7 +58,7 @@ def test_repeated_readings(tmp_path: Path, five_bar: Linkage, rng: np.random.Gen
     assert isinstance(found, RestMeasured)
     assert found.readings == (count,) * 3
     np.testing.assert_allclose(found.offsets, offsets.mean(axis=1), rtol=0, atol=WRITTEN)
-    assert found.noise == pytest.approx(sigma / np.sqrt(count), rel=0.1)
+    assert found.noise == pytest.approx(sigma, rel=0.1)
     own, told = found.estimate(five_bar), found.estimate(five_bar, 4 * sigma)
     np.testing.assert_allclose(told.deviations / own.deviations, 4.0, rtol=0.1)
 
@@ -239,7 +239,7 @@ def test_few_readings_make_intervals_wider() -> None:
         noise=1e-6,
     )
 
-    few, known = readings.estimate(linkage), readings.estimate(linkage, noise=np.sqrt(2) * 1e-6)
+    few, known = readings.estimate(linkage), readings.estimate(linkage, noise=1e-6)
 
     np.testing.assert_allclose(np.ptp(few.interval(0.9), axis=-1) / few.deviations / 2, 1.943, atol=1e-3)
     np.testing.assert_allclose(np.ptp(known.interval(0.9), axis=-1) / known.deviations / 2, 1.645, atol=1e-3)

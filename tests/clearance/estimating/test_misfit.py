@@ -106,6 +106,7 @@ def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.G
     return PathsMeasured(times=times, errors=errors)
 
 
+@pytest.mark.share(0.05)
 @pytest.mark.parametrize("fault", ["payload", "sign", "swapped"])
 def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: Sample) -> None:
     """An arm whose columns are turned about is refused, one with twice the payload nearly always.

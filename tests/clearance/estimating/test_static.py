@@ -6,10 +6,11 @@ import pytest
 from scipy.stats import binom
 
 from armwright.arrays import Array
+from armwright.clearance.estimating import static
 from armwright.clearance.estimating.static import Estimate, best_poses, estimate_at_rest, rest_matrix, rest_offsets
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, ShapeError, TooFewError
 from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
 
 # Mean of 50 readings with 10 µm each, and the measure that the thesis' way is held against [m, %].
@@ -168,7 +169,7 @@ def test_told_or_not(five_bar: Linkage) -> None:
 def test_too_few_poses(five_bar: Linkage) -> None:
     """One pose has two numbers for three clearances, and the same pose twice has no more."""
     for poses in (STARTS[:1], STARTS[[0, 0]]):
-        with pytest.raises(InvalidValueError, match=f"{len(poses)} poses do not tell 3 clearances from one another"):
+        with pytest.raises(TooFewError, match=f"{len(poses)} poses do not tell 3 clearances from one another"):
             estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A))
 
 
@@ -197,3 +198,31 @@ def test_pins_without_play(five_bar: Linkage, rng: np.random.Generator) -> None:
 
     assert found.values.min() > 0
     assert np.abs(found.values[:, 2] - 0.3e-3).max() < 10e-6
+
+
+def test_a_pose_weighs_as_often_as_it_was_read(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """The mean of several readings counts as they do one by one: the same clearances, as well known."""
+    counts = np.array([1, 2, 5, 3])[: len(STARTS)]
+    offsets = rest_offsets(five_bar, STARTS, ARM_A) + rng.normal(0.0, 1e-5, STARTS.shape)
+    again = (np.repeat(one, counts, axis=0) for one in (STARTS, offsets))
+
+    mean = estimate_at_rest(five_bar, STARTS, offsets, 1e-5, counts)
+    single = estimate_at_rest(five_bar, *again, 1e-5)
+
+    np.testing.assert_allclose(mean.values, single.values, rtol=1e-9)
+    np.testing.assert_allclose(mean.covariance, single.covariance, rtol=1e-9)
+    assert float(mean.square) == pytest.approx(float(single.square), rel=1e-6)
+    with pytest.raises(InvalidValueError, match="readings: expected at least 1 of each pose, got 0"):
+        estimate_at_rest(five_bar, STARTS, offsets, 1e-5, 0)
+
+
+def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many rounds an estimate takes, the loops of each pose are closed one after the other only once."""
+    offsets = rest_offsets(five_bar, STARTS, ARM_A)
+    closings = []
+    posed = static.posed
+    monkeypatch.setattr(static, "posed", lambda *given: (closings.append(given), posed(*given))[1])
+
+    estimate_at_rest(five_bar, STARTS, offsets)
+
+    assert len(closings) == 1

@@ -1,6 +1,7 @@
 """The debug adapter as an editor meets it: a process of its own, requests, answers and events."""
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -158,6 +159,9 @@ def test_a_program_with_errors(client: Client, written: Any) -> None:
     assert "unknown statement `OPNE`" in client.wait("output")["output"]
     missing = client.refused("launch", program=str(program.with_name("none.rlo")), cell=str(CORPUS / "cell1.json"))
     assert "none.rlo" in missing
+    os.mkfifo(pipe := str(program.with_name("pipe.rlo")))
+    assert "expected a file, got a pipe" in client.refused("launch", program=pipe)
+    assert "expected a file, got a pipe" in client.refused("launch", program=str(P02), cell=pipe)
 
     program.write_text("BEGIN\n  OPEN ARM_1\nEND.\n")
     assert "needs a cell" in client.refused("launch", program=str(program))
@@ -323,6 +327,18 @@ def test_what_a_run_leaves(client: Client, tmp_path: Path) -> None:
     client.wait("terminated")
 
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"motion.csv", "report.html", "frames.json"}
+
+
+def test_what_a_failed_run_leaves(client: Client, tmp_path: Path, written: Any) -> None:
+    """A program that could not go on leaves all up to its failure, marked with it."""
+    program = written("VAR n : SCALAR ;\nBEGIN\n  PAUSE 0.1 ; n = 0 ;\n  PRINT(1 / n)\nEND.\n")
+    client.launch(program, output=str(tmp_path / "out"), noDebug=True)
+    client.wait("terminated")
+
+    said = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert (said["ended"], said["exit_status"], said["error"]["code"]) == ("failed", 3, "E240")
+    assert [one["code"] for one in said["diagnostics"]][-1:] == ["E240"]
+    assert ": failed</title>" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_lines_and_columns_from_0(client: Client) -> None:

@@ -553,6 +553,30 @@ def test_questions_that_make_no_sense(asked: object) -> None:
     assert (answer["id"], answer["error"]["code"]) == (7, -32602)
 
 
+def test_the_end_of_a_session() -> None:
+    """An editor that says goodbye gets its last answer, and the server ends well."""
+    talk = [
+        {"id": 1, "method": lsp.INITIALIZE, "params": {"processId": None, "rootUri": None, "capabilities": {}}},
+        {"id": 2, "method": lsp.SHUTDOWN},
+        {"method": lsp.EXIT},
+    ]
+    bodies = [json.dumps({"jsonrpc": "2.0", **one}).encode() for one in talk]
+    command = [sys.executable, "-m", "armwright", "lsp"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=False
+    ) as server:
+        assert server.stdin is not None
+        assert server.stdout is not None
+        assert server.stderr is not None
+        server.stdin.write(b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(one), one) for one in bodies))
+        server.stdin.flush()  # and stays open, as that of an editor does
+        status = server.wait(timeout=300)
+        said, errors = server.stdout.read(), server.stderr.read()
+
+    assert (status, errors) == (0, b"")
+    assert said.endswith(b'{"id": 2, "jsonrpc": "2.0", "result": null}')
+
+
 def test_without_pygls() -> None:
     """Where the library of the protocol is missing, the message says how to get it."""
     without = "import sys; sys.modules['pygls'] = None; sys.argv = ['armwright', 'lsp']"
@@ -563,3 +587,36 @@ def test_without_pygls() -> None:
     assert result.stderr == (
         "armwright: the language server needs pygls; install it by: pip install 'armwright[lsp]'\n"
     )
+
+
+@pytest.mark.parametrize(("farewell", "status"), [([{"method": lsp.EXIT}], 1), ([], 0)], ids=["exit", "end of input"])
+def test_leaving_in_the_middle(farewell: list[dict[str, object]], status: int) -> None:
+    """The server ends at once while it looks at a long program: with 1 after ``exit`` without ``shutdown``."""
+    text = "VAR n : SCALAR ;\nBEGIN\n" + "  n = n + n * 2 - n / 3 ;\n" * 12_000 + "END.\n"
+    item = {"uri": "untitled:p.rlo", "languageId": "rlo", "version": 1, "text": text}
+    talk = [
+        {"id": 1, "method": lsp.INITIALIZE, "params": {"capabilities": {}}},
+        {"method": lsp.INITIALIZED, "params": {}},
+        {"method": lsp.TEXT_DOCUMENT_DID_OPEN, "params": {"textDocument": item}},
+        *farewell,
+    ]
+    bodies = [json.dumps({"jsonrpc": "2.0", **one}).encode() for one in talk]
+    with subprocess.Popen(
+        [sys.executable, "-m", "armwright", "lsp"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as server:
+        assert server.stdin is not None
+        assert server.stdout is not None
+        assert server.stderr is not None
+        server.stdin.write(b"".join(b"Content-Length: %d\r\n\r\n%s" % (len(one), one) for one in bodies))
+        server.stdin.flush()
+        if not farewell:
+            server.stdin.close()
+        ended = server.wait(timeout=300)
+        said, errors = server.stdout.read(), server.stderr.read()
+
+    assert (ended, errors) == (status, b"")
+    # Nothing is said of a program that was not looked at to the end.
+    assert b"publishDiagnostics" not in said

@@ -21,7 +21,8 @@ from armwright.files.limits import beyond, limit
 from armwright.files.reading import read_bytes
 
 _MISSING: Any = object()
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# What is matched is not given back: a word of a million digits and a letter is passed once.
+_NUMBER = re.compile(r"[+-]?(\d++\.?\d*+|\.\d++)([eE][+-]?\d++)?", re.ASCII)
 _XACRO = "xacro is expanded before it is URDF: xacro FILE > robot.urdf"
 # What URDF has in a link, in a joint, and below those: elements, attributes.
 _KNOWN: dict[str, tuple[Collection[str], Collection[str]]] = {
@@ -205,6 +206,11 @@ def _split(raw: Any) -> tuple[str, str]:
 
 def _element(path: Path, raw: Any, space: str, around: str) -> Element:
     tag = _split(raw)[1]
+    # lxml looks for each from the first one, so many take the square of the time.
+    if len(raw.attrib) > limit("attributes"):
+        raise FileFormatError(
+            path, raw.sourceline, f"<{tag}>", f"too many attributes: {beyond('attributes', len(raw.attrib))}"
+        )
     attributes = dict(raw.attrib)
     if tag in {"link", "joint"} and not around:
         place = f"{tag} {shown(attributes['name'])}" if "name" in attributes else tag

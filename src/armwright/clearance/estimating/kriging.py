@@ -10,11 +10,12 @@ from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from armwright.arrays import Array, ArrayLike, floats, one_core
-from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
+from armwright.errors import InvalidValueError, MissingExtraError, ShapeError, TooFewError
 
 # Lengths over which a feature may change, as part of the range of a parameter.
 _LENGTHS = (0.1, 30.0)
@@ -26,6 +27,8 @@ _AMPLITUDE = (1e-2, 1e4)
 MOST_POINTS = 300
 # A correlation of what surfaces miss is believed so far: it comes of a few hundred points.
 _SURE = 0.98
+# How much of what chance does to a feature at one place it does at another, as part of the range of a parameter.
+_NEIGHBOURS = 0.2
 # Features are compared at so many points first, and matched from the best of them: fewer starts end in a wrong valley.
 _TRIED, _STARTS = 480, 6
 
@@ -91,6 +94,8 @@ class Surrogate:
         processes: one per feature.
         correlation: (f, f) of what the surfaces miss: a run whose slope comes out too large has too small an
             intercept. Of features that were not learnt together, none.
+        spreads: (m, f) standard deviations over runs that nobody can tell apart, at the points of the processes; None
+            where they are not known.
     """
 
     parameters: tuple[str, ...]
@@ -99,6 +104,7 @@ class Surrogate:
     upper: Array
     processes: tuple[Process, ...]
     correlation: Array = attrs.field()
+    spreads: Array | None = None
 
     @correlation.default
     def _alone(self) -> Array:
@@ -111,7 +117,17 @@ class Surrogate:
         """
         unit = (floats(points, "points") - self.lower) / (self.upper - self.lower)
         found = [process.predict(unit) for process in self.processes]
-        return np.stack([mean for mean, _ in found], axis=-1), np.stack([std for _, std in found], axis=-1)
+        mean, deviation = (np.stack(one, axis=-1) for one in zip(*found, strict=True))
+        return mean, np.asarray(np.hypot(deviation, self._chance(unit)), dtype=np.float64)
+
+    def _chance(self, unit: Array) -> Array | float:
+        """Return by how much single runs differ about points (m, k) [standard deviation]: that of their neighbours."""
+        if self.spreads is None:
+            return 0.0
+        apart = ((unit[:, None] - self.processes[0].x) ** 2).sum(axis=-1) / _NEIGHBOURS**2
+        # Far from all others the nearest counts.
+        near = np.exp(-0.5 * (apart - apart.min(axis=-1, keepdims=True)))
+        return np.asarray(np.sqrt(near @ self.spreads**2 / near.sum(axis=-1, keepdims=True)), dtype=np.float64)
 
     def chosen(self, names: Sequence[str]) -> "Surrogate":
         """Return the surrogate of some of the features."""
@@ -121,6 +137,7 @@ class Surrogate:
             features=tuple(names),
             processes=tuple(self.processes[i] for i in numbers),
             correlation=self.correlation[np.ix_(numbers, numbers)],
+            spreads=None if self.spreads is None else self.spreads[:, numbers],
         )
 
 
@@ -130,6 +147,7 @@ def learn(
     features: Sequence[str],
     values: ArrayLike,
     *,
+    spreads: ArrayLike | None = None,
     ranges: ArrayLike | None = None,
     seed: int = 0,
     restarts: int = 0,
@@ -142,6 +160,8 @@ def learn(
         points: (m, k) at which was simulated; those that came to nothing (NaN) are left out.
         features: f names.
         values: (m, f) what came of it.
+        spreads: (m, f) standard deviations of it over runs that nobody can tell apart, by which a single run that is
+            measured may be off; none when left out.
         ranges: (k, 2) of the design; those of the points when left out, which chance leaves a little narrower.
         seed: which points are taken where there are more than ``MOST_POINTS``.
         restarts: how often the lengths are sought again from another start.
@@ -153,17 +173,14 @@ def learn(
         InvalidValueError: there are too few points, one lies outside the ranges, or a parameter does not vary.
     """
     x, y = floats(points, "points"), np.asarray(values, dtype=np.float64)
+    shaken = None if spreads is None else np.asarray(spreads, dtype=np.float64)
     if x.ndim != 2 or y.shape != (len(x), len(features)) or x.shape[1] != len(parameters):
         raise ShapeError(
             f"expected (m, {len(parameters)}) points and (m, {len(features)}) values, got {x.shape} and {y.shape}"
         )
-    kept = np.flatnonzero(np.all(np.isfinite(y), axis=-1))
-    if len(kept) < 4 * (len(parameters) + 1):
-        raise InvalidValueError(
-            f"points: expected {4 * (len(parameters) + 1)} or more that ended well, got {len(kept)}"
-        )
-    if len(kept) > MOST_POINTS:
-        kept = np.sort(np.random.default_rng(seed).choice(kept, MOST_POINTS, replace=False))
+    if shaken is not None and shaken.shape != y.shape:
+        raise ShapeError(f"spreads: expected {y.shape}, as the values, got {shaken.shape}")
+    kept = _kept(y, 4 * (len(parameters) + 1), seed)
     lower, upper = _ranges(x[kept], ranges)
     for name, low, high in zip(parameters, lower, upper, strict=True):
         if not low < high:
@@ -182,6 +199,7 @@ def learn(
         upper=upper,
         processes=tuple(processes),
         correlation=_SURE * np.atleast_2d(np.corrcoef(missed)) + (1 - _SURE) * np.eye(len(processes)),
+        spreads=None if shaken is None else shaken[kept],
     )
 
 
@@ -221,6 +239,20 @@ def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | N
         found = [least_squares(missing, starts[i], slopes, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:_STARTS]]
     best = min(found, key=lambda one: float(one.cost))
     return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)
+
+
+def _kept(y: Array, least: int, seed: int) -> npt.NDArray[np.intp]:
+    """Return which rows (m, f) are learnt from: those that ended well, at most ``MOST_POINTS``.
+
+    Raises:
+        TooFewError: there are fewer than ``least``.
+    """
+    kept = np.flatnonzero(np.all(np.isfinite(y), axis=-1))
+    if len(kept) < least:
+        raise TooFewError(f"points: expected {least} or more that ended well, got {len(kept)}")
+    if len(kept) > MOST_POINTS:
+        kept = np.sort(np.random.default_rng(seed).choice(kept, MOST_POINTS, replace=False))
+    return kept
 
 
 def _ranges(x: Array, ranges: ArrayLike | None) -> tuple[Array, Array]:

@@ -19,6 +19,7 @@ from armwright.clearance.features import Features, features_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.errors import FileFormatError, closest
+from armwright.files.limits import beyond, limit
 from armwright.files.rows import number_in_cell, of_one_width, read_rows
 
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
@@ -42,8 +43,8 @@ class RestMeasured:
         poses: (k, 2) where the tip was told to be [m].
         offsets: (k, 2) by how much it was off, mean of the readings [m].
         readings: (k,) how many there are of each.
-        noise: standard deviation of one coordinate of the mean of the fewest readings, from how all readings of a pose
-            differ; None where none was read twice, or no readings differ [m].
+        noise: standard deviation of one coordinate of one reading, from how all readings of a pose differ; None where
+            none was read twice, or no readings differ [m].
     """
 
     names: tuple[str, ...]
@@ -62,10 +63,10 @@ class RestMeasured:
 
         Raises:
             ContradictionError: no clearances explain the readings.
-            InvalidValueError: the poses do not tell all clearances.
+            TooFewError: the poses do not tell all clearances.
         """
-        own = self.noise if noise is None else noise / math.sqrt(min(self.readings))
-        found = estimate_at_rest(linkage, self.poses, self.offsets, own or LEAST_NOISE)
+        own = self.noise if noise is None else noise
+        found = estimate_at_rest(linkage, self.poses, self.offsets, own or LEAST_NOISE, self.readings)
         if noise is None and self.noise is not None:
             found = attrs.evolve(found, freedom=2.0 * sum(n - 1 for n in self.readings))
         if own is None and found.spare > 0 and found.square > found.spare:
@@ -77,7 +78,7 @@ class RestMeasured:
                 covariance=more * found.covariance,
                 freedom=float(found.spare),
             )
-        off = (found.missing / found.noise).tolist()
+        off = found.standardised.tolist()
         farthest = [
             (f"{axis} of {name}", x)
             for name, pair in zip(self.names, off, strict=True)
@@ -103,6 +104,11 @@ class PathsMeasured:
     def features(self) -> dict[str, Features]:
         """Return the features of each error curve."""
         return {name: features_of(self.times[name], self.errors[name]) for name in self.times}
+
+    def seen(self, names: tuple[str, ...]) -> Array:
+        """Return (f,) features ``path_feature``."""
+        found = self.features()
+        return np.array([getattr(found[path], name) for path, _, name in (one.partition("_") for one in names)])
 
     def noise_of(self, names: tuple[str, ...], noise: float, *, draws: int = 200, seed: int = 0) -> Array:
         """Return the covariance (f, f) that a noise of the samples gives to features ``path_feature``.
@@ -134,12 +140,15 @@ def read_measured(path: Path | str) -> RestMeasured | PathsMeasured:
     columns, scales = _columns(path, head.line, [name.lower() for name in head.cells])
     wanted = _AT_REST if "pose" in columns else _ON_PATHS
     found: dict[str, list[tuple[int, list[float]]]] = {}
+    most = limit("entries")
     for row in of_one_width(path, head, below):
         values = [number_in_cell(path, row.line, name, row.cells[columns[name]]) * scales[name] for name in wanted[1:]]
         name = row.cells[columns[wanted[0]]]
         if not name:
             raise FileFormatError(path, row.line, wanted[0], "expected a name, got nothing")
         found.setdefault(name, []).append((row.line, values))
+        if len(found) > most:
+            raise FileFormatError(path, row.line, wanted[0], f"too many: {beyond('entries')}")
     return _at_rest(path, found) if "pose" in columns else _on_paths(path, found)
 
 
@@ -203,7 +212,7 @@ def _at_rest(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) -> 
         poses=np.array(poses),
         offsets=np.array(offsets),
         readings=tuple(counts),
-        noise=math.sqrt(variance / min(counts)) if variance > 0 else None,
+        noise=math.sqrt(variance) if variance > 0 else None,
     )
 
 

@@ -8,6 +8,7 @@ Source:
 """
 
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -19,6 +20,8 @@ from armwright.errors import InvalidValueError, ShapeError
 
 _WALKERS, _STEPS, _BURN = 60, 300, 100
 _STRETCH = 2.0
+# Parameters are likelier than others when twice the logarithm of the likelihood is larger by so much.
+_LIKELIER = 1.0
 # A parameter is at a bound when it is nearer than this part of its range, or than its deviation.
 _NEAR = 1e-3
 # A parameter is told when its standard deviation is at most this part of what was known before.
@@ -126,9 +129,8 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
     measured = np.diag(spread**2) if spread.ndim == 1 else spread
     lower, upper = surrogate.lower, surrogate.upper
 
-    best, missing, covariance = _likeliest(surrogate, goal, measured)
-    square, freedom = float(missing @ np.linalg.solve(covariance, missing)), max(1, count - len(lower))
-    wider = float(widening(square, freedom))
+    freedom = max(1, count - len(lower))
+    fit = _likeliest(surrogate, goal, measured)
 
     def log_density(points: Array) -> Array:
         mean, deviation = surrogate.predict(np.clip(points, lower, upper))
@@ -139,42 +141,61 @@ def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: 
         inside = np.all((points >= lower) & (points <= upper), axis=-1)
         return np.where(inside, density, -np.inf)
 
-    with one_core():
-        samples = _walk(log_density, best, lower, upper, seed)
+    while True:
+        wider = float(widening(fit.square, freedom))
+        with one_core():
+            samples, top = _walk(log_density, fit.point, lower, upper, seed)
+        # Walkers may come to a valley that was missed; the features are then held against that.
+        other = _fit_at(surrogate, goal, measured, top)
+        if not other.unlikely < fit.unlikely - _LIKELIER:  # nor where either is no number
+            break
+        fit = other
+    off = fit.missing / np.sqrt(np.diag(fit.covariance))
     return Posterior(
         names=surrogate.parameters,
         samples=samples,
         lower=lower,
         upper=upper,
-        misfit=float(chance(square, freedom)),
-        best=best,
-        farthest=dict(zip(surrogate.features, (missing / np.sqrt(np.diag(covariance))).tolist(), strict=True)),
+        misfit=float(chance(fit.square, freedom)),
+        best=fit.point,
+        farthest=dict(zip(surrogate.features, off.tolist(), strict=True)),
         widening=wider,
     )
 
 
-def _likeliest(surrogate: Surrogate, goal: Array, measured: Array) -> tuple[Array, Array, Array]:
-    """Return the parameters (k,) whose features come nearest to those seen by the noise of all of them together.
+class _Fit(NamedTuple):
+    """Parameters (k,), what their features miss (f,), its covariance (f, f), and what that says.
 
-    Returns:
-        The parameters, what their features miss (f,), and its covariance (f, f).
+    Attributes:
+        square: of what is missing, in deviations.
+        unlikely: twice the negative logarithm of the likelihood, but for a constant.
     """
 
-    def told(point: Array) -> tuple[Array, Array]:
-        mean, deviation = surrogate.predict(point[None])
-        return mean[0], measured + surrogate.correlation * np.outer(deviation[0], deviation[0])
+    point: Array
+    missing: Array
+    covariance: Array
+    square: float
+    unlikely: float
 
-    _, covariance = told((surrogate.lower + surrogate.upper) / 2)
-    found: list[tuple[float, Array, Array, Array]] = []
+
+def _fit_at(surrogate: Surrogate, goal: Array, measured: Array, point: Array) -> _Fit:
+    """Return how well the features at a point (k,) are those seen (f,), measured with a covariance (f, f)."""
+    (mean,), (deviation,) = surrogate.predict(point[None])
+    covariance = measured + surrogate.correlation * np.outer(deviation, deviation)
+    missing = goal - mean
+    square = float(missing @ np.linalg.solve(covariance, missing))
+    return _Fit(point, missing, covariance, square, square + float(np.linalg.slogdet(covariance)[1]))
+
+
+def _likeliest(surrogate: Surrogate, goal: Array, measured: Array) -> _Fit:
+    """Return the parameters whose features come nearest to those seen by the noise of all of them together."""
+    covariance = _fit_at(surrogate, goal, measured, (surrogate.lower + surrogate.upper) / 2).covariance
+    found: list[_Fit] = []
     # The doubt of the surface depends on where one is: twice.
     for _ in range(2):
-        point = solve_features(surrogate, goal, covariance)
-        mean, covariance = told(point)
-        missing = goal - mean
-        square = float(missing @ np.linalg.solve(covariance, missing))
-        found.append((square + float(np.linalg.slogdet(covariance)[1]), point, missing, covariance))
-    _, point, missing, covariance = min(found, key=lambda one: one[0])
-    return point, missing, covariance
+        found.append(_fit_at(surrogate, goal, measured, solve_features(surrogate, goal, covariance)))
+        covariance = found[-1].covariance
+    return min(found, key=lambda one: one.unlikely)
 
 
 def _shown(name: str, value: float) -> str:
@@ -182,15 +203,18 @@ def _shown(name: str, value: float) -> str:
     return f"{value * 1e3:g} mm" if name.startswith("c_") else f"{value:g}"
 
 
-def _walk(log_density: Callable[[Array], Array], centre: Array, lower: Array, upper: Array, seed: int) -> Array:
-    """Return samples of walkers that stretch towards and away from one another."""
+def _walk(
+    log_density: Callable[[Array], Array], centre: Array, lower: Array, upper: Array, seed: int
+) -> tuple[Array, Array]:
+    """Return samples (s, k) of walkers that stretch towards and away from one another, and the likeliest (k,)."""
     rng = np.random.default_rng(seed)
     k = len(centre)
     spread = 0.02 * (upper - lower)
     places = np.clip(centre + spread * rng.standard_normal((_WALKERS, k)), lower + 1e-3 * spread, upper - 1e-3 * spread)
     density = log_density(places)
     half = _WALKERS // 2
-    kept = []
+    kept: list[Array] = []
+    top, highest = places[0].copy(), -np.inf
     for step in range(_STEPS):
         for own, others in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
             z = ((_STRETCH - 1) * rng.random(half) + 1) ** 2 / _STRETCH
@@ -200,6 +224,9 @@ def _walk(log_density: Callable[[Array], Array], centre: Array, lower: Array, up
             taken = np.log(rng.random(half)) < (k - 1) * np.log(z) + found - density[own]
             places[own] = np.where(taken[:, None], new, places[own])
             density[own] = np.where(taken, found, density[own])
+        first = int(np.argmax(density))
+        if density[first] > highest:
+            top, highest = places[first].copy(), float(density[first])
         if step >= _BURN:
             kept.append(places.copy())
-    return np.concatenate(kept)
+    return np.concatenate(kept), top

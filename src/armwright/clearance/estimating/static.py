@@ -21,7 +21,7 @@ from armwright.clearance.linkage import Linkage
 from armwright.clearance.preparing import assembled
 from armwright.clearance.rest import at_rest, forces_of
 from armwright.clearance.settings import contact_stiffness
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.errors import InvalidValueError, ShapeError, TooFewError
 
 _MOST_ROUNDS = 12
 # The rounds end when no clearance changes by more [m].
@@ -42,7 +42,8 @@ class Estimate:
         covariance: (p, p) [m²].
         singular_values: of the equations, largest first; how the offset grows with the best and worst told mixture.
         missing: (..., k, 2) what is left of the offset of each pose [m].
-        noise: standard deviation of one coordinate of an offset [m].
+        noise: standard deviation of one coordinate of one reading [m].
+        readings: (k,) of how many readings the offset of each pose is the mean.
         freedom: of how many numbers the noise was estimated; infinite where it was known. Few make intervals wider.
     """
 
@@ -52,6 +53,7 @@ class Estimate:
     singular_values: Array
     missing: Array
     noise: float
+    readings: Array
     freedom: float = np.inf
 
     @property
@@ -62,7 +64,12 @@ class Estimate:
     @property
     def square(self) -> Array:
         """(...) sum of squares of what is left, in standard deviations."""
-        return np.asarray(np.sum((self.missing / self.noise) ** 2, axis=(-2, -1)), dtype=np.float64)
+        return np.asarray(np.sum(self.standardised**2, axis=(-2, -1)), dtype=np.float64)
+
+    @property
+    def standardised(self) -> Array:
+        """(..., k, 2) what is left, in standard deviations of the offset of its pose."""
+        return np.asarray(self.missing * np.sqrt(self.readings)[:, None] / self.noise, dtype=np.float64)
 
     @property
     def spare(self) -> int:
@@ -120,7 +127,11 @@ def rest_matrix(linkage: Linkage, poses: ArrayLike) -> Array:
     Raises:
         InvalidValueError: a pose cannot be reached, or a pin carries no force there.
     """
-    q = _posed(linkage, poses)
+    return matrix_at(linkage, posed(linkage, poses))
+
+
+def matrix_at(linkage: Linkage, q: Array) -> Array:
+    """Return B (k, 2, p) at closed coordinates (k, n); see ``rest_matrix``."""
     still = np.zeros((len(q), 2))
     reactions = ideal_motion(linkage, q, still, still, by_tip=True).reactions
     direction = reactions / forces_of(linkage, reactions)[..., None]
@@ -135,62 +146,83 @@ def rest_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike) -> A
         poses: (k, 2) places of its tip without play [m].
         clearances: (..., p) [m].
     """
-    q = _posed(linkage, poses)
-    c = floats(clearances, "clearances")[..., None, :]
+    return _offsets_at(linkage, posed(linkage, poses), floats(clearances, "clearances"))
+
+
+def _offsets_at(linkage: Linkage, q: Array, clearances: Array) -> Array:
+    """Return (..., k, 2) by how much the tip is off at closed coordinates (k, n) [m]; see ``rest_offsets``."""
+    c = clearances[..., None, :]
     return np.asarray(at_rest(linkage, q, c, contact_stiffness(linkage, c)).tip - tip_of(linkage, q), dtype=np.float64)
 
 
-def estimate_at_rest(linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noise: float = 1e-6) -> Estimate:
+def estimate_at_rest(
+    linkage: Linkage, poses: ArrayLike, offsets: ArrayLike, noise: float = 1e-6, readings: ArrayLike = 1.0
+) -> Estimate:
     """Return the clearances that put the resting tip where it was seen.
 
     Args:
         linkage: with p pins.
         poses: (k, 2) places of its tip without play [m].
         offsets: (..., k, 2) by how much it was off there [m].
-        noise: standard deviation of a coordinate of an offset [m].
+        noise: standard deviation of a coordinate of one reading [m].
+        readings: (k,) of how many readings each offset is the mean: it weighs as many times.
 
     Raises:
         ShapeError: poses and offsets do not fit.
-        InvalidValueError: the poses do not tell all clearances.
+        TooFewError: the poses do not tell all clearances.
     """
     places, seen = floats(poses, "poses"), floats(offsets, "offsets")
     if places.ndim != 2 or places.shape[1] != 2 or seen.shape[-2:] != places.shape:
         raise ShapeError(f"expected (k, 2) poses and as many offsets, got shapes {places.shape} and {seen.shape}")
     if not 0 < noise < np.inf:
         raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
+    counts = np.broadcast_to(floats(readings, "readings"), len(places))
+    if not np.all(counts >= 1):
+        raise InvalidValueError(f"readings: expected at least 1 of each pose, got {counts.min():g}")
     names = tuple(linkage.clearances)
-    B = rest_matrix(linkage, places).reshape(-1, len(names))
+    weights = np.sqrt(np.repeat(counts, 2))
+    q = posed(linkage, places)
+    B = matrix_at(linkage, q).reshape(-1, len(names))
     singular = np.linalg.svd(B, compute_uv=False)
     if len(singular) < len(names) or singular[-1] < 1e-6 * singular[0]:
-        raise InvalidValueError(
+        raise TooFewError(
             f"{len(places)} poses do not tell {len(names)} clearances from one another; take more, or others"
         )
-    best, missing = _fitted(linkage, places, seen, B)
+    best, missing = _fitted(linkage, q, seen, B, weights)
+    weighted = weights[:, None] * B
     return Estimate(
         names=names,
         values=best,
-        covariance=np.asarray(noise**2 * np.linalg.inv(B.T @ B), dtype=np.float64),
+        covariance=np.asarray(noise**2 * np.linalg.inv(weighted.T @ weighted), dtype=np.float64),
         singular_values=np.asarray(singular, dtype=np.float64),
         missing=missing,
         noise=noise,
+        readings=np.array(counts),
     )
 
 
-def _fitted(linkage: Linkage, places: Array, seen: Array, B: Array) -> tuple[Array, Array]:
-    """Return the clearances (..., p) that explain offsets (..., k, 2) best, and what is left (..., k, 2) [m]."""
+def _fitted(linkage: Linkage, q: Array, seen: Array, B: Array, weights: Array) -> tuple[Array, Array]:
+    """Return the clearances (..., p) that explain offsets (..., k, 2) best, and what is left (..., k, 2) [m].
+
+    The weights (2k,) are those of the equations B (2k, p), at closed coordinates (k, n).
+    """
+    weighted = weights[:, None] * B
+
+    def square(missing: Array) -> Array:
+        return np.asarray(np.sum((weights.reshape(-1, 2) * missing) ** 2, axis=(-2, -1)), dtype=np.float64)
 
     def stepped(c: Array, missing: Array) -> Array:
         """Least squares about c, none below the smallest: with one at its bound, the others make up for it."""
         goal = missing.reshape(*missing.shape[:-2], -1) + (c - _SMALLEST) @ B.T
-        rows = [nnls(B, one)[0] for one in goal.reshape(-1, len(B))]
+        rows = [nnls(weighted, weights * one)[0] for one in goal.reshape(-1, len(B))]
         return np.reshape(rows, c.shape) + _SMALLEST
 
     c = stepped(np.full((*seen.shape[:-2], B.shape[1]), _SMALLEST), seen)
     best, left, settled = c, np.full_like(seen, np.inf), False
     for _ in range(_MOST_ROUNDS):
-        missing = seen - rest_offsets(linkage, places, c)
+        missing = seen - _offsets_at(linkage, q, c)
         # The rounds need not end with the best.
-        better = np.sum(missing**2, axis=(-2, -1)) < np.sum(left**2, axis=(-2, -1))
+        better = square(missing) < square(left)
         best, left = np.where(better[..., None], c, best), np.where(better[..., None, None], missing, left)
         if settled:
             break
@@ -227,7 +259,7 @@ def _gain(information: Array, rows: Array) -> float:
     return float(np.linalg.slogdet(information + rows.T @ rows)[1])
 
 
-def _posed(linkage: Linkage, poses: ArrayLike) -> Array:
+def posed(linkage: Linkage, poses: ArrayLike) -> Array:
     """Return (k, n) closed coordinates with the tip at each pose, each from the one before."""
     places: Iterable[Array] = floats(poses, "poses").reshape(-1, 2)
     guess, found = assembled(linkage), []

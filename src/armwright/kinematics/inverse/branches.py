@@ -44,10 +44,7 @@ def branches(arm: Arm, shoulder: Shoulder, R_BT: Matrix, p_BT: Vector, near: Seq
         p_BT: place of the tool, seen from the base [m].
         near: six joint positions; a free joint takes its value from here, and angles come near it.
     """
-    R_SB = transpose(shoulder.X_BS[:3, :3].tolist())
-    R_ST = product(R_SB, R_BT)
-    p = add(apply(R_SB, subtract(p_BT, shoulder.X_BS[:3, 3].tolist())), apply(R_ST, shoulder.p_TW.tolist()))
-    R_S6 = product(R_ST, shoulder.R_T6.tolist())
+    p, R_S6 = _wrist(shoulder, R_BT, p_BT)
     wanted = shoulder.angles(list(near))
     found = [posture(shoulder, p, R_S6, signs, wanted) for signs in BRANCHES]
     return Branches(
@@ -55,6 +52,32 @@ def branches(arm: Arm, shoulder: Shoulder, R_BT: Matrix, p_BT: Vector, near: Seq
         free=[(one.turn_free, one.raise_free, one.wrist_free) for one in found],
         miss=[one.miss for one in found],
     )
+
+
+def one_branch(
+    arm: Arm, shoulder: Shoulder, R_BT: Matrix, p_BT: Vector, near: Sequence[Scalar], *, branch: int
+) -> Vector:
+    """Return the joint positions of one branch for one pose, whether it exists or not, over abstract scalars.
+
+    Args:
+        arm: the arm.
+        shoulder: its build.
+        R_BT: as for ``branches``.
+        p_BT: as for ``branches``.
+        near: as for ``branches``.
+        branch: its number among ``BRANCHES``.
+    """
+    p, R_S6 = _wrist(shoulder, R_BT, p_BT)
+    found = posture(shoulder, p, R_S6, BRANCHES[branch], shoulder.angles(list(near)))
+    return _near(arm, shoulder.joints(found.angles), near)
+
+
+def _wrist(shoulder: Shoulder, R_BT: Matrix, p_BT: Vector) -> tuple[Vector, Matrix]:
+    """Return the wrist centre and the turn of the last wrist frame, seen from the shoulder frame."""
+    R_SB = transpose(shoulder.X_BS[:3, :3].tolist())
+    R_ST = product(R_SB, R_BT)
+    p = add(apply(R_SB, subtract(p_BT, shoulder.X_BS[:3, 3].tolist())), apply(R_ST, shoulder.p_TW.tolist()))
+    return p, product(R_ST, shoulder.R_T6.tolist())
 
 
 def merged(found: Branches) -> tuple[list[Vector], list[Scalar]]:

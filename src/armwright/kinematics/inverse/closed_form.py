@@ -9,7 +9,7 @@ from armwright.arm.positions import known_arm, one_posture, positions
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import per_joint, stack
-from armwright.kinematics.inverse.branches import BRANCHES, Branches, branches, merged
+from armwright.kinematics.inverse.branches import BRANCHES, Branches, branches, merged, one_branch
 from armwright.kinematics.inverse.family import moved_inside, turned_inside
 from armwright.kinematics.inverse.judge import EDGE, Candidate, clean_pose, judge, typed_poses
 from armwright.kinematics.inverse.numeric import numeric_inverse
@@ -157,7 +157,8 @@ def _closed(arm: Arm, shoulder: Shoulder, X: Array, near: Array) -> InverseSolut
 
 def _members(arm: Arm, shoulder: Shoulder, X_BT: Array, branch: int, near: Array) -> Array:
     """Return the postures (k, 6) of one branch that places of the arm (k, 6) lead to, where a joint is free."""
-    return np.asarray(_postures(arm, shoulder, X_BT, near)[0][:, branch])
+    R = [X_BT[i, :3].tolist() for i in range(3)]
+    return stack(one_branch(arm, shoulder, R, X_BT[:3, 3].tolist(), per_joint(near), branch=branch), near.shape[:-1])
 
 
 def _nearest_pose(shoulder: Shoulder, X_BT: Array) -> Array:

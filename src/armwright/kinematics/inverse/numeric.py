@@ -39,7 +39,7 @@ class _Task:
 
     Attributes:
         arm: the arm.
-        X: (4, 4) the pose.
+        X: (4, 4) the pose, or (k, 4, 4), one for each of k postures.
         lower: (n,) lower bounds, may be infinite.
         upper: (n,) upper bounds.
         size: how long the arm is, for what is small [m].
@@ -92,19 +92,19 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     return judge(arm, X, _named(limited, met, near), near, apart=_SAME_POSTURE)
 
 
-def next_posture(arm: Arm, X: Array, near: Array) -> Array:
-    """Return the posture (n,) that a single descent from ``near`` leads to, whatever the limits.
+def next_postures(arm: Arm, X: Array, near: Array) -> Array:
+    """Return the postures (k, n) that single descents from postures ``near`` lead to, whatever the limits.
 
-    For a pose close to that of ``near``, as on a path; whether it is met is for the caller to see.
+    For poses close to those of ``near``, as on a path; whether they are met is for the caller to see.
 
     Args:
         arm: any arm.
-        X: (4, 4) tool pose in the base frame.
-        near: (n,) joint positions.
+        X: (k, 4, 4) tool poses in the base frame.
+        near: (k, n) joint positions.
     """
     size, endless = _size(arm), np.full(arm.n, np.inf)
     task = _Task(arm=arm, X=X, lower=-endless, upper=endless, size=size, length=max(size / 4, EDGE))
-    return np.asarray(_descend(task, near[None])[0])
+    return _descend(task, near)
 
 
 def _search(task: _Task, near: Array) -> tuple[Array, Array]:
@@ -148,7 +148,7 @@ def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
     """
     if task.arm.n > 6:
         return ()
-    _, J = _residual_and_jacobian(task, q[None])
+    _, J = _residual_and_jacobian(task, q[None], task.X)
     _, sigma, Vt = np.linalg.svd(J[0])
     rank = int((sigma > _IDLE * sigma[0]).sum())
     joints: set[int] = set()
@@ -175,15 +175,15 @@ def _residuals(task: _Task, q: Array) -> Array:
 
 def _descend(task: _Task, q: Array) -> Array:
     """Go from every start (k, n) down to where the residual is least, by damped least squares within the bounds."""
-    q = q.copy()
+    q, X = q.copy(), np.broadcast_to(task.X, (len(q), 4, 4))
     running = np.arange(len(q))
     damping = np.full(len(q), _DAMPING)
-    e, J = _residual_and_jacobian(task, q)
+    e, J = _residual_and_jacobian(task, q, X)
     square = np.sum(e**2, axis=-1)
     weights = np.array([task.size**2 if joint.revolute else 1.0 for joint in task.arm.joints])
     for _ in range(_STEPS):
         moved = _bounded_step(task, q[running], e, J, (damping * square / task.size**2)[:, None] * weights)
-        e_moved, J_moved = _residual_and_jacobian(task, moved)
+        e_moved, J_moved = _residual_and_jacobian(task, moved, X[running])
         square_moved = np.sum(e_moved**2, axis=-1)
         better = square_moved < square
         still = better & (square_moved > (1 - _STILL) * square)
@@ -220,14 +220,14 @@ def _bounded_step(task: _Task, q: Array, e: Array, J: Array, damping: Array) -> 
     return np.clip(q + np.where(held, 0.0, step), lower, upper)
 
 
-def _residual_and_jacobian(task: _Task, q: Array) -> tuple[Array, Array]:
-    """Return what is missing to the pose (k, 6) and its slope (k, 6, n), turns in metres."""
+def _residual_and_jacobian(task: _Task, q: Array, X: Array) -> tuple[Array, Array]:
+    """Return what postures (k, n) miss of poses (..., 4, 4), (k, 6), and its slope (k, 6, n), turns in metres."""
     scalars, lead = per_joint(q), q.shape[:-1]
     frames = link_frames(task.arm, scalars)
     R, p = tool_frame(task.arm, frames[-1])
     R_BT = stack([x for row in R for x in row], lead).reshape(*lead, 3, 3)
-    turn = rotation_vector(task.X[:3, :3] @ np.swapaxes(R_BT, -1, -2))
-    e = np.concatenate([task.X[:3, 3] - stack(p, lead), task.length * turn], axis=-1)
+    turn = rotation_vector(X[..., :3, :3] @ np.swapaxes(R_BT, -1, -2))
+    e = np.concatenate([X[..., :3, 3] - stack(p, lead), task.length * turn], axis=-1)
     columns = frame_columns(task.arm, frames, p)
     J = np.stack([stack(column, lead) for column in columns], axis=-1)
     return e, J * np.repeat((1.0, task.length), 3)[:, None]

@@ -17,9 +17,14 @@ _MOST_IMAGES = 4096
 
 def travel(arm: Arm, q_from: ArrayLike, q_to: ArrayLike) -> float:
     """Return how far apart two postures are: the root of the summed squares of each joint's time at top speed."""
+    return float(travels(arm, joint_array(q_from, arm.n), joint_array(q_to, arm.n)))
+
+
+def travels(arm: Arm, q_from: Array, q_to: Array) -> Array:
+    """Return ``travel`` (...) of postures (..., n)."""
     speed = arm.limit("speed")
     weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
-    return float(np.linalg.norm((joint_array(q_to, arm.n) - joint_array(q_from, arm.n)) * weight))
+    return np.asarray(np.linalg.norm((q_to - q_from) * weight, axis=-1))
 
 
 def nearest_image(arm: Arm, q: ArrayLike, near: ArrayLike) -> Array:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from armwright.errors import ArmwrightError
+from armwright.files.reading import regular
 from armwright.program.debugging import breaking, looking
 from armwright.program.debugging.debugger import Command
 from armwright.program.debugging.editor import EditorSession, Launch, Load, Save
@@ -227,8 +228,8 @@ def _launched(arguments: Arguments) -> Launch:
     if standard not in {one.value for one in Standard}:
         raise RequestError(f"std: expected 2 or 83, got {standard!r}")
     return Launch(
-        program=Path(arguments.text("program")),
-        cell=Path(arguments.text("cell")) if arguments.text("cell", "") else None,
+        program=regular(Path(arguments.text("program"))),
+        cell=regular(Path(arguments.text("cell"))) if arguments.text("cell", "") else None,
         std=Standard(standard),
         output=Path(arguments.text("output")) if arguments.text("output", "") else None,
         stop_on_entry=arguments.flag("stopOnEntry"),

@@ -28,7 +28,7 @@ from armwright.program.debugging.stopping import Stop
 from armwright.program.debugging.timeline import Path
 from armwright.program.debugging.variables import Shown
 from armwright.program.debugging.views import Frame, mover, process_of, stack
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import Code, Kind
 from armwright.program.running.interpret import Limits, RunError
 from armwright.program.running.machine import Machine

@@ -18,14 +18,15 @@ from armwright.program.editing.places import UTF_16, Ruler, columns
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic
 from armwright.program.messages.rendering import render
-from armwright.program.running.machine import RunError
-from armwright.program.running.recording import Recording
+from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more, one_line
+from armwright.program.running.recording import Effect, Recording
 from armwright.program.text.source import Span
 from armwright.program.text.words import Standard
 
 _DESCRIPTIONS = {"start": "back at the start", "data breakpoint": "something has changed"}
 # The number of the text of a program that was read from a file of code.
 LISTED = 1
+_ALL_OF_IT = "with `output` in the launch configuration all are in events.jsonl"
 # What the protocol has a word for.
 _REASONS = {"start": "entry"}
 
@@ -236,12 +237,13 @@ class EditorSession:
             return
         self.ended = True
         assert self.loaded is not None  # noqa: S101 - it has run
-        status = ExitStatus.DONE if stop.reason == "end" else RunError.exit_status
+        status = stop.status
         if stop.diagnostic is not None:
             self.say(render([stop.diagnostic], self.loaded.code.source), "stderr")
-        elif self.launch is not None and self.launch.output is not None:
+        if self.launch is not None and self.launch.output is not None:
+            recording = stop.recording or self.live.recording
             try:
-                self.say(self._save(self.launch, self.loaded, self.live.recording()) + "\n", "console")
+                self.say(self._save(self.launch, self.loaded, recording()) + "\n", "console")
             except ArmwrightError as error:
                 self.say(f"{error}\n", "stderr")
                 status = error.exit_status
@@ -265,13 +267,21 @@ class EditorSession:
         self.send("output", {"category": category, "output": text, **place})
 
     def _tell_news(self, debugger: Debugger) -> None:
-        for effect in debugger.news():
-            if effect.kind == "PRINT":
-                self.say(f"{effect.data['printed']}\n", "stdout", effect.span)
-            elif effect.kind == "ERROR":
-                self.say(f"recovered: {effect.text}\n", "stderr", effect.span)
+        news = excerpt([one for one in debugger.news() if one.kind in {"PRINT", "ERROR"}], ON_A_TERMINAL)
+        for effect in news.first:
+            self._tell(effect)
+        if news.left_out:
+            self.say(f"{more(news.left_out, _ALL_OF_IT)}\n", "console")
+        for effect in news.last:
+            self._tell(effect)
         for text, breakpoint_ in debugger.said():
             self.say(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)
+
+    def _tell(self, effect: Effect) -> None:
+        if effect.kind == "PRINT":
+            self.say(f"{one_line(effect.data['printed'], _ALL_OF_IT)}\n", "stdout", effect.span)
+        else:
+            self.say(f"recovered: {effect.text}\n", "stderr", effect.span)
 
     def _tell_threads(self, debugger: Debugger) -> None:
         alive = {self.thread(one.path) for one in debugger.processes}

@@ -203,7 +203,13 @@ class Going:
         except RunError as error:
             if self._raised == done or "uncaught" not in self.catches:
                 self.ticks = max(self.ticks, machine.ticks)
-                return Stop(reason="failed", path=path, text=str(error), diagnostic=error.diagnostic)
+                return Stop(
+                    reason="failed",
+                    path=path,
+                    text=str(error),
+                    diagnostic=error.diagnostic,
+                    recording=error.recording,
+                )
             return self._before_error(
                 done, path, Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)
             )

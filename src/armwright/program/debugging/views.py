@@ -8,7 +8,7 @@ from armwright.cell.model import base_name
 from armwright.kinematics.forward import forward
 from armwright.program.debugging.statements import Statements
 from armwright.program.debugging.timeline import Path
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.running.machine import Machine
 from armwright.program.running.process import Activation, Process
 from armwright.program.text.source import Span

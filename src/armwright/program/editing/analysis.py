@@ -259,7 +259,7 @@ def _hinted(program: tree.Program) -> list[tree.Move | tree.Call | tree.Grasp]:
 
 _INNER: Mapping[type, Callable[[Any], tuple[tree.Statement, ...]]] = {
     tree.Block: lambda node: node.statements,
-    tree.If: lambda node: (node.then,) if node.otherwise is None else (node.then, node.otherwise),
+    tree.If: lambda node: node.statements,
     tree.While: lambda node: (node.body,),
     tree.For: lambda node: (node.body,),
     tree.Lock: lambda node: (node.body,),

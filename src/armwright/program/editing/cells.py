@@ -79,7 +79,7 @@ class Cells:
         Raises:
             FileFormatError: it cannot be read.
         """
-        cell = self.read(regular(folder / name)).cell
+        cell = self.read(folder / name).cell
         return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
 
     def around(self, folder: Path | None, text: str, setting: Path | None) -> Surroundings:
@@ -99,17 +99,11 @@ class Cells:
         if folder is None:
             return Surroundings()
         for name in dict.fromkeys(_IMPORT.findall(text)):
-            imported = self._imported_with_arms(folder / name)
+            imported = self._with_arms(folder / name)
             if imported is not None:
                 return Surroundings(file=imported)
         beside = [file for file in map(self._with_arms, _candidates(folder)) if file is not None]
         return Surroundings(file=beside[0] if len(beside) == 1 else None)
-
-    def _imported_with_arms(self, path: Path) -> CellFile | None:
-        try:
-            return self._with_arms(regular(path))
-        except FileFormatError:
-            return None
 
     def _with_arms(self, path: Path) -> CellFile | None:
         try:
@@ -140,7 +134,8 @@ def _stamp(path: Path) -> tuple[int, int]:
 
 def _read(path: Path) -> CellFile | FileFormatError:
     try:
-        cell = read_cell(path, arms_needed=False)
+        # A program or a setting names it, and neither may name what never ends.
+        cell = read_cell(regular(path), arms_needed=False)
         return CellFile(path=path, cell=cell, frames=cell.tree(), lines=_lines(path))
     except FileFormatError as error:
         return error

@@ -9,7 +9,7 @@ from armwright.program.editing.analysis import Before, View
 from armwright.program.editing.explained import explained
 from armwright.program.editing.hovers import signature
 from armwright.program.editing.wanted import Wanted, wanted
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import Kind, Type
 from armwright.program.meaning.known import WORLD
 from armwright.program.meaning.names import PREDECLARED

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import attrs
 
 from armwright.program.editing.analysis import Analysis
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import stages_text
 from armwright.program.intermediate.translate import form_of
 from armwright.program.syntax import tree

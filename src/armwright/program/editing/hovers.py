@@ -7,7 +7,7 @@ from armwright.cell.model import base_name
 from armwright.program.editing.analysis import Analysis
 from armwright.program.editing.explained import explained
 from armwright.program.editing.occurrences import Occurrence, What
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import Kind, Type
 from armwright.program.meaning.functions import FUNCTIONS
 from armwright.program.meaning.names import PREDECLARED

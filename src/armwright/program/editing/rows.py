@@ -200,16 +200,21 @@ class _Layout:
         self._statement(inner)
 
     def _if(self, column: int) -> None:
-        self._up_to("THEN")
-        self._nested(column)
-        if self._word != "ELSE":
-            return
-        self._start(column, inner=LEVEL)
-        self._take()
-        if self._word == "IF" and not any(comment.is_hard for comment in self._now.comments):
-            self._if(column)
-        else:
+        further = column + LEVEL
+        while True:
+            self._up_to("THEN")
             self._nested(column)
+            if self._word != "ELSE":
+                return
+            self._start(column, inner=LEVEL)
+            self._take()
+            if self._word != "IF":
+                break
+            if any(comment.is_hard for comment in self._now.comments):
+                # It cannot stand in the line of its ELSE; but a long chain does not walk off to the right.
+                column = further
+                self._start(column)
+        self._nested(column)
 
     def _cobegin(self, column: int) -> None:
         self._take()

@@ -1,6 +1,7 @@
 """The language server: a conversation with an editor about programs, in the Language Server Protocol."""
 
 import logging
+import os
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -60,8 +61,23 @@ class RloServer(LanguageServer):
         super().__init__("armwright", __version__, protocol_cls=_Protocol)
         self.documents: dict[str, Document] = {}
         self.office = Office(_USUAL, self._said, self._found_out, self._failed)
+        self._left = False
         self._told = ""
         self._guessed = False
+
+    def shutdown(self) -> None:
+        """End at once: what is being read or looked at is for nobody any more, and is not waited for."""
+        if self._stop_event is not None:
+            self._stop_event.set()
+
+    def leave(self) -> None:
+        """Take note that the editor has said ``exit``."""
+        self._left = True
+
+    @property
+    def status(self) -> int:
+        """The exit status that the protocol asks for: 1 where ``exit`` came without ``shutdown``."""
+        return int(self._left and not self.protocol._shutdown)  # noqa: SLF001 - pygls keeps it so
 
     # ---- what the editor can do
 
@@ -171,8 +187,11 @@ def make_server() -> RloServer:
     return server
 
 
-def serve() -> None:
+def serve() -> int:
     """Talk to an editor over standard input and output until it says goodbye.
+
+    Returns:
+        The exit status. Threads may be at work still, for nobody.
 
     Raises:
         InvalidValueError: it sent a message that is larger than the limit; the connection is over.
@@ -180,9 +199,14 @@ def serve() -> None:
     # Questions are answered while a program is looked at beside them: they get their turn soon.
     sys.setswitchinterval(_TURN)
     incoming = Incoming(sys.stdin.buffer)
-    make_server().start_io(cast("BinaryIO", incoming))
+    # Of its own: the protocol closes it at its end, and whatever else is printed must not get into it.
+    outgoing = os.fdopen(os.dup(1), "wb")
+    sys.stdout = sys.stderr
+    server = make_server()
+    server.start_io(cast("BinaryIO", incoming), outgoing)
     if incoming.refused:
         raise InvalidValueError(f"{incoming.refused}; the connection has ended")
+    return server.status
 
 
 def _conversation(server: RloServer) -> None:
@@ -228,7 +252,11 @@ def _conversation(server: RloServer) -> None:
 
 
 def _surroundings(server: RloServer) -> None:
-    """Let the server hear of settings and files."""
+    """Let the server hear of settings and files, and of the end."""
+
+    @server.feature(lsp.EXIT)
+    def left(_: Any) -> None:
+        server.leave()
 
     @server.feature(lsp.WORKSPACE_DID_CHANGE_CONFIGURATION)
     async def did_change_configuration(params: lsp.DidChangeConfigurationParams) -> None:

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 
+from armwright.program.following import sizes
 from armwright.program.following.course import LAST, Activation, Called, Course
 from armwright.program.following.facts import EVERYTHING, Shaky
 from armwright.program.following.linking import give
+from armwright.program.following.needs import need, need_indices
 from armwright.program.intermediate.code import Kind, Type
 from armwright.program.meaning.names import ProcedureSymbols
 from armwright.program.syntax import tree
@@ -42,10 +44,11 @@ class Calling:
         course = self._course
         procedure = course.symbols.procedures.get(node.name.key)
         if procedure is None:
-            course.need(*(one for one in node.arguments if not isinstance(one, tree.Name)))
+            need(course, *(one for one in node.arguments if not isinstance(one, tree.Name)))
             return
         key = procedure.node.name.key
         self._needs(procedure, node)
+        sizes.lengths(course, *node.arguments)
         deep = len(course.calls) >= _DEEPEST or self._left <= 0 or any(one.name == key for one in course.calls)
         if deep or not follow or len(node.arguments) != len(procedure.parameters):
             self.pass_over(key)
@@ -102,9 +105,9 @@ class Calling:
             kind = procedure.types.get(parameter)
             by_value = kind is not None and not kind.sizes and kind.kind in _BY_VALUE
             if by_value or not isinstance(argument, tree.Name | tree.Index):
-                course.need(argument)
+                need(course, argument)
             else:
-                course.need_indices(argument)
+                need_indices(course, argument)
 
     def _activation(self, procedure: ProcedureSymbols, node: tree.Call | None) -> Activation:
         """Return where a procedure keeps its names; None as the call stands for one that is not known."""

@@ -5,13 +5,15 @@ from contextlib import contextmanager
 
 import attrs
 
+from armwright.program.following import numbers
 from armwright.program.following.facts import EVERYTHING, Book, Facts, same
-from armwright.program.following.hanging import UNKNOWN, Hanging, Parting, is_any, is_arm
+from armwright.program.following.hanging import Hanging
+from armwright.program.following.places import Place
+from armwright.program.following.states import UNKNOWN, Parting, is_any, is_arm
 from armwright.program.following.writes import ANY_ARM, Writes, Writing
 from armwright.program.intermediate.code import Kind
 from armwright.program.meaning.known import KnownCell
 from armwright.program.meaning.names import Scope, Symbols
-from armwright.program.meaning.sorts import written
 from armwright.program.messages.diagnostics import Findings, Label, Severity
 from armwright.program.syntax import tree
 from armwright.program.text.source import Source, Span
@@ -78,7 +80,7 @@ class Course:
         first: whether this is the first pass of a loop that has others: what is not certain to run is passed over.
         over: whether HALT has ended the way that is being followed.
         ended: the HALT or RETRY that did.
-        conditions: in how many IFs and WHILEs the place lies that is being followed.
+        conditions: in how many parts that may not be done the place lies that is being followed.
     """
 
     def __init__(
@@ -99,6 +101,7 @@ class Course:
         self.facts = Facts()
         self.table = Hanging(cell, self.facts, rigid=self.writing.rigid)
         self.numbers: Book[tuple[float, Span] | None] = Book(self.facts, default=None, unknown=None, joined=same)
+        self.steps: Book[Place | None] = Book(self.facts, default=None, unknown=None, joined=same)
         self.last: Book[str | None] = Book(self.facts, default=None, unknown=UNKNOWN, joined=_joined_arms)
         self.main = Activation(scope=symbols.scope(None))
         self.now = self.main
@@ -177,8 +180,23 @@ class Course:
         if isinstance(node, tree.Number):
             # A number that was reported before is NaN, one with a unit depends on the units of the program.
             return None if node.unit or node.value != node.value else (node.value, node.span)
+        if isinstance(node, tree.Binary | tree.Unary):
+            found = numbers.value(node, self._known)
+            return None if found is None else (found, node.span)
         name = self.variable(node, Kind.SCALAR)
         return None if name is None or is_any(name) else self.numbers[name]
+
+    def holds(self, node: tree.Expression) -> bool | None:
+        """Return whether a condition holds; None where that is not certain."""
+        return numbers.holds(node, self._known)
+
+    def passes(self, node: tree.For) -> int | None:
+        """Return how often a FOR runs: 0, 1, or 2 for more often; None where that is not certain."""
+        return numbers.passes(node, self._known)
+
+    def _known(self, node: tree.Expression) -> float | None:
+        found = None if isinstance(node, tree.Binary | tree.Unary) else self.number(node)
+        return None if found is None else found[0]
 
     def name(self, kept: str) -> str:
         """Return a kept name as the program writes it."""
@@ -199,90 +217,7 @@ class Course:
         value = 0.0 if known is None else known[0]
         return int(value) if value.is_integer() and 1 <= value <= size else None
 
-    # ---- what is needed --------------------------------------------------------------------------------------------
-
-    def need(self, *nodes: tree.Expression | None) -> None:
-        """Say of each name in expressions that has certainly no value, once, that it needs one."""
-        waiting = [node for node in reversed(nodes) if node is not None]
-        while waiting:
-            node = waiting.pop()
-            if isinstance(node, tree.Name):
-                self._need_variable(node)
-            elif isinstance(node, tree.Matrix):
-                waiting += [item for item in reversed(node.items) if not isinstance(item, tree.Number)]
-            elif isinstance(node, tree.Binary):
-                # AND and OR look at the right side only where it matters.
-                waiting += [node.left] if node.operation in ("AND", "OR") else [node.right, node.left]
-            elif isinstance(node, tree.Index):
-                self.need(*node.indices)
-                self._need_variable(node)
-            elif isinstance(node, tree.Function):
-                waiting += reversed(node.arguments if node.name.key != "FORCE" else ())
-            elif isinstance(node, tree.ArmName):
-                self.look_up(node.key, node.span)
-            elif isinstance(node, tree.Unary):
-                waiting.append(node.operand)
-
-    def need_indices(self, *nodes: object) -> None:
-        """Say what is needed to find the variables that are written or named."""
-        for node in nodes:
-            if isinstance(node, tree.Index):
-                self.need(*node.indices)
-
-    def has_value(self, node: tree.Expression) -> bool:
-        """Whether a variable may have a value."""
-        name = self.variable(node)
-        return name is None or is_any(name) or is_arm(name) or self.table.valued[name]
-
-    def _kind(self, node: tree.Expression) -> Kind | None:
-        key = node.name.key if isinstance(node, tree.Index) else getattr(node, "key", "")
-        kind = self.now.scope.type(key)
-        return None if kind is None or kind.kind is Kind.EVENT else kind.kind
-
-    def _need_variable(self, node: tree.Name | tree.Index) -> None:
-        if self.has_value(node):
-            self._need_certain(node)
-            return
-        head = node.name if isinstance(node, tree.Index) else node
-        scope, kind = self.now.scope, self._kind(node)
-        kept = self.bound(head.key)
-        if kept is None or kind is None or scope.is_poisoned(head.key) or not self.settle(kept):
-            return
-        declared = scope.declared(head.key)
-        secondary = (Label(declared.span, "declared here"),) if declared else ()
-        if kind is Kind.FRAME:
-            self._no_place(node, secondary, from_cell=kept == head.key and head is node)
-            return
-        self.say(
-            "E303",
-            f"`{written(node)}` is used before it has a value",
-            node.span,
-            "no value here",
-            secondary=secondary,
-            helps=(f"write `{written(node)} = {'100' if kind is Kind.SCALAR else '( twelve numbers )'} ;` before",),
-        )
-
-    def _need_certain(self, node: tree.Name | tree.Index) -> None:
-        """Warn of a variable that has a value on one way here and none on the other.
-
-        Where the use depends on a condition too, that may be the one on which it has the value.
-        """
-        name = self.variable(node)
-        parting = True if name is None or is_any(name) else self.table.is_sure(name)
-        if name is None or not isinstance(parting, Parting) or self.conditions > parting.depth:
-            return
-        open_cell = self.cell is None and self._kind(node) is Kind.FRAME
-        if open_cell or not self.settle(name):
-            return
-        self.say(
-            "W207",
-            f"`{written(node)}` may have no value here",
-            node.span,
-            "needs a value",
-            secondary=(Label(parting.span, "it gets one on one side of this IF only"),),
-            helps=("give it a value before the IF, or on both sides",),
-            severity=Severity.WARNING,
-        )
+    # ---- what is said of the way ------------------------------------------------------------------------------------
 
     def unreached(self, span: Span) -> None:
         """Point at a statement that no way leads to."""
@@ -296,23 +231,6 @@ class Course:
             secondary=(Label(self.ended, "nothing behind this is done"),),
             helps=("leave it out, or put a condition in front of what ends the way",),
             severity=Severity.WARNING,
-        )
-
-    def _no_place(self, node: tree.Name | tree.Index, secondary: tuple[Label, ...], *, from_cell: bool) -> None:
-        """Say that a frame has no value; a cell file may give one to the frames of the program, and to no others."""
-        certain = self.cell is not None or not from_cell
-        note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
-        if not certain:
-            note = "no cell was given; a cell file may give it one"
-        nothing_yet = self.table.is_empty
-        self.say(
-            "E304" if certain else "W204",
-            f"frame `{written(node)}` is used before it has a value",
-            node.span,
-            "no value here",
-            secondary=() if nothing_yet and certain else secondary,
-            notes=(note,) if nothing_yet or not certain else (),
-            severity=Severity.ERROR if certain else Severity.WARNING,
         )
 
     # ---- arms ------------------------------------------------------------------------------------------------------
@@ -346,6 +264,21 @@ class Course:
         self.last.put(LAST, UNKNOWN)
 
     # ---- forgetting ------------------------------------------------------------------------------------------------
+
+    def parting(self, span: Span, says: str, advice: str) -> Parting:
+        """Return what parts the ways here; see ``Parting``."""
+        return Parting(span, self.conditions, says, advice)
+
+    def forget_undone(self, writes: Writes, parting: Parting | None = None) -> None:
+        """Give up what a part of the program may change that is perhaps not done to its end.
+
+        What had no value before may have one then, or none: there the ways part.
+        """
+        names = writes.values | writes.placed | writes.hung
+        lacking = [name for name in self.kept(names) if not is_any(name) and not self.table.valued[name]]
+        self.forget(writes)
+        for name in lacking:
+            self.table.sure.put(name, parting or False)
 
     def forget(self, writes: Writes) -> None:
         """Give up what a part of the program may change."""
@@ -392,7 +325,10 @@ class Course:
             self.facts.wipe(name)
         else:
             self.table.has(name)
-            self.numbers.put(name, None)
+            # Most variables are numbers or steps of which nothing is certain.
+            for book in (self.numbers, self.steps):
+                if book[name] is not None:
+                    book.put(name, None)
 
     # ---- saying ----------------------------------------------------------------------------------------------------
 
@@ -423,6 +359,13 @@ class Course:
         self.found.say(
             code, message, span, label, severity=severity, secondary=(*secondary, *calls), notes=notes, helps=helps
         )
+
+    @contextmanager
+    def perhaps(self) -> Iterator[None]:
+        """Follow what may not be done."""
+        self.conditions += 1
+        yield
+        self.conditions -= 1
 
     @contextmanager
     def inside(self, activation: Activation, called: Called | None = None) -> Iterator[None]:

@@ -4,7 +4,8 @@ An error is said only where it is certain that a run that comes to the statement
 agree on stays known; a loop is followed twice: once as at its first pass, and once knowing nothing of what it changes.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import attrs
 
@@ -12,14 +13,15 @@ from armwright.program.following import handling, linking, processes, sharing
 from armwright.program.following.calling import Calling
 from armwright.program.following.course import LAST, Course, Uses
 from armwright.program.following.facts import Outcome, Shaky
-from armwright.program.following.hanging import UNKNOWN, Parting, is_arm
+from armwright.program.following.needs import need, need_indices
+from armwright.program.following.states import UNKNOWN, Parting, is_any, is_arm
 from armwright.program.following.writes import ANY_ARM, ANYTHING, NOTHING, Writes, every
 from armwright.program.intermediate.code import Kind
 from armwright.program.meaning.known import KnownCell
 from armwright.program.meaning.names import Symbols
 from armwright.program.messages.diagnostics import Diagnostic
 from armwright.program.syntax import tree
-from armwright.program.text.source import Source
+from armwright.program.text.source import Source, Span
 
 # Statements inside one another that are followed; deeper ones only make things unknown.
 _DEEPEST = 100
@@ -27,8 +29,8 @@ _DEEPEST = 100
 _DEEPEST_LOOPS = 3
 # Branches beside which one looks at each other one.
 _MOST_BRANCHES = 30
-# A last pass of a loop that rounding would leave out is made.
-_ROUNDING = 1e-9
+# Ways of one IF that are joined name by name where they meet.
+_MOST_WAYS = 100
 
 
 @attrs.frozen(kw_only=True)
@@ -99,9 +101,9 @@ class _Follower:
             tree.Repeat: self._repeat,
             tree.For: self._for,
             tree.Cobegin: self._cobegin,
-            tree.Signal: lambda node: course.need_indices(node.event),
-            tree.Wait: lambda node: course.need_indices(node.event),
-            tree.Pause: lambda node: course.need(node.duration),
+            tree.Signal: lambda node: need_indices(course, node.event),
+            tree.Wait: lambda node: need_indices(course, node.event),
+            tree.Pause: lambda node: need(course, node.duration),
             tree.Lock: self._lock,
             tree.Try: self._try,
             tree.Retry: self._end,
@@ -151,10 +153,10 @@ class _Follower:
         self._course.over, self._course.ended = True, node.span if says else None
 
     def _print(self, node: tree.Print) -> None:
-        self._course.need(*(item for item in node.items if not isinstance(item, tree.String)))
+        need(self._course, *(item for item in node.items if not isinstance(item, tree.String)))
 
     def _lock(self, node: tree.Lock) -> None:
-        self._course.need_indices(*node.targets)
+        need_indices(self._course, *node.targets)
         self.one(node.body)
 
     # ---- ways that part --------------------------------------------------------------------------------------------
@@ -169,27 +171,40 @@ class _Follower:
         course.over = False
         return outcome
 
-    def _meet(self, *outcomes: Outcome | None) -> None:
-        """Go on where ways meet; not at all if none of them comes here."""
+    def _meet(self, *outcomes: Outcome | None, parting: Parting | None = None) -> None:
+        """Go on where ways meet; not at all if none of them comes here.
+
+        Args:
+            outcomes: of the ways.
+            parting: what is said of a variable that has got a value on some of them only.
+        """
         arrived = [outcome for outcome in outcomes if outcome is not None]
         if arrived:
+            self._course.table.parting = parting
             self._course.facts.join(arrived)
+            self._course.table.parting = None
         else:
             self._course.over = True
 
     def _if(self, node: tree.If) -> None:
         course = self._course
-        course.need(node.condition)
+        need(course, node.condition)
         if course.first:
             course.forget(self._writes(node))
             return
-        otherwise = () if node.otherwise is None else (node.otherwise,)
-        course.conditions += 1
-        ways = self._way((node.then,)), self._way(otherwise)
-        course.conditions -= 1
-        course.table.parting = Parting(node.head, course.conditions)
-        self._meet(*ways)
-        course.table.parting = None
+        chain, otherwise = node.chain
+        ways: list[Outcome | None] = []
+        with course.perhaps():
+            for one in chain:
+                if one is not node:
+                    need(course, one.condition)
+                ways.append(self._way((one.then,)))
+            ways.append(self._way(() if otherwise is None else (otherwise,)))
+        if len(ways) > _MOST_WAYS and any(way is not None for way in ways):
+            course.forget(self._writes(node))
+            return
+        says, advice = "it gets one on one side of this IF only", "give it a value before the IF, or on both sides"
+        self._meet(*ways, parting=course.parting(node.head, says, advice))
 
     def _move(self, node: tree.Move) -> None:
         """Follow a MOVE; what its actions do may happen or not, while the arm is on its way."""
@@ -197,7 +212,7 @@ class _Follower:
         arm = handling.begin(course, node)
         guards = [clause for clause in node.clauses if isinstance(clause, tree.On)]
         for guard in guards:
-            course.need(guard.condition)
+            need(course, guard.condition)
             writes = self._writes(guard.action)
             if not course.first:
                 mark = course.facts.mark()
@@ -205,10 +220,12 @@ class _Follower:
                     course.lose_arms(grasps=False)
                 else:
                     course.table.arrive(arm, UNKNOWN, None)
-                self.one(guard.action)
+                with course.perhaps():
+                    self.one(guard.action)
                 course.facts.take_back(mark)
                 course.over = False
-            course.forget(writes)
+            says, advice = "it gets one in this action, which may not happen", "give it a value before the MOVE"
+            course.forget_undone(writes, course.parting(guard.head, says, advice))
         halted = any(self._writes(guard.action).halts for guard in guards)
         handling.end(course, node, arm, halted=halted)
 
@@ -222,31 +239,40 @@ class _Follower:
         retries = self._writes(*node.recovery).retries
         mark = course.facts.mark()
         if retries:
-            course.forget(writes)
+            course.forget_undone(writes)
         well = self._way(node.body, mark)
-        course.forget(writes if retries else self._writes(*node.body))
+        course.forget_undone(writes if retries else self._writes(*node.body))
+        for name in self._given_at_once(node.body):
+            course.table.has(name)
         outside, self._recovering = self._recovering, True
         recovered = self._way(node.recovery, mark)
         self._recovering = outside
-        self._meet(well, recovered)
+        says = "it gets one in this TRY, where something may fail before"
+        advice = "give it a value before the TRY, or behind RECOVER too"
+        self._meet(well, recovered, parting=course.parting(_first_word(node.span), says, advice))
+
+    def _given_at_once(self, statements: Sequence[tree.Statement]) -> Iterator[str]:
+        """Give the variables that have a value before anything can fail."""
+        for one in itertools.takewhile(lambda one: isinstance(one, tree.Assign | tree.Print), statements):
+            name = self._course.variable(one.target) if isinstance(one, tree.Assign) else None
+            if name is not None and not is_any(name):
+                yield name
 
     # ---- loops -----------------------------------------------------------------------------------------------------
 
     def _while(self, node: tree.While) -> None:
-        self._course.need(node.condition)
-        self._course.conditions += 1
-        self._loop(node, (node.body,), certain=False)
-        self._course.conditions -= 1
+        need(self._course, node.condition)
+        self._perhaps_never(node, node.head, "WHILE", (node.body,), certain=bool(self._course.holds(node.condition)))
 
     def _repeat(self, node: tree.Repeat) -> None:
-        self._loop(node, node.body, certain=True)
+        self._loop(node, node.body)
         if not self._course.over:
-            self._course.need(node.condition)
+            need(self._course, node.condition)
 
     def _for(self, node: tree.For) -> None:
         course = self._course
-        course.need(node.first, node.last, node.step)
-        passes = _passes(node)
+        need(course, node.first, node.last, node.step)
+        passes = course.passes(node)
         variable = course.variable(node.variable, Kind.SCALAR)
         if passes == 0:
             return
@@ -255,19 +281,32 @@ class _Follower:
         if passes == 1:
             self.one(node.body)
         else:
-            self._loop(node, (node.body,), certain=passes is not None)
+            self._perhaps_never(node, node.head, "FOR", (node.body,), certain=passes is not None)
 
-    def _loop(self, node: tree.Statement, body: tuple[tree.Statement, ...], *, certain: bool) -> None:
+    def _perhaps_never(
+        self, node: tree.Statement, head: Span, word: str, body: tuple[tree.Statement, ...], *, certain: bool
+    ) -> None:
+        """Follow a loop that may not run once."""
+        course = self._course
+        says, advice = f"it gets one inside this {word}, which may not run once", f"give it a value before the {word}"
+        parting = course.parting(head, says, advice)
+        if certain:
+            self._loop(node, body)
+        else:
+            with course.perhaps():
+                self._loop(node, body, parting)
+
+    def _loop(self, node: tree.Statement, body: tuple[tree.Statement, ...], parting: Parting | None = None) -> None:
         """Follow a loop: as at the first pass, then knowing nothing of what it changes.
 
         Args:
             node: the loop.
             body: what it repeats.
-            certain: whether it runs once or more.
+            parting: of a loop that may not run once.
         """
         course, writes = self._course, self._writes(node)
         if course.first:
-            if certain:
+            if parting is None:
                 self.all(body)
             course.forget(writes)
             return
@@ -279,7 +318,7 @@ class _Follower:
         course.forget(writes)
         again = self._way(body, mark)
         self._loops -= 1
-        self._meet(*(again,) if certain else (none, again))
+        self._meet(*(again,) if parting is None else (none, again), parting=parting)
 
     def _first_pass(self, body: Sequence[tree.Statement]) -> None:
         """Follow what is certain to run at the first pass of several, and come back."""
@@ -338,13 +377,6 @@ def _others(writes: list[Writes], number: int) -> Writes:
     return others
 
 
-def _passes(node: tree.For) -> int | None:
-    """Return how often a FOR with constant bounds runs: 0, 1, or 2 for more often; None where that is unknown."""
-    bounds = [node.first, node.last, *([] if node.step is None else [node.step])]
-    values = [bound.value for bound in bounds if isinstance(bound, tree.Number) and not bound.unit]
-    if len(values) < len(bounds):
-        return None
-    first, last, step = (*values, 1.0)[:3]
-    if step == 0:
-        return None
-    return int(min(2, max(0, (last - first) / step + _ROUNDING + 1)))
+def _first_word(span: Span) -> Span:
+    """Return where the TRY stands that begins a statement."""
+    return Span(span.start, span.start + len("TRY"))

@@ -1,9 +1,11 @@
 """What arms, tools and sensors do in the course of a program: who carries what, and whether it can be moved."""
 
 from armwright.errors import closest
+from armwright.program.following import sizes
 from armwright.program.following.course import LAST, Course
-from armwright.program.following.hanging import UNKNOWN, is_any, is_arm
 from armwright.program.following.linking import leaves, place
+from armwright.program.following.needs import need, need_indices
+from armwright.program.following.states import UNKNOWN, is_any, is_arm
 from armwright.program.intermediate.code import HIGHEST_SPEED, LOWEST_SPEED
 from armwright.program.meaning.known import WORLD
 from armwright.program.meaning.moves import SPEED_NOTE
@@ -17,7 +19,7 @@ from armwright.program.text.words import Standard
 
 def open_hand(course: Course, node: tree.Open) -> None:
     """Open the fingers of an arm."""
-    course.need(node.width)
+    need(course, node.width)
     if isinstance(node.arm, tree.ArmName):
         course.mention(node.arm)
         course.use(node.arm.key, node.span.to(node.arm.span))
@@ -84,7 +86,7 @@ def read(course: Course, node: tree.ReadVisions) -> None:
                 if not is_arm(name):
                     course.table.forget(name)
             continue
-        course.need_indices(target)
+        need_indices(course, target)
         frame = course.frame(target)
         if frame is None or frame == WORLD:
             continue
@@ -129,7 +131,7 @@ def operate(course: Course, node: tree.Operate) -> None:
 def begin(course: Course, node: tree.Move) -> str | None:
     """Look at what a MOVE needs to begin; return the arm, None where it is unknown."""
     course.mention(node.moved)
-    course.need_indices(node.moved)
+    need_indices(course, node.moved)
     moved = course.frame(node.moved)
     implied = False
     if moved is not None and is_arm(moved):
@@ -137,12 +139,13 @@ def begin(course: Course, node: tree.Move) -> str | None:
     else:
         arm, implied = _carrier(course, node, moved)
     course.record(node, arm, implied=implied)
-    course.need(*_places(node))
+    need(course, *_places(node))
+    sizes.lengths(course, *_places(node))
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
             _speed(course, clause.value)
         elif isinstance(clause, tree.Blend | tree.Duration):
-            course.need(clause.value)
+            need(course, clause.value)
     if arm is None:
         return None
     _left_hanging(course, node, arm)
@@ -272,7 +275,7 @@ def _relative(course: Course, node: tree.Move, arm: str) -> None:
 
 
 def _speed(course: Course, node: tree.Expression) -> None:
-    course.need(node)
+    need(course, node)
     known = course.number(node)
     if isinstance(node, tree.Number) or known is None or not isinstance(node, tree.Name):
         return

@@ -4,106 +4,31 @@ from collections.abc import Iterator
 
 import attrs
 
-from armwright.program.following.facts import Book, Facts, base, either, same
+from armwright.program.following.facts import Book, Facts, either, same
+from armwright.program.following.places import HERE, Place, after, inverse
+from armwright.program.following.states import (
+    ANY_GRIP,
+    ANY_HAND,
+    ANY_LINK,
+    GRIPS,
+    HANDS,
+    UNKNOWN,
+    Assignment,
+    Grip,
+    Hand,
+    Link,
+    Parting,
+    is_any,
+    is_arm,
+    joined_grips,
+    joined_hands,
+    joined_links,
+)
 from armwright.program.meaning.known import STATION, WORLD, KnownCell
 from armwright.program.text.source import Span
 
-# Where a hand stands, or what it holds, when nobody knows.
-UNKNOWN = "?"
-# Names that wipe where all hands are and what their fingers do, and what they hold.
-HANDS, GRIPS = "(hands)", "(grips)"
-
-
-@attrs.frozen
-class Link:
-    """One affixment.
-
-    Attributes:
-        parent: the frame above; None when nobody knows whether there is one.
-        span: the AFFIX that made it; None where the cell did.
-        rigid: whether the frame above comes along when this one is given another place.
-    """
-
-    parent: str | None
-    span: Span | None = None
-    rigid: bool = False
-
-
-@attrs.frozen
-class Assignment:
-    """One value given to a frame: in which order, where, and whether the frame stood somewhere before."""
-
-    order: int
-    span: Span
-    moved: bool
-
-
-@attrs.frozen
-class Parting:
-    """An IF of which one side gives a variable its value: its head, and in how many others it stands."""
-
-    span: Span
-    depth: int
-
-
-@attrs.frozen
-class Hand:
-    """What is known of one hand, but for what it holds.
-
-    Attributes:
-        open: whether the fingers are open; None at the start of a program.
-        doubtful: whether nobody knows what the program did to the fingers.
-        at: the frame at which the hand stands.
-        arrival: the MOVE of the arm itself that brought it there.
-        arrived_open: whether the fingers were open then.
-        opened: the OPEN since then.
-        left: the frame that the fingers let go while it hung on the arm, and the OPEN that did it.
-    """
-
-    open: bool | None = None
-    doubtful: bool = False
-    at: str | None = None
-    arrival: Span | None = None
-    arrived_open: bool | None = None
-    opened: Span | None = None
-    left: tuple[str, Span] | None = None
-
-
-@attrs.frozen
-class Grip:
-    """What a hand holds: the frame at which the fingers closed, and the GRASP that closed them."""
-
-    frame: str
-    span: Span | None = None
-
-
-_ANY_LINK = Link(None)
-_ANY_HAND = Hand(doubtful=True, at=UNKNOWN)
-_ANY_GRIP = Grip(UNKNOWN)
-
-
-def _joined_links(one: Link | None, other: Link | None) -> Link | None:
-    if one == other:
-        return one
-    if one is None or other is None or (one.parent, one.rigid) != (other.parent, other.rigid):
-        return _ANY_LINK
-    return one
-
-
-def _joined_hands(one: Hand, other: Hand) -> Hand:
-    if one == other:
-        return one
-    return Hand(
-        open=same(one.open, other.open),
-        doubtful=one.doubtful or other.doubtful or one.open != other.open,
-        at=one.at if one.at == other.at else UNKNOWN,
-    )
-
-
-def _joined_grips(one: Grip | None, other: Grip | None) -> Grip | None:
-    if one is None or other is None or one.frame != other.frame:
-        return one if one == other else _ANY_GRIP
-    return one
+# Frames that hang on one another, up to which a place is worked out.
+_LONGEST_WAY = 50
 
 
 class Hanging:
@@ -121,17 +46,17 @@ class Hanging:
         self._children: dict[str, int] = {}
         self._count = self._carried = self._doubts = self._assignments = self._order = 0
         self.links: Book[Link | None] = Book(
-            facts, default=None, unknown=_ANY_LINK, joined=_joined_links, watch=self._watch
+            facts, default=None, unknown=ANY_LINK, joined=joined_links, watch=self._watch
         )
         self.valued = Book(facts, default=False, unknown=True, joined=either)
         # Of what may have a value, whether it has one on every way here, or where the ways have parted.
         self.sure: Book[Parting | bool] = Book(facts, default=False, unknown=True, joined=self._joined_sure)
         self.parting: Parting | None = None
-        # Where frames stand that hang on nothing and got their place by twelve numbers [m].
-        self.spots: Book[tuple[float, ...] | None] = Book(facts, default=None, unknown=None, joined=same)
+        # Where frames stand, seen from what they hang on.
+        self._steps: Book[Place | None] = Book(facts, default=None, unknown=None, joined=same)
         self.assigned: Book[Assignment | None] = Book(facts, default=None, unknown=None, joined=same)
-        self.hands = Book(facts, default=Hand(), unknown=_ANY_HAND, joined=_joined_hands, group=HANDS)
-        self.grips: Book[Grip | None] = Book(facts, default=None, unknown=_ANY_GRIP, joined=_joined_grips, group=GRIPS)
+        self.hands = Book(facts, default=Hand(), unknown=ANY_HAND, joined=joined_hands, group=HANDS)
+        self.grips: Book[Grip | None] = Book(facts, default=None, unknown=ANY_GRIP, joined=joined_grips, group=GRIPS)
         frames = dict(cell.frames) if cell else {}
         for name in (WORLD, STATION, *frames):
             self.has(name)
@@ -195,6 +120,27 @@ class Hanging:
             return UNKNOWN
         return next((arm for arm, frame in grips.items() if frame == name), None)
 
+    def where(self, name: str) -> Place | None:
+        """Return where a frame stands in WORLD; None where that is not certain, or up a long way."""
+        found: Place | None = HERE
+        for _ in range(_LONGEST_WAY):
+            if name == WORLD or found is None:
+                return found
+            if is_any(name) or is_arm(name) or (step := self._steps[name]) is None:
+                return None
+            found, link = after(step, found), self.links[name]
+            if link is None:
+                return found
+            if link.parent is None:
+                return None
+            name = link.parent
+        return None
+
+    def step(self, child: str, parent: str) -> Place | None:
+        """Return the step from one frame to another; None where that is not certain."""
+        there, here = self.where(child), self.where(parent)
+        return None if there is None or here is None else after(inverse(here), there)
+
     def is_sure(self, name: str) -> "Parting | bool":
         """Return whether what may have a value has one on every way here; if not, where the ways parted."""
         return self.sure[name]
@@ -211,14 +157,16 @@ class Hanging:
         self.valued.put(name, False)
         self.sure.put(name, False)
 
-    def hang(self, child: str, parent: str, span: Span | None, *, rigid: bool = False) -> None:
-        """Hang a frame on another."""
+    def hang(
+        self, child: str, parent: str, span: Span | None, *, rigid: bool = False, step: Place | None = None
+    ) -> None:
+        """Hang a frame on another, at a step from it where that is certain."""
         if is_any(child):
             self.forget(child)
             return
-        link = _ANY_LINK if is_any(parent) else Link(parent, span, rigid)
+        link = ANY_LINK if is_any(parent) else Link(parent, span, rigid)
         self.links.put(child, link)
-        self.spots.put(child, None)
+        self._steps.put(child, step)
         self.has(child)
         if self._facts.shaky and not self._steady(child):
             self.lose()
@@ -228,7 +176,17 @@ class Hanging:
         if is_any(child):
             self.forget(child)
         elif self.links[child] is not None:
+            stands = self.where(child)
             self.links.put(child, None)
+            self._steps.put(child, stands)
+
+    def stand(self, name: str, place: Place | None) -> None:
+        """Take note of where a frame has been put, in WORLD; not where putting one may move others."""
+        link = None if is_any(name) else self.links[name]
+        if is_any(name) or place is None or self._rigid or (link is not None and link.parent is None):
+            return
+        above = HERE if link is None or link.parent is None else self.where(link.parent)
+        self._steps.put(name, None if above is None else after(inverse(above), place))
 
     def assign(self, name: str, span: Span) -> None:
         """Give a frame a value, and thereby another place."""
@@ -238,7 +196,7 @@ class Hanging:
             self.forget(name)
             return
         self.assigned.put(name, Assignment(self._order, span, moved=self.valued[name]))
-        self.spots.put(name, None)
+        self._steps.put(name, None)
         self.has(name)
         leader = self.leader(name)
         if leader is None:
@@ -305,7 +263,7 @@ class Hanging:
             self.links.put(name, self.links.unknown)
             self.has(name)
             self.assigned.put(name, None)
-            self.spots.put(name, None)
+            self._steps.put(name, None)
         self.lose()
 
     def forget_hand(self, arm: str | None, *, grasps: bool) -> None:
@@ -330,7 +288,7 @@ class Hanging:
         else:
             self.has(name)
             self.assigned.put(name, None)
-            self.spots.put(name, None)
+            self._steps.put(name, None)
 
     def lose(self) -> None:
         """Take note that any frame may have been moved: where hands stand and what they hold is unknown."""
@@ -395,16 +353,3 @@ class Hanging:
             self._count += change
             self._carried += change * is_arm(link.parent)
             self._children[link.parent] = self._children.get(link.parent, 0) + change
-
-
-def is_arm(name: str) -> bool:
-    """Whether a canonical name is that of an arm; no other name has its form."""
-    return name.startswith("ARM_") and name[4:].isdecimal()
-
-
-def is_any(name: str) -> bool:
-    """Whether a name stands for some element of an array, nobody knows which."""
-    return name.endswith("[]")
-
-
-__all__ = ["HANDS", "UNKNOWN", "Assignment", "Hand", "Hanging", "Link", "base", "is_any", "is_arm"]

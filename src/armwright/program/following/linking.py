@@ -1,8 +1,9 @@
 """What gives frames their places and hangs them on one another in the course of a program."""
 
-from armwright.program.following import sizes
+from armwright.program.following import places, sizes
 from armwright.program.following.course import Course
-from armwright.program.following.hanging import is_any, is_arm
+from armwright.program.following.needs import need, need_indices
+from armwright.program.following.states import is_any, is_arm
 from armwright.program.intermediate.code import Kind
 from armwright.program.meaning.known import WORLD
 from armwright.program.meaning.sorts import written
@@ -13,18 +14,25 @@ from armwright.program.text.source import Span
 
 def assign(course: Course, node: tree.Assign) -> None:
     """Give a variable a value."""
-    course.need(node.value)
-    course.need_indices(node.target)
+    need(course, node.value)
+    need_indices(course, node.target)
     target = node.target
     frame = course.frame(target)
     if frame is not None:
+        sizes.lengths(course, node.value)
+        stands = places.certain(course, node.value)
         place(course, frame, target, node.span)
-        sizes.placed(course, frame, node)
+        course.table.stand(frame, stands)
+        sizes.placed(course, frame, node.value)
         return
-    for kind in (Kind.SCALAR, Kind.TRANS):
-        if (name := course.variable(target, kind)) is not None:
-            # Of a step it is known whether it has a value, of a number also which.
-            give(course, name, course.number(node.value) if kind is Kind.SCALAR else None, node.span)
+    if (name := course.variable(target, Kind.SCALAR)) is not None:
+        give(course, name, course.number(node.value), node.span)
+    elif (name := course.variable(target, Kind.TRANS)) is not None:
+        sizes.lengths(course, node.value)
+        step = places.certain(course, node.value)
+        give(course, name, None, node.span)
+        if not is_any(name):
+            course.steps.put(name, step)
 
 
 def give(course: Course, name: str, value: tuple[float, Span] | None, span: Span) -> None:
@@ -62,13 +70,14 @@ def place(course: Course, frame: str, node: tree.Expression, span: Span) -> None
 def affix(course: Course, node: tree.Affix) -> None:
     """Hang a frame on another."""
     course.mention(node.child, node.parent)
+    sizes.lengths(course, node.at)
     child, parent = course.frame(node.child), course.frame(node.parent)
     if node.at is None:
-        course.need(node.child)
+        need(course, node.child)
     else:
-        course.need_indices(node.child)
-        course.need(node.at)
-    course.need(node.parent)
+        need_indices(course, node.child)
+        need(course, node.at)
+    need(course, node.parent)
     if child is None or is_arm(child) or child == WORLD:
         return
     if parent is None:
@@ -78,6 +87,7 @@ def affix(course: Course, node: tree.Affix) -> None:
         _ring(course, node, child, parent)
         return
     leaves(course, child, parent, node.span)
+    step = course.table.step(child, parent) if node.at is None else places.certain(course, node.at)
     if is_any(child):
         course.table.forget(child)
         return
@@ -86,7 +96,7 @@ def affix(course: Course, node: tree.Affix) -> None:
         sizes.grasped(course, node, child, parent)
     else:
         course.table.displace(child)
-    course.table.hang(child, parent, node.link, rigid=node.rigid)
+    course.table.hang(child, parent, node.link, rigid=node.rigid, step=step)
 
 
 def leaves(course: Course, child: str, parent: str, span: Span) -> None:
@@ -158,7 +168,7 @@ def _late(course: Course, node: tree.Affix, child: str, parent: str) -> None:
 def unfix(course: Course, node: tree.Unfix) -> None:
     """Cut a frame loose."""
     course.mention(node.parent)
-    course.need_indices(node.child, node.parent)
+    need_indices(course, node.child, node.parent)
     child, table = course.frame(node.child), course.table
     if child is None or is_arm(child) or child == WORLD:
         return
@@ -170,7 +180,7 @@ def unfix(course: Course, node: tree.Unfix) -> None:
             _not_affixed(course, node, child)
             return
     if node.parent is None or parent == WORLD:
-        course.need(node.child)
+        need(course, node.child)
     table.cut(child)
 
 

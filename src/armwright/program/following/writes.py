@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import attrs
 
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import Kind
 from armwright.program.meaning.names import Scope, Symbols
 from armwright.program.syntax import tree
@@ -225,7 +225,7 @@ def every(statements: Iterable[tree.Statement]) -> Iterator[tree.Statement]:
 # The statements directly inside a statement; those that are missing have none inside.
 _PARTS: Mapping[type, Callable[..., tuple[tree.Statement, ...]]] = {
     tree.Block: lambda node: node.statements,
-    tree.If: lambda node: (node.then,) if node.otherwise is None else (node.then, node.otherwise),
+    tree.If: lambda node: node.statements,
     tree.While: lambda node: (node.body,),
     tree.For: lambda node: (node.body,),
     tree.Lock: lambda node: (node.body,),

@@ -36,6 +36,7 @@ def twin(machine: Machine) -> Machine:
     other.hands = {name: Hand(hand.at, hand.holds) for name, hand in machine.hands.items()}
     other.effects, other.stages, other.trees = list(machine.effects), list(machine.stages), list(machine.trees)
     other.runs = {name: list(runs) for name, runs in machine.runs.items()}
+    other.pushes = {name: list(pushes) for name, pushes in machine.pushes.items()}
     other.program = Process(
         path=(),
         priority=0.0,

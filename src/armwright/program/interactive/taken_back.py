@@ -3,7 +3,7 @@
 import numpy as np
 
 from armwright.cell.frames import WORLD
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.running.machine import Machine
 
 # Effects that say nothing of their own in a trace.

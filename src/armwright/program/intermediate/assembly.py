@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import attrs
 
-from armwright.errors import FileFormatError, closest
+from armwright.errors import FileFormatError, closest, shown
 from armwright.program.intermediate.code import (
     Code,
     Constant,
@@ -311,10 +311,10 @@ class _Reader:
     def _string(self, text: str) -> str:
         try:
             value = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             value = None
         if not isinstance(value, str):
-            self._fail(f'expected text in "", got {text}')
+            self._fail(f'expected text in "", got {shown(text)}')
         return value
 
     def _float(self, word: str) -> float:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 
 from armwright.program.following.flow import Flow
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import Code, Form, Op, Operand, ProcedureCode, Text, Type, stages_text
 from armwright.program.intermediate.emitting import LATER, Emitter
 from armwright.program.meaning.names import Symbols
@@ -195,16 +195,8 @@ class _Statements:
     def _control(self, statement: tree.If | tree.While | tree.Repeat | tree.For) -> None:
         out = self._out
         match statement:
-            case tree.If(condition=condition, then=then, otherwise=otherwise, head=head):
-                otherwise_at = out.emit(Op.JZ, out.value(condition), LATER, span=head)
-                self.one(then)
-                if otherwise is None:
-                    out.land(otherwise_at)
-                else:
-                    over = out.emit(Op.JMP, LATER, span=head)
-                    out.land(otherwise_at)
-                    self.one(otherwise)
-                    out.land(over)
+            case tree.If():
+                self._if(statement)
             case tree.While(condition=condition, body=body, head=head):
                 top = out.here
                 over = out.emit(Op.JZ, out.value(condition), LATER, span=head)
@@ -218,6 +210,23 @@ class _Statements:
                 out.emit(Op.JZ, out.value(condition), top, span=tail)
             case tree.For():
                 self._for(statement)
+
+    def _if(self, choice: tree.If) -> None:
+        out = self._out
+        chain, otherwise = choice.chain
+        overs: list[int] = []
+        for one in chain:
+            if one is not choice:
+                out.begin()
+            otherwise_at = out.emit(Op.JZ, out.value(one.condition), LATER, span=one.head)
+            self.one(one.then)
+            if one.otherwise is not None:
+                overs.append(out.emit(Op.JMP, LATER, span=one.head))
+            out.land(otherwise_at)
+        if otherwise is not None:
+            self.one(otherwise)
+        for over in reversed(overs):
+            out.land(over)
 
     def _for(self, loop: tree.For) -> None:
         out, head = self._out, loop.head

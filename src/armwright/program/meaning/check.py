@@ -128,10 +128,12 @@ class _Statements:
     # ---- control ---------------------------------------------------------------------------------------------------
 
     def _if(self, node: tree.If) -> None:
-        condition(self._names, node.condition, "IF")
-        self.one(node.then)
-        if node.otherwise is not None:
-            self.one(node.otherwise)
+        chain, otherwise = node.chain
+        for one in chain:
+            condition(self._names, one.condition, "IF")
+            self.one(one.then)
+        if otherwise is not None:
+            self.one(otherwise)
 
     def _while(self, node: tree.While) -> None:
         condition(self._names, node.condition, "WHILE")

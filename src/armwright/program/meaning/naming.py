@@ -67,6 +67,7 @@ class Names:
         self._called: set[str] = set()
         self._said: set[tuple[str, int, str]] = set()
         self._comparisons = 0
+        self._undeclared_names: set[str] = set()
 
     @property
     def symbols(self) -> Symbols:
@@ -96,9 +97,10 @@ class Names:
         table = self._table(key)
         table.used.add(key)
         if key not in table.types:
-            if not self.open_import:
+            # Apart from the types: whoever looks for what a name was meant to be goes through all of those.
+            if not self.open_import and key not in self._undeclared_names:
                 self._undeclared(name)
-            table.types[key] = None
+            self._undeclared_names.add(key)
             table.poisoned.add(key)
         return None if key in table.poisoned else table.types[key]
 

@@ -1,12 +1,17 @@
 """What the translator has to say about a program: one type, with places, advice and, where certain, a cure."""
 
 import enum
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import attrs
 
+from armwright.errors import counted, shortened
 from armwright.program.text.source import Source, Span
+
+# Of each code a pass over a program tells so many: else a file of nonsense takes more memory for messages than itself.
+MOST_OF_A_CODE = 10_000
 
 
 class Severity(enum.StrEnum):
@@ -21,7 +26,7 @@ class Label:
     """A word on a place."""
 
     span: Span
-    text: str
+    text: str = attrs.field(converter=shortened)
 
 
 @attrs.frozen
@@ -30,6 +35,11 @@ class Fix:
 
     span: Span
     replacement: str
+
+
+def _all_shortened(texts: Iterable[str]) -> tuple[str, ...]:
+    """Return texts of which none is longer than anybody reads."""
+    return tuple(shortened(text) for text in texts)
 
 
 @attrs.frozen(kw_only=True)
@@ -50,12 +60,12 @@ class Diagnostic:
 
     code: str
     severity: Severity = Severity.ERROR
-    message: str
+    message: str = attrs.field(converter=shortened)
     span: Span
-    label: str = ""
+    label: str = attrs.field(default="", converter=shortened)
     secondary: tuple[Label, ...] = ()
-    notes: tuple[str, ...] = ()
-    helps: tuple[str, ...] = ()
+    notes: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
+    helps: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
     fixes: tuple[Fix, ...] = ()
 
     @property
@@ -70,7 +80,35 @@ class Diagnostic:
 
 
 class Findings(list[Diagnostic]):
-    """What one pass over a program has found so far."""
+    """What one pass over a program has found so far: of each code so many at most, the last saying that more follow."""
+
+    def __init__(self) -> None:
+        """Start with nothing."""
+        super().__init__()
+        self._counts: Counter[str] = Counter()
+
+    def append(self, one: Diagnostic) -> None:
+        """Add one; of a code that was told as often as is allowed, what is added last says so."""
+        self._counts[one.code] += 1
+        count = self._counts[one.code]
+        if count < MOST_OF_A_CODE:
+            super().append(one)
+        elif count == MOST_OF_A_CODE:
+            text = f"{MOST_OF_A_CODE:,} messages have the code {one.code}; those behind this place are not told"
+            super().append(
+                attrs.evolve(
+                    one, message=text, label="this one, and perhaps more", secondary=(), notes=(), helps=(), fixes=()
+                )
+            )
+
+    def extend(self, several: Iterable[Diagnostic]) -> None:
+        """Add several."""
+        for one in several:
+            self.append(one)
+
+    def __iadd__(self, several: Iterable[Diagnostic]) -> Self:  # type: ignore[misc,override]
+        self.extend(several)
+        return self
 
     def say(
         self,
@@ -86,6 +124,8 @@ class Findings(list[Diagnostic]):
         fixes: tuple[Fix, ...] = (),
     ) -> None:
         """Add an error, or what ``severity`` says; the arguments are those of ``Diagnostic``."""
+        if self._counts[code] >= MOST_OF_A_CODE:
+            return
         self.append(
             Diagnostic(
                 code=code,
@@ -109,9 +149,13 @@ def in_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
 def count_line(diagnostics: Sequence[Diagnostic], source: Source) -> str:
     """Return the last line of a report, such as ``m6.rlo: 3 errors, 1 warning``."""
     errors = sum(one.is_error for one in diagnostics)
-    counts = [(errors, "error"), (len(diagnostics) - errors, "warning")]
-    said = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
-    return f"{source.name}: {', '.join(said) or 'no errors'}"
+    return f"{source.name}: {counts_text(errors, len(diagnostics) - errors)}"
+
+
+def counts_text(errors: int, warnings: int) -> str:
+    """Return how many errors and warnings there are, such as ``3 errors, 1 warning``."""
+    counts = [(errors, "error"), (warnings, "warning")]
+    return ", ".join(counted(count, what) for count, what in counts if count) or "no errors"
 
 
 def to_json(diagnostic: Diagnostic, source: Source) -> dict[str, Any]:

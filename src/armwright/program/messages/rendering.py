@@ -71,11 +71,11 @@ def _block(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
             yield [("...", _QUIET)]
         before = number
         here = [label for label in labels if source.line(label.span.start) == number]
-        cells = _cells(source.line_text(number))
+        line = source.line_text(number)
         anchor = labels[0] if labels[0] in here else here[0]
-        first, last = _window(len(cells), source.column(anchor.span.start) - 1)
-        before_it, behind_it = _CUT if first else "", _CUT if last < len(cells) else ""
-        shown = before_it + "".join(cells[first:last]) + behind_it
+        first, last = _window(len(line), source.column(anchor.span.start) - 1)
+        before_it, behind_it = _CUT if first else "", _CUT if last < len(line) else ""
+        shown = before_it + "".join(_cells(line[first:last])) + behind_it
         yield [(f"{number:>{width}} | ", _QUIET), (shown, "")]
         for label in sorted(here, key=lambda one: one.span.start):
             mark, style = ("^", loud) if label is labels[0] else ("-", _QUIET)
@@ -107,19 +107,19 @@ def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int
         shown: the first character of the line that is shown, and the one behind the last.
     """
     begin, end = shown
-    cells = _cells(source.line_text(source.line(label.span.start)))
+    line = source.line_text(source.line(label.span.start))
+    cells = _cells(line[begin:end])
     column = source.column(label.span.start) - 1
     # What lies in a part that is not shown is marked at its edge.
-    first = column if end == len(cells) and column >= begin else min(max(column, begin), end)
-    last = min(column + label.span.end - label.span.start, len(cells), end)
+    first = column if end == len(line) and column >= begin else min(max(column, begin), end)
+    last = min(column + label.span.end - label.span.start, len(line), end)
     # Beyond the end of the line every character that is not there counts one.
-    indent = sum(map(len, cells[begin:first])) + max(0, first - len(cells))
-    length = sum(_width(cell) for cell in cells[first:last])
-    indent += sum(_width(cell) - len(cell) for cell in cells[begin:first])
+    indent = sum(map(_width, cells[: first - begin])) + max(0, first - len(line))
+    length = sum(map(_width, cells[first - begin : max(0, last - begin)]))
     return [(" " * indent, ""), (mark * max(1, length), style), (f" {label.text}" if label.text else "", style)]
 
 
-# Diagnostics that follow one another are often about the same line, and a program may be one line.
+# Diagnostics that follow one another are often about the same line.
 @lru_cache(maxsize=4)
 def _cells(line: str) -> Sequence[str]:
     """Return what is shown for each character of a line: blanks up to the next stop for a tab."""

@@ -6,10 +6,10 @@ import numpy as np
 
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import DeviceError
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import Constant, Instruction, Op, Place, Text
 from armwright.program.messages.diagnostics import Label
-from armwright.program.running.contact import look_out, note_contact
+from armwright.program.running.contact import look_out, note_contact, pushed_otherwise
 from armwright.program.running.evaluate import IN_UNITS, PLAIN, ValueFault
 from armwright.program.running.machine import Machine
 from armwright.program.running.process import Element, Pending, Process
@@ -146,6 +146,7 @@ def _fingers(run: Machine, process: Process, step: Instruction) -> None:
     for motion in motions:
         note_contact(run, motion)
     time = run.hardware.fingers(arm, closed=closed, width=metres)
+    pushed_otherwise(run, arm, [motion.record for motion in motions if motion.record >= 0])
     for motion in motions:
         # What is let go does not press any more.
         look_out(run, motion)

@@ -1,6 +1,7 @@
 """Arms that are stopped on their way: within their limits, along their paths, and what they press on meanwhile."""
 
 import math
+from collections.abc import Sequence
 from typing import NoReturn
 
 import attrs
@@ -15,7 +16,7 @@ from armwright.motion.plan import hand_length
 from armwright.motion.trajectory import Trajectory, hold, join
 from armwright.program.running.machine import Machine
 from armwright.program.running.process import Motion, Process
-from armwright.program.running.recording import Run, efforts
+from armwright.program.running.recording import Push, Run, efforts, peaks_of
 from armwright.program.text.source import Span
 
 # A duration so little too short is rounding.
@@ -52,26 +53,64 @@ def _stop_on_the_way(run: Machine, motion: Motion, local: float) -> int:
     arm, runs, period = run.cell.arms[motion.arm].arm, run.runs[motion.arm], run.cell.period
     last = runs[-1]
     braking = brake(last.trajectory, local, arm.limit("acceleration"), period=period)
-    _begin(run, motion, braking)
-    _, tau = efforts(arm, braking, period)
+    tau = efforts(arm, braking, period, _begin(run, motion, braking))
     runs[-1] = attrs.evolve(last, duration=local)
     runs.append(Run(t0=run.now, trajectory=braking, duration=braking.duration, tau=tau))
     if motion.record >= 0:
         done = join([last.trajectory.until(local), braking])
-        before = [] if last.tau is None else [last.tau[: round(local / period) + 1]]
+        before = [] if last.tau is None else [last.tau[: round(local / period)]]
+        peak, when = peaks_of(np.concatenate([*before, tau]), period)
         run.stages[motion.record] = attrs.evolve(
             run.stages[motion.record],
             motion=done,
             length=hand_length(arm, done),
-            peak_effort=np.abs(np.concatenate([*before, tau])).max(axis=0),
+            peak_effort=peak,
+            peak_time=when,
             stopped=True,
         )
     return math.ceil(braking.duration / period - _ROUNDING)
 
 
-def _begin(run: Machine, motion: Motion, trajectory: Trajectory) -> None:
-    run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
+def _begin(run: Machine, motion: Motion, trajectory: Trajectory) -> Push:
+    push = send(run, motion, trajectory)
     look_out(run, motion)
+    return push
+
+
+def send(run: Machine, motion: Motion, trajectory: Trajectory) -> Push:
+    """Let the arm of a motion follow a trajectory in place of what it does now; return what will push on its hand."""
+    run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
+    return _pushed(run, motion.arm)
+
+
+def _pushed(run: Machine, arm: str) -> Push:
+    """Look at what pushes on the hand of an arm from now on, and remember it."""
+    push = Push(run.now, run.hardware.wrenches(arm, run.now))
+    run.pushes[arm].append(push)
+    return push
+
+
+def pushed_otherwise(run: Machine, arm: str, records: Sequence[int]) -> None:
+    """Work out anew what the motors of an arm give from now on: what it pressed with may have been let go.
+
+    Args:
+        run: the program.
+        arm: its name.
+        records: numbers of the stages that it is on.
+    """
+    if not any(push.wrenches.any() for push in run.pushes[arm]):
+        return
+    push, period, last = _pushed(run, arm), run.cell.period, run.runs[arm][-1]
+    done = round((run.now - last.t0) / period)
+    if last.tau is None or done >= len(last.tau):
+        return
+    later = Push(last.t0, np.concatenate([np.zeros((done, 6)), push.wrenches]))
+    tau = efforts(run.cell.arms[arm].arm, last.trajectory, period, later, len(last.tau) - 1)
+    tau[:done] = last.tau[:done]
+    run.runs[arm][-1] = attrs.evolve(last, tau=tau)
+    peak, when = peaks_of(tau, period)
+    for record in records:
+        run.stages[record] = attrs.evolve(run.stages[record], peak_effort=peak, peak_time=when)
 
 
 # ---- contact -------------------------------------------------------------------------------------------------------

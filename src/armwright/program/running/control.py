@@ -3,12 +3,12 @@
 from collections.abc import Callable, Mapping
 
 from armwright.program.intermediate.code import Instruction, Kind, Op, Place
-from armwright.program.messages.diagnostics import Label
 from armwright.program.running.acting import HANDLERS as ACTIONS
 from armwright.program.running.contact import contact_of, note_contact, stop
 from armwright.program.running.machine import Machine, RunError
 from armwright.program.running.moving import halt, move, release
 from armwright.program.running.process import Activation, Attempt, Pending, Process, Waiting
+from armwright.program.running.waits import give_up, lock, signal, unlock, wait
 from armwright.program.text.source import Span
 
 Handler = Callable[[Machine, Process, Instruction], None]
@@ -150,7 +150,7 @@ def _join(run: Machine, process: Process, step: Instruction) -> None:
     run.processes += process.branches
     for branch in process.branches:
         branch.wake = run.ticks
-    process.waiting = Waiting("branches", (), step.span)
+    process.waiting = Waiting("branches", (), step.span, run.starts())
 
 
 def _quit(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
@@ -164,30 +164,12 @@ def _quit(run: Machine, process: Process, step: Instruction) -> None:  # noqa: A
 
 def end(run: Machine, process: Process) -> None:
     """Take a process out of the run."""
+    give_up(run, process)
     release(run, process, 0)
     process.done = True
-    process.motion = process.pending = process.waiting = None
-    run.processes.remove(process)
-
-
-def _signal(run: Machine, process: Process, step: Instruction) -> None:
-    name = run.name(process, step.operands[0])
-    run.events[name] = run.events.get(name, 0) + 1
-    for other in run.processes:
-        if other.waiting and other.waiting.what == "event" and name in other.waiting.names:
-            other.waiting, other.wake = None, run.ticks
-    run.effect(process, "SIGNAL", f"SIGNAL {run.spelled(name)}", step.span, data={"event": name})
-
-
-def _wait(run: Machine, process: Process, step: Instruction) -> None:
-    name = run.name(process, step.operands[0])
-    if run.events.get(name, 0) > 0:
-        run.events[name] -= 1
-        run.effect(process, "WAIT", f"WAIT {run.spelled(name)}", step.span, data={"event": name})
-        return
-    # When the event comes the same instruction is looked at again.
-    process.at -= 1
-    process.waiting = Waiting("event", (name,), step.span)
+    process.motion = process.pending = None
+    if process in run.processes:  # not where the branch after it could not begin: then its COBEGIN let none go
+        run.processes.remove(process)
 
 
 def _pause(run: Machine, process: Process, step: Instruction) -> None:
@@ -197,33 +179,6 @@ def _pause(run: Machine, process: Process, step: Instruction) -> None:
         run.fail(process, "E231", text, step.span, f"expected 0 to {_LONGEST_PAUSE:g} s")
     text = f"PAUSE {seconds:g}"
     run.take_time(process, seconds, Pending(kind="PAUSE", text=text, since=run.starts(), span=step.span))
-
-
-def _lock(run: Machine, process: Process, step: Instruction) -> None:
-    names = sorted({run.name(process, operand) for operand in step.operands})
-    if any(_locked_by(run, name) - {process} for name in names):
-        process.at -= 1
-        process.waiting = Waiting("locks", tuple(names), step.span)
-        return
-    for name in names:
-        run.locks[name] = process
-    process.locks += names
-    run.effect(process, "LOCK", f"LOCK {', '.join(map(run.spelled, names))}", step.span, data={"variables": names})
-
-
-def _locked_by(run: Machine, name: str) -> set[Process]:
-    """Return the processes that hold a variable; a whole array and its elements keep one another waiting."""
-    array, bracket, _ = name.partition("[")
-    return {
-        holder
-        for held, holder in run.locks.items()
-        if held == name or (bracket and held == array) or (not bracket and held.startswith(f"{name}["))
-    }
-
-
-def _unlock(run: Machine, process: Process, step: Instruction) -> None:
-    names = {run.name(process, operand) for operand in step.operands}
-    release(run, process, len(process.locks) - len(names))
 
 
 # ---- attempts and ends ---------------------------------------------------------------------------------------------
@@ -272,6 +227,8 @@ def rest(run: Machine, span: Span) -> list[str]:
     Returns:
         The devices that were on.
     """
+    for process in run.processes:
+        give_up(run, process)
     run.ticks = max([run.ticks, *(_still(run, process, span) for process in run.processes)])
     off = sorted(run.hardware.running())
     for device in off:
@@ -300,7 +257,7 @@ def _still(run: Machine, process: Process, span: Span) -> int:
         since=motion.begun,
         until=end_of_motion,
         arm=motion.arm,
-        data=motion.data,
+        data={**motion.data, **contact},
     )
     return end_of_motion
 
@@ -327,7 +284,8 @@ def recover(run: Machine, process: Process, error: RunError) -> bool:
         process.branches = []
         # The arm of the branch that failed may be the last to come to rest.
         process.wake = at_rest = max([at_rest, *ends, _still(run, process, span)])
-        process.pending = process.waiting = None
+        give_up(run, process)
+        process.pending = None
         if (attempt := _attempt(run, process, span)) is not None:
             process.at = attempt.recovery
             release(run, process, attempt.locks)
@@ -365,27 +323,6 @@ def _cancel(run: Machine, process: Process, span: Span) -> int:
     return max(ends)
 
 
-def deadlock(run: Machine) -> RunError:
-    """Return the error of processes that all wait for one another."""
-    stuck = [one for one in run.processes if one.waiting and one.waiting.what != "branches"]
-    stuck.sort(key=lambda one: one.path)
-    says = []
-    for one in stuck:
-        assert one.waiting is not None  # noqa: S101 - chosen so
-        names = ", ".join(map(run.spelled, one.waiting.names))
-        what = f"waits for {names}" if one.waiting.what == "event" else f"waits for the lock of {names}"
-        locks = one.waiting.what == "locks"
-        holders = {holder for name in one.waiting.names if locks for holder in _locked_by(run, name)} - {one}
-        held = ", ".join(holder.title for holder in sorted(holders, key=lambda holder: holder.path))
-        says.append((one.waiting.span, f"{one.title} {what}{f', held by {held}' if held else ''}"))
-    (span, label), *others = says
-    text = f"{len(says)} processes wait for ever" if others else "the program waits for ever"
-    try:
-        run.fail(stuck[0], "E501", text, span, label, secondary=[Label(*other) for other in others])
-    except RunError as error:
-        return error
-
-
 HANDLERS: Mapping[Op, Handler] = {
     **ACTIONS,
     Op.MVEND: move,
@@ -398,11 +335,11 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.FORK: _fork,
     Op.JOIN: _join,
     Op.QUIT: _quit,
-    Op.SIG: _signal,
-    Op.WAIT: _wait,
+    Op.SIG: signal,
+    Op.WAIT: wait,
     Op.PAUSE: _pause,
-    Op.LOCK: _lock,
-    Op.UNLK: _unlock,
+    Op.LOCK: lock,
+    Op.UNLK: unlock,
     Op.TRY: _try,
     Op.ENDT: _well,
     Op.ENDR: _recovered,

@@ -11,21 +11,23 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array
 from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic, Severity
 from armwright.program.running.contact import too_deep
-from armwright.program.running.control import HANDLERS, deadlock, recover, rest
+from armwright.program.running.control import HANDLERS, recover, rest
 from armwright.program.running.machine import Limits, Machine, RunError
 from armwright.program.running.moving import go_on
-from armwright.program.running.obstacles import detour_warning
+from armwright.program.running.obstacles import detour_warning, stops_warning
 from armwright.program.running.process import Process
-from armwright.program.running.recording import Effect, Failure, Recording, RunStage, efforts, in_order
+from armwright.program.running.recording import Effect, Failure, Recording, RunStage, in_order
+from armwright.program.running.waits import deadlock
 
 # No TRY helps a program that runs for ever: what is tried again would run for ever again.
 _FINAL = ("E504", "E506")
+# A time this part of a period before a tick is on it.
+_ON_A_TICK = 1e-6
 
 # Called now and then: the time on the clock [s], the line of the next statement.
 Progress = Callable[[float, int], None]
@@ -110,7 +112,7 @@ def advance(machine: Machine, process: Process) -> None:
 
 def _advance(machine: Machine, process: Process) -> None:
     if process.due is not None and process.due > machine.ticks:
-        last = machine.limits.time / machine.cell.period
+        last = machine.limits.time / machine.cell.period + _ON_A_TICK
         machine.ticks, machine.idle = process.due, 0
         if machine.ticks > last:
             # The clock stops there, and arms that are on their way have come as far as that.
@@ -174,30 +176,32 @@ def _failed(machine: Machine, failure: Failure) -> Recording:
 
 
 def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
-    """Return a warning for every straight line that was gone round, and for every joint asked for too much effort."""
+    """Return the warnings about a run.
+
+    For every straight line that was gone round, every VIA with stops because corners cannot be rounded, and every
+    joint asked for too much effort.
+    """
     found = []
     for stage in recording.stages:
-        detour = detour_warning(stage)
-        found += [] if detour is None else [detour]
+        found += [warning for warning in (detour_warning(stage), stops_warning(stage)) if warning is not None]
         arm = recording.cell.arms[stage.arm].arm
         over = stage.peak_effort / arm.limit("effort")
         if (over <= 1).all():
             continue
-        t, tau = efforts(arm, stage.motion, recording.cell.period)
-        found += [_effort_warning(stage, arm, joint, t, tau[:, joint]) for joint in np.flatnonzero(over > 1).tolist()]
+        found += [_effort_warning(stage, arm, joint) for joint in np.flatnonzero(over > 1).tolist()]
     return tuple(found)
 
 
-def _effort_warning(stage: RunStage, arm: Arm, joint: int, t: Array, tau: Array) -> Diagnostic:
-    worst = int(np.abs(tau).argmax())
+def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
+    needed = float(stage.peak_effort[joint])
     unit = "N m" if arm.joints[joint].revolute else "N"
     limit = arm.joints[joint].limits.effort
     return Diagnostic(
         code="W401",
         severity=Severity.WARNING,
-        message=f"{arm.called(joint)} of {stage.arm} would need {abs(tau[worst]):.1f} {unit}, "
-        f"{(abs(tau[worst]) / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
+        message=f"{arm.called(joint)} of {stage.arm} would need {needed:.1f} {unit}, "
+        f"{(needed / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
         span=stage.span,
-        label=f"at {stage.t0 + t[worst]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
+        label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
         helps=(f"a lower speed than {stage.speed:g} asks for less where it is motion and not weight that costs",),
     )

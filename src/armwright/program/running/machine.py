@@ -13,17 +13,29 @@ from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
-from armwright.program.following.hanging import is_arm
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import Code, Instruction, Kind, Operand, Type
 from armwright.program.messages.diagnostics import Diagnostic, Label
 from armwright.program.running.process import Activation, Element, Pending, Process, Start, Value
-from armwright.program.running.recording import Effect, EffectKind, Recording, Run, RunStage, in_order, stream
+from armwright.program.running.recording import (
+    Effect,
+    EffectKind,
+    Push,
+    Recording,
+    Run,
+    RunStage,
+    in_order,
+    stream,
+    thinned,
+)
 from armwright.program.running.wording import shown
 from armwright.program.text.source import Span
 from armwright.spatial.poses import from_noap, to_noap
 
 # A time this part of a period behind a tick is on it.
 _ON_A_TICK = 1e-9
+# Frame trees that are kept; a page shows fewer.
+_MOST_TREES = 2000
 
 
 class RunError(ArmwrightError, RuntimeError):
@@ -102,6 +114,7 @@ class Machine:
         self.effects: list[Effect] = []
         self.stages: list[RunStage] = []
         self.runs: dict[str, list[Run]] = {name: [] for name in cell.arms}
+        self.pushes: dict[str, list[Push]] = {name: [] for name in cell.arms}
         self.trees = [(0.0, self.tree)]
         self.program = Process(path=(), priority=0.0, at=0, wake=0, stack=[Activation(kind="main")])
         self.processes = [self.program]
@@ -120,8 +133,8 @@ class Machine:
             effects=in_order(self.effects),
             stages=tuple(self.stages),
             streams=tuple(
-                stream(name, arm.arm, arm.start, self.runs[name], duration=self.now, period=cell.period)
-                for name, arm in cell.arms.items()
+                stream(name, place, self.runs[name], self.pushes[name], duration=self.now, period=cell.period)
+                for name, place in cell.arms.items()
             ),
             trees=tuple(self.trees),
             postures={name: self.hardware.posture(name, self.now) for name in cell.arms},
@@ -266,6 +279,8 @@ class Machine:
         if len(self.trees) > 1 and self.trees[-1][0] == self.now:
             self.trees.pop()
         self.trees.append((self.now, tree))
+        if len(self.trees) > 2 * _MOST_TREES:
+            self.trees = thinned(self.trees, self.now / _MOST_TREES)
 
     # ---- arms and time ---------------------------------------------------------------------------------------------
 

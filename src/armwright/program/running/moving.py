@@ -9,10 +9,11 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.cell.model import base_name
+from armwright.errors import IncapableArmError
 from armwright.kinematics.forward import forward
 from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
-from armwright.motion.trajectory import hold, whole_ticks
-from armwright.program.following.hanging import is_arm
+from armwright.motion.trajectory import hold, slowed_together, whole_ticks
+from armwright.program.following.states import is_arm
 from armwright.program.intermediate.code import (
     Instruction,
     StagePlan,
@@ -23,11 +24,11 @@ from armwright.program.intermediate.code import (
 from armwright.program.messages.diagnostics import Label
 from armwright.program.running.acting import work_out
 from armwright.program.running.asking import Asked, Goal, asked_of
-from armwright.program.running.contact import comes_down, contact_of, look_out, note_contact, stop
+from armwright.program.running.contact import comes_down, contact_of, look_out, note_contact, send, stop
 from armwright.program.running.machine import Machine
 from armwright.program.running.obstacles import CODES, stopped, ways_round, where_and_why
 from armwright.program.running.process import Activation, Guard, Motion, Process
-from armwright.program.running.recording import Run, RunStage, efforts
+from armwright.program.running.recording import Run, RunStage, efforts, peaks_of
 from armwright.program.text.source import Span
 from armwright.program.text.words import Standard
 from armwright.spatial.poses import inverse
@@ -219,6 +220,8 @@ def _plan(run: Machine, process: Process, asked: Asked, arm: str, moved: str) ->
         stages = plan(place.arm, run.hardware.posture(arm, run.now), goals, manner)
     except StageError as error:
         _fail_move(run, process, error.obstacle, asked=asked, stage=plans[error.stage], arm=arm)
+    except IncapableArmError as error:
+        run.fail(process, "E406", f"{arm} cannot make this MOVE at any speed: {error}", asked.span, "asked for here")
     if asked.duration is not None:
         stages = _timed(run, process, asked, stages)
     return [(stage, one.frames) for stage, one in zip(stages, plans, strict=True)]
@@ -239,8 +242,7 @@ def _timed(run: Machine, process: Process, asked: Asked, stages: Sequence[Stage]
         # Nothing is to be moved: the arm stands still for so long.
         still = hold(stages[0].trajectory(0.0), asked_for)
         return [attrs.evolve(stages[0], trajectory=whole_ticks(still, run.cell.period)), *stages[1:]]
-    factor = max(1.0, asked_for / least)
-    slow = (whole_ticks(stage.trajectory.slowed(factor), run.cell.period) for stage in stages)
+    slow = slowed_together([stage.trajectory for stage in stages], asked_for, run.cell.period)
     return [attrs.evolve(stage, trajectory=one) for stage, one in zip(stages, slow, strict=True)]
 
 
@@ -255,7 +257,7 @@ def _fail_move(
     run.fail(
         process,
         CODES[obstacle.cause],
-        stopped(obstacle, label, arm),
+        stopped(obstacle, label, arm, run.cell.arms[arm].arm),
         goal.step.span,
         "cannot be reached",
         secondary=secondary,
@@ -285,19 +287,19 @@ def _start(run: Machine, process: Process, motion: Motion) -> None:
     ticks = round(trajectory.duration / period)
     # A run that lasts longer comes to its end before.
     counted = min(ticks, math.ceil(max(0.0, run.limits.time - run.now) / period))
-    _, tau = efforts(arm, trajectory, period, counted)
     if motion.record >= 0:
         note_contact(run, motion)
-    run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
+    push = send(run, motion, trajectory)
+    tau = efforts(arm, trajectory, period, push, counted)
     look_out(run, motion)
     touch = run.hardware.touches_at(motion.arm)
     if not motion.guards and (touch is not None or motion.alarm is not None):
-        run.hardware.begin(motion.arm, hold(trajectory(0.0), period), run.now, motion.tip)
+        send(run, motion, hold(trajectory(0.0), period))
         motion.alarm = None
         comes_down(run, process, motion, to[-1])
     if touch is not None:
         motion.touch = (trajectory, touch - run.now)
-    motion.record = len(run.stages)
+    motion.record, (peak, when) = len(run.stages), peaks_of(tau, period)
     run.stages.append(
         RunStage(
             t0=run.now,
@@ -308,7 +310,8 @@ def _start(run: Machine, process: Process, motion: Motion) -> None:
             stage=stage,
             motion=trajectory,
             length=stage.length,
-            peak_effort=np.abs(tau).max(axis=0),
+            peak_effort=peak,
+            peak_time=when,
         )
     )
     run.runs[motion.arm].append(Run(t0=run.now, trajectory=trajectory, duration=trajectory.duration, tau=tau))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.motion.detour import Detour
 from armwright.motion.plan import Obstacle
@@ -21,14 +22,15 @@ _ON_THE_WAY = {
 }
 # Farther away nobody counts tenths [mm].
 _FAR = 1e6
+_THROUGH_FRAMES = ("SPLINE", "BLEND")
 _BY = {"via": "by a via pose", "damped": "by damped rates"}
 
 
-def stopped(obstacle: Obstacle, goal: str, arm: str) -> str:
-    """Return the message of an error: what stops an arm on its way to a frame, as the program spells it."""
+def stopped(obstacle: Obstacle, goal: str, name: str, arm: Arm) -> str:
+    """Return the message of an error: what stops an arm, of that name, on its way to a frame."""
     texts = _ITSELF if obstacle.certain else _ON_THE_WAY
-    joint = "a joint" if obstacle.joint is None else f"joint {obstacle.joint}"
-    return texts[obstacle.cause].format(goal=goal, arm=arm, joint=joint)
+    joint = "a joint" if obstacle.joint is None else arm.called(obstacle.joint - 1)
+    return texts[obstacle.cause].format(goal=goal, arm=name, joint=joint)
 
 
 def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) -> str:
@@ -36,7 +38,7 @@ def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) ->
 
     Args:
         obstacle: what stops the stage.
-        kind: of the stage: ``PTP``, ``LINE`` or ``SPLINE``.
+        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
         to: the frames it goes to, as the program spells them.
         arm: name of the arm.
     """
@@ -44,7 +46,7 @@ def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) ->
     if obstacle.along is None or obstacle.length is None or obstacle.certain:
         return f"{place}: {obstacle.reason}"
     way = f"{obstacle.fraction * 100:.0f} % of the way there"
-    if kind == "SPLINE":
+    if kind in _THROUGH_FRAMES:
         before = "where the hand was" if obstacle.pose == 0 else f"`{to[obstacle.pose - 1]}`"
         way += f" from {before} (way {obstacle.pose + 1} of {len(to)})"
     return f"{way}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, {place}: {obstacle.reason}"
@@ -55,12 +57,12 @@ def ways_round(obstacle: Obstacle, kind: str, around: str | None) -> tuple[str, 
 
     Args:
         obstacle: what stops the stage.
-        kind: of the stage: ``PTP``, ``LINE`` or ``SPLINE``.
+        kind: of the stage: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND``.
         around: how a way round was looked for; None where it was not.
     """
     if obstacle.certain or kind == "PTP":
         return ()
-    if kind == "SPLINE":
+    if kind in _THROUGH_FRAMES:
         advice = "another VIA, or straight moves from frame to frame"
         return (f"a way through several frames is not gone round by `--around`; {advice} may do",)
     if around is None:
@@ -88,6 +90,8 @@ def note_of(run: RunStage) -> str:
     if stage.obstacle is not None and stage.detour is not None:
         why = where_and_why(stage.obstacle, stage.kind, run.to, run.arm)
         notes = [f"the straight way is stopped {why}", f"{_lead(stage.detour, run.arm)}: {stage.detour.price}", *notes]
+    elif stage.obstacle is not None:
+        notes.append(f"without stops it is stopped {where_and_why(stage.obstacle, stage.kind, run.to, run.arm)}")
     return "; ".join(notes)
 
 
@@ -106,6 +110,22 @@ def detour_warning(run: RunStage) -> Diagnostic | None:
             f"it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",
             _lead(detour, run.arm),
         ),
+    )
+
+
+def stops_warning(run: RunStage) -> Diagnostic | None:
+    """Return the warning that a stage stops at all of its frames, where it cannot go past them; None where it can."""
+    obstacle = run.stage.obstacle
+    if obstacle is None or run.stage.detour is not None:
+        return None
+    return Diagnostic(
+        code="W403",
+        severity=Severity.WARNING,
+        message=f"{run.arm} stops at every frame on its way to `{run.to[-1]}`: rounded corners cannot be followed",
+        span=run.span,
+        label=f"begun at {run.t0:.3f} s",
+        notes=(f"without stops it is stopped {where_and_why(obstacle, run.stage.kind, run.to, run.arm)}",),
+        helps=("a frame farther from that place, or another posture at the start, may do without stops",),
     )
 
 

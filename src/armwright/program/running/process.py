@@ -156,11 +156,13 @@ class Waiting:
         what: for an event, for locks, or for the processes that it has begun.
         names: of the event or the locked variables.
         span: the statement.
+        since: when it began to wait.
     """
 
     what: Literal["event", "locks", "branches"]
     names: tuple[str, ...]
     span: Span
+    since: Start
 
 
 @attrs.frozen(kw_only=True)
@@ -198,6 +200,7 @@ class Process:
         stack: activations, the present one last.
         parent: the process that began it.
         waiting: why it does not go on; None when only the clock holds it.
+        unmet: the event or the locks that it has not got yet, also while it is about to look again.
         motion: the MOVE under way.
         pending: what takes effect at ``wake``.
         last_arm: named or moved last.
@@ -213,6 +216,7 @@ class Process:
     stack: list[Activation]
     parent: "Process | None" = None
     waiting: Waiting | None = None
+    unmet: Waiting | None = None
     motion: Motion | None = None
     pending: Pending | None = None
     last_arm: str | None = None

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import attrs
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.cell.frames import FrameTree
-from armwright.cell.model import Cell
+from armwright.cell.model import Cell, CellArm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.motion.plan import Stage
 from armwright.motion.trajectory import Trajectory
@@ -85,7 +85,8 @@ class RunStage:
         motion: of the joints as it was run: all of the plan, or as far as it came before it was stopped, and its stop.
             A stop keeps to the path of the plan, so the path deviation of the plan holds for it too.
         length: of the way that the hand went [m].
-        peak_effort: (n,) largest efforts on the servo ticks of that motion [N m] or [N].
+        peak_effort: (n,) largest efforts on the servo ticks of that motion, with what pushes on the hand [N m] or [N].
+        peak_time: (n,) when, since it began [s].
         stopped: whether it was stopped on its way.
     """
 
@@ -98,6 +99,7 @@ class RunStage:
     motion: Trajectory
     length: float
     peak_effort: Array
+    peak_time: Array
     stopped: bool = False
 
     @property
@@ -128,6 +130,23 @@ class Run:
     tau: Array | None = None
 
 
+class Push(NamedTuple):
+    """What pushes on the tool of an arm from some time on.
+
+    Attributes:
+        t0: from when [s].
+        wrenches: (k, 6) forces [N] and moments [N m] at the tool point, along the axes of the base, on this and the
+            following servo ticks; the last one stays.
+    """
+
+    t0: float
+    wrenches: Array
+
+    def on(self, ticks: int) -> Array:
+        """Return the wrenches (ticks, 6) on so many servo ticks from then on."""
+        return self.wrenches[np.minimum(np.arange(ticks), len(self.wrenches) - 1)]
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Stream:
     """What one arm does at every servo tick.
@@ -138,7 +157,7 @@ class Stream:
         q: (N, n) joint positions [rad] or [m].
         qd: (N, n) speeds.
         qdd: (N, n) accelerations; at a tick where they jump, those just after it.
-        tau: (N, n) efforts by inverse dynamics, drives included [N m] or [N].
+        tau: (N, n) efforts by inverse dynamics, drives and what pushes on the hand included [N m] or [N].
     """
 
     arm: str
@@ -176,7 +195,8 @@ class Recording:
         effects: in the order in which they began.
         stages: in the order in which they began.
         streams: one per arm.
-        trees: the frame tree at the start and after each change, with the time of the change [s].
+        trees: the frame tree at the start and after each change, with the time of the change [s]; of very many
+            changes the last in every two-thousandth of the run.
         postures: by arm, the posture (n,) at the end.
         failure: why it did not come to its end; None where it did.
     """
@@ -210,22 +230,41 @@ def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     return tuple(sorted(effects, key=lambda one: (one.t0, one.order)))
 
 
-def stream(name: str, arm: Arm, start: Array, runs: Sequence[Run], *, duration: float, period: float) -> Stream:
+def thinned(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[float, FrameTree]]:
+    """Return the frame tree at the start, and the last of those that began within the same gap.
+
+    Args:
+        trees: with the time from which on each holds [s], in order.
+        gap: [s].
+    """
+    kept = {int(time / gap): (time, tree) for time, tree in trees[1:]}
+    return [trees[0], *kept.values()]
+
+
+def stream(
+    name: str,
+    place: CellArm,
+    runs: Sequence[Run],
+    pushes: Sequence[Push],
+    *,
+    duration: float,
+    period: float,
+) -> Stream:
     """Sample what an arm does at every servo tick.
 
     Args:
         name: of the arm in the cell.
-        arm: its model.
-        start: (n,) posture at the start.
+        place: its model, and its posture at the start.
         runs: in order; the arm rests between.
+        pushes: in order; each counts until the next.
         duration: of the whole run [s].
         period: of the servo [s].
     """
-    ticks = round(duration / period) + 1
+    arm, ticks = place.arm, round(duration / period) + 1
     q = np.empty((ticks, arm.n))
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
     tau, known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
-    first, posture = 0, start
+    first, posture = 0, place.start
     for run in runs:
         # A run that was stopped by an obstacle ends between two ticks.
         begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _ON_A_TICK)
@@ -238,31 +277,43 @@ def stream(name: str, arm: Arm, start: Array, runs: Sequence[Run], *, duration: 
         first, posture = end, run.trajectory(run.duration)
     q[first:] = posture
     t: Array = np.arange(ticks, dtype=np.float64) * period
+    wrench = np.zeros((ticks, 6))
+    for push in pushes:
+        begin = round(push.t0 / period)
+        wrench[begin:] = push.on(max(ticks - begin, 0))
     left = np.flatnonzero(~known)
-    for rows in _chunks(len(left)):
-        at = left[rows]
-        tau[at] = inverse_dynamics(arm, q[at], qd[at], qdd[at])
+    tau[left] = _tau(arm, (q[left], qd[left], qdd[left]), wrench[left])
     return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
 
 
-def efforts(arm: Arm, trajectory: Trajectory, period: float, ticks: int | None = None) -> tuple[Array, Array]:
-    """Return servo ticks of a trajectory and the efforts there.
+def efforts(arm: Arm, trajectory: Trajectory, period: float, push: Push, ticks: int | None = None) -> Array:
+    """Return the efforts (k, n) on the servo ticks of a trajectory, the last tick included.
 
     Args:
         arm: that follows it.
         trajectory: on whole servo periods.
         period: of the servo [s].
+        push: what pushes on the hand from the start of it on.
         ticks: how far; to its end when left out.
-
-    Returns:
-        times (k,) [s] and efforts (k, n), the last tick included.
     """
     ticks = round(trajectory.duration / period) if ticks is None else ticks
     t: Array = np.arange(ticks + 1, dtype=np.float64) * period
-    tau = np.empty((len(t), arm.n))
-    for rows in _chunks(len(t)):
-        tau[rows] = inverse_dynamics(arm, trajectory(t[rows]), trajectory(t[rows], 1), trajectory(t[rows], 2))
-    return t, tau
+    return _tau(arm, (trajectory(t), trajectory(t, 1), trajectory(t, 2)), push.on(len(t)))
+
+
+def _tau(arm: Arm, states: tuple[Array, Array, Array], wrench: Array) -> Array:
+    """Return the efforts (k, n) of positions, speeds and accelerations (k, n), with wrenches (k, 6) on the tool."""
+    tau = np.empty_like(states[0])
+    for rows in _chunks(len(tau)):
+        q, qd, qdd = (each[rows] for each in states)
+        tau[rows] = inverse_dynamics(arm, q, qd, qdd, wrench=wrench[rows] if wrench[rows].any() else None)
+    return tau
+
+
+def peaks_of(tau: Array, period: float) -> tuple[Array, Array]:
+    """Return the largest efforts (n,) on servo ticks (k, n), and when, since the first [s]."""
+    sizes = np.abs(tau)
+    return sizes.max(axis=0), sizes.argmax(axis=0) * period
 
 
 def motion_rows(streams: Iterable[Stream], kept: slice = slice(None)) -> Iterable[str]:

@@ -5,8 +5,9 @@ from armwright.program.messages.diagnostics import Fix
 from armwright.program.syntax import tree
 from armwright.program.syntax.cursor import LostError, Tokens, TooDeepError, shown
 from armwright.program.syntax.expressions import expression, listed, mobile, number, reserved_as_name, variable
-from armwright.program.syntax.statements import close, misspelt, nested, next_statement, statements
+from armwright.program.syntax.statements import ASSIGNING, close, misspelt, nested, next_statement, salvaged, statements
 from armwright.program.syntax.values import equals
+from armwright.program.text.source import Span
 from armwright.program.text.tokens import Token, TokenKind
 
 _CONDITION = "a condition"
@@ -95,7 +96,27 @@ def _passed_over(tokens: Tokens, start: Token, ends: tuple[str, ...]) -> tree.Po
 
 # "IF" expr "THEN" statement [ "ELSE" statement ]
 def if_(tokens: Tokens) -> tree.If:
-    """Read one IF."""
+    """Read one IF, and all that follow it with ELSE IF: they make a chain, which is long and not deep."""
+    chain = [_choice(tokens)]
+    otherwise: tree.Statement | None = None
+    while _else(tokens):
+        start = tokens.now
+        if not tokens.sees("IF") or tokens.ahead().key in ASSIGNING:
+            otherwise = nested(tokens, "ELSE")
+            break
+        link = salvaged(tokens, _choice)
+        if link is None:
+            otherwise = tree.Poison(tokens.since(start))
+            break
+        chain.append(link)
+    for start, head, condition, then in reversed(chain):
+        otherwise = tree.If(tokens.since(start), head, condition, then, otherwise)
+    assert isinstance(otherwise, tree.If)  # noqa: S101 - the chain has one link or more
+    return otherwise
+
+
+def _choice(tokens: Tokens) -> tuple[Token, Span, tree.Expression, tree.Statement]:
+    """Read an IF up to its ELSE: where it starts, its head, its condition, and what is done where that holds."""
     start = tokens.take()
     condition = part(tokens, _CONDITION, "after IF", "THEN")
     head = tokens.since(start)
@@ -103,8 +124,7 @@ def if_(tokens: Tokens) -> tree.If:
     tokens.waiting.append(("ELSE",))
     then = nested(tokens, "THEN")
     tokens.waiting.pop()
-    otherwise = nested(tokens, "ELSE") if _else(tokens) else None
-    return tree.If(tokens.since(start), head, condition, then, otherwise)
+    return start, head, condition, then
 
 
 def _else(tokens: Tokens) -> bool:

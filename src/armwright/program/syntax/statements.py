@@ -1,6 +1,7 @@
 """Parsing a stretch of statements: what separates them, what ends them, and how to go on after nonsense."""
 
-from typing import NoReturn
+from collections.abc import Callable
+from typing import NoReturn, TypeVar
 
 from armwright.errors import closest
 from armwright.program.messages.diagnostics import Fix, Label
@@ -12,8 +13,10 @@ from armwright.program.text.source import Span
 from armwright.program.text.tokens import Token, TokenKind
 from armwright.program.text.words import ABSENT, CLOSING, ELSEWHERE, LATER_STATEMENTS, OPENING
 
+_Read = TypeVar("_Read")
 _NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.NUMBER
-_ASSIGNING = ("=", ":=", "==")
+# What stands behind a name that is given a value.
+ASSIGNING = ("=", ":=", "==")
 # What opens the stretch that a word ends, for one that ends none.
 _OPENED_BY = {
     "UNTIL": "REPEAT",
@@ -94,7 +97,7 @@ def _ends_nothing(tokens: Tokens) -> bool:
 def _misspelt_end(tokens: Tokens) -> bool:
     """Whether END or another word that is waited for stands here, misspelt."""
     token, after = tokens.now, tokens.ahead()
-    if after.key in (*_ASSIGNING, "(", "[") or token.key in ABSENT or _is_known(tokens, token):
+    if after.key in (*ASSIGNING, "(", "[") or token.key in ABSENT or _is_known(tokens, token):
         return False
     if after.key == ".":
         near = closest(token.text, ("END",))
@@ -124,7 +127,7 @@ def statement(tokens: Tokens) -> tree.Statement:
     """
     token = tokens.now
     if token.kind is _KEYWORD and token.key in tokens.rules:
-        if tokens.later and tokens.ahead().key in _ASSIGNING:
+        if tokens.later and tokens.ahead().key in ASSIGNING:
             return _reserved(tokens)
         tokens.depth += 1
         tokens.statement_depth = tokens.depth
@@ -134,7 +137,7 @@ def statement(tokens: Tokens) -> tree.Statement:
         tokens.depth -= 1
         return found
     after = tokens.ahead()
-    if token.kind is _ARM and after.key in _ASSIGNING:
+    if token.kind is _ARM and after.key in ASSIGNING:
         return assign(tokens)
     if token.kind is _NAME:
         return _named(tokens, after)
@@ -146,7 +149,7 @@ def statement(tokens: Tokens) -> tree.Statement:
 def _named(tokens: Tokens, after: Token) -> tree.Statement:
     """Read a statement that begins with a name."""
     token = tokens.now
-    if after.key in _ASSIGNING or (tokens.later and after.key == "["):
+    if after.key in ASSIGNING or (tokens.later and after.key == "["):
         return assign(tokens)
     if tokens.later and after.key == "(" and tokens.ahead(2).kind is not TokenKind.STRING:
         return call(tokens)
@@ -224,9 +227,15 @@ def nested(tokens: Tokens, behind: str) -> tree.Statement:
         tokens.say_once("E111", f"expected a statement after {behind}", gap, "expected a statement here")
         tokens.hush()
         return tree.Poison(gap)
+    found = salvaged(tokens, statement)
+    return tree.Poison(tokens.since(token)) if found is None else found
+
+
+def salvaged(tokens: Tokens, read: Callable[[Tokens], _Read]) -> _Read | None:
+    """Read something; pass over to the next statement where it makes no sense."""
     depth, level = tokens.depth, len(tokens.waiting)
     try:
-        return statement(tokens)
+        return read(tokens)
     except TooDeepError:
         raise
     except LostError:
@@ -234,7 +243,7 @@ def nested(tokens: Tokens, behind: str) -> tree.Statement:
         tokens.depth = depth
         next_statement(tokens)
         tokens.hush()
-        return tree.Poison(tokens.since(token))
+        return None
 
 
 def close(tokens: Tokens, key: str, opening: Token) -> Span | None:
@@ -302,7 +311,7 @@ def _starts_statement(tokens: Tokens) -> bool:
         return token.key in (*tokens.words.statements, *tokens.words.headers, "BEGIN")
     if token.kind is not _NAME and token.kind is not _ARM:
         return False
-    if after.key in _ASSIGNING or not tokens.same_line():
+    if after.key in ASSIGNING or not tokens.same_line():
         return True
     if after.key in ("(", "[") and tokens.later:
         return after.key == "[" or token.key in tokens.procedures

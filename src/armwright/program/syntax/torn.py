@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Sequence
 
-from armwright.program.messages.diagnostics import Diagnostic, Fix
+from armwright.program.messages.diagnostics import Diagnostic, Findings, Fix
 from armwright.program.text.source import Source, Span
 from armwright.program.text.tokens import Token, TokenKind
 
@@ -36,8 +36,10 @@ def joined(
     inside, names = _declarations(tokens, frozenset(pairs))
     names |= set(declared)
     imports = any(token.key == "IMPORT" and token.kind is _KEYWORD for token in tokens)
-    kept, found = list(tokens), []
-    for at in reversed(pairs):
+    kept: list[Token] = []
+    found = Findings()
+    done = 0
+    for at in pairs:
         first, number = tokens[at - 1], tokens[at]
         key, before = f"{first.key}{number.key}", tokens[at - 2].key if at > 1 else ""
         declared_here = at in inside
@@ -48,9 +50,10 @@ def joined(
         if not (declared_here or torn or device or guessed):
             continue
         text = f"{first.text}{number.text}"
-        kept[at - 1 : at + 1] = [Token(_NAME, text, key, first.start, number.end)]
+        kept += [*tokens[done : at - 1], Token(_NAME, text, key, first.start, number.end)]
+        done = at + 1
         found.append(_torn(source, Span(first.start, number.end), text, certain=declared_here or torn or device))
-    return kept, found[::-1]
+    return [*kept, *tokens[done:]], found
 
 
 def _is_pair(source: Source, tokens: Sequence[Token], at: int) -> bool:

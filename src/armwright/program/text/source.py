@@ -1,5 +1,6 @@
 """Program texts and places in them: characters are counted in the text as it was written."""
 
+import re
 from bisect import bisect_right
 from functools import cached_property
 from typing import NamedTuple
@@ -7,6 +8,7 @@ from typing import NamedTuple
 import attrs
 
 _BYTE_ORDER_MARK = "\ufeff"
+_LINE_END = re.compile(r"\r\n?|\n")
 
 
 # A tuple, as a long program has a hundred thousand of them: any other frozen thing costs more than twice as much.
@@ -41,15 +43,8 @@ class Source:
     @cached_property
     def line_starts(self) -> tuple[int, ...]:
         """Where each line starts. A line ends with a line feed, a carriage return or both; never elsewhere."""
-        text = self.text
-        starts = [1 if text.startswith(_BYTE_ORDER_MARK) else 0]
-        lone_returns = "\r" in text
-        at = _next_break(text, 0, lone_returns=lone_returns)
-        while at >= 0:
-            at += 2 if text.startswith("\r\n", at) else 1
-            starts.append(at)
-            at = _next_break(text, at, lone_returns=lone_returns)
-        return tuple(starts)
+        first = 1 if self.text.startswith(_BYTE_ORDER_MARK) else 0
+        return (first, *(match.end() for match in _LINE_END.finditer(self.text)))
 
     def line(self, offset: int) -> int:
         """Return the number of the line, from 1, that holds a character."""
@@ -68,12 +63,3 @@ class Source:
     def slice(self, span: Span) -> str:
         """Return the characters of a span."""
         return self.text[span.start : span.end]
-
-
-def _next_break(text: str, start: int, *, lone_returns: bool) -> int:
-    """Return where the next line end begins, -1 after the last."""
-    feed = text.find("\n", start)
-    if not lone_returns:
-        return feed
-    back = text.find("\r", start, feed if feed >= 0 else len(text))
-    return feed if back < 0 else back

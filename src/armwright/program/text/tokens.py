@@ -3,13 +3,14 @@
 import enum
 import math
 import re
-from bisect import bisect_left
+from collections import Counter
 
 import attrs
 
 from armwright.cell.names import arm_name
+from armwright.files.limits import beyond, limit
 from armwright.program.meaning.units import UNITS
-from armwright.program.messages.diagnostics import Diagnostic, Fix
+from armwright.program.messages.diagnostics import Diagnostic, Findings, Fix
 from armwright.program.text.source import Source, Span
 from armwright.program.text.words import VOCABULARIES, Standard
 
@@ -126,6 +127,10 @@ _TEXT_ELSEWHERE = re.compile(
     '[\u201c\u201d\u201e\uff02\u00ab][^"\u201c\u201d\u201e\uff02\u00bb\r\n]*["\u201c\u201d\uff02\u00bb]'
     "|(?<!\\w)['`\u2018][^\"'`\u2019\r\n]*['`\u2019]"
 )
+# What means nothing, neither here nor in other languages.
+_NONSENSE = re.compile(
+    rf"""[^\w\s;,()=:\[\]+*<>./{{"'`#!&|\u2018\u201c\u201d\u201e\u00ab\uff02{"".join(map(chr, LOOK_ALIKES))}-]+"""
+)
 _COMMENT_ELSEWHERE = re.compile(r"[#!](?=[ \t#!])[^\r\n]*")
 _QUOTES = {Standard.RLO_83: "RLO has no quotation marks", Standard.RLO_2: 'a text stands between two `"`'}
 
@@ -151,33 +156,42 @@ class _Scanner:
         self._foreign = not text.isascii()
         self._standard = standard
         self._reserved = VOCABULARIES[standard].reserved
+        self._most = limit("words")
         self._unclosed = False
         # Most words of a program stand there more than once: what they are is found out the first time.
         self._known: dict[str, tuple[TokenKind, str]] = {}
         self._tokens: list[Token] = []
         self._comments: list[Span] = []
-        self._found: list[Diagnostic] = []
+        self._found = Findings()
+        # Of each character that does not belong to the language where the first stands, of those with a cure all.
         self._strays: dict[str, list[Span]] = {}
+        self._counts: Counter[str] = Counter()
+        # By the number of tokens in front of such characters, where the last of them ends.
+        self._behind: dict[int, int] = {}
         self._refused: set[str] = set()
 
     def run(self) -> Scanned:
         # Blanks at the end would be tried in vain from each of them.
-        position, limit = 0, len(self._text.rstrip(_BLANKS))
-        while position < limit:
-            position = self._stretch(position, limit)
+        position, last = 0, len(self._text.rstrip(_BLANKS))
+        while position < last:
+            position = self._stretch(position, last)
         end = len(self._text)
         self._tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
-        self._found += [_stray(character, spans, self._standard) for character, spans in self._strays.items()]
+        for character, spans in self._strays.items():
+            self._found.append(_stray(character, spans, max(len(spans), self._counts[character]), self._standard))
         self._hush()
         return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), found=tuple(self._found))
 
-    def _stretch(self, position: int, limit: int) -> int:
+    def _stretch(self, position: int, last: int) -> int:
         """Read tokens one behind the other; return where the text goes on behind one that needs a closer look."""
-        known, add, foreign = self._known, self._tokens.append, self._foreign
-        for match in _PATTERNS[self._standard].finditer(self._text, position, limit):
+        known, tokens, foreign, most = self._known, self._tokens, self._foreign, self._most
+        add = tokens.append
+        for match in _PATTERNS[self._standard].finditer(self._text, position, last):
             what = match.lastindex or _STRAY
             word = match[what]
             start, end = match.span(what)
+            if len(tokens) >= most:
+                return self._too_long(start, end, last)
             if foreign:
                 # Of a comment only the blanks in front, of a text only its marks.
                 inside = what == _COMMENT or (what == _STRING and self._standard is Standard.RLO_2)
@@ -188,7 +202,14 @@ class _Scanner:
             behind = self._closer_look(what, word, start, end)
             if behind != end:
                 return behind
-        return limit
+        return last
+
+    def _too_long(self, start: int, end: int, last: int) -> int:
+        """Say that the text has too many words; what follows is passed over."""
+        # Nothing is said of the end that is not read.
+        self._unclosed = True
+        self._say("E119", f"the program is too long: {beyond('words')}", Span(start, end), "read up to here")
+        return last
 
     def _closer_look(self, what: int, word: str, start: int, end: int) -> int:
         """Make a token of a word seen for the first time; return where the text goes on."""
@@ -290,9 +311,16 @@ class _Scanner:
 
     def _stray(self, start: int, end: int) -> int:
         """Take note of a character that does not belong to the language; return where the text goes on."""
+        if run := _NONSENSE.match(self._written, start):
+            self._count(run[0], start)
+            return run.end()
         text = _TEXT_ELSEWHERE.match(self._written, start) if self._standard is Standard.RLO_2 else None
         if text is None:
-            self._strays.setdefault(self._written[start], []).append(Span(start, end))
+            character = self._written[start]
+            if ord(character) in LOOK_ALIKES:
+                self._strays.setdefault(character, []).append(Span(start, end))
+            else:
+                self._count(character, start)
             comment = _COMMENT_ELSEWHERE.match(self._written, start)
             return comment.end() if comment else end
         first, last = Span(start, start + 1), Span(text.end() - 1, text.end())
@@ -301,18 +329,19 @@ class _Scanner:
         self._tokens.append(Token(TokenKind.STRING, f'"{text[0][1:-1]}"', '"', start, text.end(), damaged=True))
         return text.end()
 
+    def _count(self, characters: str, start: int) -> None:
+        """Count characters that mean nothing."""
+        self._counts.update(characters)
+        for character in set(characters) - self._strays.keys():
+            first = start + characters.index(character)
+            self._strays[character] = [Span(first, first + 1)]
+        self._behind[len(self._tokens)] = start + len(characters)
+
     def _hush(self) -> None:
         """Take what stands behind such a character, in its line, for something that has been told of."""
-        starts = [token.start for token in self._tokens] if self._strays else []
-        line_starts: dict[int, int] = {}
-        for character, spans in self._strays.items():
-            for span in spans if ord(character) not in LOOK_ALIKES else ():
-                behind = bisect_left(starts, span.end)
-                token = self._tokens[behind]
-                # Looked for once for each token, however many such characters stand before it.
-                if behind not in line_starts:
-                    line_starts[behind] = self._written.rfind("\n", 0, token.start) + 1
-                token.damaged |= line_starts[behind] <= span.end
+        for at, end in self._behind.items():
+            token = self._tokens[at]
+            token.damaged |= self._written.find("\n", end, token.start) < 0
 
     def _look_alikes(self, start: int, end: int) -> None:
         if self._written[start:end] == self._text[start:end]:
@@ -343,11 +372,11 @@ def _is_number(word: str) -> bool:
     return "_" not in word
 
 
-def _stray(character: str, spans: list[Span], standard: Standard) -> Diagnostic:
-    """Say once what a character is that does not belong to the language."""
+def _stray(character: str, spans: list[Span], count: int, standard: Standard) -> Diagnostic:
+    """Say once what a character is that does not belong to the language, and in how many places it stands."""
     meant = LOOK_ALIKES.get(ord(character))
     shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
-    more = f"it stands in {len(spans)} places" if len(spans) > 1 else ""
+    more = f"it stands in {count} places" if count > 1 else ""
     name = "a blank" if meant == " " else f"`{meant}`"
     hint = _QUOTES[standard] if character in "'\u201c\u201d" else _HINTS.get(character, "has no meaning here")
     return Diagnostic(

@@ -1,8 +1,7 @@
 """The words of the language in both standards: which are reserved, and which have a meaning in one place only."""
 
 import enum
-
-import attrs
+from typing import NamedTuple
 
 
 class Standard(enum.StrEnum):
@@ -77,9 +76,8 @@ _LATER_FRAMEWORK = (
 )
 
 
-@attrs.frozen(kw_only=True)
-class Vocabulary:
-    """The words of one standard.
+class Vocabulary(NamedTuple):
+    """The words of one standard; a plain tuple, since the command line needs them for its --help.
 
     Attributes:
         name: of the standard.

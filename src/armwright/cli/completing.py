@@ -1,0 +1,130 @@
+"""What a shell asks while somebody types: what a word may become, and the script that makes a shell ask."""
+
+import contextlib
+import enum
+import os
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from armwright.cli.commands import COMPLETE, NAME
+
+Complete = Callable[[str], list[str]]
+
+
+class Shell(enum.StrEnum):
+    """A shell that can be told what may follow."""
+
+    BASH = "bash"
+    ZSH = "zsh"
+    FISH = "fish"
+    POWERSHELL = "powershell"
+
+
+def prepare() -> None:
+    """Let the shells ask, if one does."""
+    if COMPLETE in os.environ:
+        from typer.completion import completion_init  # type: ignore[attr-defined]
+
+        completion_init()
+
+
+def script(shell: Shell) -> str:
+    """Return what a shell has to read."""
+    from typer.completion import get_completion_script  # type: ignore[attr-defined]
+
+    return get_completion_script(prog_name=NAME, complete_var=COMPLETE, shell=shell.value)
+
+
+def install(shell: Shell) -> Path:
+    """Write the script where a shell reads it whenever it starts; return its file.
+
+    Raises:
+        OutputError: the start-up files of the shell cannot be read or written.
+    """
+    from typer.completion import install as install_script  # type: ignore[attr-defined]
+
+    from armwright.errors import OutputError
+
+    try:
+        return install_script(shell=shell.value, prog_name=NAME, complete_var=COMPLETE)[1]
+    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: nobody knows the home folder
+        text = f"cannot install the completion for {shell}: {error}; --show-completion {shell} prints its script"
+        raise OutputError(text) from error
+
+
+# ---- what a word may become ----------------------------------------------------------------------------------------
+
+
+def arms(incomplete: str) -> list[str]:
+    """Complete the name of an arm, or the path of an arm file."""
+    from armwright.arm.load import arm_names
+
+    return _or_files(arm_names(), incomplete)
+
+
+def linkages(incomplete: str) -> list[str]:
+    """Complete the name of a linkage, or the path of its file."""
+    from armwright.clearance.reader import linkage_names
+
+    return _or_files(linkage_names(), incomplete)
+
+
+def codes(incomplete: str) -> list[str]:
+    """Complete the code of a message."""
+    from armwright.program.explanations.explaining import codes as known
+
+    return _beginning(known(), incomplete)
+
+
+def quantities(incomplete: str) -> list[str]:
+    """Complete the name of a compiled quantity."""
+    from armwright.dynamics.compiled import quantity_names
+
+    return _beginning(quantity_names(), incomplete)
+
+
+def paths(incomplete: str) -> list[str]:
+    """Complete the name of a path of the tip of a five-bar."""
+    from armwright.clearance.paths import PICK_AND_PLACE, TEST_PATHS
+
+    return _beginning((*TEST_PATHS, PICK_AND_PLACE), incomplete)
+
+
+def limits(incomplete: str) -> list[str]:
+    """Complete the name of a limit."""
+    from armwright.files.limits import LIMITS
+
+    return _beginning((f"{name}=" for name in LIMITS), incomplete)
+
+
+def one_of(*words: str) -> Complete:
+    """Return what completes one of some words."""
+
+    def complete(incomplete: str) -> list[str]:
+        return _beginning(words, incomplete)
+
+    return complete
+
+
+def setting(name: str) -> Complete:
+    """Return what completes a setting of a simulation of play: ``name`` is that of the constant that lists them."""
+
+    def complete(incomplete: str) -> list[str]:
+        from armwright.clearance import settings
+
+        return _beginning(getattr(settings, name), incomplete)
+
+    return complete
+
+
+def _beginning(words: Iterable[str], incomplete: str) -> list[str]:
+    return [word for word in words if word.startswith(incomplete)]
+
+
+def _or_files(names: Iterable[str], incomplete: str) -> list[str]:
+    """Complete a name, or a file beside; nothing where no name fits, and the shell completes paths by itself."""
+    found = _beginning(names, incomplete)
+    if found and incomplete:
+        with contextlib.suppress(OSError):
+            found += sorted(f"{one.name}/" if one.is_dir() else one.name for one in Path().glob(f"{incomplete}*"))
+    return found

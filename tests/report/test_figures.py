@@ -1,0 +1,43 @@
+"""Texts of a user's in figures: letters, and never a formula."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from armwright.report import clearance_figures, move_figures
+from armwright.report.figures import bars, curves, literal
+
+# What is no formula, with a tab and an end of line, what a terminal obeys, half a letter, and a page of letters.
+STRANGE = "$x_{$\t$\\frac\n\x1b[31m\ud800" + "a" * 100_000
+
+
+def test_literal() -> None:
+    """Dollars stay dollars, blanks blanks; what is no letter becomes a mark, and a page is cut."""
+    assert literal("a $ b") == r"a \$ b"
+    assert literal("a\tb\nc") == "a b c"
+    assert literal("\x1b\ud800") == "\N{REPLACEMENT CHARACTER}" * 2
+    assert len(literal("a" * 1000)) < 200
+
+
+@pytest.mark.parametrize("what", ["curves", "bars", "panels", "path", "surface", "lines", "paths"])
+def test_strange_texts(what: str) -> None:
+    """No title and no name of a user's is taken for a formula, and none has a character that no font has."""
+    x = np.linspace(0, 1, 5)
+    X = np.tile(np.eye(4), (5, 1, 1))
+    X[:, 0, 3] = x
+    plane = np.stack([x, x], axis=1)
+    draw = {
+        "curves": lambda: curves(STRANGE, x, {STRANGE: x, "b": x}, x_label="s", y_label="m"),
+        "bars": lambda: bars(STRANGE, ["a"], {STRANGE: [1.0]}, y_label="m"),
+        "panels": lambda: move_figures.panels(
+            STRANGE, x, [move_figures.Panel(STRANGE, "m", {STRANGE: x})], marks={STRANGE: 0.5}
+        ),
+        "path": lambda: move_figures.path_in_space(STRANGE, X, {STRANGE: np.zeros(3)}),
+        "surface": lambda: clearance_figures.surface(STRANGE, x, x, np.outer(x, x), ("a", "b", "c")),
+        "lines": lambda: clearance_figures.lines_of_spectrum(STRANGE, x, {STRANGE: x}, "mm"),
+        "paths": lambda: clearance_figures.paths(STRANGE, {STRANGE: {STRANGE: plane}}, np.zeros((1, 2))),
+    }[what]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "<svg" in draw()
