@@ -1,6 +1,7 @@
 """The report of a linkage with play: its numbers, its table, its figures, and its page in a real browser."""
 
 import csv
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,7 @@ def diverged(simulation: Simulation) -> Run:
     return Run.of(attrs.evolve(simulation, q=q, error=error, peaks=peaks, status=np.array(Status.DIVERGED)))
 
 
+@cache
 def page_of(run: Run) -> str:
     return rattling_page(run, rattling_figures(run), title="A & B", command="armwright clearance simulate <x>")
 

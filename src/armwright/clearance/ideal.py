@@ -4,6 +4,7 @@ All pins are closed. Positions come of Newton's iteration on the closure of the 
 derivatives, drives and reactions of the balance of every body; all for many moments at once.
 """
 
+import math
 from collections.abc import Sequence
 
 import attrs
@@ -21,9 +22,11 @@ _CLOSED = 1e-13
 _MOST_ITERATIONS = 50
 # A step of a coordinate is cut to this, so that another assembly is not jumped to [rad, m].
 _LONGEST_STEP = 0.3
+# So many moments are worked on together: what they need stays near the processor.
+_TOGETHER = 8192
 
 
-@attrs.frozen(kw_only=True, eq=False)
+@attrs.frozen(eq=False)
 class IdealMotion:
     """A motion without play.
 
@@ -68,15 +71,30 @@ def closed(
     goal = _goal(linkage, tip=tip, drives=drives)
     given = floats(guess, "guess")
     lead = np.broadcast_shapes(given.shape[:-1], goal.shape[:-1], np.shape(gaps)[:-2])
-    q = np.array(np.broadcast_to(given, (*lead, len(linkage.coordinates))))
-    apart = np.broadcast_to(gaps, (*lead, len(linkage.pins), 2)).reshape(*lead, 2 * len(linkage.pins))
-    done = np.zeros((*lead, 1), dtype=bool)
+    n, p = len(linkage.coordinates), len(linkage.pins)
+    q = np.array(np.broadcast_to(given, (*lead, n))).reshape(-1, n)
+    goals = np.broadcast_to(goal, (*lead, goal.shape[-1])).reshape(len(q), -1)
+    apart = np.broadcast_to(gaps, (*lead, p, 2)).reshape(len(q), 2 * p)
+    for some in _pieces(len(q)):
+        worst = _close(linkage, q[some], goals[some], apart[some], by_tip=tip is not None)
+        if worst is not None:
+            what = "the path" if tip is not None else "the drives"
+            raise InvalidValueError(
+                f"{linkage.name}: {what} cannot be followed: at moment {some.start + worst} the loops do not close "
+                f"(out of reach, or at a singular configuration)"
+            )
+    return q.reshape(*lead, n)
+
+
+def _close(linkage: Linkage, q: Array, goal: Array, apart: Array, *, by_tip: bool) -> int | None:
+    """Close the loops of some configurations (s, n) where they stand; return which is farthest from it, if one is."""
+    done = np.zeros((len(q), 1), dtype=bool)
     for _ in range(_MOST_ITERATIONS):
         placement = _placed(linkage, q)
-        misses = _misses(placement, goal, by_tip=tip is not None)
-        misses[..., : 2 * len(linkage.pins)] -= apart
+        misses = _misses(placement, goal, by_tip=by_tip)
+        misses[..., : apart.shape[-1]] -= apart
         with np.errstate(invalid="ignore"):
-            step = _solved(_closure(placement, tip is not None), -misses)
+            step = _solved(_closure(placement, by_tip), -misses)
         size = np.abs(step).max(axis=-1, keepdims=True, initial=0.0)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
         q += np.where(done, 0.0, step)
@@ -85,13 +103,8 @@ def closed(
         # One that is closed stays as it is, however long others take: its bits are its own.
         done |= size < _CLOSED
         if np.all(done):
-            return q
-    worst = int(np.nan_to_num(np.abs(misses).max(axis=-1), nan=np.inf).reshape(-1).argmax())
-    what = "the path" if tip is not None else "the drives"
-    raise InvalidValueError(
-        f"{linkage.name}: {what} cannot be followed: at moment {worst} the loops do not close "
-        f"(out of reach, or at a singular configuration)"
-    )
+            return None
+    return int(np.nan_to_num(np.abs(misses).max(axis=-1), nan=np.inf).argmax())
 
 
 def ideal_motion(
@@ -111,7 +124,16 @@ def ideal_motion(
     """
     q = floats(q, "q")
     lead = q.shape[:-1]
-    speeds, pulls = (np.broadcast_to(floats(x, "motion"), (*lead, np.shape(x)[-1])) for x in (velocity, acceleration))
+    motions = [np.broadcast_to(floats(x, "motion"), (*lead, np.shape(x)[-1])) for x in (velocity, acceleration)]
+    flat = [x.reshape(math.prod(lead), x.shape[-1]) for x in (q, *motions)]
+    found = [_moving(linkage, *(x[some] for x in flat), by_tip=by_tip) for some in _pieces(len(flat[0]))]
+    joined = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return IdealMotion(*(x.reshape(*lead, *x.shape[1:]) for x in joined))
+
+
+def _moving(linkage: Linkage, q: Array, speeds: Array, pulls: Array, *, by_tip: bool) -> tuple[Array, ...]:
+    """Return the parts of ``IdealMotion`` for configurations (s, n)."""
+    lead = q.shape[:-1]
     still = [np.zeros((*lead, 2 * len(linkage.pins)))]
     A = _closure(_placed(linkage, q), by_tip)
     qd = _solved(A, np.concatenate([*still, speeds], axis=-1))
@@ -123,7 +145,7 @@ def ideal_motion(
     against = against if by_tip else np.concatenate([against, np.zeros((*lead, len(linkage.drives)))], axis=-1)
     qdd = _solved(A, np.concatenate([*still, pulls], axis=-1) - against)
     efforts, reactions = balance(linkage, q, qd, qdd)
-    return IdealMotion(q=q, qd=qd, qdd=qdd, efforts=efforts, reactions=reactions)
+    return q, qd, qdd, efforts, reactions
 
 
 def balance(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
@@ -209,6 +231,11 @@ def sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
+
+
+def _pieces(count: int) -> list[slice]:
+    """Part so many moments, at least one piece, into those that are worked on together."""
+    return [slice(start, min(start + _TOGETHER, count)) for start in range(0, max(count, 1), _TOGETHER)]
 
 
 def _placed(linkage: Linkage, q: Array, qd: Array | None = None) -> Placement:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armwright.arrays import Array
     from armwright.clearance.correcting import Correction
     from armwright.clearance.linkage import Linkage
-    from armwright.clearance.settings import Settings
+    from armwright.clearance.simulation import Simulation
 
 # So many linkages stand for what is known of one; the least play of any [m].
 _DRAWS, _SMALLEST = 32, 1e-6
@@ -58,7 +58,10 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
 
     from armwright.clearance.correcting import correct_nodes, correct_path
     from armwright.clearance.paths import PICK_AND_PLACE, PickAndPlace, named_path
+    from armwright.clearance.predictability import with_outlook
+    from armwright.clearance.preparing import prepare
     from armwright.clearance.reader import load_linkage
+    from armwright.clearance.simulation import simulate
 
     model = with_clearances(load_linkage(linkage), clearance or [])
     settings = settings_of(friction_velocity, threshold_mm_s)
@@ -75,9 +78,12 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     else:
         found = correct_path(model, named_path(path), clearances, settings, knots=knots, rounds=rounds, progress=told)
     summary = _summary(model, path, found, clearances)
-    summary["predictable_until"] = _predictable_until(model, found, summary, settings)
+    usual = np.array(list(summary["clearances"].values()))
+    run, outlook = with_outlook(prepare(model, found.path, settings), usual)
+    summary["predictable_until"] = outlook.until
     if output is not None:
-        write_results(output, _files(model, path, found, summary, settings))
+        before = simulate(prepare(model, named_path(path), settings), usual)
+        write_results(output, _files(model, path, {"path as it is": before, "path corrected": run}, summary))
     if as_json:
         print_json(summary)
     elif not quiet:
@@ -107,17 +113,6 @@ def _summary(model: "Linkage", path: str, found: "Correction", clearances: "Arra
         "mean errors": list(found.history),
         "round": found.best,
     }
-
-
-def _predictable_until(model: "Linkage", found: "Correction", summary: dict[str, Any], settings: "Settings") -> float:
-    """Return until when the run on the corrected path is a prediction [s]."""
-    import numpy as np
-
-    from armwright.clearance.predictability import with_outlook
-    from armwright.clearance.preparing import prepare
-
-    _, outlook = with_outlook(prepare(model, found.path, settings), np.array(list(summary["clearances"].values())))
-    return outlook.until
 
 
 def _drawn(model: "Linkage", estimate: Path) -> "Array":
@@ -173,25 +168,22 @@ def _refuse_impossible(numbers: "Array") -> None:
 
 
 def _files(
-    model: "Linkage", name: str, found: "Correction", summary: dict[str, Any], settings: "Settings"
+    model: "Linkage", name: str, runs: dict[str, "Simulation"], summary: dict[str, Any]
 ) -> dict[str, str | bytes]:
+    """Return by name what is written: the path of the last run, the numbers, and a figure of what all runs took."""
     import numpy as np
 
     from armwright.clearance.paths import named_path
-    from armwright.clearance.preparing import prepare
-    from armwright.clearance.simulation import simulate
     from armwright.report.clearance_figures import paths
 
-    usual = list(summary["clearances"].values())
-    times = np.linspace(0.0, found.path.duration, 1001)
-    told, wanted = found.path.at(times), named_path(name)
+    path = list(runs.values())[-1].task.path
+    times = np.linspace(0.0, path.duration, 1001)
+    told, wanted = path.at(times), named_path(name)
     rows = np.column_stack([times, told.at * 1e3, told.velocity * 1e3, told.acceleration * 1e3])
     head = "t_s,x_mm,y_mm,vx_mm_per_s,vy_mm_per_s,ax_mm_per_s2,ay_mm_per_s2"
     text = "\n".join([head, *(",".join(f"{x:z.9g}" for x in row) for row in rows)]) + "\n"
-    panels = {
-        title: {"wanted": wanted.at(times).at * 1e3, "taken": simulate(prepare(model, path, settings), usual).tip * 1e3}
-        for title, path in (("path as it is", wanted), ("path corrected", found.path))
-    }
+    line = wanted.at(times).at * 1e3
+    panels = {title: {"wanted": line, "taken": run.tip * 1e3} for title, run in runs.items()}
     targets = wanted.at(np.array(wanted.targets)).at * 1e3
     return {
         "path.csv": text,
