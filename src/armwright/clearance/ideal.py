@@ -239,9 +239,10 @@ def _pieces(count: int) -> list[slice]:
 
 
 def _placed(linkage: Linkage, q: Array, qd: Array | None = None) -> Placement:
-    """Place the bodies for many configurations at once."""
-    speeds = np.zeros_like(q) if qd is None else qd
-    return Placement(linkage, *([x[..., i] for i in range(q.shape[-1])] for x in (q, speeds)))
+    """Place the bodies for many configurations at once, at rest where no speeds are given."""
+    n = q.shape[-1]
+    speeds = [0.0] * n if qd is None else [qd[..., i] for i in range(n)]
+    return Placement(linkage, [q[..., i] for i in range(n)], speeds)
 
 
 def _gap(placement: Placement, number: int) -> Point:

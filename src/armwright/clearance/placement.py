@@ -88,6 +88,8 @@ class Frame(NamedTuple):
         partials = dict(point.partials)
         for number, weight in self.turns.items():
             partials[number] = partials.get(number, NOWHERE).plus(across.times(weight))
+        if isinstance(self.spin, float) and self.spin == 0:
+            return Point(point.at.plus(arm), partials, point.velocity, point.bias)
         velocity = point.velocity.plus(across.times(self.spin))
         bias = point.bias.minus(arm.times(self.spin * self.spin))
         return Point(point.at.plus(arm), partials, velocity, bias)
@@ -107,6 +109,7 @@ class Placement:
         self.linkage, self.q = linkage, q
         still = Point(NOWHERE, {}, NOWHERE, NOWHERE)
         self.frames = {GROUND: Frame(Pair(1.0, 0.0), {}, 0.0, still)}
+        self._points: dict[Place, Point] = {}
         number = 0
         for body in linkage.bodies:
             joint = linkage.joint(body.name)
@@ -132,8 +135,10 @@ class Placement:
 
     def point(self, place: Place) -> Point:
         """Return a place of a body."""
-        along, across = map(float, self.linkage.point(place))
-        return self.frames[place.body].point(along, across)
+        if place not in self._points:
+            along, across = map(float, self.linkage.point(place))
+            self._points[place] = self.frames[place.body].point(along, across)
+        return self._points[place]
 
     def centre(self, body: Body) -> Point:
         """Return the centre of mass of a body."""
