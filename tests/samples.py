@@ -11,6 +11,7 @@ import numpy as np
 
 # What `make test` draws of a sample that `make proof` runs whole; `@pytest.mark.share(0.01)` names another part.
 SHARE = 0.1
+WHOLE = bool(os.environ.get("ARMWRIGHT_PROOF"))
 
 
 @attrs.define
@@ -72,4 +73,4 @@ def drawn(test: str, share: float = SHARE) -> Sample:
     """Return the sample of a test: a new seed unless ``ARMWRIGHT_SEED`` gives one, whole in `make proof`."""
     seed = os.environ.get("ARMWRIGHT_SEED")
     number = secrets.randbelow(10**9) if seed is None else int(seed)
-    return Sample(test, number, bool(os.environ.get("ARMWRIGHT_PROOF")), share)
+    return Sample(test, number, WHOLE, share)

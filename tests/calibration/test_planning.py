@@ -104,6 +104,7 @@ def test_as_many_as_asked_for() -> None:
     assert len(plan_poses(load_arm("ntu-3r"), 450).q) == 450
 
 
+@pytest.mark.share(0.04)
 @pytest.mark.parametrize(
     ("name", "fewest"), [("puma560", 8), ("puma560-seed", 8), ("ur5", 9), ("stanford", 8), ("ntu-3r", 6)]
 )

@@ -1,9 +1,11 @@
-"""The thesis' two arms, and how their simulations are set so that its numbers come back."""
+"""The thesis' two arms, how their simulations are set so that its numbers come back, and parts of its paths."""
 
+import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike
 from armwright.clearance.equations import Rubbing
+from armwright.clearance.paths import Path
 from armwright.clearance.settings import Settings
 
 # Clearances of J2, J3 and J4 [m].
@@ -18,3 +20,9 @@ def accuracy(found: ArrayLike, true: ArrayLike) -> Array:
     """Mean accuracy of clearances (..., 3) as the thesis counts it [%]."""
     found, true = np.asarray(found), np.asarray(true)
     return np.asarray(100 * (1 - np.abs(found / true - 1)).mean(axis=-1))
+
+
+def beginning(path: Path, end: float) -> Path:
+    """A path up to a time [s]."""
+    pieces = int(np.searchsorted(path.knots, end))
+    return attrs.evolve(path, knots=np.append(path.knots[:pieces], end), pieces=path.pieces[:pieces], targets=(0.0,))

@@ -10,6 +10,7 @@ from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import simulate
+from clearance.arms import beginning
 from clearance.exudyn_five_bar import simulated
 
 CLEARANCE = 5e-4
@@ -33,7 +34,7 @@ def linkage(request: pytest.FixtureRequest) -> Linkage:
 def test_up_to_the_impacts(linkage: Linkage) -> None:
     """Both tips go the same way until they slow down, to 5 µm of 1 mm, and the nearer the finer its steps."""
     settings = Settings(step=2e-6, sample=EVERY, impact="carvalho-martins")
-    task = prepare(linkage, thesis_path("y1"), settings)
+    task = prepare(linkage, beginning(thesis_path("y1"), END + EVERY), settings)
     found = simulate(task, [CLEARANCE] * 3)
     samples = round(END / EVERY) + 1
     efforts = task.ideal.efforts

@@ -11,6 +11,7 @@ from armwright.clearance.preparing import Task, prepare
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
+from clearance.arms import beginning
 from clearance.lagrange import Wall, motion
 
 # What RK4 at 10 µs and SciPy at 12 digits may differ by in 40 ms, in flight [m, rad].
@@ -46,17 +47,10 @@ def cartesian(q: np.ndarray, speeds_at: np.ndarray | None = None) -> np.ndarray:
     return np.array([*cranks[0], *q[1:7], *cranks[1]])
 
 
-def first_part(task: Task, end: float) -> Task:
-    """The steps of a task up to a time."""
-    steps = round(end / task.h)
-    cut = {one.name: getattr(task.ideal, one.name)[: steps + 1] for one in attrs.fields(type(task.ideal))}
-    return attrs.evolve(task, steps=steps, table=task.table[:steps], ideal=attrs.evolve(task.ideal, **cut))
-
-
 def test_without_contact(five_bar: Linkage) -> None:
     """While journals fly, links tied by multipliers go the same way as links that hang in trees."""
     settings = Settings(step=1e-5, sample=2e-3, start="centred")
-    task = first_part(prepare(five_bar, thesis_path("y1"), settings), 0.04)
+    task = prepare(five_bar, beginning(thesis_path("y1"), 0.04), settings)
     found = simulate(task, [0.1] * 3)
 
     assert found.depths.max() < -0.03
@@ -69,7 +63,7 @@ def test_without_contact(five_bar: Linkage) -> None:
 def test_in_contact(five_bar: Linkage, friction: float) -> None:
     """With journals on their walls, pushed and rubbed, both go the same way too: the levers and signs are right."""
     settings = Settings(step=2e-6, sample=1e-3)
-    task = first_part(prepare(five_bar, thesis_path("y1"), settings), 0.006)
+    task = prepare(five_bar, beginning(thesis_path("y1"), 0.006), settings)
     found = simulate(task, frictions=friction)
 
     K = float(contact_stiffness(five_bar, np.full(3, 5e-4))[0])

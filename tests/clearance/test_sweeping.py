@@ -158,7 +158,6 @@ def test_same_bits(task: FeatureSweep, tmp_path: Path) -> None:
     ) as cluster:
         ways: list[dict[str, Any]] = [
             {"workers": 1},
-            {"workers": 1, "block": 4},
             {"workers": 1, "block": 1},
             {"workers": 2, "block": 3},
             {"scheduler": cluster.scheduler_address, "block": 2},

@@ -43,7 +43,7 @@ def measured(planned: Path) -> Path:
 
 def test_calibrate(measured: Path, tmp_path: Path) -> None:
     """Errors and what cannot be told are printed; the arm that is written has its tool where it was measured."""
-    done = armwright("calibrate", ARM, measured, "-o", tmp_path / "out", columns=120)
+    done = armwright("calibrate", ARM, measured, "-o", tmp_path / "out", "--folds", "4", columns=120)
 
     assert done.returncode == 0, done.stderr
     assert "it does just what base.rz does" in done.stdout
@@ -73,7 +73,7 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
 
 def test_json(measured: Path) -> None:
     """The same as data: every error with its deviation, the covariance, why the others are held."""
-    told = json.loads(armwright("calibrate", ARM, measured, "--json").stdout)
+    told = json.loads(armwright("calibrate", ARM, measured, "--json", "--folds", "3").stdout)
 
     assert set(told["errors"]) | set(told["held"]) == set(chain_of(load_arm(ARM)).names)
     deviations = [one["deviation"] for one in told["errors"].values()]
@@ -136,7 +136,7 @@ def coupled(path: Path, share: float) -> Path:
 def test_coupled_joints_are_doubtful(tmp_path: Path) -> None:
     """Of a palletiser, q3 = a2 q2 + q3, that hardly moved joint 2 all is told and written, with status 3 and why."""
     path = coupled(tmp_path / "coupled.csv", 0.3)
-    data = armwright("calibrate", "ur5", path, "-o", tmp_path / "out", "--json", columns=200)
+    data = armwright("calibrate", "ur5", path, "-o", tmp_path / "out", "--json", "--folds", "3", columns=200)
 
     assert data.returncode == 3
     assert "armwright: the readings contradict the arm: " in data.stderr
@@ -161,8 +161,8 @@ def test_coupled_joints_are_refused(tmp_path: Path) -> None:
 
 def test_stated_noise(measured: Path) -> None:
     """Readings with 50 µm of noise contradict an arm at once that is said to be read to 20 µm, and not to 50."""
-    honest = armwright("calibrate", ARM, measured, "--noise-um", "50")
-    sharp = armwright("calibrate", ARM, measured, "--noise-um", "20", columns=400)
+    honest = armwright("calibrate", ARM, measured, "--noise-um", "50", "--folds", "2")
+    sharp = armwright("calibrate", ARM, measured, "--noise-um", "20", "--folds", "2", columns=400)
 
     assert honest.returncode == 0, honest.stderr
     assert sharp.returncode == 3

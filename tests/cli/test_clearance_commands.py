@@ -182,17 +182,17 @@ def test_factorial_with_friction(tmp_path: Path) -> None:
 
 
 def test_correct(tmp_path: Path) -> None:
-    """A corrected pick and place misses its targets by less than a micrometre; path, numbers and figure are written."""
+    """A corrected pick and place misses its targets by a hundredth of what it did; path, numbers and figure are written."""
     done = armwright(
-        "clearance", "correct", "five-bar", *CLEARANCES, *CENTRE, "--rounds", "2", "-o", tmp_path / "out", "--json"
+        "clearance", "correct", "five-bar", *CLEARANCES, *CENTRE, "--rounds", "1", "-o", tmp_path / "out", "--json"
     )
 
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["clearances"] == pytest.approx(PLAY)
     assert np.mean(found["before"]) == pytest.approx(0.559e-3, rel=0.01)
-    assert np.mean(found["after"]) < 1e-6
-    assert len(found["mean errors"]) == 3
+    assert np.mean(found["after"]) < 5e-6
+    assert len(found["mean errors"]) == 2
     assert (found["runs"], found["of"]) == (16, "whose clearances nobody can tell apart")
     assert max(found["after_spread"][:2]) < 1e-8
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"path.csv", "summary.json", "paths.svg", "run.json"}

@@ -34,7 +34,8 @@ def test_corrected_for_the_estimate(estimate: Path, tmp_path: Path) -> None:
     """A path is corrected for the play that was estimated, and the summary names this, not that of the catalogue."""
     folder = tmp_path / "out"
     done = armwright(
-        "clearance", "correct", "five-bar", "--estimate", estimate, "--rounds", "1", "--json", "-o", folder
+        *("clearance", "correct", "five-bar", "--path", "y1", "--knots", "4", "--rounds", "1"),
+        *("--estimate", estimate, "--json", "-o", folder),
     )
 
     assert done.returncode == 0, done.stderr
@@ -130,6 +131,6 @@ def test_sweep_of_another_linkage(tmp_path: Path) -> None:
 
 def test_pick_and_place() -> None:
     """The path that is corrected can be simulated too, with its three targets."""
-    done = armwright("clearance", "simulate", "five-bar", "--path", "pick-and-place", "--json")
+    done = armwright("clearance", "simulate", "five-bar", "--path", "pick-and-place", "--step", "2e-5", "--json")
 
     assert [one["time"] for one in json.loads(done.stdout)["targets"]] == pytest.approx([0.0, 0.25, 0.5])

@@ -26,12 +26,6 @@ from samples import Sample
 ROUNDING = 1e-11  # two orders of the same sums, and sines that differ by two units in the last place
 
 
-@pytest.fixture(autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compile into one folder of the tests' own."""
-    monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path_factory.getbasetemp() / "kernels"))
-
-
 def _with_wrench(arm: Arm, q: Array, qd: Array, qdd: Array, wrench: Array) -> Array:
     return inverse_dynamics(arm, q, qd, qdd, wrench=wrench)
 
@@ -71,9 +65,12 @@ def _all(values: Any) -> tuple[Array, ...]:
 @pytest.mark.parametrize("name", PLAIN)
 def test_agrees_with_the_plain_function(name: str, sample: Sample) -> None:
     """A compiled quantity has the values and shapes of the plain function, for many configurations and for one."""
-    for arm in some_of(sample, (load_arm("stanford"), random_arm(np.random.default_rng(5), 4))):
-        assert_agrees(name, arm, np.random.default_rng(sample.seed))
-    sample.record(f"compiled {name} is that of the plain function, arms", 2 if sample.whole else 1, 0)
+    rng = np.random.default_rng(sample.seed)
+    # To compile a long arm takes seconds.
+    arms = (load_arm("stanford"), random_arm(rng, 4)) if sample.whole else (random_arm(rng, 3),)
+    for arm in arms:
+        assert_agrees(name, arm, rng)
+    sample.record(f"compiled {name} is that of the plain function, arms", len(arms), 0)
 
 
 def assert_agrees(name: str, arm: Arm, rng: np.random.Generator) -> None:

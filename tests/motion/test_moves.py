@@ -23,7 +23,7 @@ from armwright.motion.limit_use import limit_use, slowing_for_limits
 from armwright.motion.moves import cartesian_move, exact_poses, joint_move, stopping_move
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import angle_between, rotation_from_vector
-from samples import Sample
+from samples import WHOLE, Sample
 
 ROUNDING = 1e-9
 # The three poses of the project on the PUMA's trajectories: joint positions [deg] and poses as printed [m].
@@ -126,7 +126,7 @@ def test_slowed_until_the_limits_hold(puma: CompiledArm) -> None:
 @pytest.mark.share(0.25)
 @pytest.mark.parametrize("orientation", ["geodesic", "zyz"])
 @pytest.mark.parametrize("ends", ["rest", "running"])
-@pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
+@pytest.mark.parametrize("name", ["puma560-seed", "ur5", *["stanford"] * WHOLE])
 def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str, sample: Sample) -> None:
     """On random moves no sample, far denser than the looks, is beyond the bounds; the branch stays what it is."""
     arm = compile_arm(load_arm(name))

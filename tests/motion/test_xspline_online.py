@@ -14,12 +14,6 @@ from armwright.motion.xspline_online import begin, finish, push, xspline_kernel
 ROUNDING = 1e-11
 
 
-@pytest.fixture(autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compile into one folder of the tests' own."""
-    monkeypatch.setenv("ARMWRIGHT_CACHE", str(tmp_path_factory.getbasetemp() / "kernels"))
-
-
 def walk(rng: np.random.Generator, knots: int, joints: int) -> tuple[Array, Array]:
     """Steps and knots of a wandering motion."""
     return rng.uniform(0.1, 0.3, size=knots - 1), np.cumsum(rng.normal(size=(knots, joints)), axis=0)

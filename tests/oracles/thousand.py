@@ -1,7 +1,6 @@
 """A thousand random arms, each in one random motion, set up in Pinocchio as well; a tenth of them in `make test`."""
 
 import functools
-import os
 from collections.abc import Callable
 
 import attrs
@@ -12,6 +11,7 @@ from armwright.arm.model import Arm, Link, Motor
 from armwright.arrays import Array
 from oracles.arms import random_arm, random_link, squared
 from oracles.with_pinocchio import pinocchio_model, pushed, with_load, with_rotors
+from samples import WHOLE
 
 # Largest deviation from Pinocchio, in parts of the largest number of the quantity.
 AGREEMENT = 1e-9
@@ -66,7 +66,7 @@ class Case:
 def thousand_arms() -> tuple[Case, ...]:
     """A thousand arms of two to nine joints and twenty of one in `make proof`, else a tenth of each."""
     rng = np.random.default_rng(1000)
-    share = 1 if os.environ.get("ARMWRIGHT_PROOF") else 10
+    share = 1 if WHOLE else 10
     counts = [2 + k % 8 for k in range(1000 // share)] + [1] * (20 // share)
     return tuple(_case(rng, joints, built=k // 8 % 2 == 1) for k, joints in enumerate(counts))
 

@@ -18,6 +18,7 @@ from armwright.program.text.tokens import scan
 from armwright.program.text.words import VOCABULARIES, Standard
 from program.sentences import Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, REJECTED
+from samples import Sample
 
 RESERVED = VOCABULARIES[Standard.RLO_2].reserved
 NO_NAME = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
@@ -131,10 +132,11 @@ def test_sentences() -> None:
     assert {rule for rules in sentences.rules.values() for rule in rules} == {*sentences.used}
 
 
-def test_damaged_sentences() -> None:
+def test_damaged_sentences(sample: Sample) -> None:
     """Both agree on sentences of the grammar with one slip, of which most are no programs."""
-    verdicts = []
-    for seed, (words, _) in enumerate(zip(Sentences(GRAMMAR, WORDS, seed=6), range(SENTENCES), strict=False)):
+    verdicts, sentences = [], Sentences(GRAMMAR, WORDS, seed=sample.seed)
+    for seed, (words, _) in enumerate(zip(sentences, range(sample.count(1000)), strict=False), sample.seed):
         verdicts += [agree(joined(mutant, seed)) for mutant in mutants(words, MUTANTS_OF_EACH // 2, seed)]
+    sample.record("damaged sentences of the grammar, both parsers of one mind", len(verdicts), 0)
 
     assert 0.05 < sum(verdicts) / len(verdicts) < 0.5

@@ -58,10 +58,19 @@ def doubts(found: Calibration, seen: Readings, noise: float | None = None) -> It
         yield from _too_far(found, seen, noise)
 
 
-def _too_far(found: Calibration, seen: Readings, noise: float) -> Iterator[str]:
-    """Say if what is left is more than the noise that is stated makes of it."""
+def refuse_noise(noise: float) -> None:
+    """Refuse a noise that no instrument has.
+
+    Raises:
+        InvalidValueError: it is not a finite number above 0.
+    """
     if not 0 < noise < np.inf:
         raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
+
+
+def _too_far(found: Calibration, seen: Readings, noise: float) -> Iterator[str]:
+    """Say if what is left is more than the noise that is stated makes of it."""
+    refuse_noise(noise)
     rows = found.model.rows(seen, found.errors)
     # Of the numbers that are to spare lengths have their share.
     freedom = max(1.0, found.freedom * float(np.mean(~rows.turning)))

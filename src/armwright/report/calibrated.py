@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.calibration.bending import largest_efforts
 from armwright.calibration.beyond import Beyond, calibrate_beyond
 from armwright.calibration.chain import chain_of
-from armwright.calibration.doubts import doubts
+from armwright.calibration.doubts import doubts, refuse_noise
 from armwright.calibration.fitting import Calibration, calibrate_to
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
 from armwright.calibration.measurements import Measurements
@@ -101,6 +101,9 @@ def calibrated(
         if progress is not None:
             progress(what)
 
+    # Before a fit of some seconds.
+    if noise is not None:
+        refuse_noise(noise)
     fit = ~measurements.check
     seen = measurements.readings.take(fit)
     refuse_not_fitted(seen, measurements.readings.take(~fit))

@@ -36,7 +36,7 @@ def is_refused(linkage: Linkage, poses: Array, offsets: Array, noise: float) -> 
     return False
 
 
-@pytest.mark.share(0.03)
+@pytest.mark.share(0.014)
 def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -> None:
     """Readings of an arm whose model is wrong by what is told are refused nine times of ten, and hardly by a fifth."""
     count, refused, little = 0, 0, 0

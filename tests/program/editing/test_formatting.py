@@ -22,6 +22,7 @@ from armwright.program.text.tokens import Scanned, scan
 from armwright.program.text.words import Standard
 from program.sentences import Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, OLD, REJECTED
+from samples import Sample
 
 GRAMMAR = Lark((CORPUS / "rlo.lark").read_text(), maybe_placeholders=False)
 WORDS = {
@@ -38,7 +39,7 @@ WORDS = {
     "ONOFF": ("ON", "off"),
     "WITHKEY": ("APPROACH", "Departure", "SPEED", "BLEND", "DURATION"),
 }
-SENTENCES = 300
+SENTENCES = 1000
 
 
 def is_right(path: Path) -> bool:
@@ -169,27 +170,29 @@ def test_layout_does_not_matter(path: Path) -> None:
     assert [without_spelling(other) for other in others] == [without_spelling(first)] * 3
 
 
-def test_sentences() -> None:
+def test_sentences(sample: Sample) -> None:
     """Every sentence of the grammar can be laid out, however long or deep, and says the same afterwards."""
-    chance = random.Random(11)
-    for words, _ in zip(Sentences(GRAMMAR, WORDS, seed=7), range(SENTENCES), strict=False):
+    chance, count = random.Random(sample.seed), sample.count(SENTENCES)
+    for words, _ in zip(Sentences(GRAMMAR, WORDS, seed=sample.seed), range(count), strict=False):
         text = " ".join(words)
         after = check_kept(text, width=chance.choice((WIDTH, 30)))
         assert (
             layout(spaced(text, Standard.RLO_2, random.Random(1)).upper(), width=200).upper()
             == layout(after, width=200).upper()
         )
+    sample.record("sentences of the grammar laid out", count, 0)
 
 
-def test_damaged_sentences() -> None:
+def test_damaged_sentences(sample: Sample) -> None:
     """A sentence with one slip is refused, or is a program as well and keeps what it says."""
-    accepted = 0
-    for seed, (words, _) in enumerate(zip(Sentences(GRAMMAR, WORDS, seed=9), range(SENTENCES), strict=False)):
-        for mutant in mutants(words, 6, seed):
+    accepted, count = 0, sample.count(SENTENCES)
+    for seed, (words, _) in enumerate(zip(Sentences(GRAMMAR, WORDS, seed=sample.seed), range(count), strict=False)):
+        for mutant in mutants(words, 6, sample.seed + seed):
             with suppress(UnformattableError):
                 check_kept(" ".join(mutant))
                 accepted += 1
-    assert accepted > SENTENCES / 4
+    sample.record("damaged sentences, six slips each, laid out or refused", 6 * count, 0)
+    assert accepted > count / 4
 
 
 def with_comments(words: list[str], chance: random.Random) -> Iterator[str]:
@@ -210,12 +213,14 @@ def with_comments(words: list[str], chance: random.Random) -> Iterator[str]:
         yield f" {comment} ".replace("c }", f"c{number} }}").replace("// ", f"// {number} ")
 
 
-def test_comments_anywhere() -> None:
+def test_comments_anywhere(sample: Sample) -> None:
     """Comments of every kind may stand between any two words: all stay, in order, and stay where they are."""
-    for seed, (words, _) in enumerate(zip(Sentences(GRAMMAR, WORDS, seed=8), range(SENTENCES), strict=False)):
-        text = "".join(with_comments(words, random.Random(seed)))
+    count = sample.count(SENTENCES)
+    for seed, (words, _) in enumerate(zip(Sentences(GRAMMAR, WORDS, seed=sample.seed), range(count), strict=False)):
+        text = "".join(with_comments(words, random.Random(sample.seed + seed)))
         check_kept(text, width=(WIDTH, 30)[seed % 2])
         check_kept(text, numbers=10)
+    sample.record("sentences with comments between any words laid out", count, 0)
 
 
 def test_indents() -> None:
