@@ -182,7 +182,7 @@ def test_factorial_with_friction(tmp_path: Path) -> None:
 
 
 def test_correct(tmp_path: Path) -> None:
-    """A corrected pick and place misses its targets by a hundredth of what it did; path, numbers and figure are written."""
+    """A corrected pick and place misses its targets by a hundredth of before; path, numbers and figure are written."""
     done = armwright(
         "clearance", "correct", "five-bar", *CLEARANCES, *CENTRE, "--rounds", "1", "-o", tmp_path / "out", "--json"
     )
