@@ -1,7 +1,9 @@
 """What all tests share: chance that can be repeated, random samples, and one browser."""
 
 import os
+import random
 import shutil
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from samples import Sample, drawn
+from samples import WHOLE, Sample, drawn
 
 # No test depends on how fast a machine is.
 settings.register_profile("untimed", deadline=None)
@@ -33,11 +35,25 @@ def sample(request: pytest.FixtureRequest) -> Iterator[Sample]:
         mine.keep(Path(folder))
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what draws random samples: `make proof` runs it whole."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what `make proof` runs whole, and leave out what `make test` does not draw this time."""
+    parts = defaultdict(list)
     for item in items:
-        if "sample" in getattr(item, "fixturenames", ()):
+        if (mark := item.get_closest_marker("drawn")) is not None:
+            parts[item.nodeid.partition("[")[0], *mark.args].append(item)
+        if mark is not None or "sample" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.proof)
+    # The same in all processes of a run, and shown at its start: `--randomly-seed` repeats the choice.
+    seed = config.getoption("randomly_seed", None)
+    if WHOLE or seed is None:
+        return
+    left_out = set()
+    for (name, part), group in parts.items():
+        chosen = random.Random(f"{seed} {name}").sample(group, max(1, round(part * len(group))))
+        left_out |= set(group) - set(chosen)
+    if left_out:
+        config.hook.pytest_deselected(items=list(left_out))
+        items[:] = [item for item in items if item not in left_out]
 
 
 @pytest.hookimpl(wrapper=True)

@@ -100,6 +100,7 @@ def test_one_number_for_all(door: str) -> None:
 
 @pytest.mark.parametrize("how", SAME)
 @pytest.mark.parametrize("door", DOORS)
+@pytest.mark.drawn(0.4)
 def test_the_same_numbers_differently(door: str, how: str) -> None:
     """How numbers are stored makes no difference, to the last bit, and what was handed in stays as it was."""
     value = SAME[how]

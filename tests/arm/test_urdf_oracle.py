@@ -56,6 +56,7 @@ def any_plan(rng: np.random.Generator, joints: int) -> Sequence[tuple[str, str]]
     return [(str(rng.choice(KINDS)), str(rng.choice(RELATIONS))) for _ in range(joints)]
 
 
+@pytest.mark.drawn(0.4)
 @pytest.mark.parametrize("joints", range(1, 13))
 def test_random_chains(joints: int, rng: np.random.Generator, tmp_path: Path) -> None:
     """A chain of any length with joints of all kinds, axes however they lie, and links welded to links."""

@@ -108,6 +108,7 @@ def test_as_many_as_asked_for() -> None:
 @pytest.mark.parametrize(
     ("name", "fewest"), [("puma560", 8), ("puma560-seed", 8), ("ur5", 9), ("stanford", 8), ("ntu-3r", 6)]
 )
+@pytest.mark.drawn(0.4)
 def test_enough_to_calibrate(name: str, fewest: int, sample: Sample) -> None:
     """The fewest poses that are proposed are always enough for a calibration; one less is refused."""
     arm = load_arm(name)

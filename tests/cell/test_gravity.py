@@ -96,6 +96,7 @@ def test_efforts_of_every_stand(sample: Sample) -> None:
 
 
 @pytest.mark.parametrize("stand", ["hanging", "wall", "tilted"])
+@pytest.mark.drawn(0.34)
 def test_one_gravity_for_all(rng: np.random.Generator, stand: str) -> None:
     """Holding efforts, terms, payload, slowing, energy and simulation weigh an arm in a cell all alike."""
     arm = load_arm("puma560")

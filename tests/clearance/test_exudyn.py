@@ -31,6 +31,7 @@ def linkage(request: pytest.FixtureRequest) -> Linkage:
     return attrs.evolve(found, material=attrs.evolve(found.material, friction=request.param))
 
 
+@pytest.mark.drawn(0.5)
 def test_up_to_the_impacts(linkage: Linkage) -> None:
     """Both tips go the same way until they slow down, to 5 µm of 1 mm, and the nearer the finer its steps."""
     settings = Settings(step=2e-6, sample=EVERY, impact="carvalho-martins")

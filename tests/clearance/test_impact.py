@@ -46,6 +46,7 @@ def stiffness() -> float:
     return float(contact_stiffness(linkage, np.array([linkage.pins[0].clearance]))[0])
 
 
+@pytest.mark.drawn(0.4)
 @pytest.mark.parametrize("restitution", [0.6, 0.8, 0.9, 1.0])
 @pytest.mark.parametrize("law", IMPACT_LAWS)
 def test_blows_rebound_by_the_closed_form(law: ImpactLaw, restitution: float) -> None:

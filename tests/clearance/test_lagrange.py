@@ -60,6 +60,7 @@ def test_without_contact(five_bar: Linkage) -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.05])
+@pytest.mark.drawn(0.5)
 def test_in_contact(five_bar: Linkage, friction: float) -> None:
     """With journals on their walls, pushed and rubbed, both go the same way too: the levers and signs are right."""
     settings = Settings(step=2e-6, sample=1e-3)

@@ -125,6 +125,7 @@ def with_old_results(bench: Bench, out: Path) -> None:
 
 @pytest.mark.share(0.04)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+@pytest.mark.drawn(0.34)
 def test_signals(number: signal.Signals, bench: Bench, sample: Sample, tmp_path: Path) -> None:
     """A signal leaves the old results or the new ones, and says truly which; the next run leaves nothing else."""
     found = {OLD: 0, NEW: 0}

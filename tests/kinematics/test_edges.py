@@ -145,6 +145,7 @@ def test_exactly_singular(case: str) -> None:
 @pytest.mark.parametrize("case", SINGULAR)
 @pytest.mark.parametrize("distance", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
 @pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.drawn(0.3)
 def test_next_to_a_singularity(case: str, distance: float, way: int) -> None:
     """From a thousandth to a billionth beside it the pose is met; the posture is found as well as rounding allows.
 

@@ -72,6 +72,7 @@ def test_judged_solution(name: str, rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford"])
+@pytest.mark.drawn(0.34)
 def test_grid_of_right_angles(name: str) -> None:
     """On a 45 degree grid of joint angles, full of aligned axes, every pose inside the limits is solved.
 

@@ -44,6 +44,7 @@ def elbow() -> Arm:
 
 
 @pytest.mark.parametrize("joints", [1, 2, 3, 4, 5])
+@pytest.mark.drawn(0.4)
 def test_short_arms_find_their_posture_again(joints: int, sample: Sample) -> None:
     """With fewer than six joints, skew and of both kinds, the one posture of a pose is found from no hint at all."""
     for rng in sample.cases(20):
@@ -78,6 +79,7 @@ def test_six_skew_turns_find_their_posture_again(rng: np.random.Generator, sampl
 
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
+@pytest.mark.drawn(0.34)
 def test_against_the_closed_form(name: str, rng: np.random.Generator) -> None:
     """Where both are to be had, what is found step by step is among the closed form's branches, and most are found."""
     arm = load_arm(name)

@@ -127,6 +127,7 @@ def test_slowed_until_the_limits_hold(puma: CompiledArm) -> None:
 @pytest.mark.parametrize("orientation", ["geodesic", "zyz"])
 @pytest.mark.parametrize("ends", ["rest", "running"])
 @pytest.mark.parametrize("name", ["puma560-seed", "ur5", *["stanford"] * WHOLE])
+@pytest.mark.drawn(0.25)
 def test_the_hand_is_where_it_is_planned(name: str, ends: str, orientation: str, sample: Sample) -> None:
     """On random moves no sample, far denser than the looks, is beyond the bounds; the branch stays what it is."""
     arm = compile_arm(load_arm(name))

@@ -71,6 +71,7 @@ def test_half_steps_at_both_ends(stanford: Arm) -> None:
 
 @pytest.mark.parametrize("name", ["stanford", "puma560-seed"])
 @pytest.mark.parametrize("deviation", [2e-3, 1e-4])
+@pytest.mark.drawn(0.4)
 def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.random.Generator) -> None:
     """On random lines 20 times denser looks find nothing worse than the planner says, or than was asked."""
     arm = load_arm(name)

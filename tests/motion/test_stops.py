@@ -141,6 +141,7 @@ def lifted(fast: CompiledArm, q_start: Array, A: Array, B: Array) -> Array:
         if (name, factor[0]) != ("stanford", "e")
     ],
 )
+@pytest.mark.drawn(0.4)
 def test_the_singularity_and_a_joint_to_blame_are_named(name: str, factor: str, rng: np.random.Generator) -> None:
     """What a refused line names is a factor that is small there, and a joint that moves for nothing where it is 0.
 

@@ -111,6 +111,7 @@ def test_short_line_with_a_large_turn() -> None:
     assert twisted <= line.certificate.turn <= 5e-4
 
 
+@pytest.mark.drawn(0.34)
 def test_limits_hold_between_samples(fast: CompiledArm) -> None:
     """Speeds, accelerations and positions keep their limits everywhere, by the roots of their derivatives."""
     rng, arm = np.random.default_rng(4), fast.arm

@@ -107,6 +107,7 @@ def faults(arm: Arm, stage: Stage, X: Array) -> list[str]:
 
 @pytest.mark.share(0.03)
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5", "seven joints"])
+@pytest.mark.drawn(0.34)
 def test_random_ways_are_smooth_and_never_slower(name: str, sample: Sample) -> None:
     """Beside each leg the hand swings out at its ends alone, and the way is no slower than the legs with stops."""
     arm = arm_called(name)

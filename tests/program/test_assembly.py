@@ -48,6 +48,7 @@ def test_every_accepted_program(path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.drawn(0.4)
 def test_run_from_code(name: str) -> None:
     """A run from re-read code has the trace and the joint positions of the run from the program."""
     cell = cell_of(CELLS.get(name, "cell1"))

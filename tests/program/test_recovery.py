@@ -46,6 +46,7 @@ def test_mutated_programs(name: str, at: int, how: str, with_cell: bool) -> None
 
 
 @pytest.mark.parametrize("name", ["p01", "p02", "p04", "p05", "p06", "p07", "p08"])
+@pytest.mark.drawn(0.4)
 def test_no_cascades(name: str) -> None:
     """One slip of one token gives at most five messages, and in nine cases of ten at most two."""
     counts = []

@@ -115,6 +115,7 @@ def joined(words: list[str], seed: int) -> str:
 
 
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: f"{path.parent.name}/{path.stem}")
+@pytest.mark.drawn(0.4)
 def test_programs_of_the_shelf(path: Path) -> None:
     """Both take the same programs of the shelf for programs, and the same damaged ones."""
     words = words_of(path.read_text(encoding="utf-8"))

@@ -321,6 +321,7 @@ def test_opens_from_the_disk(opened: Opened) -> None:
 
 @pytest.mark.browser
 @pytest.mark.parametrize("t", [0.0, 0.1, 0.2213, 0.25])
+@pytest.mark.drawn(0.5)
 def test_shows_the_moment(opened: Opened, run: Run, t: float) -> None:
     """At every moment the page shows the error, the gaps and what flies as the simulation has it."""
     opened.seek(t)
@@ -386,6 +387,7 @@ def test_charts_lead(opened: Opened) -> None:
 
 @pytest.mark.browser
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar"])
+@pytest.mark.drawn(0.5)
 def test_other_pages(browser: Any, tmp_path: Path, cranked: dict[str, Run], name: str) -> None:
     """The pages of slider-crank and four-bar open, and end where their runs end."""
     shown = Opened(browser, tmp_path / f"{name}.html", cranked[name])

@@ -96,6 +96,7 @@ DAMAGES: dict[str, Callable[[bytes], bytes]] = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+@pytest.mark.drawn(0.34)
 def test_damage_is_mended_without_a_word(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
     """After any damage the kernel is compiled again, and the start after that finds it."""
     start(tmp_path)

@@ -73,7 +73,7 @@ def closed(
     lead = np.broadcast_shapes(given.shape[:-1], goal.shape[:-1], np.shape(gaps)[:-2])
     n, p = len(linkage.coordinates), len(linkage.pins)
     q = np.array(np.broadcast_to(given, (*lead, n))).reshape(-1, n)
-    goals = np.broadcast_to(goal, (*lead, goal.shape[-1])).reshape(len(q), -1)
+    goals = np.broadcast_to(goal, (*lead, goal.shape[-1])).reshape(len(q), goal.shape[-1])
     apart = np.broadcast_to(gaps, (*lead, p, 2)).reshape(len(q), 2 * p)
     for some in _pieces(len(q)):
         worst = _close(linkage, q[some], goals[some], apart[some], by_tip=tip is not None)

@@ -66,6 +66,7 @@ def test_bound_at_rest(five_bar: Linkage) -> None:
 
 
 @pytest.mark.parametrize("fault", ["none", "noise understated", "sign", "swapped"])
+@pytest.mark.drawn(0.34)
 def test_attacked_at_rest(five_bar: Linkage, fault: str, sample: Sample) -> None:
     """Resting tips with a fault are refused, or their intervals grow; nothing is told of columns that are swapped."""
     told = held = refused = 0
@@ -108,6 +109,7 @@ def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.G
 
 @pytest.mark.share(0.05)
 @pytest.mark.parametrize("fault", ["payload", "sign", "swapped"])
+@pytest.mark.drawn(0.25)
 def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: Sample) -> None:
     """An arm whose columns are turned about is refused, one with twice the payload nearly always.
 

@@ -116,6 +116,7 @@ def check_kept(text: str, std: Standard = Standard.RLO_2, numbers: int | None = 
 
 
 @pytest.mark.parametrize("path", RIGHT, ids=NAMES)
+@pytest.mark.drawn(0.4)
 def test_nothing_is_lost(path: Path) -> None:
     """A program on the shelf says the same when laid out, keeps its comments, and is laid out once and for all."""
     text, std = path.read_text(encoding="utf-8"), standard_of(path)
@@ -162,6 +163,7 @@ def without_spelling(text: str) -> str:
 
 
 @pytest.mark.parametrize("path", [path for path in RIGHT if path not in REJECTED], ids=lambda path: path.stem)
+@pytest.mark.drawn(0.4)
 def test_layout_does_not_matter(path: Path) -> None:
     """The words of a program determine how it is laid out: blanks, line ends and case do not matter."""
     text, std = path.read_text(encoding="utf-8"), standard_of(path)

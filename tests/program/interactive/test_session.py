@@ -116,6 +116,7 @@ def test_an_arm_stands_where_the_last_statement_left_it() -> None:
 
 @pytest.mark.parametrize("name", PROGRAMS)
 @pytest.mark.parametrize("line_by_line", [False, True])
+@pytest.mark.drawn(0.4)
 def test_programs_do_what_they_do(name: str, *, line_by_line: bool) -> None:
     """A program comes to the same end whether it is run, loaded into a session, or pasted line by line."""
     cell, text = cell_of("cell1"), corpus_text(name)
@@ -146,6 +147,7 @@ def test_programs_do_what_they_do(name: str, *, line_by_line: bool) -> None:
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.drawn(0.4)
 def test_a_session_is_a_program(name: str) -> None:
     """The session as a program runs to the same end, and its own session is the same program."""
     cell = cell_of("cell1")
