@@ -15,7 +15,7 @@ from hypothesis import settings
 from samples import WHOLE, Sample, drawn
 
 # No test depends on how fast a machine is.
-settings.register_profile("untimed", deadline=None)
+settings.register_profile("untimed", deadline=None, max_examples=100 if WHOLE else 40)
 settings.load_profile("untimed")
 
 
@@ -41,7 +41,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if (mark := item.get_closest_marker("drawn")) is not None:
             parts[item.nodeid.partition("[")[0], *mark.args].append(item)
-        if mark is not None or "sample" in getattr(item, "fixturenames", ()):
+        examples = getattr(getattr(item, "obj", None), "is_hypothesis_test", False)
+        if mark is not None or examples or "sample" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.proof)
     # The same in all processes of a run, and shown at its start: `--randomly-seed` repeats the choice.
     seed = config.getoption("randomly_seed", None)

@@ -375,6 +375,7 @@ def test_gallery_of_the_page() -> None:
     assert sum(exhibit.picture.stat().st_size for exhibit in made["EXHIBITS"]) < 1_500_000
 
 
+@pytest.mark.drawn(0.34)
 @pytest.mark.parametrize("name", ["stanford-torque", "puma-moves", "dh-calibration"])
 def test_studies_of_the_page(name: str) -> None:
     """The page of the studies tells what the studies find; the long one is told by a run of its own."""

@@ -53,7 +53,7 @@ CALLS: dict[str, list[str]] = {
     "clearance sweep": ["five-bar", "-o", "out", "--paths", "x1", "-n", "2", "--workers", "1", "--json"],
     "clearance estimate": ["five-bar", "rest.csv", "--json"],
     "clearance correct": ["five-bar", "--path", "x1", "--rounds", "1", "--knots", "2", "--json"],
-    "study": ["dh-calibration", "--json"],
+    "study": ["stanford-torque", "--json"],
     "kernel": ["ur5", "forward", "--json"],
 }
 PROGRAM = """VAR there : FRAME ;

@@ -21,7 +21,7 @@ from armwright.kinematics.forward import forward, link_poses
 from armwright.kinematics.inverse.closed_form import inverse_branches
 from armwright.kinematics.jacobian import jacobian
 from oracles.arms import random_arm, random_postures
-from samples import Sample
+from samples import WHOLE, Sample
 
 ROUNDING = 1e-11  # two orders of the same sums, and sines that differ by two units in the last place
 
@@ -96,7 +96,7 @@ def test_every_quantity_is_compared() -> None:
 
 def test_branches(sample: Sample) -> None:
     """Compiled branches are those of the plain function: in reach and out of it, and where a joint is free."""
-    arms = some_of(sample, [load_arm(name) for name in ("puma560", "stanford", "ur5")])
+    arms = some_of(sample, [load_arm(name) for name in ("puma560-seed", "ur5", *["stanford"] * WHOLE)])
     for arm in arms:
         assert_branches(arm, np.random.default_rng(sample.seed))
     sample.record("compiled branches are those of the plain function, arms", len(arms), 0)

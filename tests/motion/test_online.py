@@ -15,6 +15,7 @@ from armwright.motion.online import JERK_TIME, OnlineError, replace_goal, retarg
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.quintic import point_to_point, quintic
 from armwright.motion.trajectory import Trajectory, join
+from samples import Sample
 
 ruckig = pytest.importorskip("ruckig")
 
@@ -68,9 +69,10 @@ def state(rng: np.random.Generator, jerk: Array) -> tuple[Array, Array, Array]:
     return rng.uniform(LOWER, UPPER) / 4, qd, np.where(room > 0, qdd, 0.0)
 
 
-def test_thousands_of_states(rng: np.random.Generator) -> None:
-    """From 3000 states, all joints together or each by itself: the goal is met, and no limit passed in between."""
-    for k in range(3000):
+@pytest.mark.share(0.25)
+def test_thousands_of_states(sample: Sample) -> None:
+    """From any state, all joints together or each by itself: the goal is met, and no limit passed in between."""
+    for k, rng in enumerate(sample.cases(3000)):
         jerk = ACCELERATION * np.exp(rng.uniform(0, 4, 6))
         q, qd, qdd = state(rng, jerk)
         goal = rng.uniform(LOWER, UPPER) / 2
@@ -84,6 +86,7 @@ def test_thousands_of_states(rng: np.random.Generator) -> None:
         np.testing.assert_array_equal(move(0.0), q)
         np.testing.assert_array_equal(move(0.0, 1), qd)
         np.testing.assert_allclose(move(0.0, 2), qdd, rtol=ROUNDING)
+    sample.record("goals from any state of motion, met within all limits", sample.count(3000), 0)
 
 
 def test_goals_that_change_again_and_again(rng: np.random.Generator) -> None:
