@@ -21,7 +21,7 @@ from armwright.clearance.ideal import closed
 from armwright.clearance.linkage import Body, Linkage
 from armwright.clearance.rest import at_rest
 from armwright.clearance.settings import contact_stiffness
-from armwright.errors import one_of
+from armwright.errors import InvalidValueError, one_of
 
 # So surely a wrong model is refused that is called seen.
 POWER = 0.9
@@ -29,6 +29,9 @@ POWER = 0.9
 _STEP = 1e-4
 # What is left of a shift is none when it is a smaller part of it: rounding leaves some.
 _NONE = 1e-6
+# From how much on a fault is seen is put right until what is left there is this near to what is needed; a fault so many
+# times as large as a small one would have to be is not seen, for it shifts the tip less and less.
+_NEAR, _FAR, _MOST_ROUNDS = 0.01, 10.0, 20
 # What shifts the tip by less, though it is wrong by all that it is, does not matter: the mass of a crank is held [m].
 _NOTHING = 1e-9
 
@@ -76,18 +79,51 @@ def faults(linkage: Linkage, poses: ArrayLike, found: Estimate, *, noise_is_know
     B = weights[:, None] * matrix_at(linkage, q).reshape(-1, len(found.names))
     Q, _ = np.linalg.qr(B)
     least = np.sqrt(_noncentrality(found.spare, found.freedom)) * found.noise if noise_is_known else np.inf
+    right = _tips(linkage, linkage, q, np.zeros(len(linkage.drives)), found.values)
+
+    def left(shift: Array) -> float:
+        """Return how much of a weighted shift no clearances explain."""
+        return float(np.linalg.norm(shift - Q @ (Q.T @ shift)))
+
     seen = []
     for name, unit, size, changed in _kinds(linkage):
-        (there, ahead), (here, behind) = changed(_STEP), changed(-_STEP)
-        moved = _tips(there, linkage, q, ahead, found.values) - _tips(here, linkage, q, behind, found.values)
-        by_unit = weights * moved.ravel() / (2 * _STEP * size)
-        whole, left = (float(np.linalg.norm(one)) for one in (by_unit, by_unit - Q @ (Q.T @ by_unit)))
-        if whole * size < _NOTHING:
+
+        def shift(by: float, changed: Callable[[float], _Changed] = changed) -> Array:
+            wrong, zeros = changed(by)
+            return weights * (_tips(wrong, linkage, q, zeros, found.values) - right).ravel()
+
+        by_one = (shift(_STEP) - shift(-_STEP)) / (2 * _STEP)
+        whole = float(np.linalg.norm(by_one))
+        if whole < _NOTHING:
             continue
-        shows = left > _NONE * whole
-        shifts = np.linalg.lstsq(B, by_unit, rcond=None)[0]
-        seen.append(Fault(name, unit, least / left if shows else np.inf, np.asarray(shifts, dtype=np.float64)))
+        shows = np.isfinite(least) and left(by_one) > _NONE * whole
+        from_here = size * _seen_from(lambda by: left(shift(by)), least / left(by_one), least) if shows else np.inf
+        shifts = np.linalg.lstsq(B, by_one / size, rcond=None)[0]
+        seen.append(Fault(name, unit, from_here, np.asarray(shifts, dtype=np.float64)))
     return tuple(seen)
+
+
+def _seen_from(left: Callable[[float], float], small: float, least: float) -> float:
+    """Return from how much on, one way or the other, a fault leaves as much as is needed to see it.
+
+    Args:
+        left: what a change leaves that no clearances explain [m]; a change of -1 takes all away.
+        small: what is needed if that is proportional to the change.
+        least: how much has to be left [m].
+    """
+    size = small
+    for _ in range(_MOST_ROUNDS):
+        try:
+            found = min(left(by) for by in (size, -size) if by > -1)
+        except InvalidValueError:
+            # So wrong an arm cannot be put together, which nobody overlooks.
+            return size
+        if found > (1 - _NEAR) * least:
+            return size
+        size *= least / max(found, 0.5 * least)
+        if size > _FAR * small:
+            break
+    return float(np.inf)
 
 
 def wrong_offsets(linkage: Linkage, poses: ArrayLike, clearances: ArrayLike, name: str, by: float) -> Array:
