@@ -291,6 +291,21 @@ def test_damaged_results(damaged: Callable[[bytes], bytes], speeds: Design, tmp_
     assert not (tmp_path / "calls").exists()
 
 
+def test_results_without_their_hash(speeds: Design, tmp_path: Path) -> None:
+    """Results that nothing tells the hash of are not taken on trust; made again of the blocks they have one."""
+    run(Fall(), speeds, tmp_path / "out", workers=1).close()
+    record = tmp_path / "out" / "run.json"
+
+    for damage in (lambda: record.write_text('{"files": {}}'), record.unlink):
+        damage()
+        with pytest.raises(FileFormatError, match=r"results.nc: cannot be checked: no run.json beside it tells its"):
+            load(tmp_path / "out")
+    (tmp_path / "out" / "results.nc").unlink()
+
+    run(Fall(), speeds, tmp_path / "out", workers=1).close()
+    load(tmp_path / "out").close()
+
+
 def test_folder_of_other_things(speeds: Design, tmp_path: Path) -> None:
     """A folder with other files in it is refused, and nothing is written there."""
     (tmp_path / "thesis.tex").touch()

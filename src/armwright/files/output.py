@@ -58,7 +58,7 @@ def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str
     made = _make_parents(folder)
     left: dict[str, str] = {}
     try:
-        with staging(_staged_in(folder), folder, lambda dead: left.update(_recorded(dead))) as new:
+        with staging(_staged_in(folder), folder, lambda dead: left.update(recorded(dead))) as new:
             hashes = {name: _write(new / name, content) for name, content in files.items()}
             _write(new / RECORD, record_text(hashes, record or {}))
             with signals_held():
@@ -150,7 +150,7 @@ def strays(folder: Path) -> tuple[str, ...]:
     Returns:
         Their names, sorted; empty where all is as it was written, or where the folder holds no results of armwright.
     """
-    return tuple(sorted(name for name, digest in _recorded(folder).items() if sha256(folder / name) != digest))
+    return tuple(sorted(name for name, digest in recorded(folder).items() if sha256(folder / name) != digest))
 
 
 def is_stray(path: Path) -> bool:
@@ -159,7 +159,7 @@ def is_stray(path: Path) -> bool:
     One that the run has not written at all is somebody's own, unless files of the run are missing or changed: then it
     may be of another run, which was killed before it wrote its record.
     """
-    digest = _recorded(path.parent).get(path.name)
+    digest = recorded(path.parent).get(path.name)
     if digest is None:
         return path.name != RECORD and path.exists() and bool(strays(path.parent))
     return sha256(path) != digest
@@ -217,13 +217,13 @@ def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str])
         new.replace(folder)
         return
     with _alone(folder):
-        recorded = _recorded(folder)
+        named = recorded(folder)
         _refuse_what_cannot_be_replaced(folder, names)
-        _refuse_what_others_made(folder, names, {*recorded, *left})
+        _refuse_what_others_made(folder, names, {*named, *left})
         # What somebody has changed since is theirs.
         gone = {
             name
-            for name, digest in (*recorded.items(), *left.items())
+            for name, digest in (*named.items(), *left.items())
             if name not in names and _NAMES.fullmatch(name) and sha256(folder / name) == digest
         }
         kept = new.with_name(KEPT)
@@ -268,7 +268,7 @@ def _said(folder: Path) -> dict[str, Any] | None:
     return said if ours else None
 
 
-def _recorded(folder: Path) -> dict[str, str]:
+def recorded(folder: Path) -> dict[str, str]:
     """Return the hashes of the files that the record of a folder names; none where it is no record of ours."""
     files = (_said(folder) or {}).get("files", {})
     # A record is data: it names files of its own folder, and nothing else.

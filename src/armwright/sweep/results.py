@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.errors import FileFormatError, InvalidValueError, shown
-from armwright.files.output import RECORD, is_stray, record_text, sha256
+from armwright.files.output import RECORD, record_text, recorded, sha256
 from armwright.files.reading import regular
 from armwright.sweep.designs import Design
 from armwright.sweep.errors import SweepError
@@ -37,7 +37,7 @@ def load(folder: Path | str) -> "xarray.Dataset":
             (a ``Status``) and ``message``; with units, descriptions and where they come from as attributes.
 
     Raises:
-        FileFormatError: the file is damaged.
+        FileFormatError: the file is damaged, or its ``run.json`` is missing.
         MissingExtraError: a library of the extra ``sweep`` is not installed.
         SweepError: there is no finished sweep in the folder.
     """
@@ -47,7 +47,10 @@ def load(folder: Path | str) -> "xarray.Dataset":
     if not path.exists():
         state = "is not finished; run it again to go on" if path.with_name(MANIFEST).exists() else "is not there"
         raise SweepError(f"'{folder}': the sweep {state}")
-    if is_stray(regular(path)):
+    told, found = recorded(path.parent).get(RESULTS), sha256(regular(path))
+    if told is None:
+        raise FileFormatError(path, None, "", f"cannot be checked: no {RECORD} beside it tells its hash; {damaged}")
+    if told != found:
         raise FileFormatError(path, None, "", f"damaged: its hash is not that in {RECORD}; {damaged}")
     try:
         # Units such as "hours" are those of a quantity, not of a calendar.

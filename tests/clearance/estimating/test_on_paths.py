@@ -13,6 +13,7 @@ from armwright.clearance.linkage import Linkage
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.sweeping import FeatureSweep
 from armwright.errors import FileFormatError, InvalidValueError
+from armwright.files.output import record_text, sha256
 from armwright.sweep.designs import sobol
 from armwright.sweep.results import load
 from armwright.sweep.run import run
@@ -86,6 +87,7 @@ def test_foreign_results(
     """Results that no sweep of clearances has written are refused by the name of their file."""
     with load(folder) as data:
         change(data).to_netcdf(tmp_path / "results.nc", engine="scipy")
+    (tmp_path / "run.json").write_text(record_text({"results.nc": str(sha256(tmp_path / "results.nc"))}, {}))
 
     with pytest.raises(FileFormatError, match=text) as refused:
         learnt_from(tmp_path, five_bar, ("y1",), STRAIGHT)
