@@ -219,7 +219,10 @@ def wrong_in(case: Case, answer: dict[str, Any]) -> str | None:
         return "shows its inside"
     if answer["left"]:
         return f"leaves {answer['left']}"
-    if "--json" in case.arguments and status != ExitStatus.CHECK_FAILED:
+    # After `--` it is the name of a file, and `--version` and `--help` are all that is done where they stand.
+    options = case.arguments[: case.arguments.index("--")] if "--" in case.arguments else case.arguments
+    asked = "--json" in options and not {"--version", "--help", "-h"} & set(options)
+    if asked and status != ExitStatus.CHECK_FAILED:
         return wrong_as_json(status, answer["out"])
     return None
 
