@@ -51,6 +51,20 @@ def armwright_process(
     )
 
 
+def fed_to(
+    command: str, path: str, folder: Path, *options: str, typed: str = "", piped: str | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Call a command with a program that somebody types, or writes once into a pipe of that name."""
+    if piped is None:
+        return armwright(command, path, *options, cwd=folder, fed=typed)
+    os.mkfifo(folder / path)
+    with subprocess.Popen(["sh", "-c", 'printf %s "$0" > "$1"', piped, folder / path]) as writer:
+        result = armwright_process(command, path, *options, cwd=folder)
+        writer.kill()
+    (folder / path).unlink()
+    return result
+
+
 def _status() -> int:
     """Run the command and return its exit status, as the interpreter does."""
     try:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cli_calls import armwright
+from cli_calls import armwright, fed_to
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 WRONG = "VAR f : FRAME\nBEGIN\n  READ VISIONS (f) ;\n  MVOE ARM_1 TO f ;\n  OPEN ARM - 1\n  GRASP\nEND\n"
@@ -118,3 +118,18 @@ def test_help() -> None:
 
     assert result.returncode == 0
     assert "armwright fix examples/bench.rlo --diff" in result.stdout
+
+
+@pytest.mark.parametrize("name", ["-", "pipe"])
+def test_what_is_typed_or_piped_in(name: str, tmp_path: Path) -> None:
+    """What cannot be written back is printed, and what was done told beside it; no file is made and nobody waits."""
+    fed = {"typed": WRONG} if name == "-" else {"piped": WRONG}
+    result = fed_to("fix", name, tmp_path, **fed)
+    data = fed_to("fix", name, tmp_path, "--json", **fed)
+
+    assert result.stdout == CURED
+    assert "(E110): put in `.`" in result.stderr
+    assert "MVOE" in result.stderr
+    assert json.loads(data.stdout)[0]["text"] == CURED
+    assert (result.returncode, data.returncode) == (1, 1)
+    assert {path.name for path in tmp_path.iterdir()} <= {"pipe"}

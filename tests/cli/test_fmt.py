@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from armwright.cli.rewriting import read_source, write_back
+from cli_calls import fed_to
 
 WRITTEN = "begin open arm-1 ; { now } grasp end.\n"
 LAID_OUT = "BEGIN\n  OPEN ARM_1 ;  { now }\n  GRASP\nEND.\n"
@@ -103,6 +104,13 @@ def test_standard_input() -> None:
     assert fmt("-", typed=WRITTEN).stdout.decode() == LAID_OUT
     assert fmt("-", "--check", typed=WRITTEN).returncode == 5
     assert fmt("-", "--check", typed=LAID_OUT).returncode == 0
+
+
+def test_what_is_piped_in(tmp_path: Path) -> None:
+    """A pipe is not written back to: what becomes of its program is printed, and stands in the document."""
+    assert fed_to("fmt", "pipe", tmp_path, piped=WRITTEN).stdout == LAID_OUT
+    assert json.loads(fed_to("fmt", "pipe", tmp_path, "--json", piped=WRITTEN).stdout)[0]["text"] == LAID_OUT
+    assert fed_to("fmt", "pipe", tmp_path, "--check", piped=WRITTEN).returncode == 5
 
 
 def test_standard_input_that_is_no_text() -> None:

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 def fix(
-    programs: Annotated[list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO.", show_default=False)],
+    programs: Annotated[
+        list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
+    ],
     cell: Annotated[
         Path | None, typer.Option("--cell", help="The cell they will run in; what is left is then checked against it.")
     ] = None,
@@ -31,32 +33,39 @@ def fix(
 ) -> None:
     """Cure what is certain in RLO programs: a missing `;` or `=`, a matrix row by row, look-alike characters.
 
+    A program from the standard input or a pipe is printed as it becomes; what was done is told on the error output.
+
     Exit status 0: no program has errors any more; 1: something is left to do by hand.
 
     **Example:** `armwright fix examples/bench.rlo --diff`
     """
     from armwright.cli.programs import given_cell
-    from armwright.cli.rewriting import print_difference, read_source, write_back
+    from armwright.cli.rewriting import is_stream, print_difference, read_source, write_back
+    from armwright.cli.terminal import print_verbatim
     from armwright.program.editing.fixing import fixed
 
     acted_on = given_cell(cell)
     rows: list[dict[str, Any]] = []
     for path in programs:
+        printed = is_stream(path)
         try:
             source = read_source(path)
             result = fixed(source, _translator(path.parent, acted_on, std))
-            if result.cures and not diff:
+            if result.cures and not (diff or printed):
                 write_back(path, result.text)
         except ArmwrightError as error:
             rows.append({"program": str(path), "errors": 1, **failure_data(error.exit_status, error, str(error))})
             if not as_json:
                 print(f"armwright: {error}", file=sys.stderr)
             continue
-        rows.append(_as_data(result))
-        if not as_json:
-            if diff and result.cures:
-                print_difference(source, result.text)
-            _print(result, done="could be cured" if diff else "cured")
+        rows.append(_as_data(result) | ({"text": result.text} if printed else {}))
+        if as_json:
+            continue
+        if diff and result.cures:
+            print_difference(source, result.text)
+        elif printed and not diff:
+            print_verbatim(result.text)
+        _print(result, done="could be cured" if diff else "cured", to_errors=printed and not diff)
     if as_json:
         print_json(rows)
     if any(row["exit_status"] for row in rows):
@@ -81,18 +90,19 @@ def _translator(folder: Path, cell: "Cell | None", std: Standard) -> "Translate"
     return find
 
 
-def _print(result: "Fixed", *, done: str) -> None:
+def _print(result: "Fixed", *, done: str, to_errors: bool) -> None:
     from armwright.cli.programs import print_diagnostics
 
+    out = sys.stderr if to_errors else sys.stdout
     for cure in result.cures:
         source, start = cure.source, cure.diagnostic.span.start
         place = f"{source.name}:{source.line(start)}:{source.column(start)}"
-        print(f"{place}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.what}")
+        print(f"{place}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.what}", file=out)
     count = len(result.cures)
     slips = f"{counted(count, 'slip')} {done}" if count else "nothing to cure"
-    print(f"{result.compilation.source.name}: {slips}")
+    print(f"{result.compilation.source.name}: {slips}", file=out)
     if result.compilation.diagnostics:
-        print_diagnostics(result.compilation.diagnostics, result.compilation.source)
+        print_diagnostics(result.compilation.diagnostics, result.compilation.source, to_errors=to_errors)
 
 
 def _as_data(result: "Fixed") -> dict[str, Any]:

@@ -39,7 +39,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
-    from armwright.cli.rewriting import INPUT, print_difference, read_source, write_back
+    from armwright.cli.rewriting import is_stream, print_difference, read_source, write_back
     from armwright.cli.terminal import print_verbatim
     from armwright.program.editing.formatting import formatted
 
@@ -47,11 +47,12 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
     for path in programs:
         row: dict[str, Any] = {"program": str(path), "exit_status": ExitStatus.DONE}
         rows.append(row)
+        streamed = is_stream(path)
         try:
             source = read_source(path)
             after = formatted(source, std=std, numbers=numbers)
             row["changed"] = after != source.text
-            if row["changed"] and not (check or diff or stdout or path == INPUT):
+            if row["changed"] and not (check or diff or stdout or streamed):
                 write_back(path, after)
         except ArmwrightError as error:
             row |= failure_data(error.exit_status, error, str(error))
@@ -61,10 +62,11 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
         if check and row["changed"]:
             row["exit_status"] = ExitStatus.CHECK_FAILED
         if as_json:
+            row |= {"text": after} if stdout or streamed else {}
             continue
         if diff:
             print_difference(source, after)
-        elif stdout or (path == INPUT and not check):
+        elif stdout or (streamed and not check):
             print_verbatim(after)
         else:
             print(_said(source, changed=row["changed"], check=check))

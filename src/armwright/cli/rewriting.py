@@ -11,7 +11,7 @@ INPUT = Path("-")
 
 
 def read_source(path: Path) -> "Source":
-    """Read a program, or the standard input for ``-``.
+    """Read a program, from the standard input for ``-``.
 
     Raises:
         FileFormatError: it cannot be read, is larger than the limit, or is not UTF-8 text.
@@ -24,6 +24,11 @@ def read_source(path: Path) -> "Source":
     if path == INPUT:
         return Source("standard input", read_typed_program(sys.stdin.buffer))
     return Source(str(path), read_program(path))
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a program comes from the standard input, a pipe or a device, and what becomes of it is printed."""
+    return path == INPUT or (path.exists() and not path.is_file())
 
 
 def print_difference(source: "Source", after: str) -> None:
