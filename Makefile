@@ -60,17 +60,17 @@ examples: $(VENV)/core   ## Run every example into out/
 	$(BIN)/armwright run examples/hand_over_sideways.rlo --cell examples/two_arms.toml -o out/hand_over_sideways
 	$(BIN)/armwright move joint puma560-seed examples/puma_poses.toml -o out/joint
 	$(BIN)/armwright move cartesian puma560 examples/round_the_post.toml -o out/round_the_post
-	$(BIN)/python examples/measurements.py
+	$(BIN)/python examples/measurements.py out
 	$(BIN)/armwright iso9283 examples/measured_poses.csv examples/measured_paths.csv -o out/iso9283
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sweep,clearance,calibration]'
-	$(BIN)/python examples/five_bar.py
+	$(BIN)/python examples/five_bar.py out
 	$(BIN)/armwright clearance simulate five-bar --path y1 -o out/rattling
 	$(BIN)/armwright clearance estimate five-bar examples/five_bar_rest.csv
 	$(BIN)/armwright clearance sweep five-bar --friction-velocity centre --threshold-mm-s 10 -o out/sweep
 	$(BIN)/armwright clearance estimate five-bar examples/five_bar_paths.csv --sweep out/sweep --noise-um 2
 	$(BIN)/armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483 -o out/corrected
 	$(BIN)/armwright plan-poses puma560 -n 30 -o out/poses.csv
-	$(BIN)/python examples/tracked_points.py
+	$(BIN)/python examples/tracked_points.py out
 	$(BIN)/armwright calibrate puma560-seed examples/puma_points.csv --beyond -o out/calibrated
 	$(BIN)/armwright study dh-calibration -o out/dh
 

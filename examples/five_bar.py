@@ -1,10 +1,12 @@
-"""Writes five_bar_rest.csv and five_bar_paths.csv beside it: what a tracker would see of a five-bar with play.
+"""Writes five_bar_rest.csv and five_bar_paths.csv into a folder: what a tracker would see of a five-bar with play.
 
 The arm has 0.328, 0.171 and 0.483 mm of play in the pins J2, J3 and J4. Its tip is read ten times at each of four
 poses, with 10 µm of noise, and 250 times on the way along each of three paths, with 2 µm.
-Run it to see how such files are made; its numbers are the same in every run.
+Run it to see how such files are made, with the name of the folder or in it; its numbers are the same in every run, but
+for the last digit of some on other processors.
 """
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,7 +20,6 @@ from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 
-HERE = Path(__file__).parent
 PLAY = np.array((0.328, 0.171, 0.483)) * 1e-3  # m
 POSES = np.array(((-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7), (0.0, -0.55)))  # m
 READINGS, READ_NOISE = 10, 10e-6  # m
@@ -55,4 +56,4 @@ def texts() -> dict[str, str]:
 
 if __name__ == "__main__":
     for name, text in texts().items():
-        (HERE / name).write_text(text, encoding="utf-8")
+        Path(*sys.argv[1:2], name).write_text(text, encoding="utf-8")

@@ -1,15 +1,16 @@
-"""Writes measured_poses.csv and measured_paths.csv beside it: what an imaginary robot would give a laser tracker.
+"""Writes measured_poses.csv and measured_paths.csv into a folder: what an imaginary robot would give a laser tracker.
 
 The robot misses its poses by a fixed offset and Gaussian noise, swings when it stops, and rounds its corners.
-Run it to see how such files are made; its numbers are the same in every run.
+Run it to see how such files are made, with the name of the folder or in it; its numbers are the same in every run, but
+for the last digit of some on other processors.
 """
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-HERE = Path(__file__).parent
 POSES = {"P1": (400.0, 0.0, 300.0), "P2": (600.0, 200.0, 500.0)}  # mm
 OFFSET = np.array((0.12, -0.05, 0.08))  # mm
 NOISE = 0.02  # mm in each direction
@@ -90,4 +91,4 @@ def texts() -> dict[str, str]:
 
 if __name__ == "__main__":
     for name, text in texts().items():
-        (HERE / name).write_text(text, encoding="utf-8")
+        Path(*sys.argv[1:2], name).write_text(text, encoding="utf-8")

@@ -1,10 +1,12 @@
-"""Writes puma_points.csv beside it: what a laser tracker would measure of an imaginary PUMA 560 (puma560-seed).
+"""Writes puma_points.csv into a folder: what a laser tracker would measure of an imaginary PUMA 560 (puma560-seed).
 
 Its dimensions are off by tenths of a millimetre and of a degree, its shoulder and elbow give under gravity, and it
-comes back to some hundredths of a millimetre. The tracker stands somewhere in the hall. Run it to see how such files
-are made; its numbers are the same in every run.
+comes back to some hundredths of a millimetre. The tracker stands somewhere in the hall.
+Run it to see how such files are made, with the name of the folder or in it; its numbers are the same in every run, but
+for the last digit of some on other processors.
 """
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,7 +19,6 @@ from armwright.calibration.planning import plan_poses
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 
-HERE = Path(__file__).parent
 POSES, REPEATED, CYCLES, CHECKED = 60, 6, 5, 12
 LENGTH, ANGLE = 3e-4, 1.5e-3  # of the errors of the arm [m], [rad]
 SAG = {"joint2.sag": 1.2e-3, "joint3.sag": 0.8e-3}  # under the largest effort of gravity [rad]
@@ -47,8 +48,8 @@ def rows() -> Iterator[str]:
 
 
 def main() -> None:
-    """Write the file."""
-    (HERE / "puma_points.csv").write_text("\n".join(rows()) + "\n", encoding="utf-8")
+    """Write the file into the folder."""
+    Path(*sys.argv[1:2], "puma_points.csv").write_text("\n".join(rows()) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
