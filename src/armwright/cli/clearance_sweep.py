@@ -65,6 +65,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.clearance.reader import load_linkage
     from armwright.clearance.sweeping import FeatureSweep
     from armwright.sweep.extras import check_extras
+    from armwright.sweep.folder import RESULTS
     from armwright.sweep.run import run
 
     check_extras()
@@ -78,8 +79,9 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     plan = _plan(task, design, (from_mm * 1e-3, to_mm * 1e-3), to_friction, levels=levels, runs=runs, seed=seed)
     # Whatever is wrong with a path is said now, and a step too long for the least play; and the simulation is compiled
     # once, not by every worker.
-    with waiting(f"{task.linkage.name}: the first run compiles it", quiet=quiet or as_json):
-        task(plan.points.min(axis=0, keepdims=True))
+    if not (output / RESULTS).exists():
+        with waiting(f"{task.linkage.name}: the first run compiles it", quiet=quiet or as_json):
+            task(plan.points.min(axis=0, keepdims=True))
     with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
         try:
             found = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
