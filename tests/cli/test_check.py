@@ -1,8 +1,10 @@
 """The command ``armwright check``, as a user calls it."""
 
+import errno
 import json
 import os
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -193,3 +195,31 @@ def test_folder_without_programs(tmp_path: Path) -> None:
 
     assert result.returncode == 4
     assert "there is no program in this folder; expected files *.rlo" in result.stderr
+
+
+def test_folder_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder inside that may not be looked into is told of: its programs would be taken for checked."""
+    closed = tmp_path / "closed"
+    closed.mkdir()
+    (tmp_path / "bench.rlo").write_text("BEGIN GRASP END.")
+    scanned = os.scandir
+
+    def scan(path: str) -> Iterator[os.DirEntry[str]]:
+        if Path(path) == closed:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(closed))
+        return scanned(path)
+
+    monkeypatch.setattr(os, "scandir", scan)
+    result = check(tmp_path)
+
+    assert result.returncode == 4
+    assert result.stderr == f"armwright: {closed}: cannot be read: Permission denied\n"
+
+
+def test_rights_are_asked_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether a file can be read shows when it is read, and is no wrong call."""
+    path = tmp_path / "bench.rlo"
+    path.write_text("BEGIN PRINT(1) END.")
+    monkeypatch.setattr(os, "access", lambda *_: False)
+
+    assert check(path).returncode == 0

@@ -133,3 +133,13 @@ def test_a_program_that_cannot_run(tmp_path: Path) -> None:
 
     assert status == 1
     assert said[0] == "error[E105]: unknown statement `OPNE`"
+
+
+def test_numbers_of_any_length() -> None:
+    """A number of thousands of digits is none, and the session goes on; a mark of byte order is no command."""
+    digits = "9" * 5000
+    status, said = debug(f"\ufefft {digits}", f"b {digits}", f"x {digits}", f"th {digits}", "p 6 * 7", "q")
+
+    assert status == 0
+    assert [line[:26] for line in said[-5:-1]] == ["expected a whole number, g"] * 4
+    assert said[-1].startswith("42")

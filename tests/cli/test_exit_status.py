@@ -228,3 +228,54 @@ def test_changed_results_are_told(tmp_path: Path) -> None:
         for command in commands:
             done = armwright(*command, tmp_path / "out" / name)
             assert "not what the run has written" in done.stderr, (command, done)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [("fmt -", 1), ("fix -", 1), ("repl", 0), ("repl --json", 0), ("debug", 0), ("lsp", 0)],
+)
+def test_closed_input(arguments: str, status: int) -> None:
+    """A closed standard input is an empty one."""
+    command = f"{sys.executable} -m armwright {arguments} <&-"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=120)
+
+    assert done.returncode == status, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"), [("show nosuch", 2), ("nosuch", 2), ("run", 2), ("check nosuch.rlo", 4), ("arms", 0)]
+)
+def test_full_error_output(arguments: str, status: int) -> None:
+    """What the error output cannot take is lost, and the status stays."""
+    command = f"{sys.executable} -m armwright {arguments} 2>/dev/full"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=120)
+
+    assert done.returncode == status
+
+
+def test_folder_that_has_gone(tmp_path: Path) -> None:
+    """An error of the system that names no file is none of the output, and stands in the document."""
+    inside = tmp_path / "gone"
+    inside.mkdir()
+    command = f"cd {inside} && rmdir {inside} && {sys.executable} -m armwright clearance sweep five-bar -o o --json"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, timeout=120)
+
+    assert done.returncode == 4
+    assert json.loads(done.stdout)["error"]["message"].startswith("cannot read or write the current folder: ")
+
+
+def test_signal_that_nobody_heard() -> None:
+    """A signal that comes while an object is cleared away, where exceptions go nowhere, is sent once more."""
+    program = (
+        "import os, signal, sys, time\n"
+        "from armwright.cli import failures\n"
+        "class Gone:\n"
+        "    def __del__(self): os.kill(os.getpid(), signal.SIGINT); time.sleep(0.01)\n"
+        "def work(**_):\n"
+        "    Gone()\n"
+        "    time.sleep(60)\n"
+        "failures.run_and_exit(work)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=50)
+
+    assert (done.returncode, done.stderr) == (130, "armwright: interrupted; nothing was written\n")

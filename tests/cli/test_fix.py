@@ -133,3 +133,12 @@ def test_what_is_typed_or_piped_in(name: str, tmp_path: Path) -> None:
     assert json.loads(data.stdout)[0]["text"] == CURED
     assert (result.returncode, data.returncode) == (1, 1)
     assert {path.name for path in tmp_path.iterdir()} <= {"pipe"}
+
+
+def test_zero_bytes(tmp_path: Path) -> None:
+    """A text in another encoding is that of no program, and nothing is put before it."""
+    path = tmp_path / "wide.rlo"
+    path.write_bytes(WRONG.encode("utf-16-le"))
+
+    assert fix(path).returncode == 1
+    assert path.read_bytes() == WRONG.encode("utf-16-le")

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from armwright.cli.rewriting import read_source, write_back
+from armwright.errors import OutputError
 from cli_calls import fed_to
 
 WRITTEN = "begin open arm-1 ; { now } grasp end.\n"
@@ -54,7 +55,7 @@ def test_ends_of_lines(written: Path, mark: bytes, end: bytes) -> None:
     """Lines go on to end as they did, and a mark of byte order stays, whether fmt or fix has changed them."""
     written.write_bytes(mark + b"begin open arm-1 ;\n{ now } grasp\nend.\n".replace(b"\n", end))
 
-    write_back(written, LAID_OUT)
+    write_back(read_source(written), written, LAID_OUT)
 
     assert written.read_bytes() == mark + LAID_OUT.encode().replace(b"\n", end)
     assert read_source(written).text == LAID_OUT
@@ -104,6 +105,26 @@ def test_standard_input() -> None:
     assert fmt("-", typed=WRITTEN).stdout.decode() == LAID_OUT
     assert fmt("-", "--check", typed=WRITTEN).returncode == 5
     assert fmt("-", "--check", typed=LAID_OUT).returncode == 0
+
+
+def test_changed_meanwhile(written: Path) -> None:
+    """What somebody writes into a program while it is laid out is not lost."""
+    source = read_source(written)
+    written.write_text(f"{WRITTEN}{{ mine }}")
+
+    with pytest.raises(OutputError, match="it has changed since it was read; nothing was written"):
+        write_back(source, written, LAID_OUT)
+    assert written.read_text().endswith("{ mine }")
+
+
+def test_descriptor_of_a_file(written: Path) -> None:
+    """The standard input is printed by its other name, too, and the file behind it stays as it is."""
+    with written.open("rb") as file:
+        command = [sys.executable, "-m", "armwright", "fmt", "/dev/stdin"]
+        done = subprocess.run(command, stdin=file, capture_output=True, check=True, timeout=300)
+
+    assert done.stdout.decode() == LAID_OUT
+    assert written.read_text() == WRITTEN
 
 
 def test_what_is_piped_in(tmp_path: Path) -> None:

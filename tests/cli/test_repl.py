@@ -425,3 +425,39 @@ def test_ctrl_c_in_a_pipe() -> None:
         assert talk.stdout.readline() == "1\n"
         talk.send_signal(signal.SIGINT)
         assert talk.wait(PATIENCE) == 130
+
+
+def test_paths_that_cannot_be(tmp_path: Path) -> None:
+    """A path with a zero byte or of a name too long is told of, and the session goes on."""
+    wrong = ("x\0y", "n" * 300)
+    status, said = fed(
+        *(f":{word} {path}" for path in wrong for word in ("save", "save!", "report")), "42", cwd=tmp_path
+    )
+
+    assert status == 4
+    assert said.count("; nothing was written") == 6
+    assert said.endswith("42\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_that_is_refused(tmp_path: Path) -> None:
+    """Where a file of the user's stands in the way of a report, nothing of it is written."""
+    (tmp_path / "report.html").write_text("mine")
+
+    status, said = fed(
+        f":report {tmp_path}", f":report {tmp_path / 'report.html' / 'below'}", f":report {tmp_path}/a/b"
+    )
+
+    assert status == 4
+    assert said.count("nothing was written") == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "report.html"]
+    assert (tmp_path / "a" / "b" / "session.rlo").exists()
+
+
+def test_a_line_without_end() -> None:
+    """A line is no longer than a program; a mark of byte order before the first is none of its letters."""
+    status, said = fed("\ufeff6 * 7", "1" * 1_000_001)
+
+    assert status == 4
+    assert said.splitlines()[0] == "42"
+    assert "standard input: a line is too long" in said

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from armwright.errors import OutputError
-from armwright.files.output import write_file, write_folder
+from armwright.files import output
+from armwright.files.output import descriptor, write_file, write_folder
+from armwright.files.reading import forget, read_text
 
 
 def test_writes_and_replaces(tmp_path: Path) -> None:
@@ -187,3 +189,100 @@ def test_a_file_in_a_folder_of_others(tmp_path: Path) -> None:
     tmp_path.chmod(0o700)
 
     assert path.read_text() == "new"
+
+
+def test_what_was_read_stays(tmp_path: Path) -> None:
+    """What results are made of is never replaced by them, by whatever name they are called."""
+    source = tmp_path / "figure-x.svg"
+    write_folder(tmp_path, {source.name: "mine"})
+    assert read_text(source) == "mine"
+    (tmp_path / "link.svg").symlink_to(source)
+    (tmp_path / "second.svg").hardlink_to(source)
+
+    for name in ("figure-x.svg", "link.svg", "second.svg", "../" + tmp_path.name + "/figure-x.svg"):
+        with pytest.raises(OutputError, match="was read by this command, and would be lost; name another file"):
+            write_file(tmp_path / name, "other")
+    for files in ({source.name: "other"}, {"figure-y.svg": "other"}):
+        with pytest.raises(OutputError, match=r"'figure-x.svg' in it was read, and would be lost: name another folder"):
+            write_folder(tmp_path, files)
+    assert source.read_text() == "mine"
+
+    write_file(source, "changed", back=True)
+    assert source.read_text() == "changed"
+    forget()
+    write_file(source, "other")
+
+
+def test_open_descriptors(tmp_path: Path) -> None:
+    """What goes to /dev/stdout or another open descriptor goes on behind what is there; a link to it is one, too."""
+    (tmp_path / "link").symlink_to("/dev/fd")
+    with (tmp_path / "log").open("w+b", buffering=0) as log:
+        log.write(b"kept ")
+        write_file(Path(f"/dev/fd/{log.fileno()}"), ["o", "ne "])
+        write_file(tmp_path / "link" / str(log.fileno()), "two")
+        assert descriptor(Path("/dev/stdin")) == 0
+    read, write = os.pipe()
+    with os.fdopen(read, "rb") as reader:
+        write_file(Path(f"/proc/self/fd/{write}"), "piped")
+        os.close(write)
+        assert reader.read() == b"piped"
+
+    assert (tmp_path / "log").read_text() == "kept one two"
+    assert [descriptor(tmp_path / name) for name in ("log", "1", "link", "none/1")] == [None] * 4
+    with pytest.raises(OutputError, match="Bad file descriptor"):
+        write_file(Path("/dev/fd/987"), "nowhere")
+
+
+def test_several_names(tmp_path: Path) -> None:
+    """A file of two names goes on to have them."""
+    path, second = tmp_path / "figure-x.svg", tmp_path / "second.svg"
+    path.write_text("one and more")
+    second.hardlink_to(path)
+
+    write_file(path, "two")
+
+    assert second.read_text() == "two"
+    assert path.samefile(second)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
+def test_owner(tmp_path: Path) -> None:
+    """Who owns a file goes on to own it."""
+    path = tmp_path / "figure-x.svg"
+    path.write_text("one")
+    os.chown(path, 1234, 4321)
+    path.chmod(0o600)
+
+    write_file(path, "two")
+
+    assert (path.stat().st_uid, path.stat().st_gid, path.stat().st_mode & 0o777) == (1234, 4321, 0o600)
+    assert path.read_text() == "two"
+
+
+def test_owner_that_cannot_be_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of somebody else, in a folder that both may write to, is written where it stands."""
+    path = tmp_path / "figure-x.svg"
+    path.write_text("one")
+    number = path.stat().st_ino
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(output, "_give", refuse)
+    write_file(path, "two")
+
+    assert path.read_text() == "two"
+    assert path.stat().st_ino == number
+
+
+def test_write_protected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that is protected against writing is not replaced, though its folder would allow it."""
+    path = tmp_path / "figure-x.svg"
+    path.write_text("one")
+    allowed = os.access
+    monkeypatch.setattr(os, "access", lambda at, mode: at != path and allowed(at, mode))
+
+    with pytest.raises(OutputError, match="it is write-protected; nothing was written"):
+        write_file(path, "two")
+
+    assert path.read_text() == "one"

@@ -403,7 +403,7 @@ def test_least_turn_of_a_straight_wrist(name: str, sample: Sample) -> None:
 
         solution = inverse(narrow, X, near)
 
-        places = np.linspace(max(lower[3], near[3] - np.pi), min(upper[3], near[3] + np.pi), 20_001)
+        places = np.linspace(max(lower[3], near[3] - 2 * np.pi), min(upper[3], near[3] + 2 * np.pi), 20_001)
         others = np.remainder(q[3] + q[5] - places - (lower[5] + upper[5]) / 2 + np.pi, 2 * np.pi) - np.pi
         inside = places[np.abs(others) <= (upper[5] - lower[5]) / 2]
         free = [branch for branch in solution.allowed if branch.free == (4, 6)]

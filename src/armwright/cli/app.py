@@ -12,7 +12,7 @@ from armwright.cli.commands import COMPLETE, NAME, App
 from armwright.cli.completing import Shell, install, limits, prepare, script
 from armwright.cli.failures import Commands, run_and_exit
 from armwright.cli.listed import register
-from armwright.cli.terminal import bound_widths, clean_output
+from armwright.cli.terminal import bound_widths, prepare_streams
 from armwright.version import __version__
 
 
@@ -125,7 +125,7 @@ def __getattr__(name: str) -> App:
 def main() -> None:
     """Run the command line; an error ends it with one message and the exit status of its kind."""
     bound_widths()
-    clean_output()
+    prepare_streams()
     prepare()
     warnings.showwarning = _warn
     # A shell that asks what may follow is told of all.

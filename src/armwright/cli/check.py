@@ -1,6 +1,7 @@
 """``armwright check``: what the translator has to say about a program, and what it makes of it."""
 
 import enum
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -88,12 +89,25 @@ def _found(given: list[Path]) -> list[Path]:
     """
     paths: dict[Path, None] = {}
     for path in given:
-        # A pipe that nobody named is no program.
-        inside = sorted(one for one in path.rglob(f"*{_SUFFIX}") if one.is_file()) if path.is_dir() else [path]
+        inside = _inside(path) if path.is_dir() else [path]
         if not inside:
             raise FileFormatError(str(path), None, "", f"there is no program in this folder; expected files *{_SUFFIX}")
         paths |= dict.fromkeys(inside)
     return list(paths)
+
+
+def _inside(folder: Path) -> list[Path]:
+    """Return the programs in a folder and in its folders; a pipe that nobody named is none.
+
+    Raises:
+        FileFormatError: one of them cannot be read.
+    """
+
+    def refuse(error: OSError) -> None:
+        raise FileFormatError(str(error.filename), None, "", f"cannot be read: {error.strerror}") from error
+
+    every = (Path(at, name) for at, _, names in os.walk(folder, onerror=refuse) for name in names)
+    return sorted(one for one in every if one.suffix == _SUFFIX and one.is_file())
 
 
 def _print(compiled: "Compilation", emit: Emit | None) -> None:

@@ -19,6 +19,15 @@ def _without_values(parameters: list[Any]) -> list[Any]:
     return parameters
 
 
+def _opened_later(function: Any) -> Any:
+    """Let whoever reads a file find out whether it can be read: one without permission is no wrong call."""
+    for annotation in function.__annotations__.values():
+        for said in getattr(annotation, "__metadata__", ()):
+            if hasattr(said, "readable"):
+                said.readable = False
+    return function
+
+
 class Command(TyperCommand):
     """A command."""
 
@@ -40,4 +49,5 @@ class App(typer.Typer):
 
     def command(self, *arguments: Any, **settings: Any) -> Callable[[Any], Any]:
         """Take a function as a command."""
-        return super().command(*arguments, **{"cls": Command, **settings})
+        take = super().command(*arguments, **{"cls": Command, **settings})
+        return lambda function: take(_opened_later(function))

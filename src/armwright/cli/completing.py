@@ -44,8 +44,11 @@ def install(shell: Shell) -> Path:
     from typer.completion import install as install_script  # type: ignore[attr-defined]
 
     from armwright.errors import OutputError
+    from armwright.files.reading import regular
 
     try:
+        for name in (".bashrc", ".zshrc"):
+            regular(Path.home() / name)
         return install_script(shell=shell.value, prog_name=NAME, complete_var=COMPLETE)[1]
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: nobody knows the home folder
         text = f"cannot install the completion for {shell}: {error}; --show-completion {shell} prints its script"

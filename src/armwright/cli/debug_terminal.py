@@ -1,11 +1,13 @@
 """The debugger on a terminal: a line of command, an answer."""
 
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from armwright.errors import ArmwrightError, ExitStatus
+from armwright.cli.repl_lines import Script
+from armwright.errors import ArmwrightError, ExitStatus, shortened
 
 if TYPE_CHECKING:
     from armwright.program.debugging.debugger import Command
@@ -41,6 +43,9 @@ _WHOLE_WORDS = {
 # Lines shown around the present one.
 _AROUND = 5
 _SLICE = 0.05
+_PROMPT = "(rlo) "
+# No count, and no number of a breakpoint or process, has more.
+_MOST_DIGITS = 15
 _ALL_OF_IT = "`armwright run -o FOLDER` keeps all in events.jsonl"
 
 
@@ -54,7 +59,7 @@ class Terminal:
         self._loaded = loaded
         self._debugger = Debugger(loaded.code, loaded.cell)
         self._path: Path = ()
-        self._last = ""
+        self._last, self._script = "", Script()
         self._interrupted = False
         self._commands: dict[str, Callable[[str], None]] = {
             **{word: self._going(command) for word, command in _STEPS.items()},
@@ -78,13 +83,22 @@ class Terminal:
         self._finish()
         while True:
             try:
-                line = input("(rlo) ").strip()
+                line = self._line().strip()
             except EOFError:
                 break
             if line in {"q", "quit", "exit"}:
                 break
             self._do(line or self._last)
         return ExitStatus.DONE if self._debugger.stop is None else self._debugger.stop.status
+
+    def _line(self) -> str:
+        if sys.stdin.isatty():
+            return input(_PROMPT)
+        print(_PROMPT, end="", flush=True)
+        line = self._script.line(_PROMPT)
+        if line is None:
+            raise EOFError
+        return line
 
     def _do(self, line: str) -> None:
         word, _, rest = line.partition(" ")
@@ -253,6 +267,7 @@ class _NumberError(ArmwrightError, ValueError):
 
 
 def _number(text: str) -> int:
-    if not text.strip().isdecimal():
-        raise _NumberError(f"expected a whole number, got `{text.strip()}`")
-    return int(text)
+    number = text.strip()
+    if not number.isdecimal() or len(number) > _MOST_DIGITS:
+        raise _NumberError(f"expected a whole number, got `{shortened(number)}`")
+    return int(number)

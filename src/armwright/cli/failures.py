@@ -1,10 +1,12 @@
 """How a command ends that could not do what was asked: one message, or one JSON document, and its exit status."""
 
 import contextlib
+import errno
 import itertools
 import os
 import signal
 import sys
+import threading
 import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +28,22 @@ DEBUG = "ARMWRIGHT_DEBUG"
 # What a wrong call raises: a base of all such errors of Typer, whose place depends on its version.
 _CallError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 _OUTPUTS = ("-o", "--output")
+# How an output answers that cannot be written; such errors name no file.
+_OUTPUT_FAILS = {
+    errno.EPIPE,
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EFBIG,
+    errno.EIO,
+    errno.EBADF,
+    errno.ENXIO,
+    errno.EINVAL,
+}
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+# How long a signal waits that nobody has heard [s].
+_AGAIN = 0.02
 
 
 class Interrupted(BaseException):
@@ -138,7 +155,7 @@ def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
         error: BaseException = raised.error
     except (Exception, Interrupted) as other:  # noqa: BLE001 - all that is not foreseen is our fault, and told as such
         error = other
-    if isinstance(error, OSError) and not isinstance(error, ArmwrightError) and error.filename is None:
+    if isinstance(error, OSError) and error.filename is None and error.errno in _OUTPUT_FAILS:
         raise error
     status, message = _judged(error)
     # Of a check that failed, and of a doubtful result, the document is printed already: what was found.
@@ -163,7 +180,8 @@ def _judged(error: BaseException) -> tuple[int, str]:
             notes = getattr(error, "__notes__", [said])
             return 128 + error.number, "; ".join(["interrupted", *notes])
         case OSError():
-            return ExitStatus.FILE, f"cannot read or write '{error.filename}': {error.strerror or error}"
+            what = "the current folder" if error.filename is None else f"'{error.filename}'"
+            return ExitStatus.FILE, f"cannot read or write {what}: {error.strerror or error}"
         case MemoryError():
             return ExitStatus.INFEASIBLE, "this takes more memory than there is"
         case _:
@@ -212,15 +230,25 @@ def _interruptible() -> "Iterator[None]":
     heard = [number for number in _SIGNALS if number is not signal.SIGHUP or before[number] is not signal.SIG_IGN]
     for number in heard:
         signal.signal(number, _interrupt)
+    unraisable, sys.unraisablehook = sys.unraisablehook, _interrupt_again
     try:
         yield
     finally:
+        sys.unraisablehook = unraisable
         for number in heard:
             signal.signal(number, before[number] or signal.SIG_DFL)
 
 
 def _interrupt(number: int, _frame: "FrameType | None") -> None:
     raise Interrupted(number)
+
+
+def _interrupt_again(lost: "sys.UnraisableHookArgs") -> None:
+    """Send a signal once more that came while an object was cleared away, where exceptions go nowhere."""
+    if isinstance(lost.exc_value, Interrupted):
+        threading.Timer(_AGAIN, os.kill, (os.getpid(), lost.exc_value.number)).start()
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _forget_output() -> None:

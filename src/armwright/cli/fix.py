@@ -52,7 +52,7 @@ def fix(
             source = read_source(path)
             result = fixed(source, _translator(path.parent, acted_on, std))
             if result.cures and not (diff or printed):
-                write_back(path, result.text)
+                write_back(source, path, result.text)
         except ArmwrightError as error:
             rows.append({"program": str(path), "errors": 1, **failure_data(error.exit_status, error, str(error))})
             if not as_json:

@@ -53,7 +53,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
             after = formatted(source, std=std, numbers=numbers)
             row["changed"] = after != source.text
             if row["changed"] and not (check or diff or stdout or streamed):
-                write_back(path, after)
+                write_back(source, path, after)
         except ArmwrightError as error:
             row |= failure_data(error.exit_status, error, str(error))
             if not as_json:

@@ -30,7 +30,12 @@ Strict: TypeAlias = Annotated[bool, typer.Option("--strict", help="Treat an impl
 
 
 def translate_file(
-    path: Path, cell: "Cell | None" = None, *, strict: bool = False, std: Standard = Standard.RLO_2
+    path: Path,
+    cell: "Cell | None" = None,
+    *,
+    strict: bool = False,
+    std: Standard = Standard.RLO_2,
+    source: "Source | None" = None,
 ) -> "Compilation":
     """Read and translate a program.
 
@@ -39,6 +44,7 @@ def translate_file(
         cell: what it will act on.
         strict: whether an AFFIX that is only implied is an error.
         std: the language.
+        source: what is to be there, and need not be read.
 
     Raises:
         FileFormatError: the file cannot be read, or is not text.
@@ -47,7 +53,7 @@ def translate_file(
     from armwright.program import Source, known_cell
     from armwright.program import compile as translate
 
-    source = Source(path.name, read_program(path))
+    source = source or Source(path.name, read_program(path))
     known = known_cell(cell) if cell else None
     return translate(source, known, strict=strict, std=std, read_import=import_reader(path.parent))
 
@@ -77,13 +83,15 @@ def import_reader(folder: Path) -> "ReadImport":
     return read
 
 
-def in_its_cell(path: Path, cell: "Cell | None", *, strict: bool, std: Standard) -> "tuple[Compilation, Cell | None]":
+def in_its_cell(
+    path: Path, cell: "Cell | None", *, strict: bool, std: Standard, source: "Source | None" = None
+) -> "tuple[Compilation, Cell | None]":
     """Translate a program for its cell: the one given, or else the first it IMPORTs that has arms.
 
     Returns:
         The translation, and the cell with all frames that the program imports; None where there is no cell.
     """
-    compiled = translate_file(path, cell, strict=strict, std=std)
+    compiled = translate_file(path, cell, strict=strict, std=std, source=source)
     if cell is None:
         cell = next((one.cell for one in compiled.imports if one.cell and one.cell.arms), None)
     return compiled, None if cell is None else with_imports(cell, compiled)

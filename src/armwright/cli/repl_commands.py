@@ -1,5 +1,6 @@
 """The commands of a session, which begin with a colon: looking round, going back, files."""
 
+import contextlib
 import os
 import shlex
 from collections.abc import Callable, Mapping
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import attrs
 
-from armwright.errors import InvalidValueError, OutputError, UnknownNameError
+from armwright.errors import InvalidValueError, OutputError, UnknownNameError, shortened
 
 if TYPE_CHECKING:
     from armwright.program.interactive.session import Answer, Session
@@ -139,11 +140,11 @@ class Commands:
 
     def save(self, argument: str) -> Reply:
         """Write the session as a program that runs to the same end."""
-        return self._save(_path(argument), overwrite=False)
+        return self._save(_target(argument), overwrite=False)
 
     def overwrite(self, argument: str) -> Reply:
         """Write it over a file that is there already."""
-        return self._save(_path(argument), overwrite=True)
+        return self._save(_target(argument), overwrite=True)
 
     def _save(self, path: Path, *, overwrite: bool) -> Reply:
         from armwright.files.output import write_file
@@ -152,7 +153,7 @@ class Commands:
             raise OutputError(f"cannot write '{path}': it is a folder")
         if path.exists() and not overwrite:
             raise OutputError(f"'{path}' is there already; `:save! {path}` overwrites it")
-        write_file(path, self._program(path))
+        write_file(path, self._program(path), back=overwrite)
         return Reply(lines=(f"saved: {path}",))
 
     def _program(self, path: Path) -> str:
@@ -163,17 +164,36 @@ class Commands:
 
     def report(self, argument: str) -> Reply:
         """Write the program and what it did: motion, events, frames, and a page that shows the arms moving."""
+        from armwright.files.output import reason
+
+        folder = _target(argument)
+        made = not folder.exists()
+        try:
+            # What the program imports is looked for from there.
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot write to '{folder}': {reason(error, folder)}; nothing was written") from error
+        try:
+            self._report(folder)
+        except BaseException:
+            if made:
+                with contextlib.suppress(OSError):
+                    folder.rmdir()
+            raise
+        return Reply(lines=(f"report: {folder / 'report.html'}",))
+
+    def _report(self, folder: Path) -> None:
         from armwright.cell.simulator import Simulator
         from armwright.cli.programs import imported_files, in_its_cell
         from armwright.files.output import write_folder
-        from armwright.files.reading import read_program
         from armwright.program.running.interpret import interpret, warnings
+        from armwright.program.text.source import Source
         from armwright.report.files import Origin, result_files, run_record
 
-        folder, session = _path(argument), self._session
-        program = folder / _PROGRAM
-        write_folder(folder, {_PROGRAM: self._program(program)})
-        compiled, place = in_its_cell(program, session.state.cell, strict=False, std=session.std)
+        session, program = self._session, folder / _PROGRAM
+        text = self._program(program)
+        source = Source(program.name, text)
+        compiled, place = in_its_cell(program, session.state.cell, strict=False, std=session.std, source=source)
         assert compiled.code is not None  # noqa: S101 - the session was checked piece by piece
         assert place is not None  # noqa: S101 - it was given
         recording = interpret(compiled.code, place, Simulator(place))
@@ -185,11 +205,10 @@ class Commands:
             imports=imported_files(program, compiled),
             command=shlex.join(command),
             options={"std": session.std.value},
+            text=text,
         )
         made = (recording, compiled.code, diagnostics, origin)
-        text = read_program(program)
         write_folder(folder, {_PROGRAM: text, **result_files(*made)}, run_record(*made))
-        return Reply(lines=(f"report: {folder / 'report.html'}",))
 
 
 @attrs.frozen(kw_only=True)
@@ -244,6 +263,23 @@ def _path(argument: str) -> Path:
         return path.expanduser()
     except RuntimeError:  # nobody is called so
         return path
+
+
+def _target(argument: str) -> Path:
+    """Return a path to be written to.
+
+    Raises:
+        OutputError: there can be no such path, or what is there cannot be looked at.
+    """
+    path = _path(argument)
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return path
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise OutputError(f"cannot write '{shortened(str(path))}': {why}; nothing was written") from error
+    return path
 
 
 def _seen_from(folder: Path, name: str) -> str:

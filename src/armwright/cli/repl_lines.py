@@ -6,6 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from armwright.errors import FileFormatError
+from armwright.files.limits import MEGABYTE, beyond, limit
+
 if TYPE_CHECKING:
     from armwright.program.interactive.session import Session
 
@@ -28,10 +31,22 @@ class Lines(Protocol):
 class Script:
     """Lines of the standard input that nobody types: no prompts, no history."""
 
+    def __init__(self) -> None:
+        """Begin with the first line, before which a mark of byte order may stand."""
+        self._encoding = "utf-8-sig"
+
     def line(self, prompt: str) -> str | None:  # noqa: ARG002 - nobody would read it
-        """Return the next line; characters that are not UTF-8 become the one that stands for them."""
-        line = sys.stdin.buffer.readline()
-        return line.decode("utf-8", errors="replace").rstrip("\r\n") if line else None
+        """Return the next line; characters that are not UTF-8 become the one that stands for them.
+
+        Raises:
+            FileFormatError: it is longer than a program may be.
+        """
+        most = limit("program_mb") * MEGABYTE
+        line = sys.stdin.buffer.readline(most + 1)
+        if len(line) > most:
+            raise FileFormatError("standard input", None, "", f"a line is too long: {beyond('program_mb')}")
+        text, self._encoding = line.decode(self._encoding, errors="replace"), "utf-8"
+        return text.rstrip("\r\n") if line else None
 
 
 class Terminal:

@@ -28,7 +28,9 @@ def read_source(path: Path) -> "Source":
 
 def is_stream(path: Path) -> bool:
     """Whether a program comes from the standard input, a pipe or a device, and what becomes of it is printed."""
-    return path == INPUT or (path.exists() and not path.is_file())
+    from armwright.files.output import descriptor
+
+    return path == INPUT or descriptor(path) is not None or (path.exists() and not path.is_file())
 
 
 def print_difference(source: "Source", after: str) -> None:
@@ -49,28 +51,29 @@ def print_difference(source: "Source", after: str) -> None:
             print(line)
 
 
-def write_back(path: Path, text: str) -> None:
+def write_back(source: "Source", path: Path, text: str) -> None:
     """Write a program where it was read: all of it or nothing; a link stays one, and who may read it may go on.
 
     Lines end as most of them did, and a mark of byte order stays.
 
+    Args:
+        source: as it was read.
+        path: from there.
+        text: what it is from now on.
+
     Raises:
         FileFormatError: it cannot be read any more.
-        OutputError: it cannot be written; the text says why.
+        OutputError: it cannot be written, or somebody has changed it meanwhile; the text says why.
     """
-    from armwright.files.output import write_file
-
-    mark, end = _ways(path) if path.is_file() else ("", "\n")
-    write_file(path, mark + text.replace("\n", end))
-
-
-def _ways(path: Path) -> tuple[str, str]:
-    """Return what a file begins with before its text, and how most of its lines end."""
     from codecs import BOM_UTF8
 
-    from armwright.files.reading import read_bytes
+    from armwright.errors import OutputError
+    from armwright.files.output import write_file
+    from armwright.files.reading import decoded, read_bytes
 
     data = read_bytes(path, "program_mb")
-    pairs = data.count(b"\r\n")
+    if decoded(data, path) != source.text:
+        raise OutputError(f"cannot write '{path}': it has changed since it was read; nothing was written")
     mark = "\ufeff" if data.startswith(BOM_UTF8) else ""
-    return mark, "\r\n" if 2 * pairs > data.count(b"\n") else "\n"
+    end = "\r\n" if 2 * data.count(b"\r\n") > data.count(b"\n") else "\n"
+    write_file(path, mark + text.replace("\n", end), back=True)

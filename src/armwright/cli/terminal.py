@@ -4,6 +4,7 @@ Control characters, marks that turn the direction of writing and letters that ca
 as ``\u001b``. These are JSON's own, so that JSON stays JSON and says the same.
 """
 
+import contextlib
 import io
 import os
 import re
@@ -105,12 +106,36 @@ def bound_widths() -> None:
             del os.environ[name]
 
 
-def clean_output() -> None:
-    """Let nothing reach standard and error output uncleaned from now on; what is said to a closed one is lost."""
-    sys.stdout, sys.stderr = _clean(sys.stdout), _clean(sys.stderr)
+class ErrorStream(CleanStream):
+    """The error output of a command: what it cannot take is lost, and changes neither status nor results."""
+
+    def write(self, text: str) -> int:
+        """Write a text, cleaned."""
+        return self.verbatim(cleaned(text))
+
+    def verbatim(self, text: str) -> int:
+        """Write a text as it is."""
+        with contextlib.suppress(OSError):
+            super().verbatim(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Write what has been kept so far."""
+        with contextlib.suppress(OSError):
+            super().flush()
 
 
-def _clean(stream: Any) -> Any:
+def prepare_streams() -> None:
+    """Let nothing reach standard and error output uncleaned from now on; what is said to a closed one is lost.
+
+    A closed standard input is an empty one.
+    """
+    if sys.stdin is None:
+        sys.stdin = Path(os.devnull).open(encoding="utf-8")  # noqa: SIM115 - it stays as long as the process
+    sys.stdout, sys.stderr = _clean(sys.stdout, CleanStream), _clean(sys.stderr, ErrorStream)
+
+
+def _clean(stream: Any, kind: type[CleanStream]) -> Any:
     if stream is None:
         # Otherwise errors would be printed to the other of the two, among the results.
         stream = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - it stays as long as the process
@@ -120,7 +145,7 @@ def _clean(stream: Any) -> Any:
         return CleanProxy(stream)
     encoding, by_lines, at_once = stream.encoding, stream.line_buffering, stream.write_through
     # A terminal that knows no degree sign gets an escape, not a traceback.
-    return CleanStream(
+    return kind(
         stream.detach(), encoding=encoding, errors="backslashreplace", line_buffering=by_lines, write_through=at_once
     )
 

@@ -13,12 +13,14 @@ import json
 import os
 import re
 import stat
+import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from armwright.errors import OutputError
 from armwright.files.exchange import exchange, overwrite
+from armwright.files.reading import is_source
 from armwright.files.staging import KEPT, PREFIX, signals_held, staging
 
 Content: TypeAlias = str | bytes | Iterable[str]
@@ -36,6 +38,8 @@ _NAMES = re.compile(
 )
 # A record that is larger is none of ours [bytes], and hashes are worked out in pieces [bytes].
 _LARGEST_RECORD, _PIECE = 200_000_000, 1 << 20
+# Links that a path may lead through, as Linux has it.
+_MOST_LINKS = 40
 
 
 def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str, Any] | None = None) -> None:
@@ -72,33 +76,40 @@ def write_folder(folder: Path, files: Mapping[str, Content], record: Mapping[str
         raise
 
 
-def write_file(path: Path, text: str | Iterable[str]) -> None:
-    """Write one file, or leave what was there before. A link stays one, and so does who may read the file.
+def write_file(path: Path, text: str | Iterable[str], *, back: bool = False) -> None:
+    """Write one file, or leave what was there before. A link stays one, and so do its owner and who may read the file.
 
-    A file that cannot be replaced is written where it stands: one that is mounted by itself, as into a container, or
-    one that the user may write to in a folder where nothing can be made.
+    A file that cannot be replaced is written where it stands: one that is mounted by itself, as into a container, one
+    that the user may write to in a folder where nothing can be made, one of somebody else, and one of several names.
 
     Args:
-        path: its folder is made where it is missing, with its parents. A device or a pipe is written to as it is.
+        path: its folder is made where it is missing, with its parents. A device, a pipe or an open descriptor, such as
+            ``/dev/stdout``, is written to as it is.
         text: or pieces of it that are written as they come.
+        back: it may be a file that was read, and is to be changed.
 
     Raises:
-        OutputError: it cannot be written; the text says why.
+        OutputError: it cannot be written, or it was read; the text says why.
     """
+    if (number := descriptor(path)) is not None:
+        _write_to(number, path, text)
+        return
     named, path = path, _resolved(path)
+    if not back and is_source(path):
+        raise OutputError(f"cannot write '{named}': it was read by this command, and would be lost; name another file")
     made = _make_parents(path)
     try:
-        mode = path.stat().st_mode if path.exists() else None
-        if mode is not None and not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        there = path.stat() if path.exists() else None
+        if there is not None and not stat.S_ISREG(there.st_mode) and not stat.S_ISDIR(there.st_mode):
             with path.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as stream:
                 stream.writelines([text] if isinstance(text, str) else text)
-        elif mode is not None and os.access(path, os.W_OK) and not os.access(path.parent, os.W_OK | os.X_OK):
+        elif there is not None and _stays_in_place(path, there):
             data = b"".join(_encoded(text))
             with signals_held():
                 overwrite(path, data)
                 WRITTEN[named] = None
         else:
-            _write_beside(path, named, text, mode)
+            _write_beside(path, named, text, there)
     except OSError as error:
         _remove(made)
         raise OutputError(f"cannot write '{path}': {error.strerror or error}; nothing was written") from error
@@ -107,28 +118,67 @@ def write_file(path: Path, text: str | Iterable[str]) -> None:
         raise
 
 
-def _write_beside(path: Path, named: Path, text: str | Iterable[str], mode: int | None) -> None:
+def descriptor(path: Path) -> int | None:
+    """Return the number of the open descriptor that a path names, such as ``/dev/stdin``; None where it names none."""
+    folders = (Path(f"/proc/{os.getpid()}/fd"), Path("/dev/fd"))
+    with contextlib.suppress(OSError, ValueError):
+        for _ in range(_MOST_LINKS):
+            folder = path.parent.resolve()
+            if folder in folders and path.name.isascii() and path.name.isdigit():
+                return int(path.name[:9])
+            path = folder / path.readlink()
+    return None
+
+
+def _write_to(number: int, path: Path, text: str | Iterable[str]) -> None:
+    """Write into an open descriptor, behind what was printed so far."""
+    try:
+        sys.stdout.flush()
+        with os.fdopen(os.dup(number), "wb") as stream:
+            stream.writelines(_encoded(text))
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutputError(f"cannot write '{path}': {error.strerror or error}") from error
+
+
+def _stays_in_place(path: Path, there: os.stat_result) -> bool:
+    """Whether a file is written where it stands: beside it nothing can be made, or it has several names."""
+    if not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, "it is write-protected")
+    return there.st_nlink > 1 or not os.access(path.parent, os.W_OK | os.X_OK)
+
+
+def _write_beside(path: Path, named: Path, text: str | Iterable[str], there: os.stat_result | None) -> None:
     """Write a file beside its place, and move it there.
 
     Args:
         path: where it goes.
         named: how the user calls it.
         text: what is in it.
-        mode: of the file that is there; None where there is none.
+        there: the state of the file that is there; None where there is none.
     """
     with staging(path.parent, path) as new:
         made = new / path.name
         _write(made, text)
-        if mode is not None:
-            made.chmod(stat.S_IMODE(mode))
         with signals_held():
             try:
+                if there is not None:
+                    _give(made, there)
                 made.replace(path)
             except OSError as error:
-                if error.errno != errno.EBUSY or mode is None:
+                if error.errno not in (errno.EBUSY, errno.EPERM) or there is None:
                     raise
                 overwrite(path, made.read_bytes())
             WRITTEN[named] = None
+
+
+def _give(path: Path, there: os.stat_result) -> None:
+    """Give a file the owner and the mode of another; an ``EPERM`` where that is not allowed."""
+    made = path.stat()
+    if (made.st_uid, made.st_gid) != (there.st_uid, there.st_gid):
+        os.chown(path, there.st_uid, there.st_gid)
+    path.chmod(stat.S_IMODE(there.st_mode))
 
 
 def record_text(hashes: Mapping[str, str], said: Mapping[str, Any]) -> str:
@@ -200,8 +250,8 @@ def _resolved(path: Path) -> Path:
     """Return where a path leads: links stay, and what they lead to is replaced."""
     try:
         return path.resolve()
-    except (OSError, RuntimeError) as error:
-        raise OutputError(f"cannot write '{path}': {error}; nothing was written") from error
+    except (OSError, RuntimeError, ValueError) as error:
+        raise OutputError(f"cannot write {str(path)!r}: {error}; nothing was written") from error
 
 
 def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str]) -> None:
@@ -226,6 +276,7 @@ def _replace(folder: Path, new: Path, names: list[str], left: Mapping[str, str])
             for name, digest in (*named.items(), *left.items())
             if name not in names and _NAMES.fullmatch(name) and sha256(folder / name) == digest
         }
+        _refuse_sources(folder, {*names, *gone})
         kept = new.with_name(KEPT)
         kept.mkdir()
         exchange(folder, new, kept, names, gone)
@@ -334,6 +385,13 @@ def _refuse_what_others_made(folder: Path, files: Iterable[str], known: Collecti
                 errno.EEXIST,
                 f"'{name}' in it is not of a run of armwright, and would be lost: move it away, or name another folder",
             )
+
+
+def _refuse_sources(folder: Path, names: Iterable[str]) -> None:
+    """Fail where a file that was read for the results would give way to them."""
+    for name in sorted(names):
+        if is_source(folder / name):
+            raise FileExistsError(errno.EEXIST, f"'{name}' in it was read, and would be lost: name another folder")
 
 
 def _remove(folders: Iterable[Path]) -> None:

@@ -1,6 +1,7 @@
 """Reading files, never more of one than its limit allows, and never what is no file where data name it."""
 
 import codecs
+import contextlib
 import hashlib
 import io
 import itertools
@@ -25,6 +26,8 @@ _KINDS = {
 _MOST_NAMES = 1000
 # The SHA-256 hash of what was read last of every file: the file may be another by now, or a pipe, which is empty then.
 _READ: dict[Path, str] = {}
+# The files that this process has read, by where they were then.
+_SOURCES: dict[Path, None] = {}
 
 
 def regular(path: Path) -> Path:
@@ -61,6 +64,7 @@ def pieces(path: Path | str, bound: str = "file_mb") -> Iterator[bytes]:
         # A file such as those of /proc may make its reader wait for ever though it is a regular one; a pipe shall wait.
         waits = 0 if not stat.S_ISREG(path.stat().st_mode) else os.O_NONBLOCK
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | waits)
+        _SOURCES[path.absolute()] = None
         try:
             size = os.fstat(handle).st_size
             if size > most:
@@ -104,6 +108,27 @@ def read_bytes(path: Path | str, bound: str = "file_mb") -> bytes:
 def hash_read(path: Path) -> str | None:
     """Return the SHA-256 hash of what this process has read last of a file; None where it has not read it."""
     return _READ.get(path)
+
+
+def forget() -> None:
+    """Forget what was read, as a new process does."""
+    _READ.clear()
+    _SOURCES.clear()
+
+
+def is_source(path: Path) -> bool:
+    """Whether a path leads to a file that this process has read, by whatever name: results would take its place."""
+    try:
+        there = path.stat()
+    except (OSError, ValueError):
+        return False
+    return any(_is_there(source, there) for source in _SOURCES)
+
+
+def _is_there(path: Path, state: os.stat_result) -> bool:
+    with contextlib.suppress(OSError):
+        return os.path.samestat(path.stat(), state)
+    return False
 
 
 def read_text(path: Path | str, bound: str = "file_mb") -> str:

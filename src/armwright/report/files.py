@@ -1,5 +1,6 @@
 """The files of a run: motion, events, frames, what made them, and the page."""
 
+import hashlib
 import json
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -42,6 +43,7 @@ class Origin:
         command: the command line.
         options: those that shape the result, by name.
         motion_rows: how many rows ``motion.csv`` may have.
+        text: of the program where it is written with the results; None where it was read.
     """
 
     program: Path
@@ -50,6 +52,7 @@ class Origin:
     command: str
     options: Mapping[str, Any]
     motion_rows: int = MOTION_ROWS
+    text: str | None = None
 
 
 def result_files(
@@ -263,7 +266,7 @@ def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnosti
         **ending(recording, code),
         "command": origin.command,
         "inputs": {
-            "program": _file(origin.program),
+            "program": _file(origin.program, origin.text),
             "cell": None if origin.cell is None else _file(origin.cell),
             "imports": [_file(path) for path in origin.imports],
             "arms": arms,
@@ -276,8 +279,9 @@ def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnosti
     }
 
 
-def _file(path: Path) -> dict[str, str | None]:
-    return {"path": str(path), "sha256": hash_read(path) or sha256(path)}
+def _file(path: Path, text: str | None = None) -> dict[str, str | None]:
+    digest = hash_read(path) or sha256(path) if text is None else hashlib.sha256(text.encode()).hexdigest()
+    return {"path": str(path), "sha256": digest}
 
 
 def _numbers(values: Array) -> list[float]:

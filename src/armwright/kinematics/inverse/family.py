@@ -17,6 +17,8 @@ _FINER = 4
 # How far a joint is moved to see which way another goes with it [rad].
 _PROBE = 0.5
 _TURN = 2 * np.pi
+# Turns by which the place is looked at where another joint reaches a limit.
+_IMAGES = np.arange(-2, 3)
 # Joints that are together this far outside their limits are inside [rad] or [m].
 _INSIDE = 1e-10
 
@@ -34,11 +36,20 @@ def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Arr
         members: returns the members (k, n) of the family that places (k, n) of the arm lead to.
         joint: number of the free joint, from 1.
     """
-    lower, upper = _room(arm, near, joint)
-    if lower > upper:
-        return q
-    start = near[joint - 1]
+    # What lies more than half a turn away is an image of what does not, which may be outside the limits.
+    for turn in (np.pi, _TURN):
+        lower, upper = _room(arm, near, joint, turn)
+        found = _found_inside(arm, near, members, joint, lower, upper) if lower <= upper else None
+        if found is not None:
+            return found
+    return q
 
+
+def _found_inside(
+    arm: Arm, near: Array, members: Callable[[Array], Array], joint: int, lower: float, upper: float
+) -> Array | None:
+    """Return the member nearest to ``near`` of those with all joints inside that a search from here to there finds."""
+    start = near[joint - 1]
     places, width = np.linspace(lower, upper, _TRIED), (upper - lower) / (_TRIED - 1)
     for _ in range(_CLOSER):
         rows = members(_placed(near, joint, places))
@@ -51,7 +62,7 @@ def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Arr
         low = low[excess[low].argsort(kind="stable")][:_LEAST]
         fan = np.linspace(-width, width, 2 * _FINER + 1)
         places, width = np.unique(np.clip(places[low][:, None] + fan, lower, upper)), width / _FINER
-    return q
+    return None
 
 
 def turned_inside(
@@ -70,14 +81,14 @@ def turned_inside(
         joint: number of the free joint, from 1.
         other: number of the joint that turns with it.
     """
-    lower, upper = _room(arm, near, joint)
+    lower, upper = _room(arm, near, joint, _TURN)
     if lower > upper:
         return q
     start, limits = near[joint - 1], arm.joints[other - 1].limits
     here, probed = members(_placed(near, joint, start + np.array((0.0, _PROBE))))[:, other - 1]
     way = 1.0 if abs(np.remainder(probed - here + np.pi, _TURN) - np.pi - _PROBE) < _PROBE else -1.0
-    images = _TURN * np.arange(-2, 3)
-    reached = [way * (limit - here + images) for limit in (limits.lower, limits.upper) if np.isfinite(limit)]
+    ends = [limit for limit in (limits.lower, limits.upper) if np.isfinite(limit)]
+    reached = [way * (end - here + _TURN * (_IMAGES - np.round((end - here) / _TURN))) for end in ends]
     turns = np.concatenate([[0.0, lower - start, upper - start], *reached])
     turns = turns[(turns >= lower - start) & (turns <= upper - start)]
     turns = turns[np.abs(turns).argsort(kind="stable")]
@@ -93,10 +104,15 @@ def _placed(near: Array, joint: int, values: Array) -> Array:
     return rows
 
 
-def _room(arm: Arm, near: Array, joint: int) -> tuple[float, float]:
-    """Return from where to where a free joint may move: inside its limits, half a turn at most."""
+def _room(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, float]:
+    """Return from where to where a free joint may move: inside its limits, by so much at most [rad].
+
+    One that is outside of them is moved inside before it is turned by a whole turn.
+    """
     limits, start = arm.joints[joint - 1].limits, near[joint - 1]
-    return max(limits.lower, start - np.pi), min(limits.upper, start + np.pi)
+    if turn == _TURN:
+        start = min(max(start, limits.lower), limits.upper)
+    return max(limits.lower, start - turn), min(limits.upper, start + turn)
 
 
 def _excess(arm: Arm, q: Array) -> Array:

@@ -62,7 +62,7 @@ def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixe
     """Make the changes that diagnostics offer.
 
     In each round all changes are made that do not touch one another. Where one does not make its message go away, or
-    brings a new slip of syntax, it is left alone.
+    brings a new slip of syntax, it is left alone. A text with zero bytes is that of no program, and left alone.
 
     Args:
         source: the program.
@@ -72,7 +72,7 @@ def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixe
     now = translate(source)
     cures: list[Cure] = []
     vain: set[tuple[str, str]] = set()
-    for _ in range(rounds):
+    for _ in range(rounds if "\0" not in source.text else 0):
         offered = [one for one in now.diagnostics if one.fixes and _line_of(one, now.source) not in vain]
         wanted = apart(offered)
         if not wanted:
