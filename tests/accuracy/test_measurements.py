@@ -257,6 +257,10 @@ MISTAKES = {
     "no time": (RUNS.replace("L,1,1,", "L,1,,"), "5: t_s: empty; expected a number, as in the rows before"),
     "one sample": (RUNS + "path,L,3,0,0,0\n", "8: cycle: a run has two rows at least, and this is its only one"),
     "no times": (f"{HEAD}settling,P1,1,0,0\nsettling,P1,1,1,0\n", "2: t_s: a test of settling needs the time of every"),
+    "settling commanded": (
+        f"{HEAD}settling,P1,commanded,0,0\nsettling,P1,1,0,0\n",
+        "2: cycle: a test of settling has no commanded row",
+    ),
     "no speed": (RUNS.replace("path,L", "velocity,L"), "2: speed_mm_per_s: a test of velocity tells the commanded"),
 }
 

@@ -289,6 +289,16 @@ FAULTS = {
         "arms, ARM_1, posture: joint 3 would stand at 1200.0 mm, 82.4 mm beyond its limit 1117.6 mm",
     ),
     "posture too short": ("[arms.ARM_1]\nposture = [0, 0]\n", 2, "arms, ARM_1, posture: expected 6 numbers, got 2"),
+    "posture in degrees": (
+        '[arms.ARM_1]\nmodel = "ur5"\nposture = [10, -90, 90, -90, -90, 0]\n',
+        3,
+        "arms, ARM_1, posture: joint 1",
+    ),
+    "key without its unit": (
+        ARM + "[motion]\ncorner = 3\n",
+        5,
+        "motion, corner: unknown key; did you mean 'corner_mm'?",
+    ),
     "misspelt key": (ARM + "grasp_sec = 1\n", 4, "arms, ARM_1, grasp_sec: unknown key; did you mean 'grasp_s'?"),
     "minutes to grasp": (ARM + "grasp_s = 900\n", 4, "arms, ARM_1, grasp_s: expected 0 to 600, got 900"),
     "pose too short": (ARM + "[frames]\nA = [1,0,0]\n", 5, "frames, A: expected 12 numbers, got 3"),

@@ -173,7 +173,7 @@ def test_stated_noise(measured: Path) -> None:
 def test_next_poses(measured: Path, tmp_path: Path) -> None:
     """Poses are planned beside those that were measured; with turns, fewer will do."""
     done = armwright("plan-poses", ARM, "-n", "2", "--after", measured, "-o", tmp_path / "more.csv")
-    few = armwright("plan-poses", ARM, "-n", "6", "--turns")
+    few = armwright("plan-poses", ARM, "-n", "8", "--turns")
 
     assert done.returncode == 0, done.stderr
     assert len((tmp_path / "more.csv").read_text(encoding="utf-8").splitlines()) == 3

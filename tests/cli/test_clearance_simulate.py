@@ -139,3 +139,11 @@ def test_nothing_heavy_for_help() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
 
     assert done.stdout.strip() == "[]"
+
+
+def test_micrometres_for_millimetres() -> None:
+    """A clearance larger than its journal is that of no bearing: another unit was meant."""
+    done = armwright("clearance", "simulate", "five-bar", "--path", "y1", "--clearance", "J2=300")
+
+    assert done.returncode == 2
+    assert "clearance J2: expected at most the radius of the journal, 10 mm, got 300 mm" in done.stderr

@@ -194,3 +194,18 @@ def test_kernel() -> None:
     assert "operations per configuration" in armwright("kernel", "ur5", "jacobian", "--count").stdout
     wrong = armwright("kernel", "ur5", "jacobain")
     assert (wrong.returncode, "Did you mean 'jacobian'?" in wrong.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("command", ["forward", "torque"])
+def test_rows_of_several_arms(command: str, tmp_path: Path) -> None:
+    """Joints of one arm are not taken for those of another: a file of several arms is refused by its line."""
+    names = ",".join(f"{name}{i}" for name in ("q", "qd", "qdd") for i in range(1, 7))
+    rows = [f"ARM_{k},{','.join(['0.5'] * 18)}" for k in (1, 1, 2)]
+    path = tmp_path / "motion.csv"
+    path.write_text("\n".join([f"arm,{names}", *rows]) + "\n")
+    refused = armwright(command, "puma560-seed", "--csv", path)
+    path.write_text("\n".join([f"arm,{names}", *rows[:2]]) + "\n")
+
+    assert refused.returncode == 4
+    assert "motion.csv:4: arm: rows of several arms, 'ARM_1' and 'ARM_2'; leave" in refused.stderr
+    assert armwright(command, "puma560-seed", "--csv", path).returncode == 0

@@ -657,3 +657,36 @@ def test_a_line_of_many_letters(tmp_path: Path) -> None:
     assert "x" * 200_000 in (out / "events.jsonl").read_text()
     # The text of the program is there whole, and no line of what happened.
     assert (out / "report.html").read_text().count("x" * 200_000) == 1
+
+
+def test_what_a_failed_run_has_printed(tmp_path: Path) -> None:
+    """The terminal shows what happened up to a failure, lines for people too, and the devices that it switched off."""
+    program, cell = tmp_path / "p.rlo", tmp_path / "cell.toml"
+    cell.write_text(STANFORD.read_text() + "\n[devices]\nPUMP = {}\n")
+    program.write_text(
+        'VAR f : FRAME ; BEGIN f = (1,0,0,0,-1,0,0,0,-1,3,0,0) ;\nPRINT("gripped at", 42) ;\n'
+        "OPERATE PUMP ; MOVE ARM_1 TO f ; END."
+    )
+
+    done = armwright("run", program, "--cell", cell, "-o", tmp_path / "out", columns=200)
+    quiet = armwright("run", program, "--cell", cell, "-q", columns=200)
+
+    assert "gripped at 42" in done.stdout
+    assert "; PUMP OFF" in done.stdout
+    assert "gripped" not in quiet.stdout
+    last = json.loads((tmp_path / "out" / "events.jsonl").read_text().splitlines()[-1])
+    assert (last["kind"], last["switched_off"]) == ("ERROR", ["PUMP"])
+    assert last["text"].endswith("; PUMP OFF")
+
+
+def test_a_duration_is_no_slowness(tmp_path: Path) -> None:
+    """A stage that lasts as long as was asked for is not told to be slow for a joint; without DURATION it is."""
+    text = (EXAMPLES / "gearbox.rlo").read_text()
+    said = {}
+    for name, with_ in (("short", text), ("long", text.replace("VIA (v1, v2)", "WITH DURATION = 30s, VIA (v1, v2)"))):
+        (tmp_path / f"{name}.rlo").write_text(with_)
+        said[name] = armwright("run", tmp_path / f"{name}.rlo", "--cell", PUMA, columns=200).stdout
+
+    assert "line 25: SPLINE to aphole runs" in said["short"]
+    assert "line 25: SPLINE to aphole" not in said["long"]
+    assert "line 31: LINE to aphole runs" in said["long"]

@@ -418,6 +418,20 @@ def test_least_turn_of_a_straight_wrist(name: str, sample: Sample) -> None:
     sample.record(f"straight wrists of the {name} with random limits", found, 0)
 
 
+@pytest.mark.parametrize(("limit", "start"), [(60, -170), (60, -121), (20, -175), (1, 175)])
+def test_straight_wrist_far_from_where_it_is(limit: float, start: float) -> None:
+    """The member inside the limits is found more than half a turn away, where its image nearer by is outside."""
+    arm, end = load_arm("stanford"), math.radians(limit)
+    joints = list(arm.joints)
+    joints[5] = attrs.evolve(joints[5], limits=attrs.evolve(joints[5].limits, lower=-end, upper=end))
+    arm = attrs.evolve(arm, joints=tuple(joints))
+    q, near = np.array((0.3, 1.0, 0.5, math.pi / 2, 0.0, 0.0)), (0.3, 1.0, 0.5, math.radians(start), 0.0, 0.0)
+
+    found = inverse(arm, forward(arm, q), near=near)
+
+    assert any(abs(branch.q[3] + branch.q[5] - math.pi / 2) < 1e-9 for branch in found.allowed)
+
+
 @pytest.mark.parametrize("case", [case for case in SINGULAR if "wrist" in case or "drawn" in case])
 def test_a_free_family_is_free(case: str) -> None:
     """The free joints of a branch are those that the idle motion moves, and the hand stays while they move far."""

@@ -254,6 +254,8 @@ def _path_test(rows: list[Row]) -> PathTest:
         raise rows[0].error("cycle", "there is what was commanded, but nothing that was attained")
     if not path and first.test in _COMMANDED:
         raise rows[0].error("cycle", f"the commanded path of {first.name} is not there: rows with cycle commanded")
+    if path and first.test == "settling":
+        raise path[0].error("cycle", "a test of settling has no commanded row: it is told by where it comes to rest")
     commanded = _trace(path, timed=False) if path else None
     traces = tuple(_trace(run, timed=True) for run in runs.values())
     if commanded is not None:

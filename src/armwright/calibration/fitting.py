@@ -275,10 +275,7 @@ def _rounds(
             )
         kept, before = found.kept, noise
         if not is_enough(len(rows.off), len(kept)):
-            raise TooFewError(
-                f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more, "
-                f"or fit fewer errors"
-            )
+            raise TooFewError(f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more")
         if progress is not None:
             progress(f"fitting {len(kept)} errors to {len(seen)} readings")
         errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)

@@ -5,6 +5,7 @@ Source:
 """
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -15,6 +16,7 @@ from armwright.arm.positions import ranges
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.calibration.chain import Chain, chain_of
 from armwright.calibration.identifying import identify, is_enough, preferred
+from armwright.calibration.validation import FOLDS
 from armwright.errors import InvalidValueError, one_of
 
 Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
@@ -118,11 +120,15 @@ def plan_poses(
     told = identify(chain.names, J, chain.is_length, _USUAL_NOISE, first=preferred(chain.names))
     kept = list(told.kept)
     numbers, poses = slopes.shape[1], count + len(before)
-    if not is_enough(numbers * poses, len(kept)):
-        fewest = next(more for more in itertools.count(1) if is_enough(numbers * more, len(kept)))
+    # A calibration is judged by poses that it has not seen: those that are left have to be enough.
+    fewest = next(
+        more for more in itertools.count(FOLDS) if is_enough(numbers * (more - math.ceil(more / FOLDS)), len(kept))
+    )
+    if poses < fewest:
         raise InvalidValueError(
-            f"count: {arm.name} has {len(kept)} errors that {'poses' if turns else 'points'} can tell; "
-            f"expected {fewest - len(before)} poses or more, got {count}"
+            f"count: {arm.name} has {len(kept)} errors that {'poses' if turns else 'points'} can tell, and one in "
+            f"{FOLDS} poses is held out to see how good a calibration is; expected {fewest - len(before)} poses or "
+            f"more, got {count}"
         )
     rows, fixed = slopes[:, :, kept], list(range(candidates, len(slopes)))
     taken = _greedy(rows, count, fixed, progress)

@@ -19,6 +19,10 @@ from armwright.errors import ContradictionError, InvalidValueError, TooFewError
 _SAME = 1e-4
 
 
+# Parts into which postures are dealt out, each of which is held out once.
+FOLDS = 5
+
+
 class HeldOut(NamedTuple):
     """By how much readings miss arms that were calibrated without them.
 
@@ -85,7 +89,7 @@ def cross_validated(
     arm: Arm,
     seen: Readings,
     *,
-    folds: int = 5,
+    folds: int = FOLDS,
     seed: int = 0,
     base: Array | None = None,
     bends: tuple[Bend, ...] = (),

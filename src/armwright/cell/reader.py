@@ -10,6 +10,7 @@ import numpy as np
 
 from armwright.arm.load import is_path, load_arm
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
+from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Around, Cell, CellArm
@@ -173,6 +174,8 @@ def _start(table: Table, arm: Arm, base: Array) -> Array:
             raise table.error("hand", "the start is given twice, as hand and as posture")
         table.allow("hand")
         q = table.vector("posture", arm.n)
+        if mistake := degrees_by_mistake(arm, q):
+            raise table.error("posture", mistake)
         for fault in violations(arm, q):
             raise table.error("posture", str(fault))
         return q

@@ -104,7 +104,7 @@ def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) ->
             *_told_of_fit(float(found.misfit), float(widening(found.square, found.spare))),
             *_told_of_friction(model.material.friction, float(found.values.max())),
             *(
-                f"{name} is at its bound, 0 mm: the readings would have it below nothing"
+                f"{name} cannot be told from 0 mm: it is less than its standard deviation"
                 for name, ends in zip(found.names, found.at_bound, strict=True)
                 if ends
             ),

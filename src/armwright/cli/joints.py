@@ -50,7 +50,7 @@ def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     import numpy as np
 
     from armwright.cli.results import warn_of_stray
-    from armwright.errors import FileFormatError
+    from armwright.errors import FileFormatError, shown
     from armwright.files.rows import number_in_cell, of_one_width, read_rows
 
     warn_of_stray(path)
@@ -66,7 +66,11 @@ def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     places = [(name, header.index(name)) for name in wanted]
     # Eight bytes a number: a table may have many millions.
     values = array("d")
+    at, name_of_arm = header.index("arm") if "arm" in header else None, ""
     for row in of_one_width(path, head, below):
+        if at is not None and row.cells[at] != (name_of_arm := name_of_arm or row.cells[at]):
+            said = f"rows of several arms, {shown(name_of_arm)} and {shown(row.cells[at])}; leave those of one"
+            raise FileFormatError(path, row.line, "arm", said)
         values.extend(number_in_cell(path, row.line, name, row.cells[place]) for name, place in places)
     table = np.array(values).reshape(-1, len(quantities), arm.n)
     _ask_for_degrees(arm, path, table[:, 0])

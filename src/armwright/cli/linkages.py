@@ -6,6 +6,7 @@ import typer
 
 from armwright.cli.completing import linkages, setting
 from armwright.cli.numbers import named_numbers
+from armwright.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
@@ -37,11 +38,20 @@ def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float
 
     Raises:
         BadParameter: a text is something else.
+        InvalidValueError: a clearance is larger than the radius of its journal.
     """
     found = {} if clearance_mm is None else dict.fromkeys(model.clearances, clearance_mm * 1e-3)
     given = named_numbers(clearances, ("", "mm"), "a pin and its clearance in mm, J2=0.5", "--clearance")
     found |= {name: one.value * 1e-3 for name, one in given.items()}
-    return model.with_clearances(found)
+    playing = model.with_clearances(found)
+    for pin in playing.pins:
+        c, most = playing.clearances[pin.name], pin.journal_radius
+        if pin.name in found and c > most:
+            raise InvalidValueError(
+                f"clearance {pin.name}: expected at most the radius of the journal, {most * 1e3:g} mm, got {c * 1e3:g} "
+                f"mm; if micrometres are meant, {c * 1e3:g} µm are {c:g} mm"
+            )
+    return playing
 
 
 def settings_of(velocity: str, threshold_mm_s: float, *, law: str = "linear", **others: Any) -> "Settings":

@@ -157,6 +157,8 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
         for note in notes:
             print(f"armwright: {note}", file=sys.stderr)
         if error is not None:
+            if not quiet:
+                print_table(plain_console(), _trace_table(recording, code, KEPT if output else NOT_KEPT))
             _print_moment(error, code)
         elif not quiet:
             _print_summary(recording, code, KEPT if output else NOT_KEPT)

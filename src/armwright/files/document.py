@@ -221,7 +221,8 @@ class Table:
         """
         for key in self._data:
             if key not in self._read:
-                near = closest(key, self._read - set(self._data))
+                left = self._read - set(self._data)
+                near = closest(key, left) or next((one for one in sorted(left) if one.startswith(f"{key}_")), None)
                 known = ", ".join(sorted(self._read))
                 hint = f"did you mean '{near}'?" if near else f"known here: {known}" if known else "none is known here"
                 raise self.error(key, f"unknown key; {hint}")

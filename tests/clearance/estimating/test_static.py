@@ -226,3 +226,18 @@ def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatc
     estimate_at_rest(five_bar, STARTS, offsets)
 
     assert len(closings) == 1
+
+
+def test_nothing_is_told_from_none(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """No interval reaches below nothing, and a clearance less than its deviation is told to be none, not identified."""
+    true = np.array((0.328e-3, 0.171e-3, 0.0))
+    exact = rest_offsets(five_bar, STARTS, np.maximum(true, 1e-9))
+    told = []
+    for _ in range(40):
+        found = estimate_at_rest(five_bar, STARTS, exact + rng.normal(scale=2e-6, size=exact.shape), noise=2e-6)
+        low = found.interval()[2, 0]
+        assert low >= 0
+        told.append(found.identifiable(1e-3)[2])
+        assert told[-1] == (found.values[2] > max(found.deviations[2], 2e-7))
+
+    assert 2 <= sum(told) <= 20

@@ -95,8 +95,8 @@ class Estimate:
 
     @property
     def at_bound(self) -> Flags:
-        """(..., p) which clearances the data would have below nothing; they are told as next to none."""
-        return np.asarray(self.values <= 2 * _SMALLEST, dtype=np.bool_)
+        """(..., p) which clearances the data do not tell from none: they are less than their deviation."""
+        return np.asarray(self.values <= np.maximum(2 * _SMALLEST, self.deviations), dtype=np.bool_)
 
     def interval(self, level: float = 0.9) -> Array:
         """Return (..., p, 2) in which each clearance lies with a probability [m]."""
@@ -106,7 +106,7 @@ class Estimate:
 
         reach = norm.ppf(0.5 + level / 2) if np.isinf(self.freedom) else t.ppf(0.5 + level / 2, self.freedom)
         half = reach * self.deviations
-        return np.stack([self.values - half, self.values + half], axis=-1)
+        return np.stack([np.maximum(self.values - half, 0.0), self.values + half], axis=-1)
 
     def identifiable(self, width: float) -> tuple[bool, ...]:
         """Whether each clearance is told: known well beside the range in which it may lie [m], and not at a bound."""

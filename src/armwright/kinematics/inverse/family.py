@@ -38,18 +38,18 @@ def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Arr
     """
     # What lies more than half a turn away is an image of what does not, which may be outside the limits.
     for turn in (np.pi, _TURN):
-        lower, upper = _room(arm, near, joint, turn)
-        found = _found_inside(arm, near, members, joint, lower, upper) if lower <= upper else None
+        room = _room(arm, near, joint, turn)
+        found = _found_inside(arm, near, members, joint, room) if room[0] <= room[1] else None
         if found is not None:
             return found
     return q
 
 
 def _found_inside(
-    arm: Arm, near: Array, members: Callable[[Array], Array], joint: int, lower: float, upper: float
+    arm: Arm, near: Array, members: Callable[[Array], Array], joint: int, room: tuple[float, float]
 ) -> Array | None:
-    """Return the member nearest to ``near`` of those with all joints inside that a search from here to there finds."""
-    start = near[joint - 1]
+    """Return the member nearest to ``near`` of those with all joints inside that a search of a room finds."""
+    (lower, upper), start = room, near[joint - 1]
     places, width = np.linspace(lower, upper, _TRIED), (upper - lower) / (_TRIED - 1)
     for _ in range(_CLOSER):
         rows = members(_placed(near, joint, places))

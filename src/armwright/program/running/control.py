@@ -1,6 +1,6 @@
 """Jumps, procedures, processes, events, locks, attempts, and the end of a program."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from armwright.program.intermediate.code import Instruction, Kind, Op, Place
 from armwright.program.running.acting import HANDLERS as ACTIONS
@@ -265,8 +265,12 @@ def _still(run: Machine, process: Process, span: Span) -> int:
 def finish(run: Machine, process: Process, span: Span, word: str) -> None:
     """End the program: arms at rest, devices off, the frame table true."""
     off = rest(run, span)
-    words = "".join(f"; {run.spelled(device)} OFF" for device in off)
-    run.effect(process, "END", f"{word}{words}", span, data={"switched_off": off})
+    run.effect(process, "END", f"{word}{words_of(run, off)}", span, data={"switched_off": off})
+
+
+def words_of(run: Machine, off: Sequence[str]) -> str:
+    """Return what is said behind the end of a program of the devices that it switched off."""
+    return "".join(f"; {run.spelled(device)} OFF" for device in off)
 
 
 def recover(run: Machine, process: Process, error: RunError) -> bool:

@@ -5,7 +5,7 @@ served first, then the one that comes first in the text; so a run is the same on
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
@@ -16,7 +16,7 @@ from armwright.cell.model import Cell
 from armwright.program.intermediate.code import Code
 from armwright.program.messages.diagnostics import Diagnostic, Severity
 from armwright.program.running.contact import too_deep
-from armwright.program.running.control import HANDLERS, recover, rest
+from armwright.program.running.control import HANDLERS, recover, rest, words_of
 from armwright.program.running.machine import Limits, Machine, RunError
 from armwright.program.running.moving import go_on
 from armwright.program.running.obstacles import detour_warning, stops_warning
@@ -151,16 +151,16 @@ def _advance(machine: Machine, process: Process) -> None:
 
 def _stopped(machine: Machine, error: RunError, process: Process, arm: str | None) -> RunError:
     """Return the error with the frames as they are when all arms are at rest and all devices off."""
-    rest(machine, error.diagnostic.span)
+    off = rest(machine, error.diagnostic.span)
     failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm, process=process.title)
-    return RunError(error.diagnostic, machine.tree, machine.now, lambda: _failed(machine, failure))
+    return RunError(error.diagnostic, machine.tree, machine.now, lambda: _failed(machine, failure, off))
 
 
-def _failed(machine: Machine, failure: Failure) -> Recording:
-    """Return all that happened up to a failure, and the failure as the last thing that did."""
+def _failed(machine: Machine, failure: Failure, off: Sequence[str]) -> Recording:
+    """Return all that happened up to a failure, and as the last thing the failure, with the devices it switched off."""
     found, recording = failure.diagnostic, machine.recording()
-    text = f"{found.code} in line {machine.code.source.line(found.span.start)}: {found.message}"
-    data = {"code": found.code, "failed_at": failure.time}
+    text = f"{found.code} in line {machine.code.source.line(found.span.start)}: {found.message}{words_of(machine, off)}"
+    data = {"code": found.code, "failed_at": failure.time, "switched_off": list(off)}
     end = Effect(
         t0=failure.time,
         t1=machine.now,

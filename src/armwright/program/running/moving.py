@@ -243,7 +243,12 @@ def _timed(run: Machine, process: Process, asked: Asked, stages: Sequence[Stage]
         still = hold(stages[0].trajectory(0.0), asked_for)
         return [attrs.evolve(stages[0], trajectory=whole_ticks(still, run.cell.period)), *stages[1:]]
     slow = slowed_together([stage.trajectory for stage in stages], asked_for, run.cell.period)
-    return [attrs.evolve(stage, trajectory=one) for stage, one in zip(stages, slow, strict=True)]
+    # What kept a stage slow does so no more where it is to take longer.
+    longer = asked_for > least + run.cell.period
+    return [
+        attrs.evolve(stage, trajectory=one, slowed="" if longer else stage.slowed)
+        for stage, one in zip(stages, slow, strict=True)
+    ]
 
 
 def _fail_move(
