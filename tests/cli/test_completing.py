@@ -139,6 +139,17 @@ def test_installed(shell: str, file: str, tmp_path: Path, monkeypatch: pytest.Mo
     assert "_ARMWRIGHT_COMPLETE" in (tmp_path / file).read_text()
 
 
+def test_a_pipe_in_the_place_of_a_start_up_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody waits for a pipe where a shell has its start-up file."""
+    os.mkfifo(tmp_path / ".bashrc")
+    monkeypatch.setenv("HOME", str(tmp_path))
+
+    done = armwright("--install-completion", "bash")
+
+    assert done.returncode == 4
+    assert ".bashrc: expected a file, got a pipe" in done.stderr
+
+
 def test_cannot_be_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Start-up files that are no text are left alone, and the script can be had otherwise."""
     (tmp_path / ".bashrc").write_bytes(b"\xff\xfe")

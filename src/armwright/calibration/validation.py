@@ -17,8 +17,6 @@ from armwright.errors import ContradictionError, InvalidValueError, TooFewError
 
 # Postures whose joints differ by less are one [rad], [m].
 _SAME = 1e-4
-
-
 # Parts into which postures are dealt out, each of which is held out once.
 FOLDS = 5
 

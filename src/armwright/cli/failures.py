@@ -40,8 +40,6 @@ _OUTPUT_FAILS = {
     errno.EINVAL,
 }
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-
-
 # How long a signal waits that nobody has heard [s].
 _AGAIN = 0.02
 
@@ -180,7 +178,8 @@ def _judged(error: BaseException) -> tuple[int, str]:
             notes = getattr(error, "__notes__", [said])
             return 128 + error.number, "; ".join(["interrupted", *notes])
         case OSError():
-            what = "the current folder" if error.filename is None else f"'{error.filename}'"
+            gone = "the current folder" if error.errno == errno.ENOENT else "a file"
+            what = gone if error.filename is None else f"'{error.filename}'"
             return ExitStatus.FILE, f"cannot read or write {what}: {error.strerror or error}"
         case MemoryError():
             return ExitStatus.INFEASIBLE, "this takes more memory than there is"

@@ -167,7 +167,7 @@ class Commands:
         from armwright.files.output import reason
 
         folder = _target(argument)
-        made = not folder.exists()
+        missing = [one for one in (folder, *folder.parents) if not one.exists()]
         try:
             # What the program imports is looked for from there.
             folder.mkdir(parents=True, exist_ok=True)
@@ -176,9 +176,9 @@ class Commands:
         try:
             self._report(folder)
         except BaseException:
-            if made:
-                with contextlib.suppress(OSError):
-                    folder.rmdir()
+            with contextlib.suppress(OSError):
+                for one in missing:
+                    one.rmdir()
             raise
         return Reply(lines=(f"report: {folder / 'report.html'}",))
 

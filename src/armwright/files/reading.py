@@ -122,7 +122,7 @@ def is_source(path: Path) -> bool:
         there = path.stat()
     except (OSError, ValueError):
         return False
-    return any(_is_there(source, there) for source in _SOURCES)
+    return stat.S_ISREG(there.st_mode) and any(_is_there(source, there) for source in _SOURCES)
 
 
 def _is_there(path: Path, state: os.stat_result) -> bool:
