@@ -20,7 +20,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 PACKAGE = ROOT / "src" / "armwright"
 # Pages outside of docs/ that the site has too, under the same names.
-OUTSIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "benchmarks/results.md")
+OUTSIDE = ("CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md", "benchmarks/results.md")
 # The commands have a page of their own.
 NO_API = ("__main__", "cli", "version")
 
