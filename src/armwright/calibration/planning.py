@@ -120,10 +120,7 @@ def plan_poses(
     told = identify(chain.names, J, chain.is_length, _USUAL_NOISE, first=preferred(chain.names))
     kept = list(told.kept)
     numbers, poses = slopes.shape[1], count + len(before)
-    # A calibration is judged by poses that it has not seen: those that are left have to be enough.
-    fewest = next(
-        more for more in itertools.count(FOLDS) if is_enough(numbers * (more - math.ceil(more / FOLDS)), len(kept))
-    )
+    fewest = _fewest(numbers, len(kept))
     if poses < fewest:
         raise InvalidValueError(
             f"count: {arm.name} has {len(kept)} errors that {'poses' if turns else 'points'} can tell, and one in "
@@ -142,6 +139,16 @@ def plan_poses(
         observability=_indices(_stacked(rows, [*taken, *fixed]), poses),
         by_chance=Observability(*(float(np.median([one[i] for one in chance])) for i in range(len(INDICES)))),
         names=tuple(chain.names[i] for i in kept),
+    )
+
+
+def _fewest(numbers: int, errors: int) -> int:
+    """Return how many poses are enough for so many errors, each measured by so many numbers.
+
+    A calibration is judged by poses that it has not seen: those that are left have to be enough.
+    """
+    return next(
+        more for more in itertools.count(FOLDS) if is_enough(numbers * (more - math.ceil(more / FOLDS)), errors)
     )
 
 
