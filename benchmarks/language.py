@@ -12,12 +12,12 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.program import Compilation, Source, compile, known_cell  # noqa: A004 - what a translator does
-from armwright.program.intermediate.code import Code
-from armwright.program.running.interpret import Limits, Machine, interpret, run
-from armwright.program.syntax.parse import parse
-from armwright.program.text.numbering import without_numbers
-from armwright.program.text.tokens import scan
-from armwright.program.text.words import Standard
+from armwright.program.bytecode.instructions import Code
+from armwright.program.language.words import Standard
+from armwright.program.syntax.lexer import scan
+from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.parser import parse
+from armwright.program.vm.interpreter import Limits, Machine, interpret, run
 
 CORPUS = Path(__file__).parents[1] / "tests" / "program" / "corpus"
 LINES = 10_000

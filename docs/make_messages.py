@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from armwright.program.explanations.explaining import explanation, ranges
+from armwright.program.diagnostics.index import explanation, ranges
 
 PAGE = Path(__file__).parent / "messages.md"
 HEAD = """\

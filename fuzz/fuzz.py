@@ -29,13 +29,13 @@ with atheris.instrument_imports(include=WATCHED):
     from armwright.errors import ArmwrightError, FileFormatError
     from armwright.program import Source
     from armwright.program import compile as translate
-    from armwright.program.editing.formatting import formatted
-    from armwright.program.intermediate.assembly import assemble, assembly
-    from armwright.program.messages.rendering import render
-    from armwright.program.syntax.parse import parse
-    from armwright.program.text.numbering import without_numbers
-    from armwright.program.text.tokens import scan
-    from armwright.program.text.words import VOCABULARIES, Standard
+    from armwright.program.bytecode.assembler import assemble, assembly
+    from armwright.program.diagnostics.render import render
+    from armwright.program.formatter.format import formatted
+    from armwright.program.language.words import VOCABULARIES, Standard
+    from armwright.program.syntax.lexer import scan
+    from armwright.program.syntax.line_numbers import without_numbers
+    from armwright.program.syntax.parser import parse
 
 
 def _text(data: bytes) -> str:

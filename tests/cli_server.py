@@ -78,8 +78,8 @@ def _load() -> None:
     """Load what most commands need, once for all of them."""
     import importlib
 
-    for name in ("armwright.cli.app", "armwright.arm.load", "armwright.program.compiler", "armwright.cell.reader",
-                 "armwright.program.running.interpret", "armwright.report.files", "armwright.motion.moves",
+    for name in ("armwright.cli.app", "armwright.arm.load", "armwright.program.api", "armwright.cell.reader",
+                 "armwright.program.vm.interpreter", "armwright.report.files", "armwright.motion.moves",
                  "armwright.clearance.reader", "armwright.dynamics.compiled", "rich.markdown"):  # fmt: skip
         importlib.import_module(name)
 

@@ -34,9 +34,9 @@ from armwright.motion.solver import solver_of
 from armwright.motion.straight import straight_line
 from armwright.program import Source, known_cell
 from armwright.program import compile as compile_program
-from armwright.program.running.interpret import interpret
-from armwright.program.running.interpret import warnings as warnings_of
-from armwright.program.running.recording import Recording
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.interpreter import warnings as warnings_of
+from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import pose
 from oracles.with_pinocchio import pinocchio_model, with_load, with_rotors
 from samples import Sample

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.program.running import excerpt
+from armwright.program.vm import excerpt
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BENCH, STANFORD = EXAMPLES / "bench.rlo", EXAMPLES / "stanford_cell.toml"

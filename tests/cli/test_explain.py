@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from armwright.program.explanations.explaining import codes, explanation
+from armwright.program.diagnostics.index import codes, explanation
 
 ENVIRONMENT = {**os.environ, "COLUMNS": "100", "PYTHONUTF8": "1", "TERM": "xterm-256color"}
 

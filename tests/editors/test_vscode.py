@@ -11,11 +11,11 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace
 
-from armwright.program.meaning.functions import FUNCTIONS
-from armwright.program.meaning.names import PREDECLARED
-from armwright.program.meaning.units import UNITS
-from armwright.program.text.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
-from armwright.program.text.words import CLOSING, OPENING, SENSORS
+from armwright.program.language.units import UNITS
+from armwright.program.language.words import CLOSING, OPENING, SENSORS
+from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
+from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.symbols import PREDECLARED
 from editors.textmate import Engine
 from program.shelf import ACCEPTED, CORPUS, REJECTED
 

@@ -24,8 +24,8 @@ from armwright.files.lines import longest_dotted_key
 from armwright.files.reading import read_lines, read_text, read_typed_program
 from armwright.files.rows import read_rows
 from armwright.motion.poses_file import read_poses
-from armwright.program.editing.cells import Cells
-from armwright.program.messages.rendering import render
+from armwright.program.diagnostics.render import render
+from armwright.program.language_server.cell_lookup import Cells
 
 ROOT = Path(__file__).resolve().parents[2]
 IDENTITY = "[1,0,0, 0,1,0, 0,0,1, 0,0,0]"

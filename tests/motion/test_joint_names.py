@@ -18,7 +18,7 @@ from armwright.motion.quintic import point_to_point
 from armwright.motion.stops import at_speed
 from armwright.motion.straight import straight_line
 from armwright.motion.time_optimal import time_optimal
-from armwright.program.running.obstacles import stopped
+from armwright.program.vm.move_diagnostics import stopped
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 

@@ -10,10 +10,10 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.program import Source, known_cell
 from armwright.program import compile as translate
-from armwright.program.intermediate.code import Code
-from armwright.program.running.interpret import Limits, RunError, interpret
-from armwright.program.running.recording import Recording
-from armwright.program.text.words import Standard
+from armwright.program.bytecode.instructions import Code
+from armwright.program.language.words import Standard
+from armwright.program.vm.interpreter import Limits, RunError, interpret
+from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import pose
 
 CORPUS = Path(__file__).parent / "corpus"

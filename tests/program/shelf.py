@@ -7,8 +7,8 @@ from pathlib import Path
 from armwright.errors import FileFormatError
 from armwright.program import Compilation, KnownCell, Source
 from armwright.program import compile as translate
-from armwright.program.meaning.known import Imported, ReadImport
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
+from armwright.program.semantics.cell_symbols import Imported, ReadImport
 
 ONE_ARM = KnownCell(
     arms=frozenset({"ARM_1"}),

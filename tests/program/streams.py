@@ -5,7 +5,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.motion.polynomials import derivative, extremes, shifted
-from armwright.program.running.recording import Recording, RunStage, motion_rows
+from armwright.program.vm.recording import Recording, RunStage, motion_rows
 
 # What a limit may be exceeded by.
 AT_MOST = 1.001

@@ -16,11 +16,11 @@ from armwright.motion import detour
 from armwright.motion.path import report_speed
 from armwright.program import compile as compile_program
 from armwright.program import known_cell
-from armwright.program.messages.diagnostics import Diagnostic
-from armwright.program.running.interpret import RunError, interpret, warnings
-from armwright.program.running.obstacles import note_of
-from armwright.program.running.recording import Recording, RunStage
-from armwright.program.text.source import Source
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Source
+from armwright.program.vm.interpreter import RunError, interpret, warnings
+from armwright.program.vm.move_diagnostics import note_of
+from armwright.program.vm.recording import Recording, RunStage
 from armwright.spatial.rotations import angle_between
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -11,9 +11,9 @@ from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
 from armwright.program import Source, known_cell
 from armwright.program import compile as translate
-from armwright.program.intermediate.assembly import assemble, assembly
-from armwright.program.intermediate.code import Code, listing
-from armwright.program.running.interpret import RunError, interpret
+from armwright.program.bytecode.assembler import assemble, assembly
+from armwright.program.bytecode.instructions import Code, listing
+from armwright.program.vm.interpreter import RunError, interpret
 from program.running import cell_of, code_of, corpus_text
 from program.shelf import ACCEPTED
 from program.shelf import cell_of as told_cell

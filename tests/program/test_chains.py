@@ -8,9 +8,9 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.editing.formatting import formatted
-from armwright.program.running.interpret import interpret
+from armwright.program.formatter.format import formatted
 from armwright.program.syntax import tree
+from armwright.program.vm.interpreter import interpret
 
 CELL = Path(__file__).parents[2] / "examples" / "stanford_cell.toml"
 LINKS = 1500

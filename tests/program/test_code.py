@@ -5,7 +5,7 @@ import pytest
 
 from armwright.program import KnownCell, Source
 from armwright.program import compile as translate
-from armwright.program.intermediate.code import Code, Constant, Kind, Op, Trajectory, Type, listing
+from armwright.program.bytecode.instructions import Code, Constant, Kind, Op, Trajectory, Type, listing
 from program.shelf import BARE
 
 # Twelve numbers as the program writes them come through unchanged, or as the nearest rotation to rounding.

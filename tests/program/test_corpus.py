@@ -4,9 +4,9 @@ import pytest
 
 from armwright.program import Compilation, Source, known_cell
 from armwright.program import compile as translate
-from armwright.program.intermediate.code import Op, listing
-from armwright.program.messages.rendering import render
-from armwright.program.text.words import Standard
+from armwright.program.bytecode.instructions import Op, listing
+from armwright.program.diagnostics.render import render
+from armwright.program.language.words import Standard
 from program.running import cell_of
 from program.shelf import BARE, CORPUS, ONE_ARM, compile_program, said
 

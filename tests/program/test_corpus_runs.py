@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.frames import WORLD
-from armwright.program.running.recording import Recording
+from armwright.program.vm.recording import Recording
 from program.running import EXACT, cell_of, corpus_text, down, expect, printed, run
 
 

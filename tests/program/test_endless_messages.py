@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from armwright.program.debugging.protocol import Noise, messages
-from armwright.program.editing.incoming import Incoming
+from armwright.program.debugger.dap_messages import Noise, messages
+from armwright.program.language_server.message_limits import Incoming
 
 TOO_LARGE = "a message is too large: more, and at most 16 MB are read; `armwright --raise message_mb=NUMBER ...`"
 TOO_LONG = "the header of a message is too large: more, and at most 8,192 bytes are read"

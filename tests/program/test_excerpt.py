@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armwright.program.running.excerpt import excerpt, listed, more, one_line
+from armwright.program.vm.excerpt import excerpt, listed, more, one_line
 
 
 @given(st.lists(st.integers(), max_size=30), st.integers(2, 20))

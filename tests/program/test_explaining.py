@@ -8,10 +8,10 @@ import pytest
 
 import armwright.program
 from armwright.errors import UnknownNameError
-from armwright.program.explanations.explaining import codes, explanation, ranges
-from armwright.program.explanations.trying import answer
-from armwright.program.text.source import Source
-from armwright.program.text.words import VOCABULARIES, Standard
+from armwright.program.diagnostics.examples import answer
+from armwright.program.diagnostics.index import codes, explanation, ranges
+from armwright.program.language.source import Source
+from armwright.program.language.words import VOCABULARIES, Standard
 
 SOURCES = Path(armwright.program.__file__).parent
 DOCS = Path(__file__).parents[2] / "docs"
@@ -136,7 +136,7 @@ def test_every_row_of_the_page_leads_somewhere() -> None:
 
 def test_every_cell_of_a_page_is_told() -> None:
     """The page of messages says what the cells are in which its programs run."""
-    cells = {path.stem for path in (SOURCES / "explanations" / "pages" / "cells").glob("*.toml")}
+    cells = {path.stem for path in (SOURCES / "diagnostics" / "pages" / "cells").glob("*.toml")}
     used = {name for code in codes() for name in re.findall(r"// run in (\w+)", explanation(code).wrong)}
 
     assert used == cells == set(re.findall(r"\(`(\w+)`\)", MESSAGES))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from armwright.program.following.facts import Book, Facts, Shaky, same
+from armwright.program.flow_analysis.lattice import Book, Facts, Shaky, same
 
 
 def book(facts: Facts) -> Book[int | None]:

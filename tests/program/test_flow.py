@@ -7,12 +7,12 @@ import pytest
 from armwright.cell.simulator import Simulator
 from armwright.program import Compilation, KnownCell, Source, known_cell
 from armwright.program import compile as translate
-from armwright.program.following.flow import _Follower
-from armwright.program.intermediate.code import Code
-from armwright.program.intermediate.translate import translate as code_of
-from armwright.program.messages.diagnostics import Diagnostic
-from armwright.program.running.interpret import Limits, Machine, RunError
-from armwright.program.running.interpret import run as run_on
+from armwright.program.bytecode.codegen import translate as code_of
+from armwright.program.bytecode.instructions import Code
+from armwright.program.flow_analysis.analysis import _Follower
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.vm.interpreter import Limits, Machine, RunError
+from armwright.program.vm.interpreter import run as run_on
 from program.running import cell_of
 from program.shelf import BARE, compile_program
 from program.wandering import Wandering

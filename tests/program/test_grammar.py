@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import Standard
 from armwright.program.syntax import tree
-from armwright.program.syntax.cursor import DEEPEST
-from armwright.program.syntax.parse import parse
-from armwright.program.text.source import Source, Span
-from armwright.program.text.tokens import scan
-from armwright.program.text.words import Standard
+from armwright.program.syntax.lexer import scan
+from armwright.program.syntax.parser import parse
+from armwright.program.syntax.token_stream import DEEPEST
 
 # So often a thing is repeated that no sound program would.
 MANY = 10_000

@@ -9,14 +9,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pygments.token import Comment, Error, Keyword, Name, Number, Operator, Punctuation, String, Whitespace, _TokenType
 
-from armwright.program.meaning.functions import FUNCTIONS
-from armwright.program.meaning.names import PREDECLARED
-from armwright.program.meaning.units import UNITS
-from armwright.program.text.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
-from armwright.program.text.numbering import without_numbers
-from armwright.program.text.source import Source
-from armwright.program.text.tokens import TokenKind, scan
-from armwright.program.text.words import SENSORS, VOCABULARIES, Standard
+from armwright.program.language.source import Source
+from armwright.program.language.units import UNITS
+from armwright.program.language.words import SENSORS, VOCABULARIES, Standard
+from armwright.program.language_server.highlight import DECLARATIONS, KEYWORDS, OPERATORS, TYPES, RloLexer
+from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.syntax.lexer import TokenKind, scan
+from armwright.program.syntax.line_numbers import without_numbers
 from program.shelf import ACCEPTED, CORPUS
 
 PROGRAMS = [*sorted(CORPUS.glob("*.rlo")), *ACCEPTED]

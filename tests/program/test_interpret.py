@@ -14,9 +14,9 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward import forward
 from armwright.program import compile as compile_program
 from armwright.program import known_cell
-from armwright.program.running.interpret import RunError, interpret, warnings
-from armwright.program.running.recording import Recording
-from armwright.program.text.source import Source
+from armwright.program.language.source import Source
+from armwright.program.vm.interpreter import RunError, interpret, warnings
+from armwright.program.vm.recording import Recording
 from armwright.spatial.poses import pose
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

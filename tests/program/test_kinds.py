@@ -2,18 +2,18 @@
 
 import pytest
 
-from armwright.program.intermediate.code import Kind, Type
-from armwright.program.meaning import check
-from armwright.program.meaning.kinds import sort
-from armwright.program.meaning.names import Symbols
-from armwright.program.meaning.naming import Names
-from armwright.program.meaning.sorts import Sort, written
-from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Source
+from armwright.program.language.words import Standard
+from armwright.program.semantics import check
+from armwright.program.semantics.expression_types import Sort, written
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.symbols import Symbols
+from armwright.program.semantics.type_check import sort
 from armwright.program.syntax import tree
-from armwright.program.syntax.parse import parse
-from armwright.program.text.source import Source
-from armwright.program.text.tokens import scan
-from armwright.program.text.words import Standard
+from armwright.program.syntax.lexer import scan
+from armwright.program.syntax.parser import parse
 
 DECLARED = {
     "F": Type(Kind.FRAME),

@@ -5,9 +5,9 @@ import pytest
 
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.editing.formatting import formatted
-from armwright.program.running.interpret import Limits
+from armwright.program.formatter.format import formatted
 from armwright.program.syntax import tree
+from armwright.program.vm.interpreter import Limits
 from program.running import cell_of, failure, printed, run
 
 HEAD = (

@@ -9,11 +9,11 @@ from armwright.kinematics.forward import forward
 from armwright.motion.follow import follow
 from armwright.motion.path import Path
 from armwright.motion.trajectory import whole_ticks
-from armwright.program.intermediate.assembly import assemble, assembly
-from armwright.program.intermediate.code import Code
-from armwright.program.running.interpret import interpret
-from armwright.program.running.recording import Recording
-from armwright.program.text.words import Standard
+from armwright.program.bytecode.assembler import assemble, assembly
+from armwright.program.bytecode.instructions import Code
+from armwright.program.language.words import Standard
+from armwright.program.vm.interpreter import interpret
+from armwright.program.vm.recording import Recording
 from program.running import cell_of, code_of, run
 
 FRAMES = (

@@ -10,8 +10,8 @@ import pytest
 
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.running.interpret import Limits
-from armwright.program.running.recording import Recording
+from armwright.program.vm.interpreter import Limits
+from armwright.program.vm.recording import Recording
 from program.running import cell_of, corpus_text, down, expect, failure, printed, run
 
 HOME = "VAR a, b : FRAME ; n : SCALAR ; e, g : EVENT ; BEGIN a = (1,0,0, 0,-1,0, 0,0,-1, 0.40,0.15,0.20) ; "

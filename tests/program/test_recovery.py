@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from armwright.program import Compilation, Source
 from armwright.program import compile as translate
-from armwright.program.messages.diagnostics import Fix
-from armwright.program.messages.rendering import render
+from armwright.program.diagnostics.render import render
+from armwright.program.language.diagnostic import Fix
 from program.shelf import ACCEPTED, BARE, CORPUS, REJECTED, compile_file
 
 TEXTS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(CORPUS.glob("*.rlo"))}

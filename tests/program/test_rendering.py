@@ -7,9 +7,9 @@ import pytest
 
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.messages.diagnostics import Diagnostic, Fix, Label, Severity, to_json
-from armwright.program.messages.rendering import MOST_SHOWN, render, render_rich
-from armwright.program.text.source import Span
+from armwright.program.diagnostics.render import MOST_SHOWN, render, render_rich
+from armwright.program.language.diagnostic import Diagnostic, Fix, Label, Severity, to_json
+from armwright.program.language.source import Span
 
 # Two thousand messages take a quarter of a second [s]; looking at the whole line for each takes minutes.
 GENEROUS = 5.0

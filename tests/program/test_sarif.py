@@ -4,7 +4,7 @@ import json
 
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.messages.sarif import to_sarif
+from armwright.program.diagnostics.sarif import to_sarif
 from program.shelf import BARE, CORPUS
 
 M1 = (CORPUS / "m1.rlo").read_text(encoding="utf-8")

@@ -8,8 +8,8 @@ import pytest
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.program.running.interpret import RunError, interpret
-from armwright.program.running.recording import Recording
+from armwright.program.vm.interpreter import RunError, interpret
+from armwright.program.vm.recording import Recording
 from armwright.report.files import summary
 from program.guarded import guarded_program
 from program.running import cell_of, code_of, corpus_text

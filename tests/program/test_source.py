@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.text.numbering import without_numbers
-from armwright.program.text.source import Span
+from armwright.program.language.source import Span
+from armwright.program.syntax.line_numbers import without_numbers
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armwright.program.text.source import Source, Span
-from armwright.program.text.tokens import Scanned, Token, TokenKind, scan
-from armwright.program.text.words import VOCABULARIES, Standard
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import VOCABULARIES, Standard
+from armwright.program.syntax.lexer import Scanned, Token, TokenKind, scan
 
 
 def scanned(text: str, standard: Standard = Standard.RLO_2) -> Scanned:

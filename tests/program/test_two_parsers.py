@@ -8,14 +8,14 @@ import pytest
 from lark import Lark, Token
 from lark.exceptions import LarkError
 
-from armwright.program.meaning.units import DECLARABLE
-from armwright.program.messages.diagnostics import Diagnostic
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Source
+from armwright.program.language.units import DECLARABLE
+from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.syntax import tree
-from armwright.program.syntax.parse import parse
-from armwright.program.text.numbering import without_numbers
-from armwright.program.text.source import Source
-from armwright.program.text.tokens import scan
-from armwright.program.text.words import VOCABULARIES, Standard
+from armwright.program.syntax.lexer import scan
+from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.parser import parse
 from program.sentences import Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, REJECTED
 from samples import Sample

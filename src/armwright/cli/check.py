@@ -12,7 +12,7 @@ import typer
 from armwright.cli.printing import print_json
 from armwright.cli.programs import Std, Strict
 from armwright.errors import ExitStatus, FileFormatError
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from armwright.program import Compilation
@@ -68,7 +68,7 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
         several = [_as_data(one, emit) for one in compiled]
         print_json(several[0] if len(several) == 1 else _together(several, paths))
     elif output_format is Format.SARIF:
-        from armwright.program.messages.sarif import sarif_of
+        from armwright.program.diagnostics.sarif import sarif_of
 
         pairs = zip(compiled, paths, strict=True)
         print_json(sarif_of([(one.diagnostics, one.source, path.as_posix()) for one, path in pairs]))
@@ -121,7 +121,7 @@ def _print(compiled: "Compilation", emit: Emit | None) -> None:
 
 def _counted(compiled: "list[Compilation]") -> str:
     """Return the last line of a report on several programs."""
-    from armwright.program.messages.diagnostics import counts_text
+    from armwright.program.language.diagnostic import counts_text
 
     errors = sum(one.is_error for program in compiled for one in program.diagnostics)
     warnings = sum(len(program.diagnostics) for program in compiled) - errors
@@ -140,7 +140,7 @@ def _together(several: list[dict[str, Any]], paths: list[Path]) -> dict[str, Any
 
 def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:
     """Return a stage of the translation as lines; no lines of code for a program with errors."""
-    from armwright.program.intermediate.code import listing
+    from armwright.program.bytecode.instructions import listing
     from armwright.program.syntax.tree import dump
 
     source = compiled.source
@@ -156,7 +156,7 @@ def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:
 
 def _as_data(compiled: "Compilation", emit: Emit | None) -> dict[str, Any]:
     from armwright.cli.programs import diagnostics_data
-    from armwright.program.intermediate.code import shown_operands
+    from armwright.program.bytecode.instructions import shown_operands
 
     data = diagnostics_data(compiled)
     if emit is Emit.CODE and compiled.code:

@@ -7,10 +7,10 @@ import typer
 
 from armwright.cli.programs import CODE_SUFFIX, CellFile, Std, Strict
 from armwright.errors import ExitStatus
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.intermediate.code import Code
+    from armwright.program.bytecode.instructions import Code
 
 
 def code(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -33,8 +33,8 @@ def code(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.cli.terminal import print_verbatim
     from armwright.files.output import write_file
-    from armwright.program.intermediate.assembly import assembly
-    from armwright.program.intermediate.code import listing
+    from armwright.program.bytecode.assembler import assembly
+    from armwright.program.bytecode.instructions import listing
 
     found = load_code(program, cell, strict=strict, std=std)
     if output is not None:
@@ -53,7 +53,7 @@ def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> 
     """
     from armwright.cli.programs import given_cell, in_its_cell, print_diagnostics
     from armwright.files.reading import read_program
-    from armwright.program.intermediate.assembly import assemble
+    from armwright.program.bytecode.assembler import assemble
 
     if path.suffix == CODE_SUFFIX:
         return assemble(read_program(path), str(path))

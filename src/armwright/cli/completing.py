@@ -74,7 +74,7 @@ def linkages(incomplete: str) -> list[str]:
 
 def codes(incomplete: str) -> list[str]:
     """Complete the code of a message."""
-    from armwright.program.explanations.explaining import codes as known
+    from armwright.program.diagnostics.index import codes as known
 
     return _beginning(known(), incomplete)
 

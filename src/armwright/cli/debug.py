@@ -7,11 +7,11 @@ import typer
 
 from armwright.cli.programs import CODE_SUFFIX, CellFile, Std, Strict
 from armwright.errors import ExitStatus
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.debugging.editor import Launch, Loaded
-    from armwright.program.running.recording import Recording
+    from armwright.program.debugger.dap_session import Launch, Loaded
+    from armwright.program.vm.recording import Recording
 
 
 def debug(
@@ -37,7 +37,7 @@ def debug(
         _serve()
         return
     from armwright.cli.debug_terminal import Terminal
-    from armwright.program.debugging.editor import Launch, LoadError
+    from armwright.program.debugger.dap_session import Launch, LoadError
 
     launch = Launch(program=program, cell=cell, std=std, output=None, stop_on_entry=True, no_debug=False, strict=strict)
     try:
@@ -54,7 +54,7 @@ def _serve() -> None:
     import os
     import sys
 
-    from armwright.program.debugging.adapter import serve
+    from armwright.program.debugger.dap_server import serve
 
     # Unbuffered, and apart from sys.stdin: a thread may still be reading when the interpreter ends.
     incoming = os.fdopen(os.dup(0), "rb", buffering=0)
@@ -72,11 +72,11 @@ def load(launch: "Launch") -> "Loaded":
     """
     from armwright.cli.programs import given_cell, imported_files, in_its_cell
     from armwright.files.reading import read_program
-    from armwright.program.debugging.editor import Loaded, LoadError
-    from armwright.program.editing.cells import Cells
-    from armwright.program.intermediate.assembly import assemble
-    from armwright.program.messages.diagnostics import count_line
-    from armwright.program.messages.rendering import render
+    from armwright.program.bytecode.assembler import assemble
+    from armwright.program.debugger.dap_session import Loaded, LoadError
+    from armwright.program.diagnostics.render import render
+    from armwright.program.language.diagnostic import count_line
+    from armwright.program.language_server.cell_lookup import Cells
 
     given = given_cell(launch.cell)
     if launch.program.suffix == CODE_SUFFIX:
@@ -106,7 +106,7 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
         OutputError: the folder cannot be written.
     """
     from armwright.files.output import write_folder
-    from armwright.program.running.interpret import warnings
+    from armwright.program.vm.interpreter import warnings
     from armwright.report.files import Origin, result_files, run_record
 
     assert launch.output is not None  # noqa: S101 - asked for only then

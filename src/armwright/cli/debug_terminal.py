@@ -10,10 +10,10 @@ from armwright.cli.repl_lines import Script
 from armwright.errors import ArmwrightError, ExitStatus, shortened
 
 if TYPE_CHECKING:
-    from armwright.program.debugging.debugger import Command
-    from armwright.program.debugging.editor import Loaded
-    from armwright.program.debugging.stopping import Stop
-    from armwright.program.debugging.timeline import Path
+    from armwright.program.debugger.dap_session import Loaded
+    from armwright.program.debugger.debugger import Command
+    from armwright.program.debugger.history import Path
+    from armwright.program.debugger.stop_reason import Stop
 
 _HELP = """\
 n         next statement, over procedures         back      back to the statement before
@@ -54,7 +54,7 @@ class Terminal:
 
     def __init__(self, loaded: "Loaded") -> None:
         """Load the program."""
-        from armwright.program.debugging.debugger import Debugger
+        from armwright.program.debugger.debugger import Debugger
 
         self._loaded = loaded
         self._debugger = Debugger(loaded.code, loaded.cell)
@@ -136,7 +136,7 @@ class Terminal:
         self._tell()
 
     def _work(self) -> "Stop":
-        from armwright.program.running.excerpt import ON_A_TERMINAL, listed
+        from armwright.program.vm.excerpt import ON_A_TERMINAL, listed
 
         debugger = self._debugger
         with self._interruptible():
@@ -165,7 +165,7 @@ class Terminal:
             signal.signal(signal.SIGINT, before)
 
     def _tell(self) -> None:
-        from armwright.program.messages.rendering import render
+        from armwright.program.diagnostics.render import render
 
         debugger, stop = self._debugger, self._debugger.stop
         assert stop is not None  # noqa: S101 - it stands still

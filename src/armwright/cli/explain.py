@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.text import Text
 
-    from armwright.program.explanations.explaining import Page
-    from armwright.program.messages.diagnostics import Diagnostic
-    from armwright.program.text.source import Source
+    from armwright.program.diagnostics.index import Page
+    from armwright.program.language.diagnostic import Diagnostic
+    from armwright.program.language.source import Source
 
 _WIDTH = 80
 _INDENT = "    "
@@ -43,9 +43,9 @@ def explain(
         _list(as_json=as_json)
         return
     from armwright.cli.terminal import console as clean_console
-    from armwright.program.explanations.explaining import explanation
-    from armwright.program.explanations.trying import answer
-    from armwright.program.text.source import Source
+    from armwright.program.diagnostics.examples import answer
+    from armwright.program.diagnostics.index import explanation
+    from armwright.program.language.source import Source
 
     page = explanation(code)
     source = Source("wrong.rlo", page.wrong)
@@ -62,7 +62,7 @@ def explain(
 
 def _list(*, as_json: bool) -> None:
     """Print all codes with their titles."""
-    from armwright.program.explanations.explaining import explanation, ranges
+    from armwright.program.diagnostics.index import explanation, ranges
 
     if as_json:
         rows = [
@@ -81,7 +81,7 @@ def _list(*, as_json: bool) -> None:
 def _print_json(page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> None:
     import attrs
 
-    from armwright.program.messages.diagnostics import to_json
+    from armwright.program.language.diagnostic import to_json
 
     data: dict[str, Any] = {**attrs.asdict(page), "diagnostics": [to_json(one, source) for one in said]}
     print_json(data)
@@ -89,7 +89,7 @@ def _print_json(page: "Page", said: "Sequence[Diagnostic]", source: "Source") ->
 
 def _plain(page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:
     """Return a page as lines of plain text."""
-    from armwright.program.messages.rendering import render
+    from armwright.program.diagnostics.render import render
 
     yield f"{page.code}: {page.title}"
     for paragraph in page.text.split("\n\n"):
@@ -110,7 +110,7 @@ def _show(console: "Console", page: "Page", said: "Sequence[Diagnostic]", source
     from rich.markdown import Markdown
     from rich.text import Text
 
-    from armwright.program.messages.rendering import render_rich
+    from armwright.program.diagnostics.render import render_rich
 
     console.print(Text(f"{page.code}: {page.title}\n", "bold"))
     console.print(Markdown(page.text), width=min(console.width, _WIDTH))
@@ -126,7 +126,7 @@ def _coloured(program: str) -> "Text":
     from rich.syntax import Syntax
     from rich.text import Text
 
-    from armwright.program.text.highlight import RloLexer
+    from armwright.program.language_server.highlight import RloLexer
 
     text = Syntax(program, RloLexer(), theme="ansi_dark", background_color="default").highlight(program)
     lines = text.split("\n", allow_blank=False)

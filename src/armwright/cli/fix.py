@@ -10,12 +10,12 @@ from armwright.cli.failures import failure_data
 from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
 from armwright.errors import ArmwrightError, ExitStatus, counted
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cell.model import Cell
     from armwright.program import Compilation, Source
-    from armwright.program.editing.fixing import Fixed, Translate
+    from armwright.program.diagnostics.fixes import Fixed, Translate
 
 
 def fix(
@@ -42,7 +42,7 @@ def fix(
     from armwright.cli.programs import given_cell
     from armwright.cli.rewriting import is_stream, print_difference, read_source, write_back
     from armwright.cli.terminal import print_verbatim
-    from armwright.program.editing.fixing import fixed
+    from armwright.program.diagnostics.fixes import fixed
 
     acted_on = given_cell(cell)
     rows: list[dict[str, Any]] = []
@@ -107,7 +107,7 @@ def _print(result: "Fixed", *, done: str, to_errors: bool) -> None:
 
 def _as_data(result: "Fixed") -> dict[str, Any]:
     from armwright.cli.programs import diagnostics_data
-    from armwright.program.messages.diagnostics import to_json
+    from armwright.program.language.diagnostic import to_json
 
     cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.what} for cure in result.cures]
     found = diagnostics_data(result.compilation)

@@ -10,10 +10,10 @@ from armwright.cli.failures import failure_data
 from armwright.cli.printing import print_json
 from armwright.cli.programs import Std
 from armwright.errors import ArmwrightError, ExitStatus
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
-    from armwright.program.text.source import Source
+    from armwright.program.language.source import Source
 
 
 def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
@@ -41,7 +41,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
     """
     from armwright.cli.rewriting import is_stream, print_difference, read_source, write_back
     from armwright.cli.terminal import print_verbatim
-    from armwright.program.editing.formatting import formatted
+    from armwright.program.formatter.format import formatted
 
     rows: list[dict[str, Any]] = []
     for path in programs:

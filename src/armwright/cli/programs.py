@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from armwright.errors import ExitStatus
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cell.model import Cell
     from armwright.program import Compilation, Source
-    from armwright.program.meaning.known import ReadImport
-    from armwright.program.messages.diagnostics import Diagnostic
+    from armwright.program.language.diagnostic import Diagnostic
+    from armwright.program.semantics.cell_symbols import ReadImport
 
 # The text form of intermediate code.
 CODE_SUFFIX = ".rlc"
@@ -71,7 +71,7 @@ def given_cell(path: Path | None) -> "Cell | None":
 
 def import_reader(folder: Path) -> "ReadImport":
     """Return what reads the files that a program of this folder IMPORTs."""
-    from armwright.program.meaning.known import Imported
+    from armwright.program.semantics.cell_symbols import Imported
 
     def read(name: str) -> Imported:
         from armwright.cell.reader import read_cell
@@ -121,7 +121,7 @@ def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, 
     import sys
 
     from armwright.cli.terminal import console
-    from armwright.program.messages.rendering import render, render_rich
+    from armwright.program.diagnostics.render import render, render_rich
 
     shown = console(stderr=to_errors)
     if shown.is_terminal:
@@ -147,7 +147,7 @@ def error_data(diagnostics: "Iterable[Diagnostic]", source: "Source") -> dict[st
 
 def diagnostics_data(compiled: "Compilation") -> dict[str, Any]:
     """Return what is wrong with a program as plain data."""
-    from armwright.program.messages.diagnostics import to_json
+    from armwright.program.language.diagnostic import to_json
 
     errors = sum(one.is_error for one in compiled.diagnostics)
     return {

@@ -15,13 +15,13 @@ import typer
 from armwright.cli.failures import failure_data
 from armwright.cli.programs import CellFile, Std
 from armwright.errors import ArmwrightError, ExitStatus
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from armwright.cli.repl_commands import Commands
     from armwright.cli.repl_lines import Lines
-    from armwright.program.interactive.session import Answer, Session
-    from armwright.program.running.recording import Effect
+    from armwright.program.repl.session import Answer, Session
+    from armwright.program.vm.recording import Effect
 
 _DIM = "dim"
 _ALL_OF_IT = "`:report DIR` keeps all in events.jsonl"
@@ -47,7 +47,7 @@ def repl(
     from armwright.cli.programs import given_cell, import_reader
     from armwright.cli.repl_commands import COMMANDS, Commands
     from armwright.cli.repl_lines import Script, Terminal, editing
-    from armwright.program.interactive.session import Session
+    from armwright.program.repl.session import Session
 
     session = Session(given_cell(cell), std, import_reader(Path()))
     commands = Commands(session, cell)
@@ -151,8 +151,8 @@ class _Talk:
     def answer(self, answer: "Answer") -> None:
         """Show what was done, in order, and then what is wrong."""
         from armwright.cli.programs import print_diagnostics
-        from armwright.program.interactive.taken_back import SILENT
-        from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more
+        from armwright.program.repl.undo_report import SILENT
+        from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
 
         self.status = max(self.status, answer.status)
         found = excerpt([one for one in answer.effects if one.kind not in SILENT], ON_A_TERMINAL).mapped(_shown)
@@ -183,7 +183,7 @@ class _Talk:
 
 def _shown(effect: "Effect") -> tuple[str, str]:
     """Return what is shown of an effect, and how it looks."""
-    from armwright.program.running.excerpt import one_line
+    from armwright.program.vm.excerpt import one_line
 
     if effect.kind == "PRINT":
         return one_line(effect.data["printed"], _ALL_OF_IT), ""
@@ -222,7 +222,7 @@ class _Json(_Talk):
 
 def _as_data(answer: "Answer") -> dict[str, Any]:
     from armwright.cli.programs import error_data
-    from armwright.program.messages.diagnostics import to_json
+    from armwright.program.language.diagnostic import to_json
 
     return {
         "ok": not answer.is_wrong,

@@ -12,7 +12,7 @@ import attrs
 from armwright.errors import InvalidValueError, OutputError, UnknownNameError, shortened
 
 if TYPE_CHECKING:
-    from armwright.program.interactive.session import Answer, Session
+    from armwright.program.repl.session import Answer, Session
 
 _PROGRAM = "session.rlo"
 
@@ -68,13 +68,13 @@ class Commands:
 
     def frames(self, _: str) -> Reply:
         """Show the frame tree: places in the unit of the program, turns about z, y, x in degrees."""
-        from armwright.program.interactive.showing import frames
+        from armwright.program.repl.frame_view import frames
 
         return Reply(lines=tuple(frames(self._session)))
 
     def arms(self, _: str) -> Reply:
         """Show the joints of the arms and what their hands hold."""
-        from armwright.program.interactive.showing import arms
+        from armwright.program.repl.frame_view import arms
 
         return Reply(lines=tuple(arms(self._session)))
 
@@ -131,7 +131,7 @@ class Commands:
             FileFormatError: it cannot be read.
         """
         from armwright.files.reading import read_program
-        from armwright.program.text.source import Source
+        from armwright.program.language.source import Source
 
         # What a file imports it names as seen from its own folder.
         return self._session.load(
@@ -186,8 +186,8 @@ class Commands:
         from armwright.cell.simulator import Simulator
         from armwright.cli.programs import imported_files, in_its_cell
         from armwright.files.output import write_folder
-        from armwright.program.running.interpret import interpret, warnings
-        from armwright.program.text.source import Source
+        from armwright.program.language.source import Source
+        from armwright.program.vm.interpreter import interpret, warnings
         from armwright.report.files import Origin, result_files, run_record
 
         session, program = self._session, folder / _PROGRAM

@@ -10,7 +10,7 @@ from armwright.errors import FileFormatError
 from armwright.files.limits import MEGABYTE, beyond, limit
 
 if TYPE_CHECKING:
-    from armwright.program.interactive.session import Session
+    from armwright.program.repl.session import Session
 
 # Lines of earlier sessions that the arrow keys come back to.
 _LONGEST_HISTORY = 2000
@@ -121,9 +121,9 @@ def completions(session: "Session", commands: tuple[str, ...], before: str, word
         before: the line in front of the word.
         word: its beginning; it may be empty.
     """
-    from armwright.program.interactive.showing import names
-    from armwright.program.meaning.functions import FUNCTIONS
-    from armwright.program.text.words import SENSORS, VOCABULARIES, Standard
+    from armwright.program.language.words import SENSORS, VOCABULARIES, Standard
+    from armwright.program.repl.frame_view import names
+    from armwright.program.semantics.builtins import FUNCTIONS
 
     start = before.lstrip()
     if start == ":":

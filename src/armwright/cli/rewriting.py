@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from armwright.program.text.source import Source
+    from armwright.program.language.source import Source
 
 # The program that stands for what is typed or piped in.
 INPUT = Path("-")
@@ -19,7 +19,7 @@ def read_source(path: Path) -> "Source":
     import sys
 
     from armwright.files.reading import read_program, read_typed_program
-    from armwright.program.text.source import Source
+    from armwright.program.language.source import Source
 
     if path == INPUT:
         return Source("standard input", read_typed_program(sys.stdin.buffer))

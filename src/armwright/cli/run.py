@@ -13,7 +13,7 @@ from armwright.cli.printing import command_line, plain_console, print_json, prin
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, given_cell
 from armwright.cli.progress import waiting
 from armwright.errors import ExitStatus, counted
-from armwright.program.text.words import Standard
+from armwright.program.language.words import Standard
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     from armwright.cell.model import Cell
     from armwright.program import Source
-    from armwright.program.intermediate.code import Code
-    from armwright.program.messages.diagnostics import Diagnostic
-    from armwright.program.running.interpret import Limits, RunError
-    from armwright.program.running.recording import Effect, Recording, RunStage
+    from armwright.program.bytecode.instructions import Code
+    from armwright.program.language.diagnostic import Diagnostic
+    from armwright.program.vm.interpreter import Limits, RunError
+    from armwright.program.vm.recording import Effect, Recording, RunStage
     from armwright.report.files import Origin
 
 
@@ -83,7 +83,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.cli.results import warn_of_stray
     from armwright.errors import FileFormatError
-    from armwright.program.running.interpret import Limits, RunError
+    from armwright.program.vm.interpreter import Limits, RunError
     from armwright.report.files import Origin
 
     warn_of_stray(program)
@@ -136,8 +136,8 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
     """Write what a run has left, also one that failed, and say how it went."""
     from armwright.cli.programs import print_diagnostics
     from armwright.cli.results import write_results
-    from armwright.program.running.excerpt import KEPT, NOT_KEPT
-    from armwright.program.running.interpret import warnings
+    from armwright.program.vm.excerpt import KEPT, NOT_KEPT
+    from armwright.program.vm.interpreter import warnings
     from armwright.report.files import ending, left_out, result_files, run_record, summary
 
     failed = () if error is None else (error.diagnostic,)
@@ -175,7 +175,7 @@ def _translated(
     """Return the code of a program, its cell, what was said of it, and the files that it imports."""
     from armwright.cli.programs import imported_files, in_its_cell
     from armwright.files.reading import read_program
-    from armwright.program.intermediate.assembly import assemble
+    from armwright.program.bytecode.assembler import assemble
 
     if program.suffix == CODE_SUFFIX:
         if given is None:
@@ -210,7 +210,7 @@ def _adjusted(place: "Cell", servo_ms: float | None, deviation_mm: float | None,
 def _interpret(code: "Code", place: "Cell", limits: "Limits", *, watched: bool) -> "Recording":
     """Run in the simulator, with the present statement on the screen when a person watches."""
     from armwright.cell.simulator import Simulator
-    from armwright.program.running.interpret import interpret
+    from armwright.program.vm.interpreter import interpret
 
     simulator = Simulator(place)
     with waiting("", quiet=not watched) as told:
@@ -228,7 +228,7 @@ def _interpret(code: "Code", place: "Cell", limits: "Limits", *, watched: bool) 
 def _refuse(source: "Source", diagnostics: "Sequence[Diagnostic]", *, as_json: bool) -> NoReturn:
     """Say why a program cannot run, and stop."""
     from armwright.cli.programs import error_data, print_diagnostics
-    from armwright.program.messages.diagnostics import to_json
+    from armwright.program.language.diagnostic import to_json
 
     if as_json:
         said = {"program": source.name, "diagnostics": [to_json(one, source) for one in diagnostics]}
@@ -245,7 +245,7 @@ def _places(error: "RunError") -> dict[str, list[float] | None]:
 
 
 def _print_summary(recording: "Recording", code: "Code", where: str) -> None:
-    from armwright.program.running.excerpt import ON_A_TERMINAL, listed
+    from armwright.program.vm.excerpt import ON_A_TERMINAL, listed
 
     console = plain_console()
     print_table(console, _trace_table(recording, code, where))
@@ -270,7 +270,7 @@ def _print_summary(recording: "Recording", code: "Code", where: str) -> None:
 def _trace_table(recording: "Recording", code: "Code", where: str) -> "Table":
     from rich.text import Text
 
-    from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more, one_line
+    from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
 
     several = len(recording.processes) > 1
 
@@ -285,7 +285,7 @@ def _trace_table(recording: "Recording", code: "Code", where: str) -> "Table":
 
 
 def _stage_table(recording: "Recording", code: "Code", where: str) -> "Table":
-    from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more
+    from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
 
     def row(stage: "RunStage") -> "tuple[str | Text, ...]":
         off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
@@ -317,7 +317,7 @@ def _print_moment(error: "RunError", code: "Code") -> None:
     """Show where every frame was when a program could not go on."""
     from armwright.cell.frames import WORLD
     from armwright.cli.terminal import console
-    from armwright.program.running.excerpt import ON_A_TERMINAL, excerpt, more
+    from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
 
     def row(name: str) -> tuple[str, ...]:
         parent = (error.tree.parent(name) or WORLD).removesuffix(".BASE")

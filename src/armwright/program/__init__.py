@@ -4,11 +4,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from armwright.program.compiler import Compilation as Compilation
-    from armwright.program.compiler import compile as compile  # noqa: A004 - what a translator does
-    from armwright.program.meaning.known import KnownCell as KnownCell
-    from armwright.program.meaning.known import known_cell as known_cell
-    from armwright.program.text.source import Source as Source
+    from armwright.program.api import Compilation as Compilation
+    from armwright.program.api import compile as compile  # noqa: A004 - what a translator does
+    from armwright.program.language.source import Source as Source
+    from armwright.program.semantics.cell_symbols import KnownCell as KnownCell
+    from armwright.program.semantics.cell_symbols import known_cell as known_cell
 
 # Loaded when they are asked for: the command line needs some words of the language for its --help, and no compiler.
 _HOMES = {

@@ -16,11 +16,11 @@ from armwright.errors import ExitStatus
 from armwright.files.output import sha256
 from armwright.files.reading import hash_read
 from armwright.motion.plan import Stage
-from armwright.program.intermediate.code import Code
-from armwright.program.messages.diagnostics import Diagnostic, to_json
-from armwright.program.running.excerpt import IN_A_LIST, KEPT, Excerpt, excerpt, listed, more
-from armwright.program.running.machine import RunError
-from armwright.program.running.recording import Effect, Recording, RunStage, motion_rows
+from armwright.program.bytecode.instructions import Code
+from armwright.program.language.diagnostic import Diagnostic, to_json
+from armwright.program.vm.excerpt import IN_A_LIST, KEPT, Excerpt, excerpt, listed, more
+from armwright.program.vm.machine import RunError
+from armwright.program.vm.recording import Effect, Recording, RunStage, motion_rows
 from armwright.report.page import COLLISIONS, run_page
 from armwright.report.recorded import page_of
 from armwright.spatial.poses import to_noap

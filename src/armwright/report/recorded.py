@@ -11,12 +11,12 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell, CellArm, base_name
 from armwright.kinematics.forward import link_poses
-from armwright.program.intermediate.code import Code
-from armwright.program.messages.diagnostics import Diagnostic
-from armwright.program.running.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
-from armwright.program.running.obstacles import note_of
-from armwright.program.running.recording import Effect as RunEffect
-from armwright.program.running.recording import Recording, RunStage, Stream
+from armwright.program.bytecode.instructions import Code
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.vm.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
+from armwright.program.vm.move_diagnostics import note_of
+from armwright.program.vm.recording import Effect as RunEffect
+from armwright.program.vm.recording import Recording, RunStage, Stream
 from armwright.report.page import (
     Animation,
     ArmRecord,

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from armwright.program.intermediate.assembly import assembly
+from armwright.program.bytecode.assembler import assembly
 from program.debugging.client import Client
 from program.running import CORPUS, cell_of, code_of
 

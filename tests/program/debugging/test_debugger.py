@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from armwright.cell.simulator import Simulator
-from armwright.program.debugging.breakpoints import CountError
-from armwright.program.debugging.debugger import Command, Debugger, DebuggerError
-from armwright.program.debugging.evaluating import ExpressionError
-from armwright.program.debugging.variables import Shown
-from armwright.program.running.interpret import Limits, interpret
-from armwright.program.text.words import Standard
+from armwright.program.debugger.breakpoints import CountError
+from armwright.program.debugger.debugger import Command, Debugger, DebuggerError
+from armwright.program.debugger.expressions import ExpressionError
+from armwright.program.debugger.variables import Shown
+from armwright.program.language.words import Standard
+from armwright.program.vm.interpreter import Limits, interpret
 from program.running import cell_of, code_of, corpus_text, down
 
 HEAD = "VAR f, g : FRAME ;\n    n, m : SCALAR ;\n    t : TRANS ;\n    e : EVENT ;\n"

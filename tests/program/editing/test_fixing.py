@@ -6,10 +6,10 @@ import pytest
 
 from armwright.program import Compilation, Source
 from armwright.program import compile as translate
-from armwright.program.editing.fixing import Fixed, apart, fixed
-from armwright.program.messages.diagnostics import Diagnostic, Fix
-from armwright.program.text.source import Span
-from armwright.program.text.words import Standard
+from armwright.program.diagnostics.fixes import Fixed, apart, fixed
+from armwright.program.language.diagnostic import Diagnostic, Fix
+from armwright.program.language.source import Span
+from armwright.program.language.words import Standard
 from program.shelf import CORPUS, OLD, REJECTED, cell_of, imports_of
 
 # What is left out of the conformance programs, one at a time.

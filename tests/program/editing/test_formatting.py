@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from lark import Lark
 
 from armwright.errors import InvalidValueError
-from armwright.program.editing.formatting import WIDTH, UnformattableError, formatted
+from armwright.program.formatter.format import WIDTH, UnformattableError, formatted
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import Standard
 from armwright.program.syntax import tree
-from armwright.program.syntax.parse import parse
-from armwright.program.text.numbering import without_numbers
-from armwright.program.text.source import Source, Span
-from armwright.program.text.tokens import Scanned, scan
-from armwright.program.text.words import Standard
+from armwright.program.syntax.lexer import Scanned, scan
+from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.parser import parse
 from program.sentences import Sentences, mutants
 from program.shelf import ACCEPTED, CORPUS, OLD, REJECTED
 from samples import Sample

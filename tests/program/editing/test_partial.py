@@ -5,8 +5,8 @@ import pytest
 
 from armwright.program import Source
 from armwright.program import compile as translate
-from armwright.program.editing.formatting import UnformattableError, formatted
-from armwright.program.editing.partial import formatted_around
+from armwright.program.formatter.format import UnformattableError, formatted
+from armwright.program.formatter.partial import formatted_around
 from program.shelf import ACCEPTED, CORPUS, REJECTED, compile_file
 from samples import Sample
 

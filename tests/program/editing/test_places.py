@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armwright.program.editing.places import NO_DRIFT, Edit, Ruler, drift, edited
-from armwright.program.text.source import Span
+from armwright.program.language.source import Span
+from armwright.program.language_server.positions import NO_DRIFT, Edit, Ruler, drift, edited
 
 TEXTS = st.text(st.sampled_from(["a", "b", " ", "\n", "\r", "é", "€", "🤖", "\u2028", "\f"]), max_size=30)
 ENCODINGS = st.sampled_from(["utf-8", "utf-16", "utf-32"])

@@ -9,23 +9,23 @@ import pytest
 from armwright.errors import InvalidValueError
 from armwright.program import KnownCell, Source
 from armwright.program import compile as translate
-from armwright.program.editing.analysing import Settings, analyse
-from armwright.program.editing.analysis import Analysis, View
-from armwright.program.editing.cells import Cells
-from armwright.program.editing.completions import completions
-from armwright.program.editing.explained import WORDS, explained
-from armwright.program.editing.hints import hints
-from armwright.program.editing.hovers import hover
-from armwright.program.editing.occurrences import What
-from armwright.program.editing.outline import folds, outline
-from armwright.program.editing.places import Ruler, edited
-from armwright.program.editing.quickfixes import all_fixes, quickfixes
-from armwright.program.editing.renames import rename
-from armwright.program.editing.semantic import difference, encoded, line_stretches, patched
-from armwright.program.editing.signatures import signature_at
-from armwright.program.meaning.functions import FUNCTIONS
-from armwright.program.text.source import Span
-from armwright.program.text.words import VOCABULARIES, Standard
+from armwright.program.language.source import Span
+from armwright.program.language.words import VOCABULARIES, Standard
+from armwright.program.language_server.analyse import Settings, analyse
+from armwright.program.language_server.analysis import Analysis, View
+from armwright.program.language_server.cell_lookup import Cells
+from armwright.program.language_server.code_actions import all_fixes, quickfixes
+from armwright.program.language_server.completions import completions
+from armwright.program.language_server.hover import hover
+from armwright.program.language_server.inlay_hints import hints
+from armwright.program.language_server.keyword_docs import WORDS, explained
+from armwright.program.language_server.outline import folds, outline
+from armwright.program.language_server.positions import Ruler, edited
+from armwright.program.language_server.rename import rename
+from armwright.program.language_server.semantic_tokens import difference, encoded, line_stretches, patched
+from armwright.program.language_server.signature_help import signature_at
+from armwright.program.language_server.symbol_index import What
+from armwright.program.semantics.builtins import FUNCTIONS
 from program.shelf import ACCEPTED, CORPUS
 
 STANFORD = CORPUS / "cell1.json"

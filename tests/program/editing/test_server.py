@@ -13,7 +13,7 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 from pytest_lsp import ClientServerConfig, LanguageClient, client_capabilities
 
-from armwright.program.editing.semantic import KINDS, MODIFIERS
+from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS
 
 CELL = """
 name = "bench"

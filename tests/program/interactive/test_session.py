@@ -10,13 +10,13 @@ import pytest
 from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
-from armwright.program.interactive.session import Answer, Session
-from armwright.program.interactive.showing import arms, frames, to_zyx
-from armwright.program.meaning.known import Imported
-from armwright.program.running.interpret import Limits, interpret
-from armwright.program.running.machine import Machine
-from armwright.program.text.source import Source
-from armwright.program.text.words import Standard
+from armwright.program.language.source import Source
+from armwright.program.language.words import Standard
+from armwright.program.repl.frame_view import arms, frames, to_zyx
+from armwright.program.repl.session import Answer, Session
+from armwright.program.semantics.cell_symbols import Imported
+from armwright.program.vm.interpreter import Limits, interpret
+from armwright.program.vm.machine import Machine
 from armwright.spatial.poses import pose
 from program.running import DOWN, EXACT, cell_of, code_of, corpus_text, down
 

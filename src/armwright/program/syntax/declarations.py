@@ -3,13 +3,13 @@
 import math
 
 from armwright.errors import closest
-from armwright.program.messages.diagnostics import Fix
-from armwright.program.syntax import beyond, tree
-from armwright.program.syntax.cursor import LostError, Tokens, shown
+from armwright.program.language.diagnostic import Fix
+from armwright.program.language.words import LATER_TYPES
+from armwright.program.syntax import rlo83, tree
 from armwright.program.syntax.expressions import listed, number
-from armwright.program.syntax.values import check_length
-from armwright.program.text.tokens import TokenKind
-from armwright.program.text.words import LATER_TYPES
+from armwright.program.syntax.lexer import TokenKind
+from armwright.program.syntax.operands import check_length
+from armwright.program.syntax.token_stream import LostError, Tokens, shown
 
 
 def passed_over(tokens: Tokens, names: list[tree.Name | None]) -> tree.Declaration:
@@ -73,7 +73,7 @@ def _goes_on(tokens: Tokens) -> bool:
         return True
     if tokens.later:
         return not closest(token.text, ["BEGIN", *tokens.words.headers, *tokens.words.statements])
-    return not beyond.starts_header(tokens) and not closest(token.text, ["BEGIN", *tokens.words.statements])
+    return not rlo83.starts_header(tokens) and not closest(token.text, ["BEGIN", *tokens.words.statements])
 
 
 # decl = name { "," name } ":" type ";" ;
@@ -153,7 +153,7 @@ def type_name(tokens: Tokens) -> tree.TypeName:
         span = tokens.since(start)
         return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
     if tokens.sees_word(*LATER_TYPES):
-        return beyond.type_name(tokens)
+        return rlo83.type_name(tokens)
     if token.kind is not TokenKind.NAME:
         tokens.lost("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
     near = closest(token.text, types)

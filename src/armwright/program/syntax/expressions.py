@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable
 from typing import TypeVar
 
-from armwright.program.messages.diagnostics import Fix
+from armwright.program.language.diagnostic import Fix
+from armwright.program.language.source import Span
 from armwright.program.syntax import tree
-from armwright.program.syntax.cursor import DEEPEST, Tokens, shown
-from armwright.program.text.source import Span
-from armwright.program.text.tokens import Token, TokenKind
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.token_stream import DEEPEST, Tokens, shown
 
 T = TypeVar("T")
 

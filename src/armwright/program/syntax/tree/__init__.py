@@ -47,6 +47,10 @@ from armwright.program.syntax.tree.statements import (
     Wait,
     While,
 )
+from armwright.program.syntax.tree.traversal import (
+    dump,
+    walk,
+)
 from armwright.program.syntax.tree.values import (
     ArmName,
     Binary,
@@ -62,10 +66,6 @@ from armwright.program.syntax.tree.values import (
     Unary,
     Variable,
     chain,
-)
-from armwright.program.syntax.tree.walking import (
-    dump,
-    walk,
 )
 
 __all__ = [

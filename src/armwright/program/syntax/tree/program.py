@@ -4,9 +4,9 @@ from typing import TypeAlias
 
 import attrs
 
+from armwright.program.language.source import Span
 from armwright.program.syntax.tree.statements import Block, Statement
 from armwright.program.syntax.tree.values import Name, Number, String
-from armwright.program.text.source import Span
 
 
 @attrs.frozen

@@ -4,8 +4,8 @@ from typing import TypeAlias
 
 import attrs
 
+from armwright.program.language.source import Span
 from armwright.program.syntax.tree.values import ArmName, Expression, Mobile, Name, Number, Poison, String, Variable
-from armwright.program.text.source import Span
 
 
 @attrs.frozen

@@ -4,7 +4,7 @@ from typing import TypeAlias
 
 import attrs
 
-from armwright.program.text.source import Span
+from armwright.program.language.source import Span
 
 
 @attrs.frozen

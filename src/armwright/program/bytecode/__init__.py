@@ -1,0 +1,1 @@
+"""Intermediate code: its instructions, how they are generated, and their text form."""

@@ -1,0 +1,410 @@
+"""The text form of intermediate code: written out, changed by hand if need be, and read back to the same code.
+
+The form is described in docs/code.md. It holds everything the interpreter and its messages need, the program text
+included, so that a program can be run, and its errors shown, from this file alone.
+"""
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import NoReturn
+
+import attrs
+
+from armwright.errors import FileFormatError, closest, shown
+from armwright.program.bytecode.instructions import (
+    Code,
+    Constant,
+    Instruction,
+    Kind,
+    Op,
+    Operand,
+    Place,
+    ProcedureCode,
+    Text,
+    Type,
+)
+from armwright.program.language.source import Source, Span
+from armwright.program.language.units import DECLARABLE, UnitSystem, dimension
+from armwright.program.language.words import Standard
+
+HEAD = "; armwright intermediate code, form 1"
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(?:-[0-9]+)?")
+_PASSING = re.compile(r"%[0-9]+")
+_STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
+_OPERAND = re.compile(r'"(?:[^"\\]|\\.)*"|[^\s;]+')
+_ROW = re.compile(r"(?P<at>[0-9]+)\s+(?P<span>\S+)\s+(?P<op>[A-Za-z]+)(?P<rest>.*)")
+_SPAN = re.compile(r"(?P<line>[0-9]+):(?P<column>[0-9]+)\+(?P<length>[0-9]+)(?P<begins>!?)")
+_TYPE = re.compile(r"(?:ARRAY \[(?P<sizes>[0-9]+(?:,[0-9]+)*)\] OF )?(?P<kind>[A-Z]+)")
+# What a file may ask for at most.
+_MOST_ELEMENTS = 1_000_000
+
+
+# ---- writing -------------------------------------------------------------------------------------------------------
+
+
+def assembly(code: Code) -> str:
+    """Return the text form of a program's code."""
+    return "\n".join(_lines(code)) + "\n"
+
+
+def _lines(code: Code) -> Iterator[str]:
+    yield HEAD
+    yield f"program {json.dumps(code.source.name, ensure_ascii=False)}"
+    yield f"units {code.units.length} {code.units.angle}"
+    if code.standard is not Standard.RLO_2:
+        yield f"standard {code.standard.value}"
+    yield from (f"name {text}" for text in code.spelling.values())
+    for name, kind in code.types.items():
+        yield f"var {name} {kind}"
+    for name, procedure in code.procedures.items():
+        yield f"procedure {name} @{procedure.start:04d}"
+        for own, kind in procedure.types.items():
+            word = "parameter" if own in procedure.parameters else "local"
+            yield f"  {word} {own} {kind}"
+    for index, value in enumerate(code.constants):
+        numbers = value if isinstance(value, tuple) else (value,)
+        yield f"constant c{index} {' '.join(map(repr, numbers))}"
+    yield "code"
+    for at, step in enumerate(code.instructions):
+        source, span = code.source, step.span
+        place = f"{source.line(span.start)}:{source.column(span.start)}+{span.end - span.start}"
+        operands = " ".join(map(_written, step.operands))
+        row = f"{at:04d}  {place + ('!' if step.begins else ''):<12} {step.op.value:<6} {operands}".rstrip()
+        yield f"{row:<56} ; {step.comment}" if step.comment else row
+    yield "source"
+    yield from (f"| {json.dumps(line, ensure_ascii=False)[1:-1]}" for line in code.source.text.split("\n"))
+
+
+def _written(operand: Operand) -> str:
+    match operand:
+        case str():
+            return operand
+        case Constant(index=index):
+            return f"c{index}"
+        case Place(index=index):
+            return f"@{index:04d}"
+        case Text(value=value):
+            return json.dumps(value, ensure_ascii=False)
+        case _:
+            return repr(float(operand))
+
+
+# ---- reading -------------------------------------------------------------------------------------------------------
+
+
+def assemble(text: str, name: str = "code") -> Code:
+    """Read the text form of code.
+
+    Args:
+        text: as ``assembly`` writes it; comments behind ``;`` and blank lines mean nothing.
+        name: of the file, for messages.
+
+    Raises:
+        FileFormatError: a line makes no sense, or the code could not be run: an operand of another sort than the
+            operation takes, a jump out of the program. The message has the number of the line.
+    """
+    return _Reader(name, text).code()
+
+
+@attrs.define
+class _Procedure:
+    start: int
+    parameters: list[str] = attrs.field(factory=list)
+    types: dict[str, Type] = attrs.field(factory=dict)
+
+
+class _Reader:
+    """One pass over the lines."""
+
+    def __init__(self, file: str, text: str) -> None:
+        self._file, self._rows = file, text.split("\n")
+        self._number = 0
+        self._program = "program"
+        self._units = UnitSystem()
+        self._standard = Standard.RLO_2
+        self._spelling: dict[str, str] = {}
+        self._types: dict[str, Type] = {}
+        self._procedures: dict[str, _Procedure] = {}
+        self._constants: list[tuple[float, ...] | float] = []
+        self._steps: list[tuple[int, Op, tuple[Operand, ...], tuple[int, int, int], bool]] = []
+
+    def code(self) -> Code:
+        body, source = self._split()
+        words: Mapping[str, Callable[[str], None]] = {
+            "program": self._read_program,
+            "units": self._read_units,
+            "standard": self._read_standard,
+            "name": self._read_name,
+            "var": self._read_variable,
+            "procedure": self._read_procedure,
+            "parameter": self._read_own,
+            "local": self._read_own,
+            "constant": self._read_constant,
+        }
+        in_code = False
+        for number, row in enumerate(body, 1):
+            self._number = number
+            line = row.strip()
+            if not line or line.startswith(";"):
+                continue
+            word, _, rest = line.partition(" ")
+            if in_code:
+                self._read_step(line)
+            elif word == "code" and not rest:
+                in_code = True
+            elif word in words:
+                self._word = word
+                words[word](rest.strip())
+            else:
+                self._fail(f"unknown word {word!r}", closest(word, [*words, "code"]))
+        self._number = len(body) + 1
+        if not self._steps:
+            self._fail("there is no instruction")
+        return self._whole(source)
+
+    def _split(self) -> tuple[list[str], str]:
+        """Return the lines in front of the source, and the source."""
+        if "source" not in self._rows:
+            self._number = len(self._rows)
+            self._fail("the program text is missing; it follows a line `source`")
+        at = self._rows.index("source")
+        lines = []
+        for number, row in enumerate(self._rows[at + 1 :], at + 2):
+            self._number = number
+            if not row and self._number == len(self._rows):
+                break
+            if not row.startswith("| ") and row != "|":
+                self._fail("a line of the program text begins with `| `")
+            try:
+                lines.append(json.loads(f'"{row[2:]}"'))
+            except ValueError:
+                self._fail("not a line of text as JSON writes it")
+        return self._rows[:at], "\n".join(lines)
+
+    def _read_program(self, rest: str) -> None:
+        self._program = self._string(rest)
+
+    def _read_units(self, rest: str) -> None:
+        for unit in rest.split():
+            if unit not in DECLARABLE:
+                self._fail(f"unknown unit {unit!r}", closest(unit, DECLARABLE))
+            self._units = attrs.evolve(self._units, **{dimension(unit): unit})
+
+    def _read_standard(self, rest: str) -> None:
+        known = [standard.value for standard in Standard]
+        if rest not in known:
+            self._fail(f"unknown standard {rest!r}, expected {' or '.join(known)}")
+        self._standard = Standard(rest)
+
+    def _read_name(self, rest: str) -> None:
+        self._spelling[self._name(rest)] = rest
+
+    def _read_variable(self, rest: str) -> None:
+        name, _, kind = rest.partition(" ")
+        self._types[self._name(name)] = self._type(kind)
+
+    def _read_procedure(self, rest: str) -> None:
+        name, _, start = rest.partition(" ")
+        if not re.fullmatch(r"@[0-9]{1,9}", start):
+            self._fail("a procedure begins at an instruction such as @0012")
+        self._procedures[self._name(name)] = _Procedure(int(start[1:]))
+
+    def _read_own(self, rest: str) -> None:
+        if not self._procedures:
+            self._fail(f"a {self._word} belongs to a procedure")
+        procedure = self._procedures[next(reversed(self._procedures))]
+        name, _, kind = rest.partition(" ")
+        procedure.types[self._name(name)] = self._type(kind)
+        if self._word == "parameter":
+            procedure.parameters.append(self._name(name))
+
+    def _read_constant(self, rest: str) -> None:
+        name, *numbers = rest.split() or [""]
+        if name != f"c{len(self._constants)}" or len(numbers) not in (1, 12):
+            self._fail(f"expected c{len(self._constants)} and 1 or 12 numbers")
+        values = tuple(map(self._float, numbers))
+        self._constants.append(values if len(values) > 1 else values[0])
+
+    def _read_step(self, line: str) -> None:
+        match = _ROW.fullmatch(line)
+        if match is None:
+            self._fail("expected the number, the place, the operation and its operands")
+        if int(match["at"][:9]) != len(self._steps):
+            self._fail(f"expected instruction {len(self._steps):04d}")
+        span = _SPAN.fullmatch(match["span"])
+        if span is None:
+            self._fail("expected a place such as 12:5+20")
+        name = match["op"].upper()
+        if name not in Op.__members__:
+            self._fail(f"unknown operation {name!r}", closest(name, Op.__members__))
+        operands = []
+        rest = match["rest"]
+        while (found := _OPERAND.search(rest)) and not rest[: found.start()].count(";"):
+            operands.append(self._operand(found[0]))
+            rest = rest[found.end() :]
+        numbers = (int(span["line"][:9]), int(span["column"][:9]), int(span["length"][:9]))
+        self._steps.append((self._number, Op[name], tuple(operands), numbers, bool(span["begins"])))
+
+    def _operand(self, word: str) -> Operand:
+        if _STRING.fullmatch(word):
+            return Text(self._string(word))
+        if word[0] == "@" and word[1:].isdecimal():
+            return Place(int(word[1:10]))
+        if re.fullmatch(r"c[0-9]+", word):
+            return Constant(int(word[1:10]))
+        if _PASSING.fullmatch(word):
+            return word
+        if _NAME.fullmatch(word):
+            return word.upper()
+        return self._float(word)
+
+    # ---- whole and sound -------------------------------------------------------------------------------------------
+
+    def _whole(self, text: str) -> Code:
+        source = Source(self._program, text)
+        instructions = []
+        for number, op, operands, (line, column, length), begins in self._steps:
+            self._number = number
+            if not 1 <= line <= len(source.line_starts):
+                self._fail(f"the program has no line {line}")
+            start = source.line_starts[line - 1] + column - 1
+            if column < 1 or start + length > len(text):
+                self._fail(f"the program has no {length} characters from {line}:{column} on")
+            instructions.append(Instruction(op=op, operands=operands, span=Span(start, start + length), begins=begins))
+        procedures = {
+            name: ProcedureCode(start=one.start, parameters=tuple(one.parameters), types=one.types)
+            for name, one in self._procedures.items()
+        }
+        code = Code(
+            instructions=tuple(instructions),
+            constants=tuple(self._constants),
+            types=self._types,
+            procedures=procedures,
+            units=self._units,
+            spelling=self._spelling,
+            standard=self._standard,
+            source=source,
+        )
+        numbers = [number for number, *_ in self._steps]
+        for at, fault in faults(code):
+            self._number = numbers[at] if at < len(numbers) else len(numbers)
+            self._fail(fault)
+        return code
+
+    def _type(self, text: str) -> Type:
+        match = _TYPE.fullmatch(text.strip())
+        if match is None or match["kind"] not in Kind.__members__:
+            self._fail(f"unknown type {text!r}")
+        sizes = tuple(int(size[:9]) for size in (match["sizes"] or "").split(",") if size)
+        if sizes and not 1 <= math.prod(sizes) <= _MOST_ELEMENTS:
+            self._fail(f"an array has 1 to {_MOST_ELEMENTS} elements")
+        return Type(Kind[match["kind"]], sizes)
+
+    def _name(self, text: str) -> str:
+        if not _NAME.fullmatch(text):
+            self._fail(f"{text!r} is not a name")
+        return text.upper()
+
+    def _string(self, text: str) -> str:
+        try:
+            value = json.loads(text)
+        except (ValueError, RecursionError):
+            value = None
+        if not isinstance(value, str):
+            self._fail(f'expected text in "", got {shown(text)}')
+        return value
+
+    def _float(self, word: str) -> float:
+        try:
+            value = float(word)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            self._fail(f"{word!r} is no operand")
+        return value
+
+    def _fail(self, message: str, near: str | None = None) -> NoReturn:
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise FileFormatError(self._file, self._number, "", f"{message}{hint}")
+
+
+# What each operation takes: n a name or element, v a value, k a constant, p a place, t text or value, x a word; in
+# brackets what may be left out, + for any number more of the last.
+_TAKES: Mapping[str, str] = {
+    "LOADM LOADS": "nk",
+    "COPY NEG INV NOT ROTX ROTY ROTZ": "nv",
+    "MUL DIV ADD SUB LT LE EQ NE GE GT DIST": "nvv",
+    "XYZ": "nvvv",
+    "MATX": "nvvvvvvvvvvvv",
+    "FORCE": "nx",
+    "ELEM": "nxv+",
+    "AFFIX": "nn(x)",
+    "AFFAT": "nnv(x)",
+    "UNFIX": "n(n)",
+    "OPEN": "x(v)",
+    "GRASP": "(x)",
+    "OPER": "xx",
+    "READV": "n",
+    "READS": "x",
+    "MVBEG": "nv",
+    "MVVIA": "v+",
+    "MVAPP MVDEP MVSPD MVBLD MVDUR": "v",
+    "MVON": "pnp",
+    "MVDIR MVSTR MVEND MVHLT RET JOIN QUIT ENDR RETRY HALT STOP": "",
+    "JMP TRY ENDT": "p",
+    "JZ": "vp",
+    "FOR": "nvvvvp",
+    "CALL": "x(v+)",
+    "FORK": "p(v)",
+    "SIG WAIT": "n",
+    "PAUSE": "v",
+    "LOCK UNLK": "n+",
+    "PRINT": "t+",
+}
+TAKES: Mapping[Op, str] = {Op[name]: takes for names, takes in _TAKES.items() for name in names.split()}
+_PATTERNS = {
+    op: re.compile(
+        takes.replace("(", "(?:")
+        .replace(")", ")?")
+        .replace("n", "[wq]")
+        .replace("v", "[wqd]")
+        .replace("x", "w")
+        .replace("t", "[wqds]")
+    )
+    for op, takes in TAKES.items()
+}
+
+
+def _letter(operand: Operand) -> str:
+    match operand:
+        case str():
+            return "q" if operand.startswith("%") else "w"
+        case Constant():
+            return "k"
+        case Place():
+            return "p"
+        case Text():
+            return "s"
+        case _:
+            return "d"
+
+
+def faults(code: Code) -> Iterator[tuple[int, str]]:
+    """Say what would keep code from being run, with the number of the instruction."""
+    last = len(code.instructions)
+    for at, step in enumerate(code.instructions):
+        if not _PATTERNS[step.op].fullmatch("".join(map(_letter, step.operands))):
+            yield at, f"{step.op} does not take these operands"
+        for operand in step.operands:
+            if isinstance(operand, Place) and not 0 <= operand.index < last:
+                yield at, f"there is no instruction @{operand.index:04d}"
+            if isinstance(operand, Constant) and operand.index >= len(code.constants):
+                yield at, f"there is no constant c{operand.index}"
+    for name, procedure in code.procedures.items():
+        if procedure.start >= last:
+            yield last, f"procedure {name} begins behind the last instruction"
+    if code.instructions[-1].op not in (Op.STOP, Op.RET, Op.QUIT, Op.JMP, Op.HALT):
+        yield last - 1, "the code runs on behind its last instruction"

@@ -1,0 +1,163 @@
+"""Writing instructions: places that are known later, values in passing, and the code of expressions."""
+
+from armwright.program.bytecode.instructions import Constant, Instruction, Op, Operand, Place
+from armwright.program.language.source import Source, Span
+from armwright.program.language.units import UnitSystem, convert
+from armwright.program.syntax import pose_literals, tree
+
+# A place that will be known later.
+LATER = Place(-1)
+
+_OPERATIONS = {
+    "*": Op.MUL,
+    "/": Op.DIV,
+    "+": Op.ADD,
+    "-": Op.SUB,
+    "<": Op.LT,
+    "<=": Op.LE,
+    "=": Op.EQ,
+    "<>": Op.NE,
+    ">=": Op.GE,
+    ">": Op.GT,
+}
+
+
+class Emitter:
+    """The instructions of a program so far."""
+
+    def __init__(self, source: Source, units: UnitSystem) -> None:
+        """Start with nothing."""
+        self.source, self.units = source, units
+        self.instructions: list[Instruction] = []
+        self.constants: list[tuple[float, ...] | float] = []
+        self._passing = 0
+        self._begins = False
+
+    @property
+    def here(self) -> Place:
+        """Where the next instruction will stand."""
+        return Place(len(self.instructions))
+
+    def begin(self) -> None:
+        """A statement begins: its first instruction is marked."""
+        self._begins = True
+
+    def passing(self) -> str:
+        """Return the name of a new value in passing."""
+        self._passing += 1
+        return f"%{self._passing}"
+
+    def emit(self, op: Op, *operands: Operand, span: Span, comment: str = "") -> int:
+        """Write an instruction; return its number."""
+        begins, self._begins = self._begins, False
+        self.instructions.append(Instruction(op=op, operands=operands, span=span, begins=begins, comment=comment))
+        return len(self.instructions) - 1
+
+    def land(self, number: int) -> None:
+        """Let an instruction that was written with a place still open lead here."""
+        old, target = self.instructions[number], self.here
+        operands = tuple(target if operand == LATER else operand for operand in old.operands)
+        self.instructions[number] = Instruction(
+            op=old.op, operands=operands, span=old.span, begins=old.begins, comment=old.comment
+        )
+
+    def constant(self, value: tuple[float, ...] | float) -> Constant:
+        """Keep a constant."""
+        self.constants.append(value)
+        return Constant(len(self.constants) - 1)
+
+    # ---- expressions -----------------------------------------------------------------------------------------------
+
+    def value(self, node: tree.Expression, into: str | None = None) -> Operand:
+        """Write the code of an expression.
+
+        Args:
+            node: a checked expression.
+            into: a variable or value in passing that shall hold the value; where it goes by itself when left out.
+
+        Returns:
+            The operand that has the value: ``into`` if given.
+        """
+        match node:
+            case tree.Number() | tree.Name() | tree.ArmName():
+                operand = convert(node, self.units) if isinstance(node, tree.Number) else node.key
+                if into is None:
+                    return operand
+                self.emit(Op.COPY, into, operand, span=node.span)
+            case tree.Index(name=name, indices=indices):
+                element = self.passing()
+                numbers = [self.value(index) for index in indices]
+                self.emit(Op.ELEM, element, name.key, *numbers, span=node.span)
+                if into is None:
+                    return element
+                self.emit(Op.COPY, into, element, span=node.span)
+            case tree.Binary():
+                return self._chain(node, into)
+            case tree.Matrix():
+                return self._matrix(node, into or self.passing())
+            case _:
+                return self._operation(node, into)
+        return _given(into)
+
+    def _operation(self, node: tree.Expression, into: str | None) -> Operand:
+        match node:
+            case tree.Function(name=name, arguments=arguments):
+                op, operands = Op(name.key), [self.value(argument) for argument in arguments]
+            case tree.Unary(operation=operation, operand=operand):
+                op, operands = Op.NOT if operation == "NOT" else Op.NEG, [self.value(operand)]
+            case _:
+                raise AssertionError(f"a checked program has no {type(node).__name__}")
+        to = into or self.passing()
+        self.emit(op, to, *operands, span=node.span)
+        return to
+
+    def _chain(self, node: tree.Binary, into: str | None) -> Operand:
+        """Write the operations of a chain, one after the other."""
+        first, chain = tree.chain(node)
+        # Both sides of AND and OR go to the same place, so that of the last is that of all in front of it.
+        targets: list[str | None] = []
+        for one in reversed(chain):
+            joins = one.operation in ("AND", "OR")
+            targets.append((into or self.passing()) if joins else into)
+            into = targets[-1] if joins else None
+        left = self.value(first, into)
+        for one in chain:
+            to = targets.pop()
+            if one.operation in ("AND", "OR"):
+                left = self._joint(one, _given(to))
+                continue
+            right = self.value(one.right)
+            to = to or self.passing()
+            self.emit(_OPERATIONS[one.operation], to, left, right, span=one.span)
+            left = to
+        return left
+
+    def _joint(self, node: tree.Binary, to: str) -> str:
+        """AND and OR look at the right side only where it matters: ``n > 0 AND a[n] > 2``."""
+        decides = to
+        if node.operation == "OR":
+            decides = self.passing()
+            self.emit(Op.NOT, decides, to, span=node.left.span)
+        over = self.emit(Op.JZ, decides, LATER, span=node.span)
+        self.value(node.right, to)
+        self.land(over)
+        return to
+
+    def _matrix(self, node: tree.Matrix, to: str) -> str:
+        if all(isinstance(item, tree.Number) for item in node.items):
+            numbers = pose_literals.constant(node)
+            metres = self.units.metres
+            shift = [convert(item, self.units) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
+            self.emit(Op.LOADM, to, self.constant((*numbers[:9], *shift)), span=node.span)
+        else:
+            self.emit(Op.MATX, to, *(self.value(item) for item in node.items), span=node.span)
+        return to
+
+    def text(self, node: tree.Expression) -> str:
+        """Return an expression as the program writes it, on one line."""
+        return " ".join(self.source.slice(node.span).split())
+
+
+def _given(into: str | None) -> str:
+    assert into is not None  # noqa: S101 - the cases without were returned from
+    return into

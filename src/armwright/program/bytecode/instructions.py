@@ -1,0 +1,329 @@
+"""Intermediate code: one instruction is one effect on the frame table, one part of a motion, or one step to it."""
+
+import enum
+import json
+from collections.abc import Iterator, Mapping
+from typing import TypeAlias
+
+import attrs
+
+from armwright.program.language.source import Source, Span
+from armwright.program.language.units import UnitSystem
+from armwright.program.language.words import Standard
+
+NORMAL_SPEED = 100.0
+LOWEST_SPEED, HIGHEST_SPEED = 1.0, 120.0
+
+
+class Op(enum.StrEnum):
+    """What an instruction does; docs/code.md has the operands. What a value goes to is the first operand."""
+
+    # values
+    LOADM = "LOADM"  # to, constant: the twelve numbers
+    LOADS = "LOADS"  # to, constant: the number
+    COPY = "COPY"  # to, value
+    MATX = "MATX"  # to, twelve values: n, o, a, p
+    MUL = "MUL"  # to, left, right: numbers, or places and steps
+    DIV = "DIV"
+    ADD = "ADD"
+    SUB = "SUB"
+    NEG = "NEG"  # to, value
+    INV = "INV"  # to, place or step
+    LT = "LT"  # to, left, right: a truth value
+    LE = "LE"
+    EQ = "EQ"
+    NE = "NE"
+    GE = "GE"
+    GT = "GT"
+    NOT = "NOT"  # to, truth value
+    XYZ = "XYZ"  # to, x, y, z: a step without a turn
+    ROTX = "ROTX"  # to, angle: a turn
+    ROTY = "ROTY"
+    ROTZ = "ROTZ"
+    DIST = "DIST"  # to, frame, frame
+    FORCE = "FORCE"  # to, axis
+    ELEM = "ELEM"  # to, array, indices: the element itself, to be read and written
+    # frames
+    AFFIX = "AFFIX"  # child, parent[, RIGIDLY]: hang on, where both stand now
+    AFFAT = "AFFAT"  # child, parent, step[, RIGIDLY]: hang on, at a step from the parent
+    UNFIX = "UNFIX"  # child[, parent]: cut; the child keeps its place
+    # tools and sensors
+    OPEN = "OPEN"  # arm[, width]: open the fingers
+    GRASP = "GRASP"  # [arm]: close the fingers; without an arm, of the one named or moved last
+    OPER = "OPER"  # device, ON or OFF
+    READV = "READV"  # frame: ask the vision system
+    READS = "READS"  # arm: read the joint sensors
+    # motion
+    MVBEG = "MVBEG"  # moved, goal: a motion begins
+    MVDIR = "MVDIR"  # the shortest way in joint space
+    MVSTR = "MVSTR"  # one straight line
+    MVVIA = "MVVIA"  # frames: through these without a stop
+    MVAPP = "MVAPP"  # frame: approach point
+    MVDEP = "MVDEP"  # frame: departure point
+    MVSPD = "MVSPD"  # number: speed
+    MVBLD = "MVBLD"  # number: how far from via points corners may be rounded
+    MVDUR = "MVDUR"  # number: how long it shall take
+    MVON = "MVON"  # condition, truth value, action: look at every tick, act once
+    MVEND = "MVEND"  # go
+    MVHLT = "MVHLT"  # in an action: end the motion
+    # control
+    JMP = "JMP"  # place
+    JZ = "JZ"  # truth value, place: go there when it is false
+    FOR = "FOR"  # variable, count so far, first, last, step, place: next pass, or go there
+    CALL = "CALL"  # procedure, arguments
+    RET = "RET"  # end of a procedure, a condition or an action
+    FORK = "FORK"  # place[, priority]: a process begins there
+    JOIN = "JOIN"  # wait for the processes begun here
+    QUIT = "QUIT"  # end of a process
+    SIG = "SIG"  # event
+    WAIT = "WAIT"  # event
+    PAUSE = "PAUSE"  # seconds
+    LOCK = "LOCK"  # variables or elements
+    UNLK = "UNLK"  # the same
+    TRY = "TRY"  # place of the recovery
+    ENDT = "ENDT"  # place behind the recovery; nothing went wrong
+    ENDR = "ENDR"  # end of a recovery
+    RETRY = "RETRY"  # from the start of the TRY again
+    HALT = "HALT"  # the program ends here
+    STOP = "STOP"  # end of the text
+    PRINT = "PRINT"  # values and texts
+
+
+class Kind(enum.StrEnum):
+    """What a name stands for."""
+
+    SCALAR = "SCALAR"
+    TRANS = "TRANS"
+    FRAME = "FRAME"
+    EVENT = "EVENT"
+
+
+@attrs.frozen
+class Type:
+    """What a variable holds.
+
+    Attributes:
+        kind: of the thing, or of each element.
+        sizes: of an array, one for each index; empty for a single thing.
+    """
+
+    kind: Kind
+    sizes: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        """Return the type as a declaration writes it."""
+        sizes = ",".join(map(str, self.sizes))
+        return f"ARRAY [{sizes}] OF {self.kind}" if sizes else str(self.kind)
+
+
+@attrs.frozen
+class Constant:
+    """An operand: the constant of that number."""
+
+    index: int
+
+
+@attrs.frozen
+class Place:
+    """An operand: the instruction of that number."""
+
+    index: int
+
+
+@attrs.frozen
+class Text:
+    """An operand: characters to print."""
+
+    value: str
+
+
+# A name in upper case (a variable, an arm, a device, a procedure, a word such as RIGIDLY), a value in passing
+# (``%3``), a number, or one of the above.
+Operand: TypeAlias = str | float | Constant | Place | Text
+
+
+class Trajectory(enum.StrEnum):
+    """The basic trajectories.
+
+    ``PTP``: all joints at once, at rest at both ends. ``LINE``: the moved frame on a straight line.
+    ``SPLINE``: past frames without a stop, at rest at the last; straight between corners that are rounded as far as
+    the cell allows, or through the frames by the report's X-spline in RLO-83. ``BLEND``: the same, rounded from a
+    distance on that the program tells.
+    """
+
+    PTP = "PTP"
+    LINE = "LINE"
+    SPLINE = "SPLINE"
+    BLEND = "BLEND"
+
+
+@attrs.frozen(kw_only=True)
+class Form:
+    """The form of a MOVE: what it goes to, by the names or expressions of the program.
+
+    Attributes:
+        goal: what to come to.
+        via: what lies on the way, without a stop.
+        approach: whence the goal is approached in a straight line.
+        departure: where the start is left to in a straight line.
+        straight: one straight line.
+        blend: whether the corners at via points are rounded.
+    """
+
+    goal: str
+    via: tuple[str, ...] = ()
+    approach: str | None = None
+    departure: str | None = None
+    straight: bool = False
+    blend: bool = False
+
+    @property
+    def direct(self) -> bool:
+        """Whether there is neither a line nor a point on the way."""
+        return not (self.straight or self.via or self.approach or self.departure)
+
+
+@attrs.frozen(kw_only=True)
+class StagePlan:
+    """One stage of a motion: a basic trajectory and the frames it leads to, the last being its end."""
+
+    kind: Trajectory
+    frames: tuple[str, ...]
+
+
+def stages_of(form: Form) -> tuple[StagePlan, ...]:
+    """Return the stages that make up a motion, in order.
+
+    Source:
+        TR-83-008, third paper: twelve forms of MOVE; approach and departure together by the same logic.
+    """
+    stages = []
+    if form.departure:
+        stages.append(StagePlan(kind=Trajectory.LINE, frames=(form.departure,)))
+    end = form.approach or form.goal
+    gross = Trajectory.LINE if form.straight else Trajectory.PTP
+    if form.via:
+        gross = Trajectory.BLEND if form.blend else Trajectory.SPLINE
+    stages.append(StagePlan(kind=gross, frames=(*form.via, end)))
+    if form.approach:
+        stages.append(StagePlan(kind=Trajectory.LINE, frames=(form.goal,)))
+    return tuple(stages)
+
+
+def stages_text(form: Form) -> str:
+    """Return the stages in a word each, such as ``PTP apf1 / LINE obj1``."""
+    return " / ".join(" ".join((stage.kind.value, *stage.frames)) for stage in stages_of(form))
+
+
+@attrs.frozen(kw_only=True)
+class Instruction:
+    """One step.
+
+    Attributes:
+        op: what to do.
+        operands: in the order of the operation.
+        span: the part of the program that asks for it.
+        begins: whether it is the first of a statement.
+        comment: a word to the reader of a listing; it means nothing.
+    """
+
+    op: Op
+    operands: tuple[Operand, ...] = ()
+    span: Span
+    begins: bool = False
+    comment: str = attrs.field(default="", eq=False)
+
+
+@attrs.frozen(kw_only=True)
+class ProcedureCode:
+    """A procedure.
+
+    Attributes:
+        start: its first instruction.
+        parameters: names, in order.
+        types: of parameters and own variables, by name.
+    """
+
+    start: int
+    parameters: tuple[str, ...]
+    types: Mapping[str, Type]
+
+
+@attrs.frozen(kw_only=True)
+class Code:
+    """A translated program.
+
+    Attributes:
+        instructions: in order; execution begins with the first.
+        constants: n, o, a, p (twelve numbers, column by column, lengths in [m]) or one number each.
+        types: what each declared or predeclared name stands for.
+        procedures: by name.
+        units: what numbers count at run time.
+        spelling: how the program first writes each canonical name that is not in upper case.
+        standard: which RLO it was read as; motion past VIA points is that of the report in RLO-83.
+        source: the program text.
+    """
+
+    instructions: tuple[Instruction, ...]
+    constants: tuple[tuple[float, ...] | float, ...] = ()
+    types: Mapping[str, Type] = attrs.field(factory=dict)
+    procedures: Mapping[str, ProcedureCode] = attrs.field(factory=dict)
+    units: UnitSystem = attrs.field(factory=UnitSystem)
+    spelling: Mapping[str, str] = attrs.field(factory=dict)
+    standard: Standard = Standard.RLO_2
+    source: Source
+
+    def spelled(self, name: str) -> str:
+        """Return a canonical name as the program writes it; of an element or a local variable too."""
+        if name in self.spelling:
+            return self.spelling[name]
+        base, bracket, indices = name.partition("[")
+        base = base.partition("'")[0]
+        return f"{self.spelling.get(base, base)}{bracket}{indices}"
+
+    def line(self, instruction: Instruction) -> int:
+        """Return the line of the program, from 1, that asks for an instruction."""
+        return self.source.line(instruction.span.start)
+
+
+def listing(code: Code) -> str:
+    """Return the code for people: number, line, operation, operands, remarks; then the constants."""
+    width = max(3, *(len(str(code.line(step))) for step in code.instructions))
+    starts = {one.start: name for name, one in code.procedures.items()}
+    rows = [f"{'line':>{width + 7}}  op     operands"]
+    for at, step in enumerate(code.instructions):
+        if at in starts:
+            rows.append(f"{'':{width + 9}}{code.spelled(starts[at])}:")
+        rows.append(_row(code, at, step, width))
+    if code.constants:
+        rows += ["", *(f"c{index:<4} {number_list(value)}" for index, value in enumerate(code.constants))]
+    return "\n".join(rows) + "\n"
+
+
+def _row(code: Code, at: int, step: Instruction, width: int) -> str:
+    operands = " ".join(shown_operands(code, step))
+    row = f"{at:04d} {code.line(step):>{width}}    {step.op.value:<6} {operands}".rstrip()
+    return f"{row:<37} ; {step.comment}" if step.comment else row
+
+
+def shown_operands(code: Code, step: Instruction) -> Iterator[str]:
+    """Give the operands of an instruction as a listing writes them."""
+    for operand in step.operands:
+        match operand:
+            case str():
+                yield code.spelled(operand)
+            case Constant(index=index):
+                yield f"c{index}"
+            case Place(index=index):
+                yield f"@{index:04d}"
+            case Text(value=value):
+                yield json.dumps(value, ensure_ascii=False)
+            case _:
+                yield f"{operand:.12g}"
+
+
+def number_list(value: tuple[float, ...] | float) -> str:
+    """Return a constant for people."""
+    numbers = value if isinstance(value, tuple) else (value,)
+    triples = [numbers[i : i + 3] for i in range(0, len(numbers), 3)]
+    return ", ".join(",".join(f"{number:.12g}" for number in triple) for triple in triples)

@@ -1,0 +1,1 @@
+"""The debugger, and the Debug Adapter Protocol by which editors use it."""

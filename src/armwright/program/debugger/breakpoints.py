@@ -1,0 +1,151 @@
+"""Where a run shall be stopped: lines with conditions and counts, and frames or variables that change."""
+
+import operator
+import re
+from collections.abc import Callable, Mapping
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.errors import ArmwrightError
+from armwright.program.bytecode.instructions import Kind
+from armwright.program.debugger.history import Path
+from armwright.program.debugger.snapshot import mover
+from armwright.program.debugger.statements import Start
+from armwright.program.vm.machine import Machine
+
+# A frame that is farther from where it was than this has moved [m], and entries of rotations.
+_MOVED = 1e-9
+_COUNT = re.compile(r"\s*(==|>=|<=|=|>|<|%)?\s*([0-9]{1,9})\s*")
+_COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
+    "==": operator.eq,
+    "=": operator.eq,
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
+    "%": lambda hits, number: number > 0 and hits % number == 0,
+}
+
+
+class CountError(ArmwrightError, ValueError):
+    """A condition on how often a place is come to makes no sense."""
+
+
+def counts(condition: str, hits: int) -> bool:
+    """Whether a place is to be stopped at when it is come to for that time.
+
+    Args:
+        condition: ``3`` for the third time, ``>= 3`` from then on, ``% 3`` for every third.
+        hits: how often it has been come to, this time included.
+
+    Raises:
+        CountError: the condition is none of those.
+    """
+    match = _COUNT.fullmatch(condition)
+    if match is None:
+        raise CountError(f"expected a count such as `3`, `>= 3` or `% 3`, got `{condition}`")
+    return _COMPARISONS[match[1] or "=="](hits, int(match[2]))
+
+
+@attrs.frozen(kw_only=True)
+class Breakpoint:
+    """A line at which a run shall be stopped.
+
+    Attributes:
+        number: its own, from 1.
+        start: the statement; None where there is none, or its condition makes no sense.
+        condition: that must be true; empty for none.
+        hits: a condition on how often it has been come to; empty for none.
+        log: what to say in place of stopping, with expressions in braces; empty to stop.
+        message: why it is not as it was asked for; empty where it is.
+    """
+
+    number: int
+    start: Start | None
+    condition: str = ""
+    hits: str = ""
+    log: str = ""
+    message: str = ""
+
+
+@attrs.define(kw_only=True, eq=False)
+class Watch:
+    """A frame or a variable at whose change a run shall be stopped.
+
+    Of a motion that moves a frame only the first tick stops the run: it would be stopped a thousand times a second.
+
+    Attributes:
+        number: its own, among the breakpoints.
+        kept: where the frame or variable is kept.
+        condition: that must be true; empty for none.
+        hits: a condition on how often it has changed; empty for none.
+        changes: how often it has changed since it is watched.
+        last: what it was when last looked at.
+        told: the motion that has been spoken of: process, beginning.
+    """
+
+    number: int
+    kept: str
+    condition: str = ""
+    hits: str = ""
+    changes: int = 0
+    last: "Array | float | None" = None
+    told: tuple[Path, int] | None = None
+
+    def look(self, view: Machine) -> str | None:
+        """Return what has changed since the last look, in words; None where nothing has."""
+        now = _value(view, self.kept)
+        before, self.last = self.last, now
+        process = mover(view, self.kept)
+        motion = None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
+        if self.told is not None:
+            # The motion goes on, or has just come to its end.
+            self.told = motion if motion == self.told else None
+            return None
+        if _same(before, now):
+            return None
+        self.told = motion
+        self.changes += 1
+        name = view.spelled(self.kept)
+        if isinstance(now, float | int):
+            return f"{name} = {now:g}" + ("" if before is None else f", was {before:g}")
+        if now is None:
+            return f"{name} has no value any more"
+        if process is not None and process.motion is not None:
+            return f"{name} begins to move with {process.motion.arm}"
+        return f"{name} has moved" if before is not None else f"{name} has a value"
+
+    def start(self, view: Machine, *, told: bool) -> None:
+        """Take what is now for what was.
+
+        Args:
+            view: the machine as it is seen now.
+            told: whether of the motion that moves it now has been spoken.
+        """
+        self.last = _value(view, self.kept)
+        process = mover(view, self.kept) if told else None
+        self.told = None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
+
+    def rides(self, view: Machine) -> bool:
+        """Whether an arm moves it, so that every tick has to be looked at."""
+        process = mover(view, self.kept)
+        if process is None or process.motion is None:
+            return False
+        return self.told != (process.path, process.motion.begun.tick)
+
+
+def _value(view: Machine, kept: str) -> "Array | float | None":
+    kind = view.type_of(kept).kind
+    if kind is Kind.FRAME:
+        return view.tree.world(kept) if view.has_place(kept) else None
+    if kind is Kind.EVENT:
+        return float(view.events.get(kept, 0))
+    return view.values.get(kept)
+
+
+def _same(one: "Array | float | None", other: "Array | float | None") -> bool:
+    if one is None or other is None:
+        return one is other
+    return bool(np.allclose(one, other, rtol=0, atol=_MOVED if isinstance(one, np.ndarray) else 0))

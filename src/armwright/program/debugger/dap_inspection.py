@@ -1,0 +1,184 @@
+"""Requests about what a program that stands still looks like: stacks, variables, expressions."""
+
+import re
+from collections.abc import Sequence
+from itertools import islice
+from typing import Any
+
+from armwright.program.debugger.dap_messages import Arguments, RequestError
+from armwright.program.debugger.dap_session import EditorSession
+from armwright.program.debugger.expressions import names_at
+from armwright.program.debugger.history import Path
+from armwright.program.debugger.variables import Shown
+from armwright.program.diagnostics.render import render
+from armwright.program.language_server.positions import UTF_16, Ruler
+from armwright.program.semantics.builtins import FUNCTIONS
+
+# So many elements are sent to an editor that does not say how many it wants.
+_MOST_ELEMENTS = 1000
+# What gives a variable or an element a value.
+_ASSIGNMENT = re.compile(r"([A-Za-z][\w-]*(?:\s*\[[^\[\]]*\])?)\s*=\s*(.+)", re.DOTALL)
+_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*$")
+
+
+def threads(session: EditorSession, _: Arguments) -> dict[str, Any]:
+    """Answer ``threads``: the program and the branches of COBEGIN."""
+    if session.debugger is None:
+        return {"threads": [{"id": 1, "name": "program"}]}
+    named = []
+    for process in session.debugger.processes:
+        arm = process.motion.arm if process.motion else process.last_arm
+        name = f"{process.title} ({arm})" if arm else process.title
+        named.append({"id": session.thread(process.path), "name": name})
+    return {"threads": named}
+
+
+def stack_trace(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``stackTrace``: where a process is, the innermost first."""
+    debugger = session.standing
+    path = session.process(arguments.whole("threadId"))
+    frames = debugger.stack(path)
+    first, count = arguments.whole("startFrame", 0), arguments.whole("levels", 0) or len(frames)
+    answers = []
+    for level, frame in enumerate(frames):
+        if first <= level < first + count:
+            session.frames.append((path, level))
+            place = session.place(frame.span)
+            answers.append({"id": len(session.frames), "name": frame.title, "source": session.source(), **place})
+    return {"stackFrames": answers, "totalFrames": len(frames)}
+
+
+def scopes(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``scopes``: locals, variables, frames, arms, the run."""
+    debugger = session.standing
+    path, level = _frame(session, arguments)
+    answers = []
+    for shown in debugger.scopes(path, level):
+        reference = _open(session, shown, path, level)
+        answers.append({"name": shown.name, "variablesReference": reference, "expensive": False})
+    return {"scopes": answers}
+
+
+def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``variables``: what is inside of something."""
+    session.live  # noqa: B018 - there must be a program
+    reference = arguments.whole("variablesReference")
+    if not 0 < reference <= len(session.opened):
+        raise RequestError(f"there is nothing to open under {reference}")
+    shown, path, level = session.opened[reference - 1]
+    inside: Sequence[Shown] = () if shown.inside is None else shown.inside()
+    if arguments.text("filter", "") == ("named" if shown.elements else "indexed"):
+        inside = ()
+    first, count = arguments.whole("start", 0), arguments.whole("count", 0) or _MOST_ELEMENTS
+    listed = islice(inside, first, first + count) if not shown.elements else inside[first : first + count]
+    return {"variables": [{"name": one.name, **_variable(session, one, path, level)} for one in listed]}
+
+
+def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``evaluate``: any expression of the language, or the tree of frames.
+
+    In the console ``hit = 7`` gives a value, as it does in a program; for a comparison one writes ``(hit = 7)``.
+    """
+    debugger = session.standing
+    path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
+    text = arguments.text("expression").strip().rstrip(";")
+    given = _ASSIGNMENT.fullmatch(text) if arguments.text("context", "") == "repl" else None
+    if given is None:
+        shown = debugger.evaluate(text, path, level)
+    else:
+        kept = debugger.evaluate(given[1], path, level).kept
+        if kept is None:
+            raise RequestError(f"`{given[1]}` cannot be given a value; for a comparison write `({text})`")
+        shown = debugger.assign(kept, given[2], path, level)
+    answer = _variable(session, shown, path, level)
+    return {"result": answer.pop("value"), **answer}
+
+
+def set_variable(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``setVariable``: give what is shown another value."""
+    reference, name = arguments.whole("variablesReference"), arguments.text("name")
+    debugger = session.standing
+    if not 0 < reference <= len(session.opened):
+        raise RequestError(f"there is nothing to open under {reference}")
+    shown, path, level = session.opened[reference - 1]
+    inside: Sequence[Shown] = () if shown.inside is None else shown.inside()
+    found = next((one for one in inside if one.name == name), None)
+    if found is None or found.kept is None:
+        raise RequestError(f"{name} cannot be given a value")
+    return _variable(session, debugger.assign(found.kept, arguments.text("value"), path, level), path, level)
+
+
+def set_expression(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``setExpression``: the same for what an expression names."""
+    debugger = session.standing
+    path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
+    kept = debugger.evaluate(arguments.text("expression"), path, level).kept
+    if kept is None:
+        raise RequestError("only variables, frames and elements can be given a value")
+    return _variable(session, debugger.assign(kept, arguments.text("value"), path, level), path, level)
+
+
+def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
+    """Answer ``completions``: names that begin with what has been typed."""
+    debugger = session.standing
+    column = arguments.whole("column") - session.first_column
+    ruler = Ruler(arguments.text("text"), UTF_16)
+    end = ruler.offset(arguments.whole("line", session.first_line) - session.first_line, column)
+    match = _WORD.search(ruler.text[:end])
+    typed = match[0] if match else ""
+    path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
+    procedure = debugger.stack(path)[level].procedure
+    names = [debugger.code.spelled(name) for name in names_at(debugger.machine, procedure)]
+    words = sorted({*names, *FUNCTIONS, *debugger.machine.cell.arms, "frames"}, key=str.upper)
+    start = column - len(typed) + session.first_column
+    return {
+        "targets": [
+            {"label": word, "start": start, "length": len(typed), "type": "function" if word in FUNCTIONS else "value"}
+            for word in words
+            if word.upper().startswith(typed.upper())
+        ]
+    }
+
+
+def exception_info(session: EditorSession, _: Arguments) -> dict[str, Any]:
+    """Answer ``exceptionInfo``: what went wrong, with the lines."""
+    stop = session.standing.stop
+    if stop is None or stop.reason != "exception":
+        raise RequestError("no error has stopped the program")
+    diagnostic = stop.diagnostic
+    mode = "always" if stop.caught else "unhandled"
+    if diagnostic is None:
+        return {"exceptionId": stop.text.partition(" ")[0], "description": stop.text, "breakMode": mode}
+    page = render([diagnostic], session.standing.code.source)
+    details = {"message": diagnostic.message, "stackTrace": page}
+    return {"exceptionId": diagnostic.code, "description": diagnostic.message, "breakMode": mode, "details": details}
+
+
+def source(session: EditorSession, _: Arguments) -> dict[str, Any]:
+    """Answer ``source``: the text as it was when it was loaded."""
+    return {"content": session.live.code.source.text}
+
+
+def _frame(session: EditorSession, arguments: Arguments) -> tuple[Path, int]:
+    number = arguments.whole("frameId")
+    if not 0 < number <= len(session.frames):
+        raise RequestError(f"there is no stack frame {number}")
+    return session.frames[number - 1]
+
+
+def _open(session: EditorSession, shown: Shown, path: Path, level: int) -> int:
+    """Return the number under which something can be opened; 0 where there is nothing in it."""
+    if shown.inside is None:
+        return 0
+    session.opened.append((shown, path, level))
+    return len(session.opened)
+
+
+def _variable(session: EditorSession, shown: Shown, path: Path, level: int) -> dict[str, Any]:
+    return {
+        "value": shown.value,
+        "type": shown.type,
+        "variablesReference": _open(session, shown, path, level),
+        **({"indexedVariables": shown.elements} if shown.elements else {}),
+        **({"evaluateName": shown.expression} if shown.expression else {}),
+    }

@@ -1,0 +1,267 @@
+"""The debug adapter: what editors ask of a debugger, over the Debug Adapter Protocol.
+
+One thread reads what comes in; another answers it and, while the program runs, lets it run in slices in between. So
+a program that never ends can be paused, and nothing else has to be guarded.
+
+Source:
+    Debug Adapter Protocol, specification 1.68.
+"""
+
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from armwright.errors import ArmwrightError
+from armwright.files.reading import regular
+from armwright.program.debugger import dap_breakpoints, dap_inspection
+from armwright.program.debugger.dap_messages import Arguments, Noise, RequestError, framed, messages
+from armwright.program.debugger.dap_session import EditorSession, Launch, Load, Save
+from armwright.program.debugger.debugger import Command
+from armwright.program.language.words import Standard
+
+# How long the program runs before the next request is looked for [s].
+_SLICE = 0.02
+
+_CAPABILITIES = {
+    "supportsConfigurationDoneRequest": True,
+    "supportsConditionalBreakpoints": True,
+    "supportsHitConditionalBreakpoints": True,
+    "supportsLogPoints": True,
+    "supportsBreakpointLocationsRequest": True,
+    "supportsDataBreakpoints": True,
+    "supportsEvaluateForHovers": True,
+    "supportsStepBack": True,
+    "supportsSteppingGranularity": True,
+    "supportsSetVariable": True,
+    "supportsSetExpression": True,
+    "supportsCompletionsRequest": True,
+    "supportsExceptionInfoRequest": True,
+    "supportsDelayedStackTraceLoading": True,
+    "supportsTerminateRequest": True,
+    "supportsRestartRequest": True,
+    "supportTerminateDebuggee": True,
+    "exceptionBreakpointFilters": [
+        {"filter": "uncaught", "label": "Errors that end the program", "default": True},
+        {"filter": "caught", "label": "Errors with a RECOVER", "default": False},
+    ],
+}
+
+
+def serve(incoming: BinaryIO, outgoing: BinaryIO, load: Load, save: Save) -> None:
+    """Answer an editor until it disconnects or its stream ends.
+
+    Args:
+        incoming: where requests come from; its ``read`` returns what there is.
+        outgoing: where answers go.
+        load: reads and translates a program.
+        save: writes what a run leaves.
+    """
+    Adapter(outgoing, load, save).run(incoming)
+
+
+class Adapter:
+    """A connection to an editor."""
+
+    def __init__(self, outgoing: BinaryIO, load: Load, save: Save) -> None:
+        """Wait for the first request."""
+        self._outgoing = outgoing
+        self._sent = 0
+        self._session = EditorSession(load, save, self._event)
+        self._waiting: queue.SimpleQueue[dict[str, Any] | Noise | None] = queue.SimpleQueue()
+        self._connected = True
+        self._after: list[Callable[[], None]] = []
+
+    def run(self, incoming: BinaryIO) -> None:
+        """Answer what comes in, and let the program run in between."""
+        threading.Thread(target=self._listen, args=(incoming,), daemon=True).start()
+        try:
+            while self._connected:
+                self._turn()
+        except BrokenPipeError:
+            # The editor has gone.
+            return
+
+    def _turn(self) -> None:
+        debugger = self._session.debugger
+        running = debugger is not None and debugger.running
+        try:
+            message = self._waiting.get(block=not running)
+        except queue.Empty:
+            self._session.work(_SLICE)
+            return
+        if message is None:
+            self._connected = False
+        elif isinstance(message, Noise):
+            self._answer(0, "", success=False, text=message.text)
+        else:
+            self._handle(message)
+
+    def _listen(self, incoming: BinaryIO) -> None:
+        try:
+            for message in messages(incoming):
+                self._waiting.put(message)
+        finally:
+            self._waiting.put(None)
+
+    # ---- requests --------------------------------------------------------------------------------------------------
+
+    def _handle(self, message: Mapping[str, Any]) -> None:
+        if message.get("type") not in {"request", None}:
+            return
+        sequence, command = message.get("seq"), message.get("command")
+        number = sequence if isinstance(sequence, int) else 0
+        if not isinstance(command, str):
+            self._answer(number, "", success=False, text="a request without a command")
+            return
+        try:
+            body = self._body(command, message.get("arguments"))
+        except ArmwrightError as error:
+            self._answer(number, command, success=False, text=str(error))
+        except Exception as error:  # noqa: BLE001 - a slip of ours must not take the session with it
+            self._answer(number, command, success=False, text=f"{type(error).__name__} in the debugger: {error}")
+        else:
+            self._answer(number, command, body=body)
+        after, self._after = self._after, []
+        for one in after:
+            one()
+
+    def _body(self, command: str, given: object) -> Mapping[str, Any] | None:
+        if command in _LOOKS:
+            return _LOOKS[command](self._session, Arguments(given))
+        if command in _STEPS:
+            return self._step(command, Arguments(given))
+        own: Mapping[str, Callable[[Arguments], Mapping[str, Any] | None]] = {
+            "initialize": self._initialize,
+            "launch": self._launch,
+            "configurationDone": self._configured,
+            "restart": self._restart,
+            "pause": self._pause,
+            "terminate": self._terminate,
+            "disconnect": self._disconnect,
+        }
+        if command not in own:
+            raise RequestError(f"this debugger knows no request `{command}`")
+        return own[command](Arguments(given))
+
+    def _initialize(self, arguments: Arguments) -> Mapping[str, Any]:
+        self._session.first_line = int(arguments.flag("linesStartAt1", default=True))
+        self._session.first_column = int(arguments.flag("columnsStartAt1", default=True))
+        return _CAPABILITIES
+
+    def _launch(self, arguments: Arguments) -> None:
+        session = self._session
+        if session.debugger is not None:
+            raise RequestError("a program has been launched already")
+        session.start(_launched(arguments))
+        # Now that the program is known, breakpoints can be set in it.
+        self._after += [lambda: self._event("initialized", {}), session.begin]
+
+    def _configured(self, _: Arguments) -> None:
+        self._session.configured = True
+        self._after.append(self._session.begin)
+
+    def _restart(self, arguments: Arguments) -> None:
+        session = self._session
+        if session.launch is None:
+            raise RequestError("no program has been launched")
+        launch = _launched(arguments.part("arguments")) if "arguments" in arguments else session.launch
+        session.start(launch)
+        self._after.append(session.begin)
+
+    def _step(self, command: str, arguments: Arguments) -> Mapping[str, Any]:
+        session = self._session
+        if command in {"continue", "reverseContinue"}:
+            session.go("continue" if command == "continue" else "reverse", ())
+            return {"allThreadsContinued": True}
+        wanted: Command = _STEPS[command]
+        granularity = arguments.text("granularity", "statement")
+        if granularity not in {"statement", "line", "instruction"}:
+            raise RequestError(f"granularity: expected statement, line or instruction, got {granularity!r}")
+        if granularity == "instruction":
+            wanted = "tick back" if command == "stepBack" else "tick"
+        session.go(wanted, session.process(arguments.whole("threadId", 1)))
+        return {}
+
+    def _pause(self, _: Arguments) -> None:
+        debugger = self._session.live
+        if not debugger.running:
+            raise RequestError("the program is not running")
+        stop = debugger.pause()
+        self._after.append(lambda: self._session.told(stop))
+
+    def _terminate(self, _: Arguments) -> None:
+        self._after.append(self._session.give_up)
+
+    def _disconnect(self, _: Arguments) -> None:
+        self._connected = False
+
+    # ---- answers and events ----------------------------------------------------------------------------------------
+
+    def _answer(
+        self, number: int, command: str, *, success: bool = True, text: str = "", body: Mapping[str, Any] | None = None
+    ) -> None:
+        answer: dict[str, Any] = {"request_seq": number, "command": command, "success": success}
+        if body is not None:
+            answer["body"] = body
+        if not success:
+            answer |= {"message": text, "body": {"error": {"id": 1, "format": _unformatted(text), "showUser": True}}}
+        self._send("response", answer)
+
+    def _event(self, event: str, body: Mapping[str, Any]) -> None:
+        self._send("event", {"event": event, "body": body})
+
+    def _send(self, kind: str, message: Mapping[str, Any]) -> None:
+        self._sent += 1
+        self._outgoing.write(framed({"seq": self._sent, "type": kind, **message}))
+        self._outgoing.flush()
+
+
+def _unformatted(text: str) -> str:
+    """Return a text in which braces ask for nothing."""
+    return text.replace("{", "(").replace("}", ")")
+
+
+def _launched(arguments: Arguments) -> Launch:
+    standard = str(arguments.given.get("std", Standard.RLO_2.value))
+    if standard not in {one.value for one in Standard}:
+        raise RequestError(f"std: expected 2 or 83, got {standard!r}")
+    return Launch(
+        program=regular(Path(arguments.text("program"))),
+        cell=regular(Path(arguments.text("cell"))) if arguments.text("cell", "") else None,
+        std=Standard(standard),
+        output=Path(arguments.text("output")) if arguments.text("output", "") else None,
+        stop_on_entry=arguments.flag("stopOnEntry"),
+        no_debug=arguments.flag("noDebug"),
+        strict=arguments.flag("strict"),
+    )
+
+
+# A servo tick is the instruction of an arm; ``stepStage`` is a request of this adapter alone.
+_STEPS: Mapping[str, Command] = {
+    "continue": "continue",
+    "next": "next",
+    "stepIn": "in",
+    "stepOut": "out",
+    "stepStage": "stage",
+    "stepBack": "back",
+    "reverseContinue": "reverse",
+}
+_LOOKS: Mapping[str, Callable[[EditorSession, Arguments], dict[str, Any]]] = {
+    "setBreakpoints": dap_breakpoints.set_breakpoints,
+    "breakpointLocations": dap_breakpoints.breakpoint_locations,
+    "dataBreakpointInfo": dap_breakpoints.data_breakpoint_info,
+    "setDataBreakpoints": dap_breakpoints.set_data_breakpoints,
+    "setExceptionBreakpoints": dap_breakpoints.set_exception_breakpoints,
+    "threads": dap_inspection.threads,
+    "stackTrace": dap_inspection.stack_trace,
+    "scopes": dap_inspection.scopes,
+    "variables": dap_inspection.variables,
+    "evaluate": dap_inspection.evaluate,
+    "setVariable": dap_inspection.set_variable,
+    "setExpression": dap_inspection.set_expression,
+    "completions": dap_inspection.completions,
+    "exceptionInfo": dap_inspection.exception_info,
+    "source": dap_inspection.source,
+}

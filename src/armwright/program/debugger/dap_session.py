@@ -1,0 +1,384 @@
+"""One debugging session of an editor: the program, the debugger, and what the editor has been told so far."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from armwright.cell.model import Cell
+from armwright.errors import ArmwrightError, ExitStatus
+from armwright.program.bytecode.instructions import Code
+from armwright.program.debugger.breakpoints import Breakpoint
+from armwright.program.debugger.dap_messages import Arguments, RequestError
+from armwright.program.debugger.debugger import Command, Debugger
+from armwright.program.debugger.history import Path as ProcessPath
+from armwright.program.debugger.stop_reason import Stop
+from armwright.program.debugger.variables import Shown
+from armwright.program.diagnostics.render import render
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Span
+from armwright.program.language.words import Standard
+from armwright.program.language_server.positions import UTF_16, Ruler, columns
+from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
+from armwright.program.vm.recording import Effect, Recording
+
+_DESCRIPTIONS = {"start": "back at the start", "data breakpoint": "something has changed"}
+# The number of the text of a program that was read from a file of code.
+LISTED = 1
+_ALL_OF_IT = "with `output` in the launch configuration all are in events.jsonl"
+# What the protocol has a word for.
+_REASONS = {"start": "entry"}
+
+
+@attrs.frozen(kw_only=True)
+class Launch:
+    """What a session is asked to run.
+
+    Attributes:
+        program: path of the program.
+        cell: path of the cell; None where the program imports it, or the only cell file beside it is meant.
+        std: the language.
+        strict: whether an AFFIX that is only implied is an error.
+        output: a folder for what a run leaves; None for none.
+        stop_on_entry: whether to stop in front of the first statement.
+        no_debug: whether to run without stops.
+    """
+
+    program: Path
+    cell: Path | None
+    std: Standard
+    output: Path | None
+    stop_on_entry: bool
+    no_debug: bool
+    strict: bool = False
+
+
+@attrs.frozen(kw_only=True)
+class Loaded:
+    """A program that can run.
+
+    Attributes:
+        code: the program.
+        cell: what it runs in.
+        diagnostics: warnings.
+        imports: the files that it imports.
+        is_listed: whether it was read from a file of code, which holds the text of the program and is not that text.
+    """
+
+    code: Code
+    cell: Cell
+    diagnostics: Sequence[Diagnostic] = ()
+    imports: Sequence[Path] = ()
+    is_listed: bool = False
+
+
+class LoadError(ArmwrightError, ValueError):
+    """A program cannot run.
+
+    Attributes:
+        page: all that is wrong with it, with the lines.
+        status: with which a command ends.
+    """
+
+    exit_status = ExitStatus.PROGRAM_ERRORS
+
+    def __init__(self, message: str, page: str, status: ExitStatus = ExitStatus.PROGRAM_ERRORS) -> None:
+        """Keep both texts, and with which status a command ends: that of errors in the program, unless said."""
+        super().__init__(message)
+        self.page, self.status = page, status
+
+
+Load = Callable[[Launch], Loaded]
+# Writes what a run leaves; returns a line that says so.
+Save = Callable[[Launch, Loaded, Recording], str]
+Send = Callable[[str, Mapping[str, Any]], None]
+
+
+class EditorSession:
+    """The state of a session.
+
+    Attributes:
+        send: sends an event.
+        debugger: None until a program is launched.
+        launch: what was asked for.
+        loaded: what became of it.
+        configured: whether breakpoints have been told, so that the program may begin.
+        begun: whether it has.
+        ended: whether its end has been told.
+        wanted: the breakpoints that were asked for, with their numbers.
+        watched: what shall be watched: number, where it is kept, condition, count.
+        catches: the errors to stop at, ``uncaught`` and ``caught``.
+        frames: of the stacks that the editor has seen, process and level.
+        opened: what the editor can open, with process and level.
+        numbers: of the breakpoints as the editor knows them, by those of the debugger.
+    """
+
+    def __init__(self, load: Load, save: Save, send: Send) -> None:
+        """Start without a program."""
+        self._load, self._save, self.send = load, save, send
+        self.debugger: Debugger | None = None
+        self.launch: Launch | None = None
+        self.loaded: Loaded | None = None
+        self.configured = self.begun = self.ended = False
+        self.first_line = self.first_column = 1
+        self.wanted: list[tuple[int, Arguments]] = []
+        self.watched: list[tuple[int, str, str, str]] = []
+        self.numbers: dict[int, int] = {}
+        self.catches = frozenset({"uncaught"})
+        self._count = 0
+        self._threads: dict[ProcessPath, int] = {(): 1}
+        self._alive: set[int] = set()
+        self.frames: list[tuple[ProcessPath, int]] = []
+        self.opened: list[tuple[Shown, ProcessPath, int]] = []
+
+    # ---- the program -----------------------------------------------------------------------------------------------
+
+    def start(self, launch: Launch) -> None:
+        """Load a program.
+
+        Raises:
+            LoadError: it has errors.
+            ArmwrightError: a file cannot be read.
+        """
+        try:
+            loaded = self._load(launch)
+        except LoadError as error:
+            self.say(error.page, "stderr")
+            raise
+        self.launch, self.loaded = launch, loaded
+        self.debugger = Debugger(loaded.code, loaded.cell)
+        self.begun = self.ended = False
+        self.forget_places()
+        self.catch()
+        if loaded.diagnostics:
+            self.say(render(loaded.diagnostics, loaded.code.source), "console")
+        self.bind()
+
+    def begin(self) -> None:
+        """Let the program run, once it is loaded and the breakpoints are known."""
+        if self.debugger is None or self.launch is None or not self.configured or self.begun:
+            return
+        self.begun = True
+        if self.launch.no_debug:
+            self.debugger.clear(breakpoints=True, watches=True)
+            self.debugger.catch(uncaught=False, caught=False)
+        self.debugger.begin(stop_on_entry=self.launch.stop_on_entry and not self.launch.no_debug)
+        self.send("thread", {"reason": "started", "threadId": 1})
+        self._alive = {1}
+
+    def catch(self) -> None:
+        """Stop at the errors that were asked for."""
+        if self.debugger is not None:
+            self.debugger.catch(uncaught="uncaught" in self.catches, caught="caught" in self.catches)
+
+    @property
+    def live(self) -> Debugger:
+        """The debugger of the program.
+
+        Raises:
+            RequestError: no program has been launched.
+        """
+        if self.debugger is None:
+            raise RequestError("no program has been launched")
+        return self.debugger
+
+    @property
+    def standing(self) -> Debugger:
+        """The debugger of a program that stands still.
+
+        Raises:
+            RequestError: it does not, or there is none.
+        """
+        debugger = self.live
+        if debugger.running or not self.begun:
+            raise RequestError("the program is running" if self.begun else "the program has not begun")
+        return debugger
+
+    def go(self, command: Command, path: ProcessPath) -> None:
+        """Let the program go on.
+
+        Raises:
+            RequestError: it does not stand still, or is over.
+        """
+        self.standing.resume(command, path)
+        self.forget_places()
+
+    def work(self, seconds: float) -> None:
+        """Do a slice of what the program has to do; tell what came of it."""
+        debugger = self.live
+        stop = debugger.work(seconds)
+        self._tell_news(debugger)
+        if stop is not None and not debugger.running:
+            self.told(stop)
+
+    def told(self, stop: Stop) -> None:
+        """Tell why the program stands still."""
+        debugger = self.live
+        if stop.over:
+            self._end(stop)
+            return
+        self._tell_threads(debugger)
+        self.send(
+            "stopped",
+            {
+                "reason": _REASONS.get(stop.reason, stop.reason),
+                "description": stop.text or _DESCRIPTIONS.get(stop.reason, stop.reason),
+                "threadId": self.thread(stop.path),
+                "allThreadsStopped": True,
+                **({"text": stop.text} if stop.text else {}),
+                **({"hitBreakpointIds": [self.numbers[one] for one in stop.numbers]} if stop.numbers else {}),
+            },
+        )
+
+    def _end(self, stop: Stop) -> None:
+        """The program is over: its output is written, and the editor told."""
+        if self.ended:
+            return
+        self.ended = True
+        assert self.loaded is not None  # noqa: S101 - it has run
+        status = stop.status
+        if stop.diagnostic is not None:
+            self.say(render([stop.diagnostic], self.loaded.code.source), "stderr")
+        if self.launch is not None and self.launch.output is not None:
+            recording = stop.recording or self.live.recording
+            try:
+                self.say(self._save(self.launch, self.loaded, recording()) + "\n", "console")
+            except ArmwrightError as error:
+                self.say(f"{error}\n", "stderr")
+                status = error.exit_status
+        self.send("exited", {"exitCode": int(status)})
+        self.send("terminated", {})
+
+    def give_up(self) -> None:
+        """End the program where it is."""
+        if not self.ended and self.debugger is not None:
+            if self.debugger.running:
+                self.debugger.pause()
+            self.ended = True
+            self.send("exited", {"exitCode": int(ExitStatus.INTERRUPTED)})
+            self.send("terminated", {})
+
+    # ---- what is told ----------------------------------------------------------------------------------------------
+
+    def say(self, text: str, category: str, span: Span | None = None) -> None:
+        """Show a text to the user, with the place in the program that it comes from."""
+        place = {} if span is None else {"source": self.source(), **self.place(span, whole=False)}
+        self.send("output", {"category": category, "output": text, **place})
+
+    def _tell_news(self, debugger: Debugger) -> None:
+        news = excerpt([one for one in debugger.news() if one.kind in {"PRINT", "ERROR"}], ON_A_TERMINAL)
+        for effect in news.first:
+            self._tell(effect)
+        if news.left_out:
+            self.say(f"{more(news.left_out, _ALL_OF_IT)}\n", "console")
+        for effect in news.last:
+            self._tell(effect)
+        for text, breakpoint_ in debugger.said():
+            self.say(f"{text}\n", "console", breakpoint_.start.span if breakpoint_.start else None)
+
+    def _tell(self, effect: Effect) -> None:
+        if effect.kind == "PRINT":
+            self.say(f"{one_line(effect.data['printed'], _ALL_OF_IT)}\n", "stdout", effect.span)
+        else:
+            self.say(f"recovered: {effect.text}\n", "stderr", effect.span)
+
+    def _tell_threads(self, debugger: Debugger) -> None:
+        alive = {self.thread(one.path) for one in debugger.processes}
+        for number in sorted(alive - self._alive):
+            self.send("thread", {"reason": "started", "threadId": number})
+        for number in sorted(self._alive - alive):
+            self.send("thread", {"reason": "exited", "threadId": number})
+        self._alive = alive
+
+    # ---- numbers of threads, places and breakpoints ----------------------------------------------------------------
+
+    def thread(self, path: ProcessPath) -> int:
+        """Return the number of a process."""
+        return self._threads.setdefault(path, len(self._threads) + 1)
+
+    def process(self, number: int) -> ProcessPath:
+        """Return the process of a number.
+
+        Raises:
+            RequestError: there is none.
+        """
+        for path, known in self._threads.items():
+            if known == number and any(one.path == path for one in self.live.processes):
+                return path
+        raise RequestError(f"there is no thread {number}")
+
+    def forget_places(self) -> None:
+        """Frames and variables have other numbers after the next stop."""
+        self.frames.clear()
+        self.opened.clear()
+
+    def source(self) -> dict[str, Any]:
+        """Return what the editor has to know of the text."""
+        assert self.launch is not None  # noqa: S101 - asked for only with a program
+        if self.loaded is not None and self.loaded.is_listed:
+            return {"name": self.loaded.code.source.name, "sourceReference": LISTED}
+        return {"name": self.launch.program.name, "path": str(self.launch.program)}
+
+    def place(self, span: Span, *, whole: bool = True) -> dict[str, int]:
+        """Return where a stretch of the text is, in the numbers of the editor."""
+        assert self.loaded is not None  # noqa: S101 - asked for only with a program
+        source = self.loaded.code.source
+
+        def place(offset: int) -> tuple[int, int]:
+            line = source.line(offset)
+            # Editors count halves of words, as JavaScript does.
+            before = columns(source.text[source.line_starts[line - 1] : offset], UTF_16)
+            return line - 1 + self.first_line, before + self.first_column
+
+        line, column = place(span.start)
+        start = {"line": line, "column": column}
+        if not whole:
+            return start
+        line, column = place(span.end)
+        return {**start, "endLine": line, "endColumn": column}
+
+    def number(self) -> int:
+        """Return a new number for a breakpoint."""
+        self._count += 1
+        return self._count
+
+    def bind(self) -> None:
+        """Set the breakpoints that were asked for before there was a program."""
+        if self.debugger is None:
+            return
+        self.debugger.clear(breakpoints=True)
+        for number, wanted in self.wanted:
+            self.send("breakpoint", {"reason": "changed", "breakpoint": self.bound(number, wanted)})
+        for watched in self.watched:
+            self.watch(*watched)
+
+    def watch(self, number: int, kept: str, condition: str, hits: str) -> dict[str, Any]:
+        """Watch a frame or a variable; return what the editor has to know of it."""
+        try:
+            watch = self.live.watch(kept, condition=condition.strip(), hits=hits.strip())
+        except ArmwrightError as error:
+            return {"id": number, "verified": False, "message": str(error)}
+        self.numbers[watch.number] = number
+        return {"id": number, "verified": True}
+
+    def bound(self, number: int, wanted: Arguments) -> dict[str, Any]:
+        """Set a breakpoint; return what the editor has to know of it."""
+        if self.debugger is None:
+            return {"id": number, "verified": False, "message": "no program has been launched"}
+        line, column = wanted.whole("line") - self.first_line + 1, None
+        if "column" in wanted:
+            source = self.debugger.code.source
+            text = source.line_text(line) if 0 < line <= len(source.line_starts) else ""
+            column = Ruler(text, UTF_16).offset(0, wanted.whole("column") - self.first_column) + 1
+        found: Breakpoint = self.debugger.break_at(
+            line,
+            column,
+            condition=wanted.text("condition", "").strip(),
+            hits=wanted.text("hitCondition", "").strip(),
+            log=wanted.text("logMessage", ""),
+        )
+        self.numbers[found.number] = number
+        if found.start is None:
+            return {"id": number, "verified": False, "message": found.message}
+        return {"id": number, "verified": True, "source": self.source(), **self.place(found.start.span)}

@@ -1,0 +1,181 @@
+"""Expressions of the language, worked out in a run that stands still: by its own parser, checker and operations."""
+
+import copy
+from collections.abc import Mapping, Sequence
+
+import attrs
+
+from armwright.errors import ArmwrightError
+from armwright.program.bytecode.emitter import Emitter
+from armwright.program.bytecode.instructions import Code, Instruction, Kind, Op, Operand, Type
+from armwright.program.debugger.snapshot import Frame
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Source
+from armwright.program.language.words import Standard
+from armwright.program.semantics import type_check
+from armwright.program.semantics.expression_types import FITTING, OF_KIND, Sort, is_what
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.syntax import tree
+from armwright.program.syntax.expressions import expression
+from armwright.program.syntax.lexer import TokenKind, scan
+from armwright.program.syntax.token_stream import LostError, Tokens
+from armwright.program.vm.machine import Machine, RunError
+from armwright.program.vm.process import Activation, Process, Value
+from armwright.program.vm.simple_statements import work_out
+from armwright.spatial.poses import from_noap
+
+
+class ExpressionError(ArmwrightError, ValueError):
+    """What was asked for has no value here; the text says why."""
+
+
+@attrs.frozen(kw_only=True)
+class Parsed:
+    """An expression that makes sense where it was asked for.
+
+    Attributes:
+        source: its text.
+        node: what it says.
+        sort: what its value is; None for a whole array.
+    """
+
+    source: Source
+    node: tree.Expression
+    sort: Sort | None
+
+
+def names_at(machine: Machine, procedure: str | None) -> dict[str, Type]:
+    """Return what can be named: frames of the cell, arms aside, names of the program, and of the procedure if any."""
+    inner = (name for name in machine.tree if not set(name) & set(".'["))
+    own = {} if procedure is None else machine.code.procedures[procedure].types
+    cell = {name: Type(Kind.FRAME) for name in inner if name not in machine.cell.arms}
+    return {**cell, **PREDECLARED, **machine.code.types, **own}
+
+
+def parse(text: str, types: Mapping[str, Type], code: Code) -> Parsed:
+    """Read an expression and check what it is made of.
+
+    Args:
+        text: in RLO-2, whatever the program is written in; a word that names something is a name all the same.
+        types: of the names that it may use.
+        code: the program.
+
+    Raises:
+        ExpressionError: it makes no sense.
+    """
+    source = Source("expression", text)
+    scanned = scan(source, text)
+    _refuse(scanned.found)
+    named = [attrs.evolve(one, kind=TokenKind.NAME) if one.key in types else one for one in scanned.tokens]
+    tokens = Tokens(source, named, Standard.RLO_2, {})
+    try:
+        node = expression(tokens)
+    except LostError:
+        node = None
+    _refuse(tokens.found)
+    if node is None or not tokens.done:
+        raise ExpressionError(f"`{tokens.now.text}` does not belong here")
+    if isinstance(node, tree.Name) and node.key in types and types[node.key].sizes:
+        return Parsed(source=source, node=node, sort=None)
+    names = Names(None)
+    names.main.types = dict(types)
+    names.units = code.units
+    sort = type_check.sort(names, node)
+    _refuse(names.found)
+    if sort is None:
+        raise ExpressionError(f"`{text}` has no value")
+    return Parsed(source=source, node=node, sort=sort)
+
+
+def compute(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> Value:
+    """Return the value of an expression; of an event, how often it was signalled and not yet taken.
+
+    Args:
+        machine: as it is seen now; nothing in it is changed.
+        process: whose view is asked for.
+        frame: the level of its stack.
+        parsed: no whole array.
+
+    Raises:
+        ExpressionError: something in it has no value.
+    """
+    try:
+        here, asking, operand = _worked_out(machine, process, frame, parsed)
+        if parsed.sort is Sort.EVENT:
+            return float(here.events.get(here.name(asking, operand), 0))
+        return here.read(asking, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
+    except RunError as error:
+        raise ExpressionError(str(error)) from None
+
+
+def kept_name(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> str | None:
+    """Return where an expression is kept, if it is a variable, an element or an arm; None for anything else.
+
+    Raises:
+        ExpressionError: an index of it has no value, or the cell has no such arm.
+    """
+    node = parsed.node
+    if isinstance(node, tree.ArmName) and node.key not in machine.cell.arms:
+        raise ExpressionError(f"the cell has no arm {node.key}")
+    if isinstance(node, tree.Name | tree.ArmName):
+        return frame.activation.bindings.get(node.key, node.key)
+    if not isinstance(node, tree.Index):
+        return None
+    try:
+        here, asking, operand = _worked_out(machine, process, frame, parsed)
+    except RunError as error:
+        raise ExpressionError(str(error)) from None
+    return here.name(asking, operand)
+
+
+def value_for(machine: Machine, process: Process, frame: Frame, text: str, kind: Kind) -> Value:
+    """Return the value of an expression that a variable of some kind shall get.
+
+    Raises:
+        ExpressionError: it makes no sense, has no value, or is of another kind.
+    """
+    parsed = parse(text, names_at(machine, frame.procedure), machine.code)
+    wanted = OF_KIND[kind]
+    if parsed.sort not in FITTING[wanted]:
+        found = "an array" if parsed.sort is None else is_what(parsed.node, parsed.sort)
+        raise ExpressionError(f"expected {wanted.value}, but `{text}` is {found}")
+    return compute(machine, process, frame, parsed)
+
+
+def condition(text: str, types: Mapping[str, Type], code: Code) -> Parsed:
+    """Read a condition, or a number that may be 0.
+
+    Raises:
+        ExpressionError: it is neither.
+    """
+    parsed = parse(text, types, code)
+    if parsed.sort not in (Sort.CONDITION, Sort.SCALAR):
+        raise ExpressionError(f"expected a condition, such as `n > 0`, but `{text}` is none")
+    return parsed
+
+
+def _worked_out(machine: Machine, process: Process, frame: Frame, parsed: Parsed) -> tuple[Machine, Process, Operand]:
+    """Do the steps of an expression: they give values in passing, and nothing else.
+
+    Returns:
+        A machine and a process that know these values, and the operand that has the last one.
+
+    Raises:
+        RunError: something in it has no value.
+    """
+    emitter = Emitter(parsed.source, machine.code.units)
+    operand = emitter.value(parsed.node)
+    steps = tuple(emitter.instructions)
+    here, asking = copy.copy(machine), copy.copy(process)
+    here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
+    here.constants = [from_noap(one) if isinstance(one, tuple) else float(one) for one in emitter.constants]
+    asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
+    work_out(here, asking, steps)
+    return here, asking, operand
+
+
+def _refuse(found: Sequence[Diagnostic]) -> None:
+    for one in found:
+        if one.is_error:
+            raise ExpressionError("; ".join((one.message, *one.helps[:1])))

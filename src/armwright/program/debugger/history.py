@@ -1,0 +1,216 @@
+"""A run that can be taken back: the machine, how many steps it has done, and moments to start again from.
+
+A run is the same every time, so any moment of it can be come to again: by what was kept of a moment before it, and
+the steps from there. Moments are kept now and then, more rarely the longer a program runs.
+"""
+
+import io
+import pickle
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from armwright.cell.frames import FrameTree
+from armwright.cell.model import Cell
+from armwright.cell.simulator import Simulator
+from armwright.motion.plan import Stage
+from armwright.motion.trajectory import Trajectory
+from armwright.program.bytecode.instructions import Code, Op, Type
+from armwright.program.language.source import Span
+from armwright.program.vm.interpreter import Limits, Machine, advance, due, ready
+from armwright.program.vm.process import Process
+from armwright.program.vm.recording import Effect, Run, RunStage
+
+# Things that never change are not copied but held.
+_HELD = (Code, Cell, FrameTree, Stage, Trajectory, Limits, Type, Effect, Run, RunStage, Span, np.ndarray)
+# A moment is kept when the way from the last one has taken so long [s], or so many times what keeping one takes.
+_OFTEN = 0.05
+_SHARE = 20.0
+# With more moments than this every second one is forgotten.
+_MOST_MOMENTS = 100
+
+Path = tuple[int, ...]
+Change = Callable[[Machine], None]
+
+
+class _Moment(NamedTuple):
+    """What is kept of a moment: after how many steps, the state without what never changes, and that."""
+
+    done: int
+    state: bytes
+    held: list[object]
+
+
+class Marks:
+    """What a debugger remembers of the way to a moment, beside the state of the program itself.
+
+    Attributes:
+        blocked: processes whose statement was begun and found that it has to wait.
+        came: the instruction that each process did last.
+        visits: how often each statement has been begun, by its first instruction.
+    """
+
+    def __init__(self) -> None:
+        """Remember nothing."""
+        self.blocked: set[Path] = set()
+        self.came: dict[Path, int] = {}
+        self.visits: dict[int, int] = {}
+
+
+class Timeline:
+    """A run of a program in a simulated cell, from its start to where it has come to.
+
+    Attributes:
+        machine: its state now.
+        marks: of the way to here.
+        done: steps done so far.
+    """
+
+    def __init__(self, code: Code, cell: Cell, limits: Limits | None = None) -> None:
+        """Stand in front of the first instruction."""
+        self.machine = Machine(code, cell, Simulator(cell), limits)
+        self.marks = Marks()
+        self.done = 0
+        self._changes: list[tuple[int, Change]] = []
+        # Whether a step went wrong half-way, so that the state is not that of a moment.
+        self._broken = False
+        self._often, self._cost, self._begun = _OFTEN, 0.0, time.perf_counter()
+        self._moments = [self._moment()]
+
+    @property
+    def ready(self) -> Process | None:
+        """The process that does the next step; None where all wait for one another."""
+        return ready(self.machine)
+
+    @property
+    def kept(self) -> list[int]:
+        """The steps after which a moment was kept, in order."""
+        return [moment.done for moment in self._moments]
+
+    def arrives(self, process: Process) -> bool:
+        """Whether the next step of a process begins a statement, or another pass of a loop."""
+        if process.pending is not None or process.follows is not None:
+            return False
+        step = self.machine.code.instructions[process.at]
+        if not step.begins or process.path in self.marks.blocked:
+            return False
+        # The first pass of a FOR follows its own beginning.
+        return step.op is not Op.FOR or self.marks.came.get(process.path) != process.at - 1
+
+    def advance(self) -> Process:
+        """Do one step.
+
+        Returns:
+            The process that did it.
+
+        Raises:
+            RunError: something went wrong that no TRY is around; the run is over.
+        """
+        machine, marks = self.machine, self.marks
+        self._broken = True
+        process = due(machine)
+        at = process.at
+        if self.arrives(process):
+            marks.visits[at] = marks.visits.get(at, 0) + 1
+        instruction = process.pending is None and process.follows is None
+        advance(machine, process)
+        if instruction:
+            marks.came[process.path] = at
+        if process.waiting is not None and process.waiting.what != "branches":
+            marks.blocked.add(process.path)
+        else:
+            marks.blocked.discard(process.path)
+        self._broken = False
+        self.done += 1
+        self._keep()
+        self._change()
+        return process
+
+    def seek(self, done: int) -> None:
+        """Come to the moment after so many steps, which were done before without an error."""
+        if self._broken or not self._moments[-1].done <= self.done <= done:
+            self._restore(next(one for one in reversed(self._moments) if one.done <= done))
+        while self.done < done:
+            self.advance()
+
+    def change(self, change: Change) -> None:
+        """Change the state now; what was known of the time after it is forgotten.
+
+        Raises:
+            RunError: it cannot be changed so, and is as it was.
+        """
+        change(self.machine)
+        self._moments = [one for one in self._moments if one.done <= self.done]
+        self._changes = [one for one in self._changes if one[0] <= self.done]
+        self._changes.append((self.done, change))
+
+    def forget(self) -> None:
+        """Forget changes that were made later than now, and moments that come after one of them."""
+        later = [at for at, _ in self._changes if at > self.done]
+        self._changes = [one for one in self._changes if one[0] <= self.done]
+        if later:
+            self._moments = [one for one in self._moments if one.done <= min(later)]
+
+    def _change(self) -> None:
+        for at, change in self._changes:
+            if at == self.done:
+                change(self.machine)
+
+    # ---- moments ---------------------------------------------------------------------------------------------------
+
+    def _keep(self) -> None:
+        """Keep this moment, if the last one is long ago."""
+        now = time.perf_counter()
+        if self.done <= self._moments[-1].done or now - self._begun < max(self._often, _SHARE * self._cost):
+            return
+        self._moments.append(self._moment())
+        if len(self._moments) > _MOST_MOMENTS:
+            del self._moments[1::2]
+            self._often *= 2
+
+    def _moment(self) -> _Moment:
+        began = time.perf_counter()
+        file = io.BytesIO()
+        pickler = _Pickler(file)
+        pickler.dump((self.machine, self.marks))
+        self._begun = time.perf_counter()
+        # One that the machine was busy with something else for says little of the next.
+        cost = self._begun - began
+        self._cost = min(cost, 2 * self._cost) if self._cost else cost
+        return _Moment(self.done, file.getvalue(), pickler.held)
+
+    def _restore(self, moment: _Moment) -> None:
+        self.machine, self.marks = _Unpickler(io.BytesIO(moment.state), moment.held).load()
+        self.done, self._broken = moment.done, False
+        self._begun = time.perf_counter()
+        self._change()
+
+
+class _Pickler(pickle.Pickler):
+    """Writes a state; of what never changes only its number."""
+
+    def __init__(self, file: io.BytesIO) -> None:
+        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
+        self.held: list[object] = []
+        self._numbers: dict[int, int] = {}
+
+    def persistent_id(self, obj: Any) -> int | None:
+        if not isinstance(obj, _HELD):
+            return None
+        number = self._numbers.setdefault(id(obj), len(self.held))
+        if number == len(self.held):
+            self.held.append(obj)
+        return number
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads a state again, which never left this process."""
+
+    def __init__(self, file: io.BytesIO, held: list[object]) -> None:
+        super().__init__(file)
+        self._held = held
+
+    def persistent_load(self, pid: Any) -> Any:
+        return self._held[pid]

@@ -1,0 +1,97 @@
+"""The statements of a program as its code knows them: where each begins, and in which line a run can be stopped."""
+
+from bisect import bisect_right
+from collections.abc import Iterator
+
+import attrs
+
+from armwright.program.bytecode.instructions import Code, Op
+from armwright.program.language.source import Span
+
+# What stands behind the last statement of a part, though it belongs to a statement around it.
+_TRAILING = frozenset((Op.JMP, Op.ENDT, Op.ENDR, Op.UNLK, Op.RET, Op.QUIT))
+
+
+@attrs.frozen(kw_only=True)
+class Start:
+    """Where a statement begins.
+
+    Attributes:
+        index: of its first instruction.
+        span: in the text; of a statement that holds others only its head.
+        line: from 1.
+    """
+
+    index: int
+    span: Span
+    line: int
+
+
+class Statements:
+    """The statements of a program."""
+
+    def __init__(self, code: Code) -> None:
+        """Look at every instruction once."""
+        self._code = code
+        self._begins = [at for at, step in enumerate(code.instructions) if step.begins]
+        self._procedures = sorted((one.start, name) for name, one in code.procedures.items())
+        self.starts = tuple(self._starts())
+        self._by_index = {one.index: one for one in self.starts}
+        # A line is entered by the first statement in it; a FOR has a second beginning for each further pass.
+        self._by_place = sorted(self.starts, key=lambda one: (one.line, one.span.start, one.index))
+
+    def at(self, index: int) -> Start:
+        """Return the statement that an instruction belongs to; behind the last one, the last."""
+        index = min(index, len(self._code.instructions) - 1)
+        at = bisect_right(self._begins, index) - 1
+        start = self._by_index[self._begins[max(at, 0)]]
+        step = self._code.instructions[index]
+        if step.op in _TRAILING and not step.begins:
+            return Start(index=index, span=step.span, line=self._code.line(step))
+        return start
+
+    def begins(self, index: int) -> bool:
+        """Whether a statement begins with an instruction."""
+        return self._code.instructions[index].begins
+
+    def procedure(self, index: int) -> str | None:
+        """Return the procedure that an instruction stands in; None for the main program."""
+        at = bisect_right(self._procedures, index, key=lambda one: one[0]) - 1
+        return self._procedures[at][1] if at >= 0 else None
+
+    def find(self, line: int, column: int | None = None) -> Start | None:
+        """Return the statement at which a run can be stopped for a line.
+
+        Args:
+            line: from 1.
+            column: from 1; the statement that begins there or is the next in this line.
+
+        Returns:
+            The first statement that begins in the line, or in the next line in which one does; None where no
+            statement follows.
+        """
+        source = self._code.source
+        for one in self._by_place:
+            early = column is not None and one.line == line and source.column(one.span.start) < column
+            if one.line >= line and not early:
+                return one
+        return None
+
+    def between(self, first: int, last: int) -> Iterator[Start]:
+        """Give the statements that begin in some lines, in the order of the text, each once."""
+        seen = set()
+        for one in self._by_place:
+            if first <= one.line <= last and one.span.start not in seen:
+                seen.add(one.span.start)
+                yield one
+
+    def _starts(self) -> Iterator[Start]:
+        instructions, source = self._code.instructions, self._code.source
+        ends = [*self._begins[1:], len(instructions)]
+        for first, end in zip(self._begins, ends, strict=True):
+            group = instructions[first:end]
+            own = [group[0], *(step for step in group[1:] if step.op not in _TRAILING)]
+            at = min(step.span.start for step in own)
+            # A condition or an action of a MOVE lies inside of its statement, and never begins before it.
+            span = Span(at, max(step.span.end for step in own if step.span.start == at))
+            yield Start(index=first, span=span, line=source.line(at))

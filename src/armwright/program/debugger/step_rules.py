@@ -1,0 +1,77 @@
+"""Steps of one process: how far each kind of step goes."""
+
+from typing import Literal, TypeAlias
+
+import attrs
+
+from armwright.program.debugger.history import Path
+from armwright.program.debugger.snapshot import process_of
+from armwright.program.vm.machine import Machine
+from armwright.program.vm.process import Process
+
+# To the next statement; the next at the same level or further out; further out only; the next stage of a MOVE.
+StepKind: TypeAlias = Literal["in", "next", "out", "stage"]
+# Deeper than any stack.
+_ANY_DEPTH = 1 << 60
+
+
+@attrs.define(kw_only=True)
+class Step:
+    """A step under way.
+
+    Attributes:
+        kind: how far it goes.
+        path: the process that makes it; when its branch ends, the process that began the branch.
+        depth: of the stack of the process when the step began.
+        moved: whether the process has done anything since.
+        stage: the stage that the process is in.
+    """
+
+    kind: StepKind
+    path: Path
+    depth: int
+    moved: bool = False
+    stage: tuple[int, int] | None = None
+
+    def took(self, machine: Machine, path: Path) -> str | None:
+        """Take note of what a process has just done; return in words what ends the step with it, or None."""
+        if path == self.path:
+            self.moved = True
+        process = process_of(machine, self.path)
+        while process is None and self.path:
+            # The branch is over: the step ends where the process that began it goes on.
+            self.path, self.depth, self.moved = self.path[:-1], _ANY_DEPTH, True
+            process = process_of(machine, self.path)
+        if self.kind != "stage" or process is None:
+            return None
+        stage, self.stage = self.stage, stage_of(process)
+        if self.stage is None or self.stage == stage:
+            return None
+        record = machine.stages[self.stage[1]]
+        return f"{record.arm} begins {record.stage.kind} {' '.join(record.to)}"
+
+    def ends(self, process: Process) -> bool:
+        """Whether the step ends at the statement that a process is about to begin."""
+        own = process.path == self.path
+        # A step into a COBEGIN ends in the first of its branches.
+        if not self.moved or not (own or (self.kind == "in" and process.path[: len(self.path)] == self.path)):
+            return False
+        match self.kind:
+            case "next":
+                return len(process.stack) <= self.depth
+            case "out":
+                return len(process.stack) < self.depth
+            case _:
+                return True
+
+
+def step_of(machine: Machine, kind: StepKind, path: Path) -> Step:
+    """Return a step of a process that begins now."""
+    process = process_of(machine, path)
+    depth, stage = (_ANY_DEPTH, None) if process is None else (len(process.stack), stage_of(process))
+    return Step(kind=kind, path=path, depth=depth, stage=stage)
+
+
+def stage_of(process: Process) -> tuple[int, int] | None:
+    """Return which stage of which motion a process is in: the tick of its beginning, its number in the record."""
+    return None if process.motion is None else (process.motion.begun.tick, process.motion.record)

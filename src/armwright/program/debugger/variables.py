@@ -1,0 +1,278 @@
+"""What a debugger shows of a run that stands still: variables, frames, arms and the clock, one inside the other."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD
+from armwright.cell.model import base_name
+from armwright.kinematics.forward import forward
+from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.debugger.snapshot import Frame
+from armwright.program.vm.machine import Machine
+from armwright.program.vm.process import Process, Value
+from armwright.spatial.poses import to_noap
+
+_NOTHING = "no value yet"
+# Less than this of a number between -1 and 1 is rounding.
+_ROUNDING = 1e-9
+_COLUMNS = "noap"
+
+
+@attrs.frozen(kw_only=True)
+class Shown:
+    """A line that can be opened.
+
+    Attributes:
+        name: what it is.
+        value: for people; of what can be changed, as the program could write it.
+        type: what kind of thing it is.
+        inside: gives the lines inside of it; None where there are none.
+        elements: how many of those are elements of an array.
+        expression: what asks for it again; empty where nothing does.
+        kept: where it is kept, if it is a variable, an element or an arm.
+    """
+
+    name: str
+    value: str
+    type: str = ""
+    inside: Callable[[], "Sequence[Shown]"] | None = None
+    elements: int = 0
+    expression: str = ""
+    kept: str | None = None
+
+
+def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
+    """Return what there is to look at from one level of a stack.
+
+    Args:
+        machine: as it is seen now.
+        process: whose level it is.
+        frame: the level.
+    """
+    own = {} if frame.procedure is None else machine.code.procedures[frame.procedure].types
+    # Of a branch in the program itself, or of a procedure that has no names, there is nothing own to be seen.
+    local = {key: frame.activation.bindings.get(key, key) for key in own if key in frame.activation.bindings}
+    values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not Kind.FRAME}
+    parts: list[tuple[str, Callable[[], Sequence[Shown]]]] = [
+        ("Locals", lambda: [variable(machine, kept, name=machine.spelled(key)) for key, kept in local.items()]),
+        ("Variables", lambda: [variable(machine, kept) for kept in values]),
+        ("Frames", lambda: [variable(machine, name) for name in frames(machine)]),
+        ("Arms", lambda: [_arm(machine, name) for name in machine.cell.arms]),
+        ("Run", lambda: list(_run(machine, process))),
+    ]
+    there = {"Locals": local, "Variables": values}
+    return [Shown(name=name, value="", inside=inside) for name, inside in parts if there.get(name, True)]
+
+
+def frames(machine: Machine) -> list[str]:
+    """Return the single frames of a program and its cell, bases of arms and variables of procedures aside."""
+    return [name for name in machine.tree if name != WORLD and not set(name) & set(".'[")]
+
+
+def variable(machine: Machine, kept: str, *, name: str = "") -> Shown:
+    """Return a variable, an element, an array or the hand of an arm.
+
+    Args:
+        machine: as it is seen now.
+        kept: where it is kept.
+        name: what to call it; as the program spells it when left out.
+    """
+    kind = machine.type_of(kept)
+    called = name or machine.spelled(kept)
+    if kind.sizes:
+        return _array(machine, kept, called, kind)
+    if kind.kind is Kind.EVENT:
+        count = str(machine.events.get(kept, 0))
+        return Shown(name=called, value=count, type="EVENT", expression=called, kept=kept)
+    if kind.kind is Kind.FRAME:
+        return _frame(machine, kept, called)
+    value = machine.values.get(kept)
+    if value is None:
+        return Shown(name=called, value=_NOTHING, type=str(kind), expression=called, kept=kept)
+    return attrs.evolve(result(machine, called, value, str(kind)), expression=called, kept=kept)
+
+
+def result(machine: Machine, name: str, value: Value, kind: str) -> Shown:
+    """Return a value that stands for itself."""
+    if isinstance(value, np.ndarray):
+        return Shown(name=name, value=_matrix(machine, value), type=kind, inside=lambda: _columns(machine, value))
+    return Shown(name=name, value=_truth(value) if isinstance(value, bool) else f"{value:.12g}", type=kind)
+
+
+def frames_text(machine: Machine) -> list[str]:
+    """Return the tree of frames, a line each, what hangs on something under it."""
+    below: dict[str, list[str]] = {}
+    for name in machine.tree:
+        if name != WORLD and not name.endswith(".BASE"):
+            parent = machine.tree.parent(name) or WORLD
+            # An arm hangs on its own base, which no program can name.
+            below.setdefault(WORLD if parent.endswith(".BASE") else parent, []).append(name)
+    lines = [WORLD]
+    waiting = [(name, 1) for name in sorted(below.get(WORLD, ()), reverse=True)]
+    while waiting:
+        name, depth = waiting.pop()
+        lines.append(f"{'  ' * depth}{machine.spelled(name)}  {_place(machine, name)}")
+        waiting += [(child, depth + 1) for child in sorted(below.get(name, ()), reverse=True)]
+    return lines
+
+
+# ---- frames, steps, arrays -----------------------------------------------------------------------------------------
+
+
+def _frame(machine: Machine, kept: str, called: str) -> Shown:
+    if not machine.has_place(kept):
+        return Shown(name=called, value=_NOTHING, type="FRAME", expression=called, kept=kept)
+    parent = machine.tree.parent(kept)
+    hangs = "" if parent is None else f" on {_above(machine, parent)}"
+    return Shown(
+        name=called,
+        value=_matrix(machine, machine.tree.world(kept)),
+        type=f"FRAME{hangs}",
+        inside=lambda: _inside(machine, kept),
+        expression=called,
+        kept=kept,
+    )
+
+
+def _inside(machine: Machine, kept: str) -> list[Shown]:
+    lines = _columns(machine, machine.tree.world(kept))
+    parent = machine.tree.parent(kept)
+    if parent is not None:
+        above = _above(machine, parent)
+        X = machine.tree.relation(kept, parent)
+        place = variable(machine, parent) if parent != WORLD else None
+        lines += [
+            Shown(name="parent", value=above, type="FRAME", inside=place.inside if place else None, expression=above),
+            attrs.evolve(result(machine, "relation", X, "TRANS"), name="relation"),
+        ]
+        if machine.tree.nodes[kept].rigid:
+            lines.append(Shown(name="rigid", value="true"))
+    if kept in machine.written:
+        lines.append(Shown(name="set in line", value=str(machine.code.source.line(machine.written[kept].start))))
+    return lines
+
+
+def _above(machine: Machine, parent: str) -> str:
+    return f"the base of {parent.removesuffix('.BASE')}" if parent.endswith(".BASE") else machine.spelled(parent)
+
+
+def _columns(machine: Machine, X: Array) -> list[Shown]:
+    numbers = _numbers(machine, X)
+    unit = machine.code.units.length.lower()
+    return [
+        Shown(name=column, value=f"({', '.join(numbers[3 * at : 3 * at + 3])})", type=unit if column == "p" else "")
+        for at, column in enumerate(_COLUMNS)
+    ]
+
+
+def _matrix(machine: Machine, X: Array) -> str:
+    """Return a place or a step as the program would write it."""
+    numbers = _numbers(machine, X)
+    return "(" + ", ".join(",".join(numbers[at : at + 3]) for at in range(0, 12, 3)) + ")"
+
+
+def _numbers(machine: Machine, X: Array) -> list[str]:
+    numbers = to_noap(X)
+    numbers[9:] /= machine.code.units.metres
+    return [f"{0.0 if abs(number) < _ROUNDING else number:.7g}" for number in numbers.tolist()]
+
+
+def _place(machine: Machine, name: str) -> str:
+    if not machine.has_place(name):
+        return _NOTHING
+    return f"({', '.join(_numbers(machine, machine.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
+
+
+def _array(machine: Machine, kept: str, called: str, kind: Type) -> Shown:
+    count = math.prod(kind.sizes)
+    return Shown(
+        name=called,
+        value=f"{count} elements",
+        type=str(kind),
+        inside=lambda: _Elements(machine, kept, called, kind),
+        elements=count,
+        expression=called,
+        kept=kept,
+    )
+
+
+class _Elements(Sequence[Shown]):
+    """The elements of an array, made when they are looked at: there may be a million."""
+
+    def __init__(self, machine: Machine, kept: str, called: str, kind: Type) -> None:
+        self._machine, self._kept, self._called, self._sizes = machine, kept, called, kind.sizes
+
+    def __len__(self) -> int:
+        return math.prod(self._sizes)
+
+    def __getitem__(self, at: "int | slice") -> "Shown | list[Shown]":  # type: ignore[override]
+        if isinstance(at, slice):
+            return [self._one(one) for one in range(*at.indices(len(self)))]
+        return self._one(range(len(self))[at])
+
+    def _one(self, number: int) -> Shown:
+        indices = []
+        for size in reversed(self._sizes):
+            number, index = divmod(number, size)
+            indices.append(str(index + 1))
+        which = f"[{','.join(reversed(indices))}]"
+        element = variable(self._machine, self._kept + which, name=self._called + which)
+        return attrs.evolve(element, name=which)
+
+
+# ---- arms and the run ----------------------------------------------------------------------------------------------
+
+
+def _arm(machine: Machine, name: str) -> Shown:
+    arm = machine.cell.arms[name].arm
+    q = machine.hardware.posture(name, machine.now)
+    joints = [
+        Shown(
+            name=f"joint {number}",
+            value=f"{math.degrees(position):.6g} deg" if joint.revolute else f"{position * 1e3:.6g} mm",
+        )
+        for number, (joint, position) in enumerate(zip(arm.joints, q.tolist(), strict=True), 1)
+    ]
+
+    def inside() -> list[Shown]:
+        X_WH = machine.tree.world(base_name(name)) @ forward(arm, q)
+        holds = machine.hands[name].holds
+        force = ", ".join(f"{one:.6g}" for one in machine.hardware.force(name, machine.now).tolist())
+        return [
+            *joints,
+            attrs.evolve(result(machine, "hand", X_WH, "FRAME"), name="hand", expression=name, kept=name),
+            Shown(name="moves", value=_motion(machine, name)),
+            Shown(name="holds", value=machine.spelled(holds) if holds else "nothing"),
+            Shown(name="force", value=f"({force}) N"),
+        ]
+
+    return Shown(name=name, value=", ".join(one.value for one in joints), type=arm.name, inside=inside)
+
+
+def _motion(machine: Machine, arm: str) -> str:
+    """Return which stage of which MOVE an arm is in."""
+    motion = next((one.motion for one in machine.processes if one.motion and one.motion.arm == arm), None)
+    if motion is None:
+        return "nothing"
+    stage = machine.stages[motion.record]
+    line = machine.code.source.line(motion.span.start)
+    since = machine.now - stage.t0
+    return f"{stage.stage.kind} {' '.join(stage.to)} of line {line}, {since:.3f} s of {stage.duration:.3f} s"
+
+
+def _run(machine: Machine, process: Process) -> Iterable[Shown]:
+    yield Shown(name="clock", value=f"{machine.now:.6g} s")
+    yield Shown(name="servo tick", value=str(machine.ticks))
+    yield Shown(name="devices on", value=", ".join(map(machine.spelled, sorted(machine.hardware.running()))) or "none")
+    yield Shown(name="arm used last", value=process.last_arm or "none")
+    yield Shown(name="priority", value=f"{process.priority:g}")
+    if process.locks:
+        yield Shown(name="locks", value=", ".join(map(machine.spelled, process.locks)))
+
+
+def _truth(value: bool) -> str:  # noqa: FBT001 - a value, not a switch
+    return "true" if value else "false"

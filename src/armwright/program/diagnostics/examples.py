@@ -1,0 +1,116 @@
+"""Trying out the programs of the pages: their comments say in what cell, in what language, within what limits.
+
+``// std=83`` and ``// strict`` are the options of the command line. ``// cell: arms ARM_1, ARM_2`` tells what a
+program is checked against, and so do ``frames``, ``devices`` and ``visions``; ``// import: parts.toml: CUP, LID on
+CUP`` tells what an IMPORT brings. ``// run in one_arm`` has the program run in a cell that comes with the pages, with
+``// around: via`` and ``// limits: steps 1000`` as on the command line; ``// effort: 60 in joint 2`` makes a joint of
+its arms that weak.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import attrs
+
+from armwright.cell.model import Around, Cell, CellArm
+from armwright.cell.reader import read_cell
+from armwright.errors import FileFormatError
+from armwright.program.api import compile as translate
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Source
+from armwright.program.language.words import Standard
+from armwright.program.semantics.cell_symbols import Imported, KnownCell, ReadImport, known_cell
+
+_CELLS = Path(__file__).parent / "pages" / "cells"
+_RUN = re.compile(r"^// run in (\w+)$", re.MULTILINE)
+_AROUND = re.compile(r"^// around: (via|damped)$", re.MULTILINE)
+_WAYS: Mapping[str, Around] = {"via": "via", "damped": "damped"}
+_EFFORT = re.compile(r"^// effort: (\d+) in joint (\d)$", re.MULTILINE)
+_LIMIT = re.compile(r"^// limits: (steps|depth|time) (\d+)$", re.MULTILINE)
+_KNOWN = re.compile(r"^// cell: (arms|frames|devices|visions) (.+)$", re.MULTILINE)
+_IMPORT = re.compile(r"^// import: (\S+): (.+)$", re.MULTILINE)
+_OLD = re.compile(r"^// std=83$", re.MULTILINE)
+_STRICT = re.compile(r"^// strict$", re.MULTILINE)
+
+
+def answer(source: Source) -> tuple[Diagnostic, ...]:
+    """Return what is said of a program: by the translator and, where its comments have it run, on the way.
+
+    Args:
+        source: the program, with its comments.
+    """
+    cell = _cell(source.text)
+    compiled = translate(
+        source,
+        _known(source.text) if cell is None else known_cell(cell),
+        strict=bool(_STRICT.search(source.text)),
+        std=Standard.RLO_83 if _OLD.search(source.text) else Standard.RLO_2,
+        read_import=_imports(source.text),
+    )
+    if cell is None or compiled.code is None:
+        return compiled.diagnostics
+    from armwright.cell.simulator import Simulator  # noqa: PLC0415 - only who runs waits for it
+    from armwright.program.vm.interpreter import Limits, RunError, interpret, warnings  # noqa: PLC0415
+
+    limits = Limits()
+    for what, count in _LIMIT.findall(source.text):
+        limits = attrs.evolve(limits, **{what: int(count)})
+    try:
+        recording = interpret(compiled.code, cell, Simulator(cell), limits=limits)
+    except RunError as error:
+        return (*compiled.diagnostics, error.diagnostic)
+    return (*compiled.diagnostics, *warnings(recording))
+
+
+def _cell(text: str) -> Cell | None:
+    """Return the cell that a program is run in; None where it is not run."""
+    match = _RUN.search(text)
+    if match is None:
+        return None
+    cell = read_cell(_CELLS / f"{match[1]}.toml")
+    if around := _AROUND.search(text):
+        cell = attrs.evolve(cell, around=_WAYS[around[1]])
+    for effort, number in _EFFORT.findall(text):
+        arms = {name: _weaker(arm, int(number) - 1, float(effort)) for name, arm in cell.arms.items()}
+        cell = attrs.evolve(cell, arms=arms)
+    return cell
+
+
+def _weaker(placed: CellArm, joint: int, effort: float) -> CellArm:
+    """Return an arm of a cell of which one joint has no more effort than this."""
+    joints = list(placed.arm.joints)
+    limits = attrs.evolve(joints[joint].limits, effort=effort)
+    joints[joint] = attrs.evolve(joints[joint], limits=limits)
+    return attrs.evolve(placed, arm=attrs.evolve(placed.arm, joints=joints))
+
+
+def _known(text: str) -> KnownCell | None:
+    """Return the cell that a program is checked against."""
+    told: Mapping[str, list[str]] = {what: names.split(", ") for what, names in _KNOWN.findall(text)}
+    if not told:
+        return None
+    return KnownCell(
+        arms=frozenset(told["arms"]),
+        frames=_hanging(told.get("frames", [])),
+        devices=frozenset(told["devices"]) if "devices" in told else None,
+        visions=frozenset(told["visions"]) if "visions" in told else None,
+    )
+
+
+def _hanging(names: list[str]) -> dict[str, str]:
+    """Return what each frame hangs on, of names such as ``LID on CUP``."""
+    parts = (name.partition(" on ") for name in names)
+    return {name: parent or "WORLD" for name, _, parent in parts}
+
+
+def _imports(text: str) -> ReadImport | None:
+    """Return a reader of the files that a program is told of; any other file is missing."""
+    files = {path: _hanging(names.split(", ")) for path, names in _IMPORT.findall(text)}
+
+    def read(path: str) -> Imported:
+        if path not in files:
+            raise FileFormatError(path, None, "", "there is no such file")
+        return Imported(frames=files[path])
+
+    return read if files else None

@@ -1,0 +1,182 @@
+"""Curing what is certain: the changes that diagnostics offer are made, round after round, as long as they help."""
+
+from bisect import bisect_left, bisect_right, insort
+from collections.abc import Callable, Iterable, Sequence
+from itertools import accumulate
+from typing import TypeAlias
+
+import attrs
+
+from armwright.program.api import Compilation
+from armwright.program.language.diagnostic import Diagnostic, Fix
+from armwright.program.language.source import Source
+from armwright.program.language_server.positions import Edit, edited
+
+# How often a program is looked at again: one cure may bring the next slip to light.
+ROUNDS = 10
+# How often a program is translated at most to find out which changes help, in one round.
+_MOST_TRIALS = 200
+# A longer text is not shown whole.
+_LONGEST_SHOWN = 30
+
+Translate: TypeAlias = Callable[[Source], Compilation]
+
+
+@attrs.frozen
+class Cure:
+    """A change that was made.
+
+    Attributes:
+        source: the program before its round.
+        diagnostic: what it cures.
+    """
+
+    source: Source
+    diagnostic: Diagnostic
+
+    @property
+    def what(self) -> str:
+        """What was done, such as ``put in `;```."""
+        return " and ".join(dict.fromkeys(_said(fix, self.source) for fix in self.diagnostic.fixes))
+
+
+@attrs.frozen(kw_only=True)
+class Fixed:
+    """A program after all that is certain has been cured.
+
+    Attributes:
+        cures: what was done, in order.
+        compilation: of the program as it is now; what is left is in its diagnostics.
+    """
+
+    cures: tuple[Cure, ...]
+    compilation: Compilation
+
+    @property
+    def text(self) -> str:
+        """The program as it is now."""
+        return self.compilation.source.text
+
+
+def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixed:
+    """Make the changes that diagnostics offer.
+
+    In each round all changes are made that do not touch one another. Where one does not make its message go away, or
+    brings a new slip of syntax, it is left alone. A text with zero bytes is that of no program, and left alone.
+
+    Args:
+        source: the program.
+        translate: how to find out what is wrong.
+        rounds: how often to look again at most.
+    """
+    now = translate(source)
+    cures: list[Cure] = []
+    vain: set[tuple[str, str]] = set()
+    for _ in range(rounds if "\0" not in source.text else 0):
+        offered = [one for one in now.diagnostics if one.fixes and _line_of(one, now.source) not in vain]
+        wanted = apart(offered)
+        if not wanted:
+            break
+        after = translate(_with(now.source, wanted))
+        if not _helps(wanted, now, after):
+            wanted, after = _that_help(wanted, now, translate)
+            vain |= {_line_of(one, now.source) for one in offered if one not in wanted}
+        cures += [Cure(now.source, one) for one in wanted]
+        now = after
+    return Fixed(cures=tuple(cures), compilation=now)
+
+
+def apart(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
+    """Return those whose changes can be made at once: of two that touch, the first."""
+    found: list[Diagnostic] = []
+    taken: list[tuple[int, int]] = []
+    for one in sorted(diagnostics, key=lambda one: min(fix.span.start for fix in one.fixes)):
+        own = [(fix.span.start, fix.span.end) for fix in one.fixes]
+        if not any(_touches(span, taken) for span in own):
+            found.append(one)
+            for span in own:
+                insort(taken, span)
+    return found
+
+
+def _touches(span: tuple[int, int], taken: Sequence[tuple[int, int]]) -> bool:
+    """Whether a span touches one of some, which are in order and do not touch one another."""
+    at = bisect_right(taken, span)
+    return (at > 0 and taken[at - 1][1] >= span[0]) or (at < len(taken) and taken[at][0] <= span[1])
+
+
+def _with(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
+    """Return a program with the changes made that diagnostics offer."""
+    edits = tuple(Edit(fix.span, fix.replacement) for one in diagnostics for fix in one.fixes)
+    return Source(source.name, edited(source.text, edits))
+
+
+def _helps(wanted: Sequence[Diagnostic], before: Compilation, after: Compilation) -> bool:
+    """Whether changes have made their messages go away, and have brought no other slip of syntax.
+
+    What else is said afterwards was hidden by them: what a program does is looked at when its syntax is right, and
+    of two slips at one place that can be cured one is told at a time.
+    """
+    changes = _Changes(wanted)
+    again = {(one.code, one.message, at) for one in wanted for at in changes.moved(one.span.start)}
+    known = {(one.code, at) for one in before.diagnostics if one.is_syntax for at in changes.moved(one.span.start)} - {
+        (code, at) for code, _, at in again
+    }
+    for one in after.diagnostics:
+        at = one.span.start
+        if (one.code, one.message, at) in again:
+            return False
+        if one.is_syntax and (one.code, at) not in known and not (one.fixes and at in changes.ends):
+            return False
+    return True
+
+
+class _Changes:
+    """How places move when changes are made."""
+
+    def __init__(self, wanted: Iterable[Diagnostic]) -> None:
+        spans = sorted((fix.span.start, fix.span.end, len(fix.replacement)) for one in wanted for fix in one.fixes)
+        self._starts = [start for start, _, _ in spans]
+        self._longer = [0, *accumulate(longer - (end - start) for start, end, longer in spans)]
+        self.ends = {end + longer for (_, end, _), longer in zip(spans, self._longer[1:], strict=True)}
+
+    def moved(self, offset: int) -> tuple[int, int]:
+        """Return where a place is afterwards: in front of what is put in there, and behind it."""
+        first, last = bisect_left(self._starts, offset), bisect_right(self._starts, offset)
+        return offset + self._longer[first], offset + self._longer[last]
+
+
+def _that_help(
+    wanted: Sequence[Diagnostic], before: Compilation, translate: Translate
+) -> tuple[list[Diagnostic], Compilation]:
+    """Return the changes that help together, and what becomes of the program.
+
+    Few do not as a rule, so that changes are tried many at a time, and half of them where those are too many.
+    """
+    found: list[Diagnostic] = []
+    after = before
+    waiting = [list(wanted)]
+    for _ in range(_MOST_TRIALS):
+        if not waiting:
+            break
+        several = waiting.pop()
+        tried = translate(_with(before.source, [*found, *several]))
+        if _helps([*found, *several], before, tried):
+            found, after = [*found, *several], tried
+        elif len(several) > 1:
+            half = len(several) // 2
+            waiting += [several[half:], several[:half]]
+    return found, after
+
+
+def _line_of(one: Diagnostic, source: Source) -> tuple[str, str]:
+    """Return what a message says and of which line, by which it is known again after other lines have changed."""
+    return one.message, source.line_text(source.line(one.span.start))
+
+
+def _said(fix: Fix, source: Source) -> str:
+    old, new = (" ".join(text.split()) for text in (source.slice(fix.span), fix.replacement))
+    old, new = (text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..." for text in (old, new))
+    if not new:
+        return f"left out `{old}`"
+    return f"wrote `{new}` for `{old}`" if old else f"put in `{new}`"

@@ -1,0 +1,145 @@
+"""Diagnostics as people read them: the lines of the program with marks under the places that matter."""
+
+import unicodedata
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, TypeAlias
+
+from armwright.program.language.diagnostic import Diagnostic, Label, Severity, count_line, in_order
+from armwright.program.language.source import Source
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+# A piece of a row and its style, in the words of rich; the style is empty for plain text.
+Piece: TypeAlias = tuple[str, str]
+Row: TypeAlias = list[Piece]
+
+# So many are read one by one at most; the rest is counted.
+MOST_SHOWN = 100
+_TAB = 4
+_NARROWEST_GUTTER = 2
+# Longer lines are shown in part, from so many characters before the first place on.
+_LONGEST_LINE, _AROUND, _CUT = 240, 60, "..."
+_LOUD = {Severity.ERROR: "bold red", Severity.WARNING: "bold yellow"}
+_QUIET = "bold blue"
+
+
+def render(diagnostics: Iterable[Diagnostic], source: Source) -> str:
+    """Return diagnostics as plain text, sorted by place, a hundred at most, with a count of all at the end."""
+    return "".join("".join(text for text, _ in row).rstrip() + "\n" for row in _page(diagnostics, source))
+
+
+def render_rich(diagnostics: Iterable[Diagnostic], source: Source) -> "Text":
+    """Return the same in colour."""
+    from rich.text import Text  # noqa: PLC0415 - only who watches waits for it
+
+    page = Text(no_wrap=True)
+    for row in _page(diagnostics, source):
+        for text, style in row:
+            page.append(text, style or None)
+        page.append("\n")
+    return page
+
+
+def _page(diagnostics: Iterable[Diagnostic], source: Source) -> Iterator[Row]:
+    ordered = in_order(diagnostics)
+    # Of too many the errors come first: a warning is never shown in place of what keeps a program from running.
+    shown = in_order(sorted(ordered, key=lambda one: not one.is_error)[:MOST_SHOWN])
+    for diagnostic in shown:
+        yield from _block(diagnostic, source)
+        yield [("", "")]
+    if len(ordered) > MOST_SHOWN:
+        rest = f"{len(ordered) - MOST_SHOWN} more are not shown; one mistake may have caused many"
+        yield [("note", "bold"), (f": {rest}. `armwright check --format json` prints all", "")]
+        yield [("", "")]
+    yield [(count_line(ordered, source), "bold" if ordered else "")]
+
+
+def _block(diagnostic: Diagnostic, source: Source) -> Iterator[Row]:
+    loud = _LOUD[diagnostic.severity]
+    labels = [Label(diagnostic.span, diagnostic.label), *diagnostic.secondary]
+    numbers = sorted({source.line(label.span.start) for label in labels})
+    width = max(_NARROWEST_GUTTER, len(str(numbers[-1])))
+    yield [(f"{diagnostic.severity.value}[{diagnostic.code}]", loud), (f": {diagnostic.message}", "bold")]
+    place = f"{source.name}:{source.line(diagnostic.span.start)}:{source.column(diagnostic.span.start)}"
+    yield [(" " * width + "--> ", _QUIET), (place, "")]
+    yield [(" " * width + " |", _QUIET)]
+    before = numbers[0]
+    for number in numbers:
+        if number > before + 1:
+            yield [("...", _QUIET)]
+        before = number
+        here = [label for label in labels if source.line(label.span.start) == number]
+        line = source.line_text(number)
+        anchor = labels[0] if labels[0] in here else here[0]
+        first, last = _window(len(line), source.column(anchor.span.start) - 1)
+        before_it, behind_it = _CUT if first else "", _CUT if last < len(line) else ""
+        shown = before_it + "".join(_cells(line[first:last])) + behind_it
+        yield [(f"{number:>{width}} | ", _QUIET), (shown, "")]
+        for label in sorted(here, key=lambda one: one.span.start):
+            mark, style = ("^", loud) if label is labels[0] else ("-", _QUIET)
+            yield [
+                (" " * width + " | " + " " * len(before_it), _QUIET),
+                *_marks(label, mark, style, source, (first, last)),
+            ]
+    for head, texts in (("note", diagnostic.notes), ("help", diagnostic.helps)):
+        for text in texts:
+            yield [(" " * width + " = ", _QUIET), (f"{head}: ", "bold"), (text, "")]
+
+
+def _window(length: int, column: int) -> tuple[int, int]:
+    """Return which characters of a line are shown: all, or of a very long line those around a place."""
+    if length <= _LONGEST_LINE:
+        return 0, length
+    first = max(0, column - _AROUND)
+    return first, min(length, first + _LONGEST_LINE)
+
+
+def _marks(label: Label, mark: str, style: str, source: Source, shown: tuple[int, int]) -> Row:
+    """Return the blanks, the marks and the words under one place; a place of several lines is marked in its first.
+
+    Args:
+        label: the place and its words.
+        mark: what it is marked with.
+        style: of marks and words.
+        source: the program.
+        shown: the first character of the line that is shown, and the one behind the last.
+    """
+    begin, end = shown
+    line = source.line_text(source.line(label.span.start))
+    cells = _cells(line[begin:end])
+    column = source.column(label.span.start) - 1
+    # What lies in a part that is not shown is marked at its edge.
+    first = column if end == len(line) and column >= begin else min(max(column, begin), end)
+    last = min(column + label.span.end - label.span.start, len(line), end)
+    # Beyond the end of the line every character that is not there counts one.
+    indent = sum(map(_width, cells[: first - begin])) + max(0, first - len(line))
+    length = sum(map(_width, cells[first - begin : max(0, last - begin)]))
+    return [(" " * indent, ""), (mark * max(1, length), style), (f" {label.text}" if label.text else "", style)]
+
+
+# Diagnostics that follow one another are often about the same line.
+@lru_cache(maxsize=4)
+def _cells(line: str) -> Sequence[str]:
+    """Return what is shown for each character of a line: blanks up to the next stop for a tab."""
+    shown: list[str] = []
+    column = 0
+    for character in line:
+        cell = " " * (_TAB - column % _TAB) if character == "\t" else _visible(character)
+        column += _width(cell)
+        shown.append(cell)
+    return tuple(shown)
+
+
+def _visible(character: str) -> str:
+    """Return the character, or a stand-in for one that would disturb the terminal."""
+    return "\N{REPLACEMENT CHARACTER}" if unicodedata.category(character) in ("Cc", "Cf", "Cs") else character
+
+
+def _width(cell: str) -> int:
+    """Return how many columns of a terminal a shown character takes."""
+    return sum(
+        0 if unicodedata.combining(character) else 2 if unicodedata.east_asian_width(character) in "WF" else 1
+        for character in cell
+    )

@@ -1,0 +1,102 @@
+"""Diagnostics as SARIF 2.1.0, the form that code hosts and editors read."""
+
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+from armwright.program.diagnostics.index import explanation
+from armwright.program.language.diagnostic import Diagnostic, Severity
+from armwright.program.language.source import Source, Span
+from armwright.version import __version__
+
+_LEVELS = {Severity.ERROR: "error", Severity.WARNING: "warning"}
+
+
+def to_sarif(diagnostics: Sequence[Diagnostic], source: Source, path: str | None = None) -> dict[str, Any]:
+    """Return diagnostics as a SARIF log.
+
+    Args:
+        diagnostics: what is to be said.
+        source: the program.
+        path: of the program as it shall stand in the log; its name when left out.
+    """
+    return sarif_of([(diagnostics, source, path or source.name)])
+
+
+def sarif_of(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> dict[str, Any]:
+    """Return what is to be said of several programs as one SARIF log.
+
+    Args:
+        programs: of each the diagnostics, the text, and the path as it shall stand in the log.
+    """
+    codes = sorted({one.code for diagnostics, _, _ in programs for one in diagnostics})
+    results = [
+        _result(one, source, PurePath(path).as_posix(), codes)
+        for diagnostics, source, path in programs
+        for one in diagnostics
+    ]
+    return {
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [
+            {
+                "tool": {
+                    "driver": {
+                        "name": "armwright",
+                        "version": __version__,
+                        "rules": [_rule(code) for code in codes],
+                    }
+                },
+                "columnKind": "unicodeCodePoints",
+                "results": results,
+            }
+        ],
+    }
+
+
+def _rule(code: str) -> dict[str, Any]:
+    page = explanation(code)
+    return {"id": code, "shortDescription": {"text": page.title}, "fullDescription": {"text": page.text}}
+
+
+def _result(one: Diagnostic, source: Source, uri: str, codes: list[str]) -> dict[str, Any]:
+    advice = "".join(
+        f"\n{head}: {text}" for head, texts in (("note", one.notes), ("help", one.helps)) for text in texts
+    )
+    result: dict[str, Any] = {
+        "ruleId": one.code,
+        "ruleIndex": codes.index(one.code),
+        "level": _LEVELS[one.severity],
+        "message": {"text": one.message + advice},
+        "locations": [_location(one.span, source, uri, one.label)],
+    }
+    if one.secondary:
+        result["relatedLocations"] = [
+            {"id": number, **_location(label.span, source, uri, label.text)}
+            for number, label in enumerate(one.secondary, 1)
+        ]
+    if one.fixes:
+        replacements = [
+            {"deletedRegion": _region(fix.span, source), "insertedContent": {"text": fix.replacement}}
+            for fix in one.fixes
+        ]
+        change = {"artifactLocation": {"uri": uri}, "replacements": replacements}
+        words = one.helps[0] if one.helps else one.message
+        result["fixes"] = [{"description": {"text": words}, "artifactChanges": [change]}]
+    return result
+
+
+def _location(span: Span, source: Source, uri: str, text: str) -> dict[str, Any]:
+    physical = {"artifactLocation": {"uri": uri}, "region": _region(span, source)}
+    return {"physicalLocation": physical, **({"message": {"text": text}} if text else {})}
+
+
+def _region(span: Span, source: Source) -> dict[str, int]:
+    return {
+        "startLine": source.line(span.start),
+        "startColumn": source.column(span.start),
+        "endLine": source.line(span.end),
+        "endColumn": source.column(span.end),
+        "charOffset": span.start,
+        "charLength": span.end - span.start,
+    }

@@ -1,1 +1,0 @@
-"""Working on a program text: layout, repairs, and what an editor wants to know of a place in it."""

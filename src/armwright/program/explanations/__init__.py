@@ -1,1 +1,0 @@
-"""A page for every message, with programs that are tried."""

@@ -1,0 +1,321 @@
+"""Branches side by side: waits that cannot end, equal priorities, arms that two of them want."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import attrs
+
+from armwright.program.bytecode.instructions import Kind
+from armwright.program.flow_analysis.side_effects import every, parts, written_name
+from armwright.program.flow_analysis.state import Course, Use, Uses
+from armwright.program.language.diagnostic import Diagnostic, Findings, Label, Severity
+from armwright.program.language.source import Source
+from armwright.program.semantics.expression_types import written
+from armwright.program.semantics.symbols import Scope, Symbols
+from armwright.program.syntax import tree
+
+# Places shown in one message.
+_MOST_PLACES = 3
+
+
+def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagnostic]:
+    """Return what is wrong with events and priorities.
+
+    Args:
+        program: without errors of syntax.
+        symbols: its names.
+        source: its text.
+    """
+    found = Findings()
+    bodies = [_Body(symbols.scope(None), program.statements)]
+    for node in program.procedures:
+        procedure = symbols.procedures.get(node.name.key)
+        if procedure is not None and procedure.node is node:
+            bodies.append(_Body(symbols.scope(node.name.key), node.body.statements))
+    events = _Events(bodies)
+    for _, fork in events.forks:
+        _priorities(found, fork, source)
+    if not events.waits or events.may_halt:
+        return found
+    _never_signalled(found, events)
+    groups = [(scope, [branch.body.statements for branch in fork.branches]) for scope, fork in events.forks]
+    for scope, branches in [(bodies[0].scope, [program.statements]), *groups]:
+        _deadlock(found, events.sequences(scope, branches), source, main=branches[0] is program.statements)
+    return found
+
+
+# ---- priorities and arms -------------------------------------------------------------------------------------------
+
+
+def _priorities(found: Findings, fork: tree.Cobegin, source: Source) -> None:
+    """Warn of branches of equal priority, where it is written."""
+    seen: dict[float, tree.Branch] = {}
+    for branch in fork.branches:
+        if branch.priority is None:
+            continue
+        first = seen.setdefault(branch.priority.value, branch)
+        if first is not branch:
+            found.say(
+                "W502",
+                f"{'both' if len(fork.branches) == 2 else 'two'} branches have priority {branch.priority.text}",
+                branch.head,
+                f"same as line {source.line(first.head.start)}",
+                notes=("frame-table requests of equal priority are served in the order of the text",),
+                severity=Severity.WARNING,
+            )
+
+
+def shared_arms(course: Course, branches: Sequence[Uses]) -> None:
+    """Say which arms are used by more than one branch.
+
+    Args:
+        course: for what is found.
+        branches: what each branch of one COBEGIN uses.
+    """
+    seen: dict[str, Use] = {}
+    used = {arm for branch in branches for arm in branch.arms}
+    for branch in branches:
+        for arm, use in branch.arms.items():
+            free = _other(course, used)
+            first = seen.setdefault(arm, use)
+            if first is use:
+                continue
+            does = "moved" if first.moves and use.moves else "used"
+            course.say(
+                "E503",
+                f"{arm} is {does} in two branches of one COBEGIN",
+                use.span,
+                "second branch",
+                secondary=(Label(first.span, "first branch"), *dict.fromkeys((*first.hung, *use.hung))),
+                notes=("each arm belongs to one process at a time",),
+                helps=(f"use {free} in one branch, or give the arm over with SIGNAL and WAIT outside COBEGIN",),
+            )
+
+
+def _other(course: Course, used: set[str]) -> str:
+    """Return an arm that no branch uses."""
+    free = sorted(course.cell.arms - used) if course.cell else []
+    return free[0] if free else next(arm for n in range(1, len(used) + 2) if (arm := f"ARM_{n}") not in used)
+
+
+# ---- events --------------------------------------------------------------------------------------------------------
+
+
+_OF_PROCESSES = (tree.Signal, tree.Wait, tree.Call, tree.Cobegin)
+
+
+@attrs.frozen
+class _Body:
+    """The main program or a procedure."""
+
+    scope: Scope
+    statements: tuple[tree.Statement, ...]
+
+
+@attrs.frozen
+class _Step:
+    """A SIGNAL or WAIT that is certain to be come to, if nothing before it goes wrong or waits for ever."""
+
+    node: tree.Signal | tree.Wait
+    event: str
+
+
+class _Events:
+    """Where a program signals and waits for which events, and where it parts into branches."""
+
+    def __init__(self, bodies: Sequence[_Body]) -> None:
+        self.forks: list[tuple[Scope, tree.Cobegin]] = []
+        self.waits: dict[str, list[tuple[Scope, tree.Wait]]] = {}
+        self.signals: dict[str, list[tree.Signal]] = {}
+        # Events that are given to procedures, so that one cannot see who signals them.
+        self.given: set[str] = set()
+        for body in bodies:
+            for one in every(body.statements):
+                if isinstance(one, _OF_PROCESSES):
+                    self._take(body.scope, one)
+        self.may_halt = bool(self.waits) and any(beside for body in bodies for beside in _ends(body))
+
+    def _take(self, scope: Scope, node: tree.Statement) -> None:
+        if isinstance(node, tree.Signal | tree.Wait):
+            name = written_name(node.event, scope)
+            if name is None:
+                return
+            if isinstance(node, tree.Wait):
+                self.waits.setdefault(name, []).append((scope, node))
+            else:
+                self.signals.setdefault(name, []).append(node)
+        elif isinstance(node, tree.Cobegin):
+            self.forks.append((scope, node))
+        elif isinstance(node, tree.Call):
+            self.given.update(head(name) for one in node.arguments if (name := written_name(one, scope)))
+
+    def is_signalled(self, name: str) -> bool:
+        """Whether something may signal an event, or another element of its array."""
+        return head(name) in self.given or any(head(other) == head(name) for other in self.signals)
+
+    def sequences(self, scope: Scope, branches: Iterable[Sequence[tree.Statement]]) -> list[list[_Step]]:
+        """Return what branches signal and wait for, one after the other; only events that nobody else deals with."""
+        steps = [[*_straight(branch, scope)] for branch in branches]
+        here = {id(step.node) for several in steps for step in several}
+        waiting = [{step.event for step in several if isinstance(step.node, tree.Wait)} for several in steps]
+        names = {step.event for several in steps for step in several}
+        own = {
+            name for name in names if self._is_closed(name, scope, here) and sum(name in one for one in waiting) == 1
+        }
+        return [[step for step in several if step.event in own] for several in steps]
+
+    def _is_closed(self, name: str, scope: Scope, here: set[int]) -> bool:
+        procedure = scope.procedure
+        if procedure is not None:
+            # Several runs of a procedure share what is not its own.
+            key = head(name).rpartition(".")[2]
+            if not scope.is_local(key) or key in procedure.parameters:
+                return False
+        unclear = name.endswith("[]") or f"{head(name)}[]" in (*self.waits, *self.signals)
+        if unclear or head(name) in self.given or name not in self.signals:
+            return False
+        nodes = [*self.signals[name], *(node for _, node in self.waits.get(name, ()))]
+        return all(id(node) in here for node in nodes)
+
+
+def head(name: str) -> str:
+    """Return the variable of an element."""
+    return name.partition("[")[0]
+
+
+def _straight(statements: Sequence[tree.Statement], scope: Scope) -> Iterator[_Step]:
+    """Give what is signalled and waited for in any case, up to a HALT."""
+    for node in statements:
+        match node:
+            case tree.Signal(event=event) | tree.Wait(event=event):
+                name = written_name(event, scope)
+                if name is not None:
+                    yield _Step(node, name)
+            case tree.Block(statements=inner):
+                yield from _straight(inner, scope)
+            case tree.Lock(body=body):
+                yield from _straight((body,), scope)
+            case tree.Halt():
+                return
+            case _:
+                pass
+
+
+def _ends(body: _Body) -> Iterator[bool]:
+    """Give whether each HALT that ends the program may do so while others wait."""
+    waiting = [(statement, body.scope.procedure is not None) for statement in body.statements]
+    while waiting:
+        node, beside = waiting.pop()
+        if isinstance(node, tree.Halt):
+            yield beside
+        elif not isinstance(node, tree.Move):
+            # In an action of a MOVE it only ends the MOVE.
+            waiting += [(inner, beside or isinstance(node, tree.Cobegin)) for inner in parts(node)]
+
+
+def _never_signalled(found: Findings, events: _Events) -> None:
+    said: set[str] = set()
+    for name, waits in events.waits.items():
+        scope, node = waits[0]
+        key = head(name).rpartition(".")[2]
+        kind, procedure = scope.type(key), scope.procedure
+        given = procedure is not None and scope.is_local(key) and key in procedure.parameters
+        if kind is None or kind.kind is not Kind.EVENT or given or events.is_signalled(name) or head(name) in said:
+            continue
+        said.add(head(name))
+        declared, text = scope.declared(key), written(node.event)
+        found.say(
+            "E501",
+            f"nothing signals `{text}`, so this WAIT never ends",
+            node.span,
+            "waits for ever",
+            secondary=(Label(declared.span, "declared here"),) if declared else (),
+            helps=(f"write `SIGNAL {text}` in another branch",),
+        )
+
+
+# ---- waits that cannot end -----------------------------------------------------------------------------------------
+
+
+def _deadlock(found: Findings, branches: list[list[_Step]], source: Source, *, main: bool) -> None:
+    """Say which branches wait for one another for ever."""
+    reached = _run(branches)
+    stuck = {number: branches[number][at] for number, at in enumerate(reached) if at < len(branches[number])}
+    if not stuck:
+        return
+    # Who waits for a branch that is stuck itself: going from one to the next comes back in the end.
+    signals: dict[str, tuple[int, _Step]] = {}
+    for number in stuck:
+        for step in branches[number][reached[number] :]:
+            if isinstance(step.node, tree.Signal):
+                signals.setdefault(step.event, (number, step))
+    way: dict[int, None] = {}
+    now = min(stuck)
+    while now not in way:
+        way[now] = None
+        if stuck[now].event not in signals:
+            _too_few(found, stuck[now], branches)
+            return
+        now, _ = signals[stuck[now].event]
+    ring = list(way)[list(way).index(now) :]
+    _wait_for_each_other(found, [(stuck[one], signals[stuck[one].event][1]) for one in ring], source, main=main)
+
+
+def _run(branches: list[list[_Step]]) -> list[int]:
+    """Return how far each branch comes: what is signalled is counted, and each event has one branch that waits."""
+    reached = [0] * len(branches)
+    counts: dict[str, int] = {}
+    asleep: dict[str, int] = {}
+    ready = list(range(len(branches)))
+    while ready:
+        number = ready.pop()
+        steps = branches[number]
+        while reached[number] < len(steps):
+            step = steps[reached[number]]
+            if isinstance(step.node, tree.Signal):
+                counts[step.event] = counts.get(step.event, 0) + 1
+                if step.event in asleep:
+                    ready.append(asleep.pop(step.event))
+            elif counts.get(step.event, 0) == 0:
+                asleep[step.event] = number
+                break
+            else:
+                counts[step.event] -= 1
+            reached[number] += 1
+    return reached
+
+
+def _too_few(found: Findings, step: _Step, branches: list[list[_Step]]) -> None:
+    text = written(step.node.event)
+    nodes = [one.node for several in branches for one in several if one.event == step.event]
+    signals = [node.span for node in nodes if isinstance(node, tree.Signal)]
+    plural = "s" * (len(signals) > 1)
+    found.say(
+        "E501",
+        f"`{text}` is waited for more often than it is signalled",
+        step.node.span,
+        "waits for ever",
+        secondary=tuple(Label(span, "signalled here") for span in signals[:_MOST_PLACES]),
+        notes=(f"{len(nodes) - len(signals)} WAITs, and {len(signals)} SIGNAL{plural}",),
+    )
+
+
+def _wait_for_each_other(found: Findings, ring: list[tuple[_Step, _Step]], source: Source, *, main: bool) -> None:
+    """Speak of branches of which each waits for what the next would signal.
+
+    Args:
+        found: for what is found.
+        ring: the WAIT at which each stands, and the SIGNAL that it waits for.
+        source: of the program.
+        main: whether it is the main program, waiting for itself.
+    """
+    labels = []
+    for wait, signal in ring:
+        labels.append(Label(wait.node.span, f"waits for the SIGNAL in line {source.line(signal.node.span.start)}"))
+        labels.append(Label(signal.node.span, "comes after that WAIT"))
+    first, *others = sorted(labels, key=lambda label: label.span.start)
+    count = len(ring)
+    message = {
+        1: f"{'the program' if main else 'this branch'} waits for itself for ever",
+        2: "these two branches wait for each other for ever",
+    }.get(count, f"these {count} branches wait for one another for ever")
+    found.say("E501", message, first.span, first.text, secondary=tuple(others))

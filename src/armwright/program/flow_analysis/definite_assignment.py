@@ -1,0 +1,110 @@
+"""What has no value where it needs one, certainly or on some of the ways that lead there."""
+
+from armwright.program.bytecode.instructions import Kind
+from armwright.program.flow_analysis.facts import Parting, is_any, is_arm
+from armwright.program.flow_analysis.state import Course
+from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.semantics.expression_types import written
+from armwright.program.syntax import tree
+
+
+def need(course: Course, *nodes: tree.Expression | None) -> None:
+    """Say of each name in expressions that has certainly no value, once, that it needs one."""
+    waiting = [node for node in reversed(nodes) if node is not None]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, tree.Name):
+            _need_variable(course, node)
+        elif isinstance(node, tree.Matrix):
+            waiting += [item for item in reversed(node.items) if not isinstance(item, tree.Number)]
+        elif isinstance(node, tree.Binary):
+            # AND and OR look at the right side only where it matters.
+            waiting += [node.left] if node.operation in ("AND", "OR") else [node.right, node.left]
+        elif isinstance(node, tree.Index):
+            need(course, *node.indices)
+            _need_variable(course, node)
+        elif isinstance(node, tree.Function):
+            waiting += reversed(node.arguments if node.name.key != "FORCE" else ())
+        elif isinstance(node, tree.ArmName):
+            course.look_up(node.key, node.span)
+        elif isinstance(node, tree.Unary):
+            waiting.append(node.operand)
+
+
+def need_indices(course: Course, *nodes: object) -> None:
+    """Say what is needed to find the variables that are written or named."""
+    for node in nodes:
+        if isinstance(node, tree.Index):
+            need(course, *node.indices)
+
+
+def _kind(course: Course, node: tree.Expression) -> Kind | None:
+    key = node.name.key if isinstance(node, tree.Index) else getattr(node, "key", "")
+    kind = course.now.scope.type(key)
+    return None if kind is None or kind.kind is Kind.EVENT else kind.kind
+
+
+def _need_variable(course: Course, node: tree.Name | tree.Index) -> None:
+    name = course.variable(node)
+    if name is None or is_any(name) or is_arm(name):
+        return
+    if course.table.valued[name]:
+        parting = course.table.is_sure(name)
+        if isinstance(parting, Parting) and course.conditions <= parting.depth:
+            _uncertain(course, node, name, parting)
+        return
+    head = node.name if isinstance(node, tree.Index) else node
+    scope, kind = course.now.scope, _kind(course, node)
+    kept = course.bound(head.key)
+    if kept is None or kind is None or scope.is_poisoned(head.key) or not course.settle(kept):
+        return
+    declared = scope.declared(head.key)
+    secondary = (Label(declared.span, "declared here"),) if declared else ()
+    if kind is Kind.FRAME:
+        _no_place(course, node, secondary, from_cell=kept == head.key and head is node)
+        return
+    course.say(
+        "E303",
+        f"`{written(node)}` is used before it has a value",
+        node.span,
+        "no value here",
+        secondary=secondary,
+        helps=(f"write `{written(node)} = {'100' if kind is Kind.SCALAR else '( twelve numbers )'} ;` before",),
+    )
+
+
+def _uncertain(course: Course, node: tree.Name | tree.Index, name: str, parting: Parting) -> None:
+    """Warn of a variable that has a value on one way here and none on the other.
+
+    Where the use depends on a condition too, nothing is said: that may be the one on which it has the value.
+    """
+    open_cell = course.cell is None and _kind(course, node) is Kind.FRAME
+    if open_cell or not course.settle(name):
+        return
+    course.say(
+        "W207",
+        f"`{written(node)}` may have no value here",
+        node.span,
+        "needs a value",
+        secondary=(Label(parting.span, parting.says),),
+        helps=(parting.help,),
+        severity=Severity.WARNING,
+    )
+
+
+def _no_place(course: Course, node: tree.Name | tree.Index, secondary: tuple[Label, ...], *, from_cell: bool) -> None:
+    """Say that a frame has no value; a cell file may give one to the frames of the program, and to no others."""
+    certain = course.cell is not None or not from_cell
+    note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
+    if not certain:
+        note = "no cell was given; a cell file may give it one"
+    nothing_yet = course.table.is_empty
+    course.say(
+        "E304" if certain else "W204",
+        f"frame `{written(node)}` is used before it has a value",
+        node.span,
+        "no value here",
+        secondary=() if nothing_yet and certain else secondary,
+        notes=(note,) if nothing_yet or not certain else (),
+        severity=Severity.ERROR if certain else Severity.WARNING,
+    )

@@ -1,0 +1,125 @@
+"""What is known of one frame or one hand at a moment of a program."""
+
+import attrs
+
+from armwright.program.flow_analysis.lattice import same
+from armwright.program.language.source import Span
+
+# Where a hand stands, or what it holds, when nobody knows.
+UNKNOWN = "?"
+# Names that wipe where all hands are and what their fingers do, and what they hold.
+HANDS, GRIPS = "(hands)", "(grips)"
+
+
+@attrs.frozen
+class Link:
+    """One affixment.
+
+    Attributes:
+        parent: the frame above; None when nobody knows whether there is one.
+        span: the AFFIX that made it; None where the cell did.
+        rigid: whether the frame above comes along when this one is given another place.
+    """
+
+    parent: str | None
+    span: Span | None = None
+    rigid: bool = False
+
+
+@attrs.frozen
+class Assignment:
+    """One value given to a frame: in which order, where, and whether the frame stood somewhere before."""
+
+    order: int
+    span: Span
+    moved: bool
+
+
+@attrs.frozen
+class Parting:
+    """What gives a variable its value on one way and not on the other.
+
+    Attributes:
+        span: its head.
+        depth: in how many conditions it stands.
+        says: how it comes that there may be no value.
+        help: what to do.
+    """
+
+    span: Span
+    depth: int
+    says: str
+    help: str
+
+
+@attrs.frozen
+class Hand:
+    """What is known of one hand, but for what it holds.
+
+    Attributes:
+        open: whether the fingers are open; None at the start of a program.
+        doubtful: whether nobody knows what the program did to the fingers.
+        at: the frame at which the hand stands.
+        arrival: the MOVE of the arm itself that brought it there.
+        arrived_open: whether the fingers were open then.
+        opened: the OPEN since then.
+        left: the frame that the fingers let go while it hung on the arm, and the OPEN that did it.
+    """
+
+    open: bool | None = None
+    doubtful: bool = False
+    at: str | None = None
+    arrival: Span | None = None
+    arrived_open: bool | None = None
+    opened: Span | None = None
+    left: tuple[str, Span] | None = None
+
+
+@attrs.frozen
+class Grip:
+    """What a hand holds: the frame at which the fingers closed, and the GRASP that closed them."""
+
+    frame: str
+    span: Span | None = None
+
+
+ANY_LINK = Link(None)
+ANY_HAND = Hand(doubtful=True, at=UNKNOWN)
+ANY_GRIP = Grip(UNKNOWN)
+
+
+def joined_links(one: Link | None, other: Link | None) -> Link | None:
+    """Return what holds of an affixment where two ways meet."""
+    if one == other:
+        return one
+    if one is None or other is None or (one.parent, one.rigid) != (other.parent, other.rigid):
+        return ANY_LINK
+    return one
+
+
+def joined_hands(one: Hand, other: Hand) -> Hand:
+    """Return what holds of a hand where two ways meet."""
+    if one == other:
+        return one
+    return Hand(
+        open=same(one.open, other.open),
+        doubtful=one.doubtful or other.doubtful or one.open != other.open,
+        at=one.at if one.at == other.at else UNKNOWN,
+    )
+
+
+def joined_grips(one: Grip | None, other: Grip | None) -> Grip | None:
+    """Return what holds of what a hand holds where two ways meet."""
+    if one is None or other is None or one.frame != other.frame:
+        return one if one == other else ANY_GRIP
+    return one
+
+
+def is_arm(name: str) -> bool:
+    """Whether a canonical name is that of an arm; no other name has its form."""
+    return name.startswith("ARM_") and name[4:].isdecimal()
+
+
+def is_any(name: str) -> bool:
+    """Whether a name stands for some element of an array, nobody knows which."""
+    return name.endswith("[]")

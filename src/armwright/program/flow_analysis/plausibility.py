@@ -1,0 +1,115 @@
+"""Lengths that cannot be meant: places in another unit than the program counts in, hands far from what they take."""
+
+import math
+from collections.abc import Iterator
+
+from armwright.program.flow_analysis.facts import UNKNOWN, is_any, is_arm
+from armwright.program.flow_analysis.state import Course
+from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.units import convert
+from armwright.program.syntax import tree
+
+_UNITS = {"M": "metres", "MM": "millimetres", "CM": "centimetres", "IN": "inches"}
+# A place, or a step, this many times longer than an arm reaches is out of every robot's world.
+_FAR = 50.0
+# A place nearer to WORLD than this part of the reach that would be one in metres was typed in metres.
+_NEAR, _LEAST, _MOST = 0.02, 0.05, 3.0
+# No hand holds what is so far from it [m].
+_AWAY = 0.2
+
+
+def placed(course: Course, frame: str, value: tree.Expression) -> None:
+    """Warn of a frame that is given a place that cannot be meant, so near to WORLD."""
+    reach = course.cell.reach if course.cell else None
+    place = None if is_any(frame) else course.table.where(frame)
+    units = course.symbols.units
+    if reach is None or place is None or units.length == "M":
+        return
+    away = math.hypot(*place[9:])
+    for numbers in _typed(value):
+        size = math.hypot(*(one.value for one in numbers))
+        bare, broken = not any(one.unit for one in numbers), any(one.value % 1 for one in numbers)
+        if bare and broken and 0 < away < _NEAR * reach and _LEAST * reach < size < _MOST * reach:
+            unit = _UNITS[units.length]
+            advice = f"write the lengths in {unit}, or with their unit: `{numbers[0].text}m`"
+            _odd(course, f"`{course.name(frame)}` would be {_length(away)} from WORLD", numbers, reach, advice)
+            return
+
+
+def lengths(course: Course, *nodes: tree.Expression | None) -> None:
+    """Warn of places and steps that lead out of every robot's world."""
+    reach = course.cell.reach if course.cell else None
+    units = course.symbols.units
+    if reach is None:
+        return
+    for node in nodes:
+        for numbers in () if node is None else _typed(node):
+            away = math.hypot(*(convert(one, units) * units.metres for one in numbers))
+            if away > _FAR * reach:
+                what = "this place is {} from its origin" if isinstance(node, tree.Matrix) else "this step is {} long"
+                advice = f"write the lengths in {_UNITS[units.length]}"
+                if units.length == "M":
+                    advice = "put `UNITS MM ;` in front of BEGIN if they are millimetres, or write them with their unit"
+                _odd(course, what.format(_length(away)), numbers, reach, advice)
+
+
+def _typed(node: tree.Expression) -> Iterator[list[tree.Number]]:
+    """Give every three lengths of an expression that are typed as numbers: of twelve the last, and those of XYZ."""
+    waiting: list[tree.Expression] = [] if isinstance(node, tree.Name) else [node]
+    while waiting:
+        one = waiting.pop()
+        three: tuple[tree.Expression, ...] = ()
+        if isinstance(one, tree.Binary):
+            waiting += [one.right, one.left]
+        elif isinstance(one, tree.Matrix) and len(one.items) == 12:
+            three = one.items[9:]
+        elif isinstance(one, tree.Function) and one.name.key == "XYZ":
+            three = one.arguments
+        elif isinstance(one, tree.Function):
+            waiting += reversed(one.arguments)
+        numbers = [each for each in three if isinstance(each, tree.Number) and not math.isnan(each.value)]
+        if len(numbers) == 3:
+            yield numbers
+
+
+def _odd(course: Course, what: str, numbers: list[tree.Number], reach: float, advice: str) -> None:
+    unit = _UNITS[course.symbols.units.length]
+    course.say(
+        "W208",
+        f"{what}, in a cell whose arm reaches {_length(reach)}",
+        numbers[0].span.to(numbers[-1].span),
+        unit,
+        notes=(f"lengths in this program are {unit}",),
+        helps=(advice,),
+        severity=Severity.WARNING,
+    )
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.3g} m" if metres >= 1 else f"{metres * 1e3:.3g} mm"
+
+
+def grasped(course: Course, node: tree.Affix, child: str, arm: str) -> None:
+    """Warn of a frame that is hung on a hand which has closed at quite another place."""
+    table = course.table
+    if not is_arm(arm) or is_any(child) or table.grips[arm] is None:
+        return
+    at = table.hands[arm].at
+    if at is None or at in (UNKNOWN, child) or is_any(at) or is_arm(at):
+        return
+    here, there = table.where(at), table.where(child)
+    if here is None or there is None:
+        return
+    away = math.dist(here[9:], there[9:])
+    if away <= _AWAY:
+        return
+    name, hand = course.name, table.hands[arm]
+    course.say(
+        "W210",
+        f"`{name(child)}` is {_length(away)} away from the hand of {arm}",
+        node.link,
+        f"the hand stands at {name(at)}",
+        secondary=(Label(hand.arrival, f"it came to {name(at)} here"),) if hand.arrival else (),
+        helps=(f"write `AFFIX {name(at)} TO {arm}`, or move the arm to {name(child)} first",),
+        severity=Severity.WARNING,
+    )

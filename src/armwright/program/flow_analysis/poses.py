@@ -1,0 +1,115 @@
+"""Where frames stand and how long steps are, as far as the text of a program says so.
+
+A place is twelve numbers, columns n, o, a, p, in metres.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeAlias
+
+from armwright.program.bytecode.instructions import Kind
+from armwright.program.language.units import convert
+from armwright.program.semantics.cell_symbols import WORLD
+from armwright.program.syntax import tree
+
+if TYPE_CHECKING:
+    from armwright.program.flow_analysis.state import Course
+
+Place: TypeAlias = tuple[float, ...]
+
+HERE: Place = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_NUMBERS = 12
+
+
+def after(first: Place, step: Place) -> Place:
+    """Return the place at a step from another."""
+    turned = [
+        sum(first[3 * k + row] * step[3 * column + k] for k in range(3)) for column in range(4) for row in range(3)
+    ]
+    return (*turned[:9], *(first[9 + row] + turned[9 + row] for row in range(3)))
+
+
+def inverse(place: Place) -> Place:
+    """Return the step back."""
+    turned = [place[3 * column + row] for row in range(3) for column in range(3)]
+    back = [-sum(place[3 * row + k] * place[9 + k] for k in range(3)) for row in range(3)]
+    return (*turned, *back)
+
+
+def certain(course: "Course", node: tree.Expression) -> Place | None:
+    """Return the place or step that an expression gives; None where that is not certain."""
+    if isinstance(node, tree.Binary):
+        return _product(course, node)
+    if isinstance(node, tree.Matrix):
+        return _matrix(course, node)
+    if isinstance(node, tree.Function):
+        return _function(course, node)
+    if isinstance(node, tree.Name) and node.key == WORLD:
+        return HERE
+    if (name := course.variable(node, Kind.FRAME)) is not None:
+        return course.table.where(name)
+    name = course.variable(node, Kind.TRANS)
+    return None if name is None else course.steps[name]
+
+
+def _product(course: "Course", node: tree.Binary) -> Place | None:
+    first, operations = tree.chain(node)
+    found = certain(course, first)
+    for one in operations:
+        step = certain(course, one.right) if one.operation == "*" else None
+        if found is None or step is None:
+            return None
+        found = after(found, step)
+    return found
+
+
+def _matrix(course: "Course", node: tree.Matrix) -> Place | None:
+    if len(node.items) != _NUMBERS:
+        return None
+    turn, shift = _amounts(course, node.items[:9]), _lengths(course, node.items[9:])
+    return None if turn is None or shift is None else (*turn, *shift)
+
+
+def _function(course: "Course", node: tree.Function) -> Place | None:
+    key, arguments = node.name.key, node.arguments
+    if key == "XYZ" and len(arguments) == 3:
+        shift = _lengths(course, arguments)
+        return None if shift is None else (*HERE[:9], *shift)
+    if len(arguments) != 1:
+        return None
+    if key == "INV":
+        place = certain(course, arguments[0])
+        return None if place is None else inverse(place)
+    if key in ("ROTX", "ROTY", "ROTZ"):
+        angle = _amounts(course, arguments)
+        return None if angle is None else _turn("XYZ".index(key[-1]), angle[0] * course.symbols.units.radians)
+    return None
+
+
+def _turn(axis: int, angle: float) -> Place:
+    """Return the turn about an axis by an angle [rad]."""
+    found = list(HERE)
+    one, other = (axis + 1) % 3, (axis + 2) % 3
+    found[3 * one + one] = found[3 * other + other] = math.cos(angle)
+    found[3 * one + other], found[3 * other + one] = math.sin(angle), -math.sin(angle)
+    return tuple(found)
+
+
+def _lengths(course: "Course", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
+    amounts = _amounts(course, nodes)
+    return None if amounts is None else tuple(one * course.symbols.units.metres for one in amounts)
+
+
+def _amounts(course: "Course", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
+    """Return numbers in the units of the program."""
+    found = []
+    for node in nodes:
+        if isinstance(node, tree.Number):
+            number = None if math.isnan(node.value) else convert(node, course.symbols.units)
+        else:
+            known = course.number(node)
+            number = None if known is None else known[0]
+        if number is None:
+            return None
+        found.append(number)
+    return tuple(found)

@@ -1,0 +1,328 @@
+"""What a part of a program may change, whichever way it goes: frames, values, arms.
+
+Names are those of the text: a parameter or variable of a procedure stands with its procedure, ``FETCH.PART``.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+import attrs
+
+from armwright.program.bytecode.instructions import Kind
+from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.semantics.symbols import Scope, Symbols
+from armwright.program.syntax import tree
+
+# A part that changes more than this is taken to change everything.
+_MOST = 400
+# Any arm, nobody knows which.
+ANY_ARM = "*"
+# So often what procedures that call one another may change is looked at again.
+_MOST_ROUNDS = 10
+
+
+@attrs.frozen(kw_only=True)
+class Writes:
+    """What may be changed.
+
+    Attributes:
+        placed: frames that get another place by a value, by AFFIX ... AT or from the camera.
+        hung: frames that AFFIX or UNFIX hangs elsewhere.
+        moved: frames that MOVE moves; an AFFIX may be implied.
+        values: numbers and steps.
+        arms: used in any way; ``*`` for an arm that is not named.
+        grasps: whether a hand may close on something.
+        everything: whether it may be anything.
+        halts: whether HALT may end it.
+        retries: whether RETRY may run a TRY part around it again.
+    """
+
+    placed: frozenset[str] = frozenset()
+    hung: frozenset[str] = frozenset()
+    moved: frozenset[str] = frozenset()
+    values: frozenset[str] = frozenset()
+    arms: frozenset[str] = frozenset()
+    grasps: bool = False
+    everything: bool = False
+    halts: bool = False
+    retries: bool = False
+
+    def __or__(self, other: "Writes") -> "Writes":
+        """Return what either may change."""
+        if self is NOTHING or other is NOTHING:
+            return other if self is NOTHING else self
+        return _limited(
+            Writes(
+                placed=self.placed | other.placed,
+                hung=self.hung | other.hung,
+                moved=self.moved | other.moved,
+                values=self.values | other.values,
+                arms=self.arms | other.arms,
+                grasps=self.grasps or other.grasps,
+                everything=self.everything or other.everything,
+                halts=self.halts or other.halts,
+                retries=self.retries or other.retries,
+            )
+        )
+
+    @property
+    def names(self) -> frozenset[str]:
+        """All that may be changed."""
+        return self.placed | self.hung | self.moved | self.values | self.arms - {ANY_ARM}
+
+
+NOTHING = Writes()
+ANYTHING = Writes(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
+
+
+def _limited(writes: Writes) -> Writes:
+    if writes.everything or sum(map(len, (writes.placed, writes.hung, writes.moved, writes.values))) > _MOST:
+        return attrs.evolve(ANYTHING, halts=writes.halts, retries=writes.retries)
+    return writes
+
+
+def written_name(node: tree.Expression, scope: Scope) -> str | None:
+    """Return the name of a variable, or of an element: ``SLOT[1,2]``, or ``SLOT[]`` where an index is computed."""
+    if isinstance(node, tree.ArmName):
+        return node.key
+    if isinstance(node, tree.Index):
+        inner = ",".join(f"{one.value:.12g}" for one in node.indices if isinstance(one, tree.Number))
+        literal = all(isinstance(one, tree.Number) for one in node.indices)
+        return f"{qualified(node.name.key, scope)}[{inner if literal else ''}]"
+    return qualified(node.key, scope) if isinstance(node, tree.Name) else None
+
+
+def qualified(key: str, scope: Scope) -> str:
+    """Return a name with its procedure in front, if it is one of its own."""
+    procedure = scope.procedure
+    return f"{procedure.node.name.key}.{key}" if procedure is not None and scope.is_local(key) else key
+
+
+class Writing:
+    """What each statement of a program may change, found out once."""
+
+    def __init__(self, program: tree.Program, symbols: Symbols) -> None:
+        """Look at the procedures."""
+        self._symbols = symbols
+        self._known: dict[int, Writes] = {}
+        self._procedures: dict[str, Writes] = {}
+        bodies = (program.statements, *(node.body.statements for node in program.procedures))
+        self.rigid = any(isinstance(one, tree.Affix) and one.rigid for body in bodies for one in every(body))
+        self._settle(program)
+
+    def of(self, statement: tree.Statement, scope: Scope) -> Writes:
+        """Return what a statement and all inside it may change."""
+        found = self._known.get(id(statement))
+        if found is None:
+            found = self._own(statement, scope)
+            for inner in parts(statement):
+                found |= self.of(inner, scope)
+            if isinstance(statement, tree.Try) and found.retries:
+                found = attrs.evolve(found, retries=self.all(statement.body, scope).retries)
+            self._known[id(statement)] = found
+        return found
+
+    def all(self, statements: Iterable[tree.Statement], scope: Scope) -> Writes:
+        """Return what several statements may change."""
+        found = NOTHING
+        for statement in statements:
+            found |= self.of(statement, scope)
+        return found
+
+    def called(self, call: tree.Call, scope: Scope) -> Writes:
+        """Return what a call may change."""
+        procedure = self._symbols.procedures.get(call.name.key)
+        if procedure is None:
+            return NOTHING
+        writes = self._procedures.get(call.name.key, NOTHING)
+        given = dict(zip(procedure.parameters, call.arguments, strict=False))
+        return _seen_from_outside(writes, call.name.key, given, scope)
+
+    def _settle(self, program: tree.Program) -> None:
+        """Find out what procedures may change, through all that they call."""
+        calls: dict[str, list[tree.Call]] = {}
+        for node in program.procedures:
+            key = node.name.key
+            procedure = self._symbols.procedures.get(key)
+            if procedure is None or procedure.node is not node:
+                continue
+            scope, inner = self._symbols.scope(key), list(every(node.body.statements))
+            calls[key] = [
+                one for one in inner if isinstance(one, tree.Call) and one.name.key in self._symbols.procedures
+            ]
+            self._procedures[key] = _union(
+                self._own(one, scope) for one in inner if not isinstance(one, tree.Call | tree.Retry)
+            )
+        order = _callees_first({key: [one.name.key for one in several] for key, several in calls.items()})
+        for _ in range(_MOST_ROUNDS):
+            news = {}
+            for key in order:
+                scope, old = self._symbols.scope(key), self._procedures[key]
+                new = _union((old, *(self.called(call, scope) for call in calls[key])))
+                if new != old:
+                    news[key] = self._procedures[key] = new
+            if not news:
+                return
+        self._procedures.update(dict.fromkeys(news, ANYTHING))
+
+    def _own(self, statement: tree.Statement, scope: Scope) -> Writes:
+        """Return what one statement may change by itself, without those inside it."""
+        if isinstance(statement, tree.Call):
+            return self.called(statement, scope)
+        own = _OWN.get(type(statement))
+        return NOTHING if own is None else own(scope, statement)
+
+
+def _assigned(scope: Scope, node: tree.Assign) -> Writes:
+    names = _names(scope, node.target)
+    head = node.target.name if isinstance(node.target, tree.Index) else node.target
+    kind = scope.type(head.key) if isinstance(head, tree.Name) else None
+    is_frame = kind is None or kind.kind is Kind.FRAME
+    return Writes(placed=names if is_frame else frozenset(), values=frozenset() if is_frame else names)
+
+
+def _affixed(scope: Scope, node: tree.Affix) -> Writes:
+    hung = _names(scope, node.child)
+    return Writes(hung=hung, placed=hung if node.at is not None else frozenset(), arms=_arms(scope, node.parent))
+
+
+def _unfixed(scope: Scope, node: tree.Unfix) -> Writes:
+    return Writes(hung=_names(scope, node.child), arms=_arms(scope, node.parent))
+
+
+def _poisoned(scope: Scope, node: tree.Poison) -> Writes:
+    names = _names(scope, node)
+    return Writes(placed=names, hung=names, values=names, arms=_arms(scope, node), grasps=True)
+
+
+# What statements may change by themselves; those that are missing change nothing.
+_OWN: Mapping[type, Callable[..., Writes]] = {
+    tree.Assign: _assigned,
+    tree.Affix: _affixed,
+    tree.Unfix: _unfixed,
+    tree.Open: lambda scope, node: Writes(arms=_arms(scope, node.arm)),
+    tree.ReadSystem: lambda scope, node: Writes(arms=_arms(scope, node.arm)),
+    tree.Grasp: lambda scope, node: Writes(arms=_arms(scope, node.arm) or frozenset({ANY_ARM}), grasps=True),
+    tree.ReadVisions: lambda scope, node: Writes(
+        placed=frozenset[str]().union(*(_names(scope, target) for target in node.targets))
+    ),
+    tree.Move: lambda scope, node: Writes(moved=_names(scope, node.moved), arms=_arms(scope, node.moved)),
+    tree.For: lambda scope, node: Writes(values=_names(scope, node.variable)),
+    tree.Halt: lambda _scope, _node: Writes(halts=True),
+    tree.Retry: lambda _scope, _node: Writes(retries=True),
+    tree.Poison: _poisoned,
+}
+
+
+def every(statements: Iterable[tree.Statement]) -> Iterator[tree.Statement]:
+    """Give statements and all inside them, in the order of the text."""
+    waiting = list(statements)[::-1]
+    while waiting:
+        now = waiting.pop()
+        yield now
+        waiting += parts(now)[::-1]
+
+
+# The statements directly inside a statement; those that are missing have none inside.
+_PARTS: Mapping[type, Callable[..., tuple[tree.Statement, ...]]] = {
+    tree.Block: lambda node: node.statements,
+    tree.If: lambda node: node.statements,
+    tree.While: lambda node: (node.body,),
+    tree.For: lambda node: (node.body,),
+    tree.Lock: lambda node: (node.body,),
+    tree.Repeat: lambda node: node.body,
+    tree.Try: lambda node: (*node.body, *node.recovery),
+    tree.Cobegin: lambda node: tuple(branch.body for branch in node.branches),
+    tree.Move: lambda node: tuple(clause.action for clause in node.clauses if isinstance(clause, tree.On)),
+}
+
+
+def parts(statement: tree.Statement) -> tuple[tree.Statement, ...]:
+    """Return the statements directly inside a statement, those of actions among them."""
+    inside = _PARTS.get(type(statement))
+    return () if inside is None else inside(statement)
+
+
+def _names(scope: Scope, node: tree.Expression) -> frozenset[str]:
+    """Return the variable that a node names, or all of those in what was passed over; no arms."""
+    if isinstance(node, tree.Poison):
+        return frozenset(qualified(key, scope) for key in node.names if not is_arm(key))
+    name = written_name(node, scope)
+    return frozenset() if name is None or is_arm(name) else frozenset({name})
+
+
+def _arms(scope: Scope, node: tree.Expression | None) -> frozenset[str]:
+    """Return the arm that a node names; a parameter may be one."""
+    if isinstance(node, tree.Poison):
+        named = frozenset(key for key in node.names if is_arm(key))
+        return named or frozenset({ANY_ARM})
+    if isinstance(node, tree.Name):
+        name = qualified(node.key, scope)
+        return frozenset({name} if _is_parameter(name, scope) else ())
+    return frozenset({node.key}) if isinstance(node, tree.ArmName) else frozenset()
+
+
+def _union(several: Iterable[Writes]) -> Writes:
+    found = NOTHING
+    for one in several:
+        found |= one
+    return found
+
+
+def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:
+    """Return procedures in an order in which those that are called come first, as far as that is possible."""
+    order: dict[str, None] = {}
+    seen: set[str] = set()
+    for first in calls:
+        way = [(first, iter(calls[first]))] if first not in seen else []
+        seen.add(first)
+        while way:
+            key, others = way[-1]
+            callee = next((one for one in others if one not in seen), None)
+            if callee is None:
+                order[key] = None
+                way.pop()
+            else:
+                seen.add(callee)
+                way.append((callee, iter(calls[callee])))
+    return list(order)
+
+
+def _seen_from_outside(writes: Writes, procedure: str, given: Mapping[str, tree.Expression], scope: Scope) -> Writes:
+    """Return what a procedure changes, in the names of its caller: its own variables are nobody else's."""
+
+    def outside(name: str, *, value: bool = False) -> str:
+        """Return a name as the caller says it; empty for what the caller does not see."""
+        head, bracket, indices = name.partition("[")
+        owner, point, key = head.partition(".")
+        if not point:
+            return name
+        argument = given.get(key) if owner == procedure else None
+        # Numbers and steps are given by value; an array is given itself.
+        if argument is None or (value and not bracket) or (bracket and not isinstance(argument, tree.Name)):
+            return ""
+        passed = written_name(argument, scope)
+        return f"{passed}{bracket}{indices}" if passed else ""
+
+    def frames(names: frozenset[str]) -> frozenset[str]:
+        return frozenset(seen for name in names if (seen := outside(name)) and not is_arm(seen))
+
+    def may_be_arm(name: str) -> bool:
+        return name == ANY_ARM or is_arm(name) or _is_parameter(name, scope)
+
+    return Writes(
+        placed=frames(writes.placed),
+        hung=frames(writes.hung),
+        moved=frames(writes.moved),
+        values=frozenset(seen for name in writes.values if (seen := outside(name, value=True))),
+        arms=frozenset(seen for name in writes.arms if (seen := outside(name)) and may_be_arm(seen)),
+        grasps=writes.grasps,
+        everything=writes.everything,
+        halts=writes.halts,
+    )
+
+
+def _is_parameter(name: str, scope: Scope) -> bool:
+    procedure = scope.procedure
+    if procedure is None:
+        return False
+    return any(name == f"{procedure.node.name.key}.{key}" for key in procedure.parameters)

@@ -1,0 +1,1 @@
+"""The formatter: a program is laid out from its words, its comments kept."""

@@ -1,0 +1,82 @@
+"""Laying a program out: every program that says the same in the same words looks the same."""
+
+from armwright.errors import ExitStatus, InvalidValueError
+from armwright.program.api import no_collection
+from armwright.program.formatter.line_breaks import lines_of
+from armwright.program.formatter.pieces import pieces_of
+from armwright.program.formatter.rows import rows_of
+from armwright.program.formatter.spacing import set_blanks
+from armwright.program.language.diagnostic import Diagnostic, in_order
+from armwright.program.language.source import Source
+from armwright.program.language.words import Standard
+from armwright.program.syntax.lexer import scan
+from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.parser import parse
+
+# How long a line may be, in characters.
+WIDTH = 80
+# Digits in front of one of these are no line number.
+_NOT_NUMBERED = (",", ";", ")")
+
+
+class UnformattableError(InvalidValueError):
+    """A program cannot be laid out, because its syntax is wrong.
+
+    Attributes:
+        source: the program.
+        first: the first thing that is wrong.
+    """
+
+    exit_status = ExitStatus.PROGRAM_ERRORS
+
+    def __init__(self, source: Source, first: Diagnostic) -> None:
+        """Say what is wrong first, and where."""
+        self.source, self.first = source, first
+        line, column = source.line(first.span.start), source.column(first.span.start)
+        super().__init__(f"{source.name}:{line}:{column}: cannot be laid out: {first.message} ({first.code})")
+
+
+def formatted(source: Source, *, std: Standard = Standard.RLO_2, numbers: int | None = None, width: int = WIDTH) -> str:
+    """Return a program as it should be laid out.
+
+    Words of the language are in upper case, names spelt as they are declared, arms ``ARM_1``; each statement has a
+    line of its own, and each clause of a MOVE that is longer than a line. Comments, blank lines (one in a row),
+    parentheses and the spelling of numbers stay, and so does the last ``;`` in front of END, there or not.
+
+    Args:
+        source: the program. Line ends of any kind become line feeds.
+        std: its language.
+        numbers: how far the numbers of lines are apart; without it, lines have no numbers.
+        width: how long a line may be [characters], if there is a place where it can be broken.
+
+    Raises:
+        UnformattableError: the syntax is wrong; the text tells what is wrong first.
+        InvalidValueError: ``numbers`` or ``width`` is below 1.
+    """
+    for what, value in (("numbers", numbers), ("width", width)):
+        if value is not None and value < 1:
+            raise InvalidValueError(f"{what}: expected 1 or more, got {value}")
+    with no_collection():
+        lines = _lines(Source(source.name, source.text.replace("\r\n", "\n").replace("\r", "\n")), std, width)
+    return "\n".join((*(_numbered(lines, numbers) if numbers else lines), ""))
+
+
+def _lines(source: Source, std: Standard, width: int) -> list[str]:
+    text, _ = without_numbers(source)
+    scanned = scan(source, text, std)
+    program, slips = parse(source, scanned.tokens, std)
+    wrong = in_order(one for one in (*scanned.found, *slips) if one.is_error)
+    if wrong:
+        raise UnformattableError(source, wrong[0])
+    pieces = pieces_of(text, scanned, program)
+    set_blanks(pieces)
+    return lines_of(rows_of(pieces, width), width)
+
+
+def _numbered(lines: list[str], step: int) -> list[str]:
+    """Put a number in front of each line."""
+    field = len(str(step * len(lines))) + 2
+    return [
+        ((" " * field if line.lstrip().startswith(_NOT_NUMBERED) else f"{step * at}".ljust(field)) + line).rstrip()
+        for at, line in enumerate(lines, 1)
+    ]

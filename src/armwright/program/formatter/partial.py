@@ -1,0 +1,113 @@
+"""Laying out what can be laid out of a program with mistakes: the statements around them, and never their words."""
+
+from collections.abc import Iterator
+
+from armwright.program.formatter.format import WIDTH, UnformattableError, formatted
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import Standard
+from armwright.program.syntax import tree
+from armwright.program.syntax.lexer import TokenKind, scan
+from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.parser import parse
+
+# Comments around what is laid out by itself; no program has them.
+_FROM, _TO = "//<<armwright", "//armwright>>"
+
+
+def formatted_around(source: Source, *, std: Standard = Standard.RLO_2, width: int = WIDTH) -> str:
+    """Return a program laid out as far as its syntax is right.
+
+    A program without mistakes is laid out whole. Of any other the declarations and the statements of the main program
+    are laid out that hold no mistake and share no line with one that does; everything else stays as it is. Words,
+    their order and comments are the same afterwards.
+
+    Args:
+        source: the program.
+        std: its language.
+        width: how long a line may be [characters].
+
+    Raises:
+        UnformattableError: nothing of it can be laid out; the text tells what is wrong first.
+    """
+    try:
+        return formatted(source, std=std, width=width)
+    except UnformattableError:
+        whole = Source(source.name, source.text.replace("\r\n", "\n").replace("\r", "\n"))
+        after = _around(whole, std, width)
+        if after is None or _words(whole.text, std) != _words(after, std):
+            raise
+        return after
+
+
+def _around(source: Source, std: Standard, width: int) -> str | None:
+    """Return the text with the right stretches of it laid out; None where there are no such stretches."""
+    text, _ = without_numbers(source)
+    if text != source.text:
+        # Numbers of lines would no longer be in order.
+        return None
+    scanned = scan(source, text, std)
+    program, slips = parse(source, scanned.tokens, std)
+    wrong = [one.span for one in (*scanned.found, *slips) if one.is_error]
+    begin = next((one for one in scanned.tokens if one.key == "BEGIN" and _is_main(one.start, program)), None)
+    end = next((one for one in reversed(scanned.tokens) if one.key == "END"), None)
+    if begin is None or end is None or not program.statements or end.start < program.statements[-1].span.end:
+        return None
+    head = source.text[: begin.start]
+    head_wrong = any(one.start <= begin.end for one in wrong)
+    pieces, done, found = [], 0, False
+    for span in _stretches(source, program, Span(begin.end, end.start), wrong):
+        laid = _alone("" if head_wrong else head, source.slice(span), std, width)
+        if laid is not None and laid != source.slice(span):
+            pieces += [source.text[done : span.start], laid]
+            done = span.end
+        found = found or laid is not None
+    return "".join((*pieces, source.text[done:])) if found else None
+
+
+def _is_main(start: int, program: tree.Program) -> bool:
+    """Whether a BEGIN is that of the main program: it stands behind all headers and in front of all statements."""
+    behind = max((one.span.end for one in program.headers), default=0)
+    return start >= behind and (not program.statements or start < program.statements[0].span.start)
+
+
+def _stretches(source: Source, program: tree.Program, body: Span, wrong: list[Span]) -> Iterator[Span]:
+    """Give stretches of whole lines that hold statements of the main program without a mistake."""
+    starts = [one.span.start for one in program.statements]
+    ends = [*starts[1:], body.end]
+    first, last = -1, body.start
+    for statement, start, end in zip(program.statements, starts, ends, strict=True):
+        line, next_line = (source.text.rfind("\n", 0, at) + 1 for at in (start, end))
+        wrong_here = any(one.start <= end and one.end >= start for one in wrong)
+        if isinstance(statement, tree.Poison) or wrong_here:
+            if last > first >= 0:
+                yield Span(first, last)
+            first = -1
+            continue
+        if first < 0 and line >= body.start and not source.text[line:start].strip():
+            first = last = line
+        # Where the next statement shares a line with this one, both are laid out, or neither.
+        if first >= 0 and next_line > start and not source.text[next_line:end].strip():
+            last = next_line
+    if last > first >= 0:
+        yield Span(first, last)
+
+
+def _alone(head: str, stretch: str, std: Standard, width: int) -> str | None:
+    """Return statements laid out as those of a program of their own; None where they are none."""
+    program = f"{head}BEGIN\n{_FROM}\n{stretch}{_TO}\nEND.\n"
+    try:
+        lines = formatted(Source("", program), std=std, width=width).split("\n")
+    except UnformattableError:
+        return None
+    marks = [at for at, line in enumerate(lines) if line.strip() in (_FROM, _TO)]
+    if len(marks) != 2:
+        return None
+    laid = "\n".join((*lines[marks[0] + 1 : marks[1]], ""))
+    return laid if _words(laid, std) == _words(stretch, std) else None
+
+
+def _words(text: str, std: Standard) -> tuple[list[tuple[TokenKind, str]], list[list[str]]]:
+    """Return what must stay as it is: words and signs but for needless `;`, and the words of comments."""
+    scanned = scan(Source("", text), text, std)
+    words = [(token.kind, token.key) for token in scanned.tokens if token.key != ";"]
+    return words, [text[span.start : span.end].split() for span in scanned.comments]

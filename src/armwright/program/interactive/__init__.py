@@ -1,1 +1,0 @@
-"""Programs that are entered piece by piece: each statement is done at once, and can be taken back."""

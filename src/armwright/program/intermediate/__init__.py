@@ -1,1 +1,0 @@
-"""Intermediate code: what a program becomes, how it is made, and its text form."""

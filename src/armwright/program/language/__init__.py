@@ -1,0 +1,1 @@
+"""What every stage of the compiler knows: words, kinds of variables, names, units, source texts, diagnostics."""

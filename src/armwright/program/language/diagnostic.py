@@ -1,0 +1,177 @@
+"""What the translator has to say about a program: one type, with places, advice and, where certain, a cure."""
+
+import enum
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import Any, Self
+
+import attrs
+
+from armwright.errors import counted, shortened
+from armwright.program.language.source import Source, Span
+
+# Of each code a pass over a program tells so many: else a file of nonsense takes more memory for messages than itself.
+MOST_OF_A_CODE = 10_000
+
+
+class Severity(enum.StrEnum):
+    """How bad it is: with an error there is no code to run."""
+
+    ERROR = "error"
+    WARNING = "warning"
+
+
+@attrs.frozen
+class Label:
+    """A word on a place."""
+
+    span: Span
+    text: str = attrs.field(converter=shortened)
+
+
+@attrs.frozen
+class Fix:
+    """A change of the text that is certainly right: put ``replacement`` where ``span`` is."""
+
+    span: Span
+    replacement: str
+
+
+def _all_shortened(texts: Iterable[str]) -> tuple[str, ...]:
+    """Return texts of which none is longer than anybody reads."""
+    return tuple(shortened(text) for text in texts)
+
+
+@attrs.frozen(kw_only=True)
+class Diagnostic:
+    """One thing to say.
+
+    Attributes:
+        code: stable, such as ``E206``; E errors, W warnings, L style of working, R devices.
+        severity: error or warning.
+        message: what is wrong, in the user's words.
+        span: the place.
+        label: what is at that place.
+        secondary: other places that matter.
+        notes: what one has to know.
+        helps: what to write instead.
+        fixes: changes that cure it; empty unless they are certain.
+    """
+
+    code: str
+    severity: Severity = Severity.ERROR
+    message: str = attrs.field(converter=shortened)
+    span: Span
+    label: str = attrs.field(default="", converter=shortened)
+    secondary: tuple[Label, ...] = ()
+    notes: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
+    helps: tuple[str, ...] = attrs.field(default=(), converter=_all_shortened)
+    fixes: tuple[Fix, ...] = ()
+
+    @property
+    def is_error(self) -> bool:
+        """Whether it keeps the program from running."""
+        return self.severity is Severity.ERROR
+
+    @property
+    def is_syntax(self) -> bool:
+        """Whether the parser had to guess, so that what the program does cannot be judged."""
+        return self.code.startswith("E1")
+
+
+class Findings(list[Diagnostic]):
+    """What one pass over a program has found so far: of each code so many at most, the last saying that more follow."""
+
+    def __init__(self) -> None:
+        """Start with nothing."""
+        super().__init__()
+        self._counts: Counter[str] = Counter()
+
+    def append(self, one: Diagnostic) -> None:
+        """Add one; of a code that was told as often as is allowed, what is added last says so."""
+        self._counts[one.code] += 1
+        count = self._counts[one.code]
+        if count < MOST_OF_A_CODE:
+            super().append(one)
+        elif count == MOST_OF_A_CODE:
+            text = f"{MOST_OF_A_CODE:,} messages have the code {one.code}; those behind this place are not told"
+            super().append(
+                attrs.evolve(
+                    one, message=text, label="this one, and perhaps more", secondary=(), notes=(), helps=(), fixes=()
+                )
+            )
+
+    def extend(self, several: Iterable[Diagnostic]) -> None:
+        """Add several."""
+        for one in several:
+            self.append(one)
+
+    def __iadd__(self, several: Iterable[Diagnostic]) -> Self:  # type: ignore[misc,override]
+        self.extend(several)
+        return self
+
+    def say(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        label: str,
+        *,
+        severity: Severity = Severity.ERROR,
+        secondary: tuple[Label, ...] = (),
+        notes: tuple[str, ...] = (),
+        helps: tuple[str, ...] = (),
+        fixes: tuple[Fix, ...] = (),
+    ) -> None:
+        """Add an error, or what ``severity`` says; the arguments are those of ``Diagnostic``."""
+        if self._counts[code] >= MOST_OF_A_CODE:
+            return
+        self.append(
+            Diagnostic(
+                code=code,
+                severity=severity,
+                message=message,
+                span=span,
+                label=label,
+                secondary=secondary,
+                notes=notes,
+                helps=helps,
+                fixes=fixes,
+            )
+        )
+
+
+def in_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """Return them sorted by their place in the text."""
+    return tuple(sorted(diagnostics, key=lambda one: (one.span.start, one.span.end)))
+
+
+def count_line(diagnostics: Sequence[Diagnostic], source: Source) -> str:
+    """Return the last line of a report, such as ``m6.rlo: 3 errors, 1 warning``."""
+    errors = sum(one.is_error for one in diagnostics)
+    return f"{source.name}: {counts_text(errors, len(diagnostics) - errors)}"
+
+
+def counts_text(errors: int, warnings: int) -> str:
+    """Return how many errors and warnings there are, such as ``3 errors, 1 warning``."""
+    counts = [(errors, "error"), (warnings, "warning")]
+    return ", ".join(counted(count, what) for count, what in counts if count) or "no errors"
+
+
+def to_json(diagnostic: Diagnostic, source: Source) -> dict[str, Any]:
+    """Return a diagnostic as plain data; lines and columns count from 1, offsets from 0."""
+    return {
+        "code": diagnostic.code,
+        "severity": diagnostic.severity.value,
+        "message": diagnostic.message,
+        **_place(diagnostic.span, source),
+        "label": diagnostic.label,
+        "secondary": [{**_place(label.span, source), "label": label.text} for label in diagnostic.secondary],
+        "notes": list(diagnostic.notes),
+        "helps": list(diagnostic.helps),
+        "fixes": [{**_place(fix.span, source), "replacement": fix.replacement} for fix in diagnostic.fixes],
+    }
+
+
+def _place(span: Span, source: Source) -> dict[str, int]:
+    return {"line": source.line(span.start), "column": source.column(span.start), "start": span.start, "end": span.end}

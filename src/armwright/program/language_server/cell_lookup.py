@@ -1,0 +1,157 @@
+"""The cell that a program in an editor is meant for: named in a setting, imported, or the only one beside it."""
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import attrs
+
+from armwright.cell.frames import FrameTree
+from armwright.cell.model import Cell
+from armwright.cell.reader import read_cell
+from armwright.errors import ArmwrightError, FileFormatError
+from armwright.files.document import Document
+from armwright.files.reading import regular
+from armwright.program.semantics.cell_symbols import Imported
+
+_IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)
+_ARM = re.compile(r"ARM[-_]0*([0-9]+)", re.IGNORECASE)
+# A folder with more files that might be cells, or a larger one, is no folder of cells.
+_MOST_FILES = 50
+_LARGEST_FILE = 1_000_000
+_SUFFIXES = (".toml", ".json")
+
+
+@attrs.frozen(kw_only=True)
+class CellFile:
+    """A cell as its file tells it.
+
+    Attributes:
+        path: the file.
+        cell: what it says.
+        frames: where everything is at the start.
+        lines: of frames and arms, from 1, by name.
+    """
+
+    path: Path
+    cell: Cell
+    frames: FrameTree
+    lines: Mapping[str, int]
+
+
+@attrs.frozen(kw_only=True)
+class Surroundings:
+    """What a program acts on, as far as it can be found.
+
+    Attributes:
+        file: the cell; None where there is none.
+        problem: why the cell that a setting names could not be read; empty if it could.
+    """
+
+    file: CellFile | None = None
+    problem: str = ""
+
+
+class Cells:
+    """Cell files that have been read; one that has changed since is read again."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self._read: dict[Path, tuple[tuple[int, int], CellFile | FileFormatError]] = {}
+
+    def read(self, path: Path) -> CellFile:
+        """Return what a cell file says; it may have no arms.
+
+        Raises:
+            FileFormatError: it cannot be read.
+        """
+        stamp = _stamp(path)
+        known = self._read.get(path)
+        if known is None or known[0] != stamp:
+            known = self._read[path] = stamp, _read(path)
+        if isinstance(known[1], FileFormatError):
+            raise known[1]
+        return known[1]
+
+    def imported(self, folder: Path, name: str) -> Imported:
+        """Return what the IMPORT of a file brings.
+
+        Raises:
+            FileFormatError: it cannot be read.
+        """
+        cell = self.read(folder / name).cell
+        return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
+
+    def around(self, folder: Path | None, text: str, setting: Path | None) -> Surroundings:
+        """Return what a program acts on.
+
+        Args:
+            folder: where it lies; None where that is nowhere.
+            text: the program.
+            setting: the cell file that a setting names.
+        """
+        if setting is not None:
+            try:
+                file = self.read(setting)
+            except FileFormatError as error:
+                return Surroundings(problem=str(error))
+            return Surroundings(file=file) if file.cell.arms else Surroundings(problem=f"{setting}: it has no arms")
+        if folder is None:
+            return Surroundings()
+        for name in dict.fromkeys(_IMPORT.findall(text)):
+            imported = self._with_arms(folder / name)
+            if imported is not None:
+                return Surroundings(file=imported)
+        beside = [file for file in map(self._with_arms, _candidates(folder)) if file is not None]
+        return Surroundings(file=beside[0] if len(beside) == 1 else None)
+
+    def _with_arms(self, path: Path) -> CellFile | None:
+        try:
+            file = self.read(path)
+        except FileFormatError:
+            return None
+        return file if file.cell.arms else None
+
+
+def _candidates(folder: Path) -> Iterator[Path]:
+    """Give the files of a folder that might be cells."""
+    try:
+        paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES)
+        if len(paths) <= _MOST_FILES:
+            yield from (path for path in paths if path.is_file() and path.stat().st_size <= _LARGEST_FILE)
+    except OSError:
+        return
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Return what changes when a file does."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return 0, -1
+    return status.st_mtime_ns, status.st_size
+
+
+def _read(path: Path) -> CellFile | FileFormatError:
+    try:
+        # A program or a setting names it, and neither may name what never ends.
+        cell = read_cell(regular(path), arms_needed=False)
+        return CellFile(path=path, cell=cell, frames=cell.tree(), lines=_lines(path))
+    except FileFormatError as error:
+        return error
+    except (ArmwrightError, ArithmeticError) as error:
+        return FileFormatError(path, None, "", str(error))
+
+
+def _lines(path: Path) -> dict[str, int]:
+    document = Document.read(path)
+    found: dict[str, int] = {}
+    for table in ("visions", "frames", "arms"):
+        if not document.root.is_table(table):
+            continue
+        for key in document.root.table(table).free_keys():
+            line = document.line((table, key))
+            arm = _ARM.fullmatch(key)
+            if line is not None:
+                found[f"ARM_{arm[1]}" if arm else key.upper()] = line
+    return found

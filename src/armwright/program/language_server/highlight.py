@@ -1,0 +1,134 @@
+"""Colours for programs: a Pygments lexer, and the groups of words that every editor colours alike."""
+
+import re
+from collections import deque
+from collections.abc import Collection, Iterable, Iterator
+from typing import ClassVar
+
+from pygments.lexer import RegexLexer, default, include
+from pygments.token import (
+    Comment,
+    Error,
+    Keyword,
+    Name,
+    Number,
+    Operator,
+    Punctuation,
+    String,
+    Whitespace,
+    _TokenType,
+)
+
+from armwright.program.language.source import Source
+from armwright.program.language.units import UNITS
+from armwright.program.language.words import LATER_TYPES, SENSORS, VOCABULARIES, Standard
+from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.syntax.line_numbers import without_numbers
+
+_VOCABULARY = VOCABULARIES[Standard.RLO_2]
+
+# Every reserved word is in one of these four.
+DECLARATIONS = frozenset(_VOCABULARY.headers)
+TYPES = frozenset((*_VOCABULARY.types, *LATER_TYPES))
+OPERATORS = frozenset(("AND", "OR", "NOT"))
+KEYWORDS = _VOCABULARY.reserved - DECLARATIONS - TYPES - OPERATORS
+
+_NAME = r"(?a:[A-Z]\w*)(?!\w)"
+_NUMBER = r"[0-9]+(?:\.[0-9]+)?(?a:E[+-]?[0-9]+)?"
+
+
+def _whole(*words: str) -> str:
+    """Return a pattern for one of some words, in any case and not as the beginning of a longer one."""
+    return rf"(?a:{'|'.join(words)})(?!\w)"
+
+
+def _any_of(words: Collection[str]) -> str:
+    return _whole(*sorted(words))
+
+
+class RloLexer(RegexLexer):
+    """A Pygments lexer for RLO-2, which holds RLO-83.
+
+    Line numbers of a numbered listing are labels. What the translator would refuse as a token is an error; anything
+    else is coloured, whether or not it makes sense where it stands.
+    """
+
+    name = "RLO"
+    aliases: ClassVar[list[str]] = ["rlo"]
+    filenames: ClassVar[list[str]] = ["*.rlo"]
+    flags = re.IGNORECASE
+    tokens: ClassVar[dict[str, list[object]]] = {
+        "root": [
+            include("blank"),
+            (_whole("READ"), Keyword, "sensor"),
+            (_whole("UNITS"), Keyword.Declaration, "units"),
+            (_whole("PROCEDURE"), Keyword.Declaration, "procedure"),
+            include("reserved"),
+            include("operand"),
+            include("sign"),
+            # Whatever is left belongs to no program.
+            (r"[^\W\d_]\w*", Error),
+            (r".", Error),
+        ],
+        "blank": [
+            (r"[ \t\r\n\f\v]+", Whitespace),
+            (r"\{[^}]*(?:\}|\Z)", Comment.Multiline),
+            (r"//[^\r\n]*", Comment.Single),
+        ],
+        "reserved": [
+            (_any_of(DECLARATIONS), Keyword.Declaration),
+            (_any_of(TYPES), Keyword.Type),
+            (_any_of(OPERATORS), Operator.Word),
+            (_any_of(KEYWORDS), Keyword),
+        ],
+        "operand": [
+            (r"(?a:ARM[-_][0-9]+)(?!\w)", Name.Builtin.Pseudo),
+            (r"(?a:ARM)(?:(?:[ \t]*[-_][ \t]*|[ \t]+)[0-9]+)?(?!\w)", Error),
+            (rf"{_NUMBER}(?={_any_of(UNITS)}(?!\.))", Number, "unit"),
+            (rf"{_NUMBER}(?![\w.])", Number),
+            (r"\.?[0-9](?:[\w.]|(?<=E)[+-](?=[0-9]))*", Error),
+            (r'"[^"\r\n]*"', String.Double),
+            (r'"[^\r\n]*', Error),
+            (rf"{_any_of(FUNCTIONS)}(?=[ \t]*\()", Name.Builtin),
+            (rf"{_NAME}(?=[ \t]*\()", Name.Function),
+            (_any_of(PREDECLARED), Name.Builtin.Pseudo),
+            (_NAME, Name),
+        ],
+        "sign": [
+            # The comments and signs of other languages.
+            (r"\(\*|/\*|:=|==|!=|&&|\|\||=<|=>", Error),
+            (r"<=|>=|<>|[=<>+*/-]", Operator),
+            (r"[;,:.()\[\]]", Punctuation),
+        ],
+        "sensor": [include("blank"), (_any_of(SENSORS), Keyword.Pseudo, "#pop"), default("#pop")],
+        "units": [
+            include("blank"),
+            (_any_of(UNITS), Keyword.Type),
+            (r",", Punctuation),
+            default("#pop"),
+        ],
+        "unit": [(_any_of(UNITS), Keyword.Type, "#pop")],
+        "procedure": [
+            include("blank"),
+            (rf"(?!{_any_of(_VOCABULARY.reserved)}){_NAME}", Name.Function, "#pop"),
+            default("#pop"),
+        ],
+    }
+
+    def get_tokens_unprocessed(
+        self, text: str, stack: Iterable[str] = ("root",)
+    ) -> Iterator[tuple[int, _TokenType, str]]:
+        """Yield place, kind and text of every token; line numbers divide whatever they stand in."""
+        blanked, _ = without_numbers(Source("", text))
+        numbers = deque(match.span() for match in re.finditer(r"[0-9]+", text) if blanked[match.start()] == " ")
+        for start, kind, value in super().get_tokens_unprocessed(blanked, stack):
+            at, end = start, start + len(value)
+            while numbers and numbers[0][0] < end:
+                first, last = numbers.popleft()
+                if at < first:
+                    yield at, kind, text[at:first]
+                yield first, Name.Label, text[first:last]
+                at = last
+            if at < end:
+                yield at, kind, text[at:end]

@@ -1,0 +1,213 @@
+"""What there is to say about a place of a program: names with their types and poses, words, numbers with units."""
+
+import attrs
+
+from armwright.arrays import Array
+from armwright.cell.model import base_name
+from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.source import Span
+from armwright.program.language.units import UNITS, UnitSystem, convert, dimension
+from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.keyword_docs import explained
+from armwright.program.language_server.symbol_index import Occurrence, What
+from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.syntax import tree
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.spatial.poses import to_noap
+
+# Smaller numbers in a pose are roundings.
+_NOTHING = 1e-12
+# Words that a statement can start with and that a word of the same statement is looked up by.
+_STARTS = frozenset(("MOVE", "AFFIX", "OPEN", "FOR", "OPERATE"))
+
+
+@attrs.frozen
+class Hover:
+    """What to say of a stretch of text.
+
+    Attributes:
+        span: the stretch.
+        code: what it is, as the language would write it.
+        lines: more, a sentence or fact each.
+    """
+
+    span: Span
+    code: str
+    lines: tuple[str, ...] = ()
+
+
+def hover(analysis: Analysis, offset: int) -> Hover | None:
+    """Return what there is to say about a place; None where there is nothing."""
+    occurrence = analysis.at(offset)
+    if occurrence is not None:
+        return _of_name(analysis, occurrence)
+    token = analysis.token_at(offset)
+    if token is None:
+        return None
+    if token.kind is TokenKind.NUMBER:
+        return _of_number(token, analysis.compiled.symbols.units)
+    if token.kind is not TokenKind.KEYWORD:
+        return None
+    word = explained(token.key, _statement(analysis, token))
+    return None if word is None else Hover(token.span, word.form, (word.text,))
+
+
+def signature(procedure: tree.Procedure) -> tuple[str, tuple[tuple[int, int], ...]]:
+    """Return the head of a procedure on one line, and where its parameters stand in that."""
+    text, places = f"PROCEDURE {procedure.name.text}", []
+    for number, declaration in enumerate(procedure.parameters):
+        text += ", " if number else " ("
+        for index, name in enumerate(declaration.names):
+            text += ", " if index else ""
+            places.append((len(text), len(text) + len(name.text)))
+            text += name.text
+        text += f" : {_type_text(declaration.type)}"
+    return text + ")" * bool(places), tuple(places)
+
+
+def _type_text(written: tree.TypeName) -> str:
+    sizes = ",".join(number.text for number in written.sizes)
+    name = written.key or written.text
+    return f"ARRAY [{sizes}] OF {name}" if sizes else name
+
+
+def _statement(analysis: Analysis, token: Token) -> str:
+    """Return the word that starts the statement that a token stands in."""
+    tokens = analysis.compiled.tokens
+    at = analysis.token_starts.index(token.start)
+    while at >= 0 and tokens[at].key != ";":
+        if tokens[at].key in _STARTS and tokens[at].kind is TokenKind.KEYWORD:
+            return tokens[at].key
+        at -= 1
+    return ""
+
+
+# ---- names ---------------------------------------------------------------------------------------------------------
+
+
+def _of_name(analysis: Analysis, one: Occurrence) -> Hover | None:
+    text = analysis.text[one.start : one.end]
+    match one.what:
+        case What.VARIABLE:
+            found: tuple[str, list[str]] | None = _variable(analysis, one, text)
+        case What.ARM:
+            found = f"{one.key} : FRAME", _arm(analysis, one.key)
+        case What.PROCEDURE:
+            found = _procedure(analysis, one.key)
+        case What.DEVICE:
+            found = text, [_device(analysis, one.key)]
+        case What.UNIT:
+            found = (one.key, [f"a unit of {dimension(one.key)}"]) if one.key in UNITS else None
+        case What.AXIS:
+            found = one.key, [f"the {one.key.lower()} axis"]
+        case _:
+            found = _word(one)
+    return None if found is None else Hover(one.span, found[0], tuple(found[1]))
+
+
+def _word(one: Occurrence) -> tuple[str, list[str]] | None:
+    """Return what there is to say about a function of the language, or a word that is one only here."""
+    word = explained(one.key) if one.what in (What.FUNCTION, What.SENSOR) else None
+    if word is None:
+        return None
+    gives = f" : {FUNCTIONS[one.key].gives.name}" if one.what is What.FUNCTION else ""
+    return word.form + gives, [word.text]
+
+
+def _procedure(analysis: Analysis, key: str) -> tuple[str, list[str]] | None:
+    procedure = analysis.compiled.symbols.procedures.get(key)
+    if procedure is None:
+        return None
+    line = analysis.compiled.source.line(procedure.node.name.span.start)
+    return signature(procedure.node)[0], [f"declared in line {line}"]
+
+
+def _variable(analysis: Analysis, one: Occurrence, text: str) -> tuple[str, list[str]]:
+    symbols = analysis.compiled.symbols
+    declared = analysis.declaration(one)
+    code = f"{declared.text if declared else text} : {one.type or 'of a type that is wrong'}"
+    lines = []
+    if declared is not None:
+        line = analysis.compiled.source.line(declared.span.start)
+        if one.owner is None:
+            lines.append(f"declared in line {line}")
+        else:
+            what = "parameter" if one.key in symbols.procedures[one.owner].parameters else "variable"
+            lines.append(f"{what} of `{symbols.procedures[one.owner].node.name.text}`, declared in line {line}")
+    elif one.key in symbols.imported:
+        lines.append("imported")
+    elif one.key in PREDECLARED:
+        lines.append("predeclared")
+    if one.owner is None and one.type == Type(Kind.FRAME):
+        lines += _frame(analysis, one.key)
+    return code, lines
+
+
+def _frame(analysis: Analysis, key: str) -> list[str]:
+    """Return where the cell has a frame at the start."""
+    cell, frames = analysis.cell, analysis.frames
+    if cell is None or frames is None:
+        return []
+    lines = []
+    if key in frames:
+        parent = frames.parent(key)
+        if parent is not None:
+            lines.append(f"hangs on {_shown(parent)} in {cell.name}")
+        if parent is not None and frames.has_value(key):
+            units = analysis.compiled.symbols.units
+            if parent != "WORLD":
+                lines.append(f"seen from {_shown(parent)}: {pose_text(frames.relation(key, parent), units)}")
+            lines.append(f"in the world: {pose_text(frames.world(key), units)}")
+    if count := len(cell.visions.get(key, ())):
+        lines.append(f"the camera of {cell.name} has {count} answer{'s' * (count > 1)} for it")
+    return lines
+
+
+def _arm(analysis: Analysis, key: str) -> list[str]:
+    """Return what the cell knows of an arm."""
+    cell, frames = analysis.cell, analysis.frames
+    if cell is None or frames is None:
+        return ["an arm; its value is the pose of the hand"]
+    if key not in cell.arms:
+        return [f"{cell.name} has no such arm; it has {', '.join(sorted(cell.arms))}"]
+    units = analysis.compiled.symbols.units
+    return [
+        f"{cell.arms[key].arm.name} in {cell.name}; its value is the pose of the hand",
+        f"base: {pose_text(cell.arms[key].base, units)}",
+        f"hand at the start: {pose_text(frames.world(key), units)}",
+    ]
+
+
+def _device(analysis: Analysis, key: str) -> str:
+    cell = analysis.cell
+    if cell is None or cell.devices is None:
+        return "a device"
+    return f"a device of {cell.name}" if key in cell.devices else f"{cell.name} has no such device"
+
+
+def _shown(frame: str) -> str:
+    arm = frame.removesuffix(base_name(""))
+    return f"the base of {arm}" if arm != frame and is_arm(arm) else frame
+
+
+def pose_text(X: Array, units: UnitSystem) -> str:
+    """Return a pose (4, 4) as a program writes it: n, o, a, p, lengths in the unit of the program."""
+    numbers = to_noap(X)
+    numbers[9:] /= units.metres
+    texts = [f"{0.0 if abs(number) < _NOTHING else number:.6g}" for number in numbers.tolist()]
+    return f"`({', '.join(','.join(texts[i : i + 3]) for i in range(0, 12, 3))})` {units.length.lower()}"
+
+
+# ---- numbers -------------------------------------------------------------------------------------------------------
+
+
+def _of_number(token: Token, units: UnitSystem) -> Hover | None:
+    """Return what a number with a unit is worth in the program."""
+    unit = token.text[len(token.key) :].upper()
+    if unit not in UNITS or token.damaged:
+        return None
+    value = convert(tree.Number(token.span, token.text, float(token.key), unit), units)
+    own = {"length": units.length.lower(), "angle": units.angle.lower(), "time": "s", "force": "N"}[dimension(unit)]
+    return Hover(token.span, f"{token.text} = {value:.12g} {own}", (f"a {dimension(unit)} in the unit of the program",))

@@ -1,0 +1,168 @@
+"""The shape of a program: what it declares, and what can be folded away."""
+
+import enum
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import attrs
+
+from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.language.source import Source, Span
+from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.hover import signature
+from armwright.program.syntax import tree
+from armwright.program.syntax.lexer import Token, TokenKind
+
+
+class Part(enum.Enum):
+    """What an entry of an outline is."""
+
+    PROCEDURE = "procedure"
+    PARAMETER = "parameter"
+    VARIABLE = "variable"
+    ARRAY = "array"
+    FRAME = "frame"
+    EVENT = "event"
+
+
+@attrs.frozen
+class Entry:
+    """Something that a program declares.
+
+    Attributes:
+        name: as declared.
+        part: what it is.
+        detail: its type or parameters.
+        span: all of it.
+        place: its name.
+        inside: what it declares in turn.
+    """
+
+    name: str
+    part: Part
+    detail: str
+    span: Span
+    place: Span
+    inside: tuple["Entry", ...] = ()
+
+
+_PARTS = {Kind.FRAME: Part.FRAME, Kind.EVENT: Part.EVENT}
+
+
+def outline(analysis: Analysis) -> tuple[Entry, ...]:
+    """Return what a program declares, in the order of the text."""
+    symbols = analysis.compiled.symbols
+    found: list[Entry] = []
+    for header in analysis.compiled.tree.headers:
+        if isinstance(header, tree.Declaration):
+            found += _variables(header, symbols.types)
+        elif isinstance(header, tree.Procedure):
+            own = symbols.procedures.get(header.name.key)
+            types = {} if own is None else own.types
+            inside = [entry for one in header.parameters for entry in _variables(one, types, parameter=True)]
+            inside += [entry for one in header.declarations for entry in _variables(one, types)]
+            detail = signature(header)[0].partition(" (")[2]
+            found.append(
+                Entry(
+                    header.name.text,
+                    Part.PROCEDURE,
+                    f"({detail}" * bool(detail),
+                    header.span,
+                    _within(header.name.span, header.span),
+                    tuple(inside),
+                )
+            )
+    return tuple(sorted(found, key=lambda one: one.span.start))
+
+
+def _variables(
+    declaration: tree.Declaration, types: Mapping[str, Type | None], *, parameter: bool = False
+) -> list[Entry]:
+    found = []
+    for name in declaration.names:
+        kind = types.get(name.key)
+        part = Part.VARIABLE if kind is None else Part.ARRAY if kind.sizes else _PARTS.get(kind.kind, Part.VARIABLE)
+        detail = declaration.type.text if kind is None else str(kind)
+        found.append(Entry(name.text, Part.PARAMETER if parameter else part, detail, name.span, name.span))
+    return found
+
+
+def _within(inner: Span, outer: Span) -> Span:
+    """Return a span that is not outside of another: a name that is missing may stand anywhere."""
+    return inner if outer.start <= inner.start and inner.end <= outer.end else outer
+
+
+@attrs.frozen
+class Fold:
+    """Lines that can be folded away, from 1, both included; of comments or of the program."""
+
+    first: int
+    last: int
+    comment: bool = False
+
+
+_OPENING = frozenset(("BEGIN", "COBEGIN", "TRY", "REPEAT"))
+_CLOSING = frozenset(("END", "COEND", "UNTIL"))
+
+
+def folds(analysis: Analysis) -> tuple[Fold, ...]:
+    """Return what can be folded away: blocks, declarations, statements and comments of several lines."""
+    source, tokens = analysis.compiled.source, analysis.compiled.tokens
+    found = {*_blocks(source, tokens), *_parts(source, tokens), *_comments(source, analysis.compiled.comments)}
+    for statement in analysis.statements:
+        found.add(Fold(source.line(statement.span.start), source.line(statement.span.end)))
+    longest: dict[int, Fold] = {}
+    for fold in found:
+        if fold.last > fold.first and fold.last > longest.get(fold.first, Fold(0, 0)).last:
+            longest[fold.first] = fold
+    return tuple(longest[first] for first in sorted(longest))
+
+
+def _blocks(source: Source, tokens: Sequence[Token]) -> list[Fold]:
+    found, opened = [], []
+    for token in tokens:
+        if token.kind is not TokenKind.KEYWORD:
+            continue
+        if token.key in _OPENING:
+            opened.append(token)
+        elif token.key == "RECOVER" and opened:
+            found.append(Fold(source.line(opened.pop().start), source.line(token.start) - 1))
+            opened.append(token)
+        elif token.key in _CLOSING and opened:
+            found.append(Fold(source.line(opened.pop().start), source.line(token.end)))
+    return found
+
+
+def _parts(source: Source, tokens: Sequence[Token]) -> list[Fold]:
+    """Return VAR parts and procedures."""
+    found = []
+    part: Token | None = None
+    head: Token | None = None
+    depth = 0
+    for before, token in pairwise(tokens):
+        if token.kind is not TokenKind.KEYWORD and before.kind is not TokenKind.KEYWORD:
+            continue
+        if part is not None and token.key in ("VAR", "BEGIN", "PROCEDURE", "IMPORT", "UNITS"):
+            found.append(Fold(source.line(part.start), source.line(before.end)))
+            part = None
+        part = before if before.key == "VAR" else part
+        if before.key == "PROCEDURE" and depth == 0:
+            head = before
+        depth += (before.key in _OPENING) - (before.key in _CLOSING)
+        if before.key == "END" and depth <= 0 and head is not None:
+            found.append(Fold(source.line(head.start), source.line(before.end)))
+            head = None
+    return found
+
+
+def _comments(source: Source, comments: Sequence[Span]) -> list[Fold]:
+    found: list[Fold] = []
+    for comment in comments:
+        fold = Fold(source.line(comment.start), source.line(comment.end), comment=True)
+        alone = source.text[source.line_starts[fold.first - 1] : comment.start].isspace()
+        alone = alone or source.column(comment.start) == 1
+        if found and alone and found[-1].last + 1 == fold.first:
+            fold = Fold(found.pop().first, fold.last, comment=True)
+        if alone or fold.last > fold.first:
+            found.append(fold)
+    return found

@@ -1,0 +1,195 @@
+"""Places in a text as editors count them, changes of it, and where a place was before the text changed."""
+
+import re
+from bisect import bisect_right
+from collections.abc import Callable
+from functools import cached_property
+from itertools import takewhile
+
+import attrs
+
+from armwright.program.language.source import Span
+
+_LINE_END = re.compile(r"\r\n|\r|\n")
+# What a character takes where editors count bytes or halves of words; in UTF-32 each takes one.
+UTF_8, UTF_16, UTF_32 = "utf-8", "utf-16", "utf-32"
+
+
+@attrs.frozen(slots=False)
+class Ruler:
+    """Converts between offsets into a text and lines and columns, both from 0.
+
+    Attributes:
+        text: the text.
+        encoding: what columns count: ``utf-8``, ``utf-16`` or ``utf-32``.
+    """
+
+    text: str
+    encoding: str = UTF_16
+
+    @cached_property
+    def starts(self) -> list[int]:
+        """Where each line starts."""
+        return [0, *(match.end() for match in _LINE_END.finditer(self.text))]
+
+    @cached_property
+    def _plain(self) -> bool:
+        """Whether every character takes one column."""
+        return self.encoding == UTF_32 or self.text.isascii()
+
+    def changed(self, start: int, end: int, new: str) -> "Ruler":
+        """Return the ruler of the text with ``new`` in the place of a stretch of it: lines far from that are known."""
+        text = self.text[:start] + new + self.text[end:]
+        ruler = Ruler(text, self.encoding)
+        # The two halves of a line end may come together, or apart, at the edges of the change.
+        first = max(0, self.line_of(start) - 1)
+        last = min(self.line_of(end) + 2, len(self.starts))
+        grown = len(text) - len(self.text)
+        low = self.starts[first]
+        high = self.starts[last] + grown if last < len(self.starts) else len(text)
+        between = (match.end() for match in _LINE_END.finditer(text, low))
+        middle = list(takewhile(lambda at: at < high, between)) if last < len(self.starts) else list(between)
+        ruler.__dict__["starts"] = [*self.starts[: first + 1], *middle, *(at + grown for at in self.starts[last:])]
+        return ruler
+
+    def line_of(self, offset: int) -> int:
+        """Return the line of an offset."""
+        return bisect_right(self.starts, offset) - 1
+
+    def line_end(self, line: int) -> int:
+        """Return the offset behind the last character of a line, in front of what ends it."""
+        if line + 1 >= len(self.starts):
+            return len(self.text)
+        start, end = self.starts[line], self.starts[line + 1] - 1
+        return end - 1 if end > start and self.text[end] == "\n" and self.text[end - 1] == "\r" else end
+
+    def place(self, offset: int) -> tuple[int, int]:
+        """Return line and column of an offset."""
+        offset = min(max(0, offset), len(self.text))
+        line = self.line_of(offset)
+        return line, self.width(self.starts[line], offset)
+
+    def width(self, start: int, end: int) -> int:
+        """Return how many columns a stretch of one line takes."""
+        if self._plain:
+            return end - start
+        stretch = self.text[start:end]
+        return end - start if stretch.isascii() else columns(stretch, self.encoding)
+
+    def offset(self, line: int, column: int) -> int:
+        """Return the offset of a place; what lies behind the end of a line is its end."""
+        if line >= len(self.starts):
+            return len(self.text)
+        start, end = self.starts[max(0, line)], self.line_end(max(0, line))
+        if self._plain:
+            return min(start + max(0, column), end)
+        at = start
+        while at < end and column > 0:
+            column -= columns(self.text[at], self.encoding)
+            # A place inside a character is in front of it.
+            at += column >= 0
+        return at
+
+
+def columns(text: str, encoding: str) -> int:
+    """Return how many columns a text takes."""
+    if encoding == UTF_16:
+        return len(text) + sum(character > "\uffff" for character in text)
+    # Half of a character that takes two places in UTF-16 is no text, but may be sent all the same.
+    return len(text.encode("utf-8", "surrogatepass")) if encoding == UTF_8 else len(text)
+
+
+@attrs.frozen
+class Edit:
+    """A change: ``text`` comes where ``span`` was."""
+
+    span: Span
+    text: str
+
+
+def edited(text: str, edits: tuple[Edit, ...]) -> str:
+    """Return a text with edits made, all counted in the text as given; of two that overlap the first is made."""
+    pieces, done = [], 0
+    for edit in sorted(edits, key=lambda one: (one.span.start, one.span.end)):
+        if edit.span.start >= done:
+            pieces += [text[done : edit.span.start], edit.text]
+            done = edit.span.end
+    return "".join((*pieces, text[done:]))
+
+
+@attrs.frozen
+class Drift:
+    """How two versions of a text differ: what is in front of ``start`` and behind the ends is the same.
+
+    Attributes:
+        start: where they begin to differ.
+        old_end: where that ends in the old text.
+        new_end: where it ends in the new one.
+    """
+
+    start: int
+    old_end: int
+    new_end: int
+
+    def then(self, start: int, end: int, length: int) -> "Drift":
+        """Return how the old text differs from the new one when that is changed once more.
+
+        Args:
+            start: where the new text is changed.
+            end: up to where.
+            length: of what comes there.
+        """
+        if self.none:
+            return Drift(start, end, start + length)
+        old_end = self.old_end + max(0, end - self.new_end)
+        new_end = max(end, self.new_end) - end + start + length
+        return Drift(min(self.start, start), old_end, new_end)
+
+    @property
+    def none(self) -> bool:
+        """Whether nothing has changed."""
+        return self.start == self.old_end == self.new_end
+
+    def old(self, offset: int) -> int | None:
+        """Return where a place of the new text was; None where it was not there."""
+        return _moved(offset, self.start, self.new_end, self.old_end)
+
+    def new(self, offset: int) -> int | None:
+        """Return where a place of the old text is now; None where it is gone."""
+        return _moved(offset, self.start, self.old_end, self.new_end)
+
+    def new_span(self, span: Span) -> Span | None:
+        """Return where a stretch of the old text is now; None where some of its ends is gone."""
+        start, end = self.new(span.start), self.new(span.end)
+        return None if start is None or end is None or end < start else Span(start, end)
+
+
+def _moved(offset: int, start: int, end: int, other_end: int) -> int | None:
+    if offset >= end:
+        return offset - end + other_end
+    return offset if offset <= start else None
+
+
+NO_DRIFT = Drift(0, 0, 0)
+
+
+def drift(old: str, new: str) -> Drift:
+    """Compare two versions of a text."""
+    if old == new:
+        return NO_DRIFT
+    limit = min(len(old), len(new))
+    start = _same(lambda n: old[:n] == new[:n], limit)
+    behind = _same(lambda n: old[len(old) - n :] == new[len(new) - n :], limit - start)
+    return Drift(start, len(old) - behind, len(new) - behind)
+
+
+def _same(equal: Callable[[int], bool], limit: int) -> int:
+    """Return how many characters are the same, by halving."""
+    low, high = 0, limit
+    while low < high:
+        middle = (low + high + 1) // 2
+        if equal(middle):
+            low = middle
+        else:
+            high = middle - 1
+    return low

@@ -1,0 +1,141 @@
+"""Giving a name of a program another one, everywhere, so that the program goes on meaning the same."""
+
+import re
+
+from armwright.errors import InvalidValueError
+from armwright.program.language.words import VOCABULARIES, is_later
+from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.positions import Edit
+from armwright.program.language_server.symbol_index import Occurrence, What
+from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.symbols import PREDECLARED
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_ARM = re.compile(r"ARM(_[0-9]+)?", re.IGNORECASE)
+_NO_NAMES = {
+    What.ARM: "an arm, whose name the cell settles",
+    What.DEVICE: "a device, whose name the cell settles",
+    What.FUNCTION: "a function of the language",
+    What.UNIT: "a unit",
+    What.SENSOR: "a word of the language",
+    What.AXIS: "an axis",
+}
+
+
+def nameable(analysis: Analysis, offset: int) -> Occurrence:
+    """Return the name at a place that can be given another one.
+
+    Raises:
+        InvalidValueError: there is none; the text says what is there.
+    """
+    one = analysis.at(offset)
+    if one is None:
+        token = analysis.token_at(offset)
+        what = f"`{token.text}` is no name" if token is not None else "here is no name"
+        raise InvalidValueError(f"{what}; only variables and procedures can be renamed")
+    text = analysis.text[one.start : one.end]
+    if one.what in _NO_NAMES:
+        raise InvalidValueError(f"`{text}` is {_NO_NAMES[one.what]}, and cannot be renamed")
+    symbols = analysis.compiled.symbols
+    if one.what is What.UNKNOWN or analysis.declaration(one) is None:
+        if one.key in symbols.imported:
+            raise InvalidValueError(f"`{text}` is imported, and cannot be renamed here")
+        if one.key in PREDECLARED:
+            raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
+        raise InvalidValueError(f"`{text}` is not declared, so it is unknown what it is")
+    if one.what is What.VARIABLE and one.owner is None:
+        _require_free(analysis, one.key, text)
+    return one
+
+
+def _require_free(analysis: Analysis, key: str, text: str) -> None:
+    """Refuse a frame that the cell knows by its name."""
+    cell = analysis.cell
+    if key in analysis.compiled.symbols.imported:
+        raise InvalidValueError(f"`{text}` is imported, and cannot be renamed here")
+    if key in PREDECLARED:
+        raise InvalidValueError(f"`{text}` is predeclared, and cannot be renamed")
+    if cell is None:
+        return
+    if key in cell.frames:
+        raise InvalidValueError(f"`{text}` gets its place from {cell.name} by this name; rename it there first")
+    if key in cell.visions:
+        raise InvalidValueError(f"`{text}` is found by the camera of {cell.name} by this name; rename it there first")
+
+
+def rename(analysis: Analysis, offset: int, new: str) -> tuple[Edit, ...]:
+    """Return the changes that give the name at a place another one.
+
+    Args:
+        analysis: the program.
+        offset: a place in the name.
+        new: its new name.
+
+    Raises:
+        InvalidValueError: the name cannot be changed, the new one is none, or it has another meaning somewhere.
+    """
+    one = nameable(analysis, offset)
+    _require_name(analysis, new)
+    key = new.upper()
+    if key != one.key:
+        _require_unused(analysis, one, new)
+    return tuple(Edit(other.span, new) for other in analysis.same(one))
+
+
+def _require_name(analysis: Analysis, new: str) -> None:
+    """Refuse what is no name in the language of the program."""
+    words = VOCABULARIES[analysis.compiled.standard]
+    if not _NAME.fullmatch(new):
+        raise InvalidValueError(f"'{new}' is no name: a letter comes first, then letters A to Z, digits and `_`")
+    if len(new) > words.longest_name:
+        longest = f"{words.longest_name} characters in {words.name}"
+        raise InvalidValueError(f"'{new}' has {len(new)} characters; names have at most {longest}")
+    if _ARM.fullmatch(new):
+        raise InvalidValueError(f"'{new}' is the name of an arm")
+    if new.upper() in words.reserved:
+        later = " of RLO-2" if is_later(new.upper()) else ""
+        raise InvalidValueError(f"'{new}' is a reserved word{later}")
+
+
+def _require_unused(analysis: Analysis, one: Occurrence, new: str) -> None:
+    """Refuse a name that has a meaning where the renamed thing is known."""
+    symbols, key = analysis.compiled.symbols, new.upper()
+    if one.owner is None:
+        _require_unused_globally(analysis, one, new)
+        return
+    procedure = symbols.procedures[one.owner]
+    if key in PREDECLARED:
+        raise InvalidValueError(f"'{new}' is a frame that is predeclared")
+    if key in procedure.types:
+        raise InvalidValueError(f"procedure `{procedure.node.name.text}` has a name '{new}' already")
+    span = procedure.node.span
+    if any(other.key == key and span.start <= other.start < span.end for other in _meant(analysis)):
+        raise InvalidValueError(
+            f"procedure `{procedure.node.name.text}` uses the '{new}' of the program, which would then be hidden"
+        )
+
+
+def _require_unused_globally(analysis: Analysis, one: Occurrence, new: str) -> None:
+    symbols, key = analysis.compiled.symbols, new.upper()
+    cell = analysis.cell
+    if key in PREDECLARED or key in symbols.imported:
+        raise InvalidValueError(f"'{new}' is a frame that is {'predeclared' if key in PREDECLARED else 'imported'}")
+    if key in symbols.declared or key in symbols.procedures:
+        raise InvalidValueError(f"the program has a name '{new}' already")
+    if key in FUNCTIONS:
+        raise InvalidValueError(f"'{new}' is a function of the language")
+    if cell is not None and one.what is What.VARIABLE and (key in cell.frames or key in cell.visions):
+        raise InvalidValueError(f"{cell.name} has a frame '{new}', which this would become")
+    if any(other.key == key and other.owner is None for other in _meant(analysis)):
+        raise InvalidValueError(f"the program uses '{new}' already, though it is not declared")
+    for other in analysis.same(one):
+        procedure = analysis.extents.scope(other.start).procedure
+        if procedure is not None and key in procedure.types:
+            name = procedure.node.name.text
+            raise InvalidValueError(f"procedure `{name}` has a '{new}' of its own, which would hide this one there")
+
+
+def _meant(analysis: Analysis) -> tuple[Occurrence, ...]:
+    """Return the occurrences that stand for something by their name, and not by their place."""
+    fixed = (What.UNIT, What.SENSOR, What.AXIS, What.DEVICE)
+    return tuple(one for one in analysis.occurrences if one.what not in fixed)

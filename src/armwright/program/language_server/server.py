@@ -1,0 +1,293 @@
+"""The language server: a conversation with an editor about programs, in the Language Server Protocol."""
+
+import logging
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+from lsprotocol import types as lsp
+from pygls.exceptions import JsonRpcException
+from pygls.lsp.server import LanguageServer
+from pygls.protocol import LanguageServerProtocol, lsp_method
+from pygls.uris import to_fs_path
+
+from armwright.errors import InvalidValueError
+from armwright.program.language.words import Standard
+from armwright.program.language_server import lsp_types
+from armwright.program.language_server.analyse import Settings
+from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.documents import Changed, Document, Known, Office
+from armwright.program.language_server.message_limits import Incoming
+from armwright.program.language_server.positions import Ruler
+from armwright.version import __version__
+
+SECTION = "armwright"
+# What the protocol calls a request that cannot be granted.
+_REQUEST_FAILED = -32803
+# How long the thread that looks at programs may keep others waiting [s].
+_TURN = 5e-4
+# Columns are counted so where the editor says nothing.
+_USUAL = "utf-16"
+
+
+class _Protocol(LanguageServerProtocol):
+    """The protocol without a second copy of the texts, whose lines would end elsewhere than those of the language."""
+
+    @lsp_method(lsp.TEXT_DOCUMENT_DID_CHANGE)
+    def lsp_text_document__did_change(self, params: lsp.DidChangeTextDocumentParams) -> Any:
+        yield self.fm.features[lsp.TEXT_DOCUMENT_DID_CHANGE], (params,), None
+
+    def structure_message(self, data: dict[str, Any]) -> Any:
+        """Return a message as it came in; whoever asks what cannot be read is told so, and does not wait for ever.
+
+        Raises:
+            JsonRpcException: it makes no sense.
+        """
+        try:
+            return super().structure_message(data)
+        except JsonRpcException as error:
+            if "method" in data and isinstance(data.get("id"), int | str):
+                self._send_response(data["id"], None, error.to_response_error())
+            raise
+
+
+class RloServer(LanguageServer):
+    """The server: open documents, settings, and what the editor can do."""
+
+    def __init__(self) -> None:
+        """Wait for an editor."""
+        super().__init__("armwright", __version__, protocol_cls=_Protocol)
+        self.documents: dict[str, Document] = {}
+        self.office = Office(_USUAL, self._said, self._found_out, self._failed)
+        self._left = False
+        self._told = ""
+        self._guessed = False
+
+    def shutdown(self) -> None:
+        """End at once: what is being read or looked at is for nobody any more, and is not waited for."""
+        if self._stop_event is not None:
+            self._stop_event.set()
+
+    def leave(self) -> None:
+        """Take note that the editor has said ``exit``."""
+        self._left = True
+
+    @property
+    def status(self) -> int:
+        """The exit status that the protocol asks for: 1 where ``exit`` came without ``shutdown``."""
+        return int(self._left and not self.protocol._shutdown)  # noqa: SLF001 - pygls keeps it so
+
+    # ---- what the editor can do
+
+    def can(self, *way: str) -> Any:
+        """Return a capability of the editor; None where it says nothing of it."""
+        found: Any = self.client_capabilities
+        for word in way:
+            found = getattr(found, word, None)
+        return found
+
+    # ---- documents
+
+    def document(self, uri: str) -> Document:
+        """Return an open document.
+
+        Raises:
+            JsonRpcException: it is not open.
+        """
+        try:
+            return self.documents[uri]
+        except KeyError:
+            raise refusal(f"{uri} is not open") from None
+
+    def outdate(self) -> None:
+        """Look at all documents again: what they depend on has changed."""
+        for document in self.documents.values():
+            document.outdate()
+
+    def guessed(self) -> None:
+        """Take note that an answer was given of an earlier text: the editor shall ask again."""
+        self._guessed = True
+
+    def _said(self, analysis: Analysis, ruler: Ruler, uri: str) -> list[lsp.Diagnostic]:
+        related = bool(self.can("text_document", "publish_diagnostics", "related_information"))
+        return lsp_types.diagnostics(analysis, ruler, uri, related=related)
+
+    def _found_out(self, document: Document, known: Known) -> None:
+        self.text_document_publish_diagnostics(
+            lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=known.said, version=document.version)
+        )
+        if known.problem and known.problem != self._told:
+            self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {known.problem}"))
+        self._told = known.problem
+        if self._guessed:
+            self._guessed = False
+            self._ask_again()
+
+    def _ask_again(self) -> None:
+        if self.can("workspace", "semantic_tokens", "refresh_support"):
+            self.workspace_semantic_tokens_refresh(None)
+        if self.can("workspace", "inlay_hint", "refresh_support"):
+            self.workspace_inlay_hint_refresh(None)
+
+    def _failed(self, error: Exception) -> None:
+        text = f"armwright: this should not happen: {type(error).__name__}: {error}"
+        self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Error, text))
+
+    # ---- settings
+
+    def take_settings(self, told: object) -> None:
+        """Take up settings as an editor tells them; what is no setting is passed over."""
+        values = told if isinstance(told, dict) else {}
+        values = values[SECTION] if isinstance(values.get(SECTION), dict) else values
+        cell, std = values.get("cell"), str(values.get("std") or Standard.RLO_2)
+        settings = Settings(
+            cell=self._path(cell) if isinstance(cell, str) and cell.strip() else None,
+            std=Standard(std) if std in set(Standard) else Standard.RLO_2,
+            strict=values.get("strict") is True,
+        )
+        if settings != self.office.settings:
+            self.office.settings = settings
+            self.outdate()
+
+    def _path(self, text: str) -> Path:
+        """Return the file that a setting names: seen from the folder of the workspace."""
+        folders = [to_fs_path(uri) for uri in self.workspace.folders]
+        root = next((folder for folder in (*folders, self.workspace.root_path) if folder), ".")
+        return Path(root, text.strip().replace("${workspaceFolder}", root)).expanduser()
+
+    async def ask_settings(self) -> None:
+        """Ask the editor for its settings."""
+        if not self.can("workspace", "configuration"):
+            return
+        items = [lsp.ConfigurationItem(section=SECTION)]
+        with suppress(JsonRpcException):
+            told = await self.workspace_configuration_async(lsp.ConfigurationParams(items))
+            if told and told[0] is not None:
+                self.take_settings(told[0])
+
+
+def refusal(text: str) -> JsonRpcException:
+    """Return what tells an editor that something cannot be done, and why."""
+    return JsonRpcException(text, code=_REQUEST_FAILED)
+
+
+def make_server() -> RloServer:
+    """Return a server that knows all its answers."""
+    # Imported here: the answers need the server's class.
+    from armwright.program.language_server import handlers  # noqa: PLC0415
+
+    # What is refused is told to the editor; its record need not have it again.
+    logging.getLogger("pygls").setLevel(logging.CRITICAL)
+    server = RloServer()
+    _conversation(server)
+    _surroundings(server)
+    handlers.register(server)
+    return server
+
+
+def serve() -> int:
+    """Talk to an editor over standard input and output until it says goodbye.
+
+    Returns:
+        The exit status. Threads may be at work still, for nobody.
+
+    Raises:
+        InvalidValueError: it sent a message that is larger than the limit; the connection is over.
+    """
+    # Questions are answered while a program is looked at beside them: they get their turn soon.
+    sys.setswitchinterval(_TURN)
+    incoming = Incoming(sys.stdin.buffer)
+    # Of its own: the protocol closes it at its end, and whatever else is printed must not get into it.
+    outgoing = os.fdopen(os.dup(1), "wb")
+    sys.stdout = sys.stderr
+    server = make_server()
+    server.start_io(cast("BinaryIO", incoming), outgoing)
+    if incoming.refused:
+        raise InvalidValueError(f"{incoming.refused}; the connection has ended")
+    return server.status
+
+
+def _conversation(server: RloServer) -> None:
+    """Let the server hear of the beginning, and of documents."""
+
+    @server.feature(lsp.INITIALIZE)
+    def initialize(params: lsp.InitializeParams) -> None:
+        encoding = server.workspace.position_encoding or _USUAL
+        server.office.encoding = encoding.value if isinstance(encoding, lsp.PositionEncodingKind) else encoding
+        server.take_settings(params.initialization_options)
+
+    @server.feature(lsp.INITIALIZED)
+    async def initialized(_: lsp.InitializedParams) -> None:
+        await _watch(server)
+        await server.ask_settings()
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
+    async def did_open(params: lsp.DidOpenTextDocumentParams) -> None:
+        item = params.text_document
+        path = to_fs_path(item.uri) if item.uri.startswith("file:") else None
+        if (before := server.documents.get(item.uri)) is not None:
+            before.close()
+        server.documents[item.uri] = Document(
+            server.office, item.uri, None if path is None else Path(path), item.text, item.version
+        )
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
+    def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
+        document = server.documents.get(params.text_document.uri)
+        if document is not None:
+            document.change([_changed(one) for one in params.content_changes], params.text_document.version)
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
+    def did_save(_: lsp.DidSaveTextDocumentParams) -> None:
+        server.outdate()
+
+    @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
+    def did_close(params: lsp.DidCloseTextDocumentParams) -> None:
+        document = server.documents.pop(params.text_document.uri, None)
+        if document is not None:
+            document.close()
+            server.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=[]))
+
+
+def _surroundings(server: RloServer) -> None:
+    """Let the server hear of settings and files, and of the end."""
+
+    @server.feature(lsp.EXIT)
+    def left(_: Any) -> None:
+        server.leave()
+
+    @server.feature(lsp.WORKSPACE_DID_CHANGE_CONFIGURATION)
+    async def did_change_configuration(params: lsp.DidChangeConfigurationParams) -> None:
+        if server.can("workspace", "configuration"):
+            await server.ask_settings()
+        else:
+            server.take_settings(params.settings)
+
+    @server.feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
+    def did_change_watched_files(_: lsp.DidChangeWatchedFilesParams) -> None:
+        server.outdate()
+
+
+def _changed(change: lsp.TextDocumentContentChangeEvent) -> Changed:
+    if isinstance(change, lsp.TextDocumentContentChangeWholeDocument):
+        return Changed(change.text)
+    start, end = change.range.start, change.range.end
+    return Changed(change.text, (start.line, start.character), (end.line, end.character))
+
+
+async def _watch(server: RloServer) -> None:
+    """Ask the editor to tell of changes of cell files, and of settings."""
+    wanted: dict[str, Any] = {}
+    if server.can("workspace", "did_change_watched_files", "dynamic_registration"):
+        wanted[lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES] = lsp.DidChangeWatchedFilesRegistrationOptions(
+            watchers=[lsp.FileSystemWatcher(glob_pattern="**/*.{toml,json}")]
+        )
+    if server.can("workspace", "did_change_configuration", "dynamic_registration"):
+        wanted[lsp.WORKSPACE_DID_CHANGE_CONFIGURATION] = lsp.DidChangeConfigurationRegistrationOptions(section=SECTION)
+    if wanted:
+        asked = [lsp.Registration(method, method, options) for method, options in wanted.items()]
+        # An editor that will not do what it said it can do tells nothing of cell files, and that is all.
+        with suppress(JsonRpcException):
+            await server.client_register_capability_async(lsp.RegistrationParams(asked))

@@ -1,0 +1,197 @@
+"""Where the names of a program occur, and what each is there: told from the tokens, so of half-written programs too."""
+
+import enum
+from bisect import bisect_right
+from collections.abc import Sequence
+
+import attrs
+
+from armwright.program.bytecode.instructions import Type
+from armwright.program.language.source import Span
+from armwright.program.language.words import SENSORS
+from armwright.program.semantics.builtins import AXES, FUNCTIONS
+from armwright.program.semantics.symbols import Scope, Symbols
+from armwright.program.syntax.lexer import Token, TokenKind
+
+# Behind these words and signs a statement begins.
+OPENERS = frozenset((";", "BEGIN", "THEN", "ELSE", "DO", "TRY", "RECOVER", "REPEAT", "COBEGIN"))
+_NAME, _ARM, _KEYWORD = TokenKind.NAME, TokenKind.ARM, TokenKind.KEYWORD
+# How far an index may reach before its variable is no longer taken for one that gets a value.
+_LONGEST_INDEX = 50
+
+
+class What(enum.Enum):
+    """What a name is where it stands."""
+
+    VARIABLE = "variable"
+    PROCEDURE = "procedure"
+    FUNCTION = "function"
+    ARM = "arm"
+    DEVICE = "device"
+    UNIT = "unit"
+    SENSOR = "sensor"
+    AXIS = "axis"
+    UNKNOWN = "unknown name"
+
+
+# Not frozen, though nothing changes one: like tokens, there are many of them.
+@attrs.define
+class Occurrence:
+    """A name in the text.
+
+    Attributes:
+        start: its first character.
+        end: the one after its last.
+        key: as compared.
+        what: what it is here.
+        owner: the procedure whose own name it is; None for names of the program.
+        type: of a variable, where it is known.
+        declares: whether the name is declared here.
+        writes: whether it gets a value here.
+    """
+
+    start: int
+    end: int
+    key: str
+    what: What
+    owner: str | None = None
+    type: Type | None = None
+    declares: bool = False
+    writes: bool = False
+
+    @property
+    def span(self) -> Span:
+        """Where it stands."""
+        return Span(self.start, self.end)
+
+    def is_same(self, other: "Occurrence") -> bool:
+        """Whether another occurrence is one of the same thing."""
+        return (self.key, self.what, self.owner) == (other.key, other.what, other.owner)
+
+
+@attrs.frozen
+class Extents:
+    """Which procedure each place of a text belongs to.
+
+    Attributes:
+        symbols: the names of the program.
+        starts: where procedures start, in order.
+        ends: where each ends.
+        keys: their names.
+    """
+
+    symbols: Symbols
+    starts: tuple[int, ...]
+    ends: tuple[int, ...]
+    keys: tuple[str, ...]
+
+    def procedure(self, offset: int) -> str | None:
+        """Return the procedure that a place lies in; None outside of all."""
+        at = bisect_right(self.starts, offset) - 1
+        return self.keys[at] if at >= 0 and offset <= self.ends[at] else None
+
+    def scope(self, offset: int) -> Scope:
+        """Return the names that can be seen at a place."""
+        return self.symbols.scope(self.procedure(offset))
+
+
+def extents_of(symbols: Symbols) -> Extents:
+    """Return where the procedures of a program stand."""
+    found = sorted((one.node.span.start, one.node.span.end, key) for key, one in symbols.procedures.items())
+    return Extents(
+        symbols=symbols,
+        starts=tuple(start for start, _, _ in found),
+        ends=tuple(end for _, end, _ in found),
+        keys=tuple(key for _, _, key in found),
+    )
+
+
+def occurrences(tokens: Sequence[Token], extents: Extents, *, place: int | None = None) -> tuple[Occurrence, ...]:
+    """Return the names among some tokens.
+
+    Args:
+        tokens: in order.
+        extents: where the procedures stand.
+        place: where all of the tokens are taken to be; each where it stands when left out.
+    """
+    found: list[Occurrence] = []
+    in_units = in_read = False
+    start, end = -1, -1
+    scope = Scope(symbols=extents.symbols)
+    before = ""
+    for at, token in enumerate(tokens):
+        kind, key = token.kind, token.key
+        if kind is _NAME or kind is _ARM:
+            if not start <= token.start < end:
+                here = token.start if place is None else place
+                scope, start, end = _seen_from(extents, here, token)
+            follows = tokens[at + 1].key if at + 1 < len(tokens) else ""
+            if kind is _ARM:
+                found.append(Occurrence(token.start, token.end, key, What.ARM))
+            else:
+                found.append(_name(token, scope, before, follows, in_units=in_units))
+            one = found[-1]
+            if (in_read and before in ("(", ",")) or before == "FOR":
+                one.writes = True
+            elif before in OPENERS or not before:
+                one.writes = follows == "=" or (follows == "[" and _assigned(tokens, at + 1))
+            elif before == "(" and key in AXES and at > 1 and tokens[at - 2].key == "FORCE":
+                one.what, one.owner, one.type = What.AXIS, None, None
+        elif kind is _KEYWORD or key in (";", ")"):
+            in_units = key == "UNITS"
+            in_read = key == "READ" or (in_read and key not in (";", ")") and kind is not _KEYWORD)
+        before = key
+    return tuple(found)
+
+
+def _seen_from(extents: Extents, here: int, token: Token) -> tuple[Scope, int, int]:
+    """Return the names seen from a place, and the stretch of text that sees the same."""
+    at = bisect_right(extents.starts, here) - 1
+    if at >= 0 and here < extents.ends[at]:
+        return extents.symbols.scope(extents.keys[at]), extents.starts[at], extents.ends[at]
+    following = extents.starts[at + 1] if at + 1 < len(extents.starts) else here + (1 << 40)
+    return Scope(symbols=extents.symbols), token.start, following
+
+
+def _name(token: Token, scope: Scope, before: str, follows: str, *, in_units: bool) -> Occurrence:
+    """Return what a name is between the tokens around it."""
+    key, start, end = token.key, token.start, token.end
+    procedures = scope.symbols.procedures
+    called = follows == "(" and not scope.is_local(key)
+    if before == "PROCEDURE" or (called and key in procedures):
+        procedure = procedures.get(key)
+        declares = procedure is not None and procedure.node.name.span.start == start
+        return Occurrence(start, end, key, What.PROCEDURE, declares=declares)
+    fixed = (
+        (in_units, What.UNIT),
+        (before == "READ" and key in SENSORS, What.SENSOR),
+        (before == "OPERATE", What.DEVICE),
+        (follows == "(" and key in FUNCTIONS, What.FUNCTION),
+    )
+    for holds, what in fixed:
+        if holds:
+            return Occurrence(start, end, key, what)
+    return _variable(token, scope)
+
+
+def _variable(token: Token, scope: Scope) -> Occurrence:
+    """Return which variable a name is, if it is one."""
+    key, symbols, local = token.key, scope.symbols, scope.procedure
+    names, owner = (local, local.node.name.key) if local is not None and key in local.types else (symbols, None)
+    kind, declared = names.types.get(key), names.declared.get(key)
+    if owner is None and kind is None and declared is None:
+        what = What.PROCEDURE if key in symbols.procedures else What.UNKNOWN
+        return Occurrence(token.start, token.end, key, what)
+    declares = declared is not None and declared.span.start == token.start
+    return Occurrence(token.start, token.end, key, What.VARIABLE, owner, kind, declares)
+
+
+def _assigned(tokens: Sequence[Token], at: int) -> bool:
+    """Whether ``=`` stands behind the index that begins at a token."""
+    depth = 0
+    for index in range(at, min(len(tokens), at + _LONGEST_INDEX)):
+        key = tokens[index].key
+        depth += (key == "[") - (key == "]")
+        if not depth:
+            return index + 1 < len(tokens) and tokens[index + 1].key == "="
+    return False

@@ -1,1 +1,0 @@
-"""Names, kinds and values: what the words of a program stand for, and whether they fit."""

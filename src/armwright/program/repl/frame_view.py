@@ -1,0 +1,104 @@
+"""What there is to see of a session: the frame tree with places and turns, and the arms with their joints and hands."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD, FrameTree
+from armwright.program.repl.session import Session
+
+# Where the middle of three turns is this near to a right angle, the other two turn about the same axis.
+_SAME_AXIS = 1e-9
+# Digits of places behind the point: a hundredth of a millimetre.
+_DIGITS = {"M": 5, "MM": 2, "CM": 3, "IN": 3}
+
+
+def frames(session: Session) -> list[str]:
+    """Return the frame tree as lines: each frame under the one it hangs on, seen from the world."""
+    units, machine = session.state.symbols.units, session.state.machine
+    rows = [["frame", "x", "y", "z", units.length.lower(), "z", "y", "x", "deg"]]
+    for name, depth, rigid in _walk(machine.tree):
+        shown = "  " * depth + session.spelled(name) + (" (rigidly)" if rigid else "")
+        if not machine.has_place(name):
+            rows.append([shown, "no value yet"])
+            continue
+        X = machine.tree.world(name)
+        place = [_number(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
+        rows.append([shown, *place, "", *map(_degrees, to_zyx(X[:3, :3]).tolist()), ""])
+    return _aligned(rows)
+
+
+def _walk(tree: FrameTree) -> Iterator[tuple[str, int, bool]]:
+    """Give each frame with its depth and whether it takes its parent along; an arm stands in place of its base."""
+    below: dict[str, list[str]] = {}
+    for name, node in tree.nodes.items():
+        if not name.endswith(".BASE"):
+            above = node.parent
+            below.setdefault(tree.parent(above) or WORLD if above.endswith(".BASE") else above, []).append(name)
+    waiting = [(WORLD, 0)]
+    while waiting:
+        name, depth = waiting.pop()
+        yield name, depth, name != WORLD and tree.nodes[name].rigid
+        waiting += [(child, depth + 1) for child in reversed(below.get(name, ()))]
+
+
+def to_zyx(R: Array) -> Array:
+    """Return three turns (3,) [rad]: about z, then about the new y, then about the newest x.
+
+    Where the second is a right angle the third is taken as 0.
+    """
+    across = math.hypot(R[0, 0], R[1, 0])
+    if across < _SAME_AXIS:
+        return np.array([math.atan2(-R[0, 1], R[1, 1]), math.atan2(-R[2, 0], across), 0.0])
+    return np.array([math.atan2(R[1, 0], R[0, 0]), math.atan2(-R[2, 0], across), math.atan2(R[2, 1], R[2, 2])])
+
+
+def arms(session: Session) -> list[str]:
+    """Return the arms as lines: the position of each joint [deg] or [mm], and what the hand is at and holds."""
+    machine, lines = session.state.machine, []
+    for name, place in machine.cell.arms.items():
+        q = machine.hardware.posture(name, machine.now)
+        shown = [
+            f"{_degrees(value)} deg" if joint.revolute else f"{_number(value * 1e3, 2)} mm"
+            for joint, value in zip(place.arm.joints, q.tolist(), strict=True)
+        ]
+        hand = machine.hands[name]
+        at = f"at {session.spelled(hand.at)}" if hand.at else "at no frame"
+        holds = f", closed on {session.spelled(hand.holds)}" if hand.holds else ""
+        hanging = [session.spelled(one) for one, node in machine.tree.nodes.items() if node.parent == name]
+        carries = f", carries {', '.join(hanging)}" if hanging else ""
+        lines += [f"{name}  {place.arm.name}", f"  joints  {', '.join(shown)}", f"  hand    {at}{holds}{carries}"]
+    return lines or ["no arms: begin with `--cell`, or with an IMPORT of a cell"]
+
+
+def names(session: Session) -> list[str]:
+    """Return the names that an input can use, as they are spelled: variables, frames, procedures, arms."""
+    symbols, machine = session.state.symbols, session.state.machine
+    return [*map(session.spelled, (*symbols.types, *symbols.procedures)), *machine.cell.arms]
+
+
+def _degrees(angle: float) -> str:
+    shown = _number(math.degrees(angle), 2)
+    return "180.00" if shown == "-180.00" else shown
+
+
+def _number(value: float, digits: int) -> str:
+    # What rounds to 0 has no sign.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    whole = [row for row in rows if len(row) == len(rows[0])]
+    widths = [max(len(row[column]) for row in whole) for column in range(len(rows[0]))]
+    widths[0] = max(len(row[0]) for row in rows)
+    lines = []
+    for row in rows:
+        first, *others = row
+        if len(row) < len(rows[0]):
+            lines.append(f"{first:<{widths[0]}}  {others[0]}")
+            continue
+        cells = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
+        lines.append("  ".join((f"{first:<{widths[0]}}", *cells)).rstrip())
+    return lines

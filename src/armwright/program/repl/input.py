@@ -1,0 +1,319 @@
+"""What somebody enters at a session: declarations, statements, expressions, whole programs; and whether more must come.
+
+Each input is parsed by the rules of a program: what a program would have around it is put there as tokens without
+characters, so that every place is one in the text of the session.
+"""
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+
+import attrs
+
+from armwright.errors import closest
+from armwright.program.language.diagnostic import Diagnostic, in_order
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import CLOSING, OPENING, VOCABULARIES, Standard, Vocabulary
+from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.syntax import tree
+from armwright.program.syntax.lexer import Token, TokenKind, scan
+from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.syntax.parser import parse
+
+# No expression begins like a line of a numbered program.
+_NUMBERED = re.compile(r"\s*[0-9]+[ \t]+[A-Za-z]")
+_ASSIGNING = ("=", ":=", "==")
+_OPERATORS = ("+", "-", "*", "/", "<", "<=", ">", ">=", "<>", "AND", "OR", ",")
+# What an expression can begin with, besides a name.
+_BEGINNINGS = (TokenKind.NUMBER, TokenKind.STRING)
+
+
+@attrs.frozen(kw_only=True)
+class Entry:
+    """One input, read.
+
+    Attributes:
+        headers: what it declares.
+        statements: what is to be done, in order; a value that is to be shown is a PRINT.
+        shown: where the statements start that only show a value.
+        spelling: how it first writes each of its names, by key.
+        found: what is wrong with its syntax.
+        complete: whether it can be taken as it is; otherwise it goes on in the next line.
+    """
+
+    headers: tuple[tree.Header, ...]
+    statements: tuple[tree.Statement, ...]
+    shown: frozenset[int]
+    spelling: Mapping[str, str]
+    found: tuple[Diagnostic, ...]
+    complete: bool
+
+
+def read(
+    source: Source,
+    start: int,
+    std: Standard,
+    *,
+    names: Collection[str] = (),
+    procedures: Collection[str] = (),
+    is_file: bool = False,
+) -> Entry:
+    """Read one input.
+
+    Args:
+        source: all that was entered so far, this input last.
+        start: where it begins.
+        std: the language.
+        names: the variables that are declared.
+        procedures: the procedures that are.
+        is_file: whether it is the text of a file; elsewhere a number that begins a line may begin an expression.
+    """
+    text, found = source.text[start:], []
+    if is_file or std is Standard.RLO_83 or _NUMBERED.match(text):
+        text, odd = without_numbers(Source(source.name, text))
+        found += [moved(one, start) for one in odd]
+    scanned = scan(source, " " * start + text, std)
+    found += scanned.found
+    tokens = _without_frame(scanned.tokens[:-1])
+    reader = _Reader(source, std, names, procedures)
+    for is_header, part in _parts(tokens, VOCABULARIES[std]):
+        if is_header:
+            reader.headers_of(part)
+        else:
+            reader.statements_of(part)
+    found += map(_advised, reader.found)
+    return Entry(
+        headers=tuple(reader.headers),
+        statements=tuple(reader.statements),
+        shown=frozenset(reader.shown),
+        spelling={token.key: token.text for token in reversed(tokens) if token.kind is TokenKind.NAME},
+        found=tuple(found),
+        complete=_is_complete(scanned.tokens[:-1], found),
+    )
+
+
+def moved(diagnostic: Diagnostic, by: int) -> Diagnostic:
+    """Return a diagnostic for a text that begins ``by`` characters later."""
+
+    def shift(span: Span) -> Span:
+        return Span(span.start + by, span.end + by)
+
+    return attrs.evolve(
+        diagnostic,
+        span=shift(diagnostic.span),
+        secondary=tuple(attrs.evolve(label, span=shift(label.span)) for label in diagnostic.secondary),
+        fixes=tuple(attrs.evolve(fix, span=shift(fix.span)) for fix in diagnostic.fixes),
+    )
+
+
+def _advised(diagnostic: Diagnostic) -> Diagnostic:
+    """Return a diagnostic with the advice that it needs where a program comes line by line."""
+    if diagnostic.code != "E127" or not diagnostic.message.upper().startswith("`ELSE`"):
+        return diagnostic
+    help_ = "an IF ends with its line: let that line end with ELSE, or write `BEGIN ... END` around the whole"
+    return attrs.evolve(diagnostic, helps=(*diagnostic.helps, help_))
+
+
+def _is_complete(tokens: Sequence[Token], found: Sequence[Diagnostic]) -> bool:
+    """Whether nothing is open, and the first thing that is wrong is not that the text ends."""
+    if any(one.code == "E102" for one in found) or (tokens and _depth(tokens) > 0):
+        return False
+    first = next((one for one in in_order(found) if one.is_syntax), None)
+    # A character that RLO does not have stays wrong whatever follows, a comment of another language too.
+    if first is None or first.code == "E101" or not tokens or first.span.start < tokens[-1].end:
+        return True
+    # Whoever forgets the parentheses of a call believes that nothing is missing.
+    return any(fix.replacement == "()" for fix in first.fixes)
+
+
+def _depth(tokens: Sequence[Token]) -> int:
+    """Return how many stretches of statements are open behind some tokens."""
+    words = [token.key for token in tokens if token.kind is TokenKind.KEYWORD]
+    return sum((word in OPENING) - (word in CLOSING) for word in words)
+
+
+def _without_frame(tokens: Sequence[Token]) -> list[Token]:
+    """Return the tokens without the BEGIN and the ``END.`` of a whole program."""
+    left = list(tokens)
+    if len(left) > 1 and left[-1].key == "." and left[-2].key == "END":
+        left.pop()
+        depth = 0
+        for at in reversed(range(len(left))):
+            if left[at].kind is TokenKind.KEYWORD:
+                depth += (left[at].key in CLOSING) - (left[at].key in OPENING)
+            if depth == 0:
+                if left[at].key == "BEGIN" and (at == 0 or left[at - 1].key == ";"):
+                    del left[-1], left[at]
+                break
+    return left
+
+
+# ---- parts ---------------------------------------------------------------------------------------------------------
+
+
+def _parts(tokens: Sequence[Token], words: Vocabulary) -> Iterator[tuple[bool, Sequence[Token]]]:
+    """Cut an input into headers and stretches of statements, each with whether it is a header."""
+    at = 0
+    while at < len(tokens):
+        is_header = True
+        if _is_header(tokens[at], words):
+            end = _end_of_header(tokens, at)
+        elif _goes_on_declaring(tokens, at):
+            end = _end_of_variables(tokens, at)
+        else:
+            is_header, end = False, _end_of_statements(tokens, at, words)
+        yield is_header, tokens[at:end]
+        at = end
+
+
+def _is_header(token: Token, words: Vocabulary) -> bool:
+    return token.kind is TokenKind.KEYWORD and token.key in words.headers
+
+
+def _goes_on_declaring(tokens: Sequence[Token], at: int) -> bool:
+    """Whether names and a type follow, as behind the first ``;`` of a VAR part."""
+    while at + 1 < len(tokens) and tokens[at].kind is TokenKind.NAME:
+        if tokens[at + 1].key == ":":
+            return True
+        if tokens[at + 1].key != ",":
+            return False
+        at += 2
+    return False
+
+
+def _end_of_header(tokens: Sequence[Token], at: int) -> int:
+    if tokens[at].key == "VAR":
+        return _end_of_variables(tokens, at)
+    if tokens[at].key != "PROCEDURE":
+        return _behind(tokens, at, ";")
+    at, depth = _behind(tokens, at, "BEGIN"), 1
+    while at < len(tokens) and depth:
+        depth += _depth(tokens[at : at + 1])
+        at += 1
+    return at + 1 if at < len(tokens) and tokens[at].key in (";", ".") else at
+
+
+def _end_of_variables(tokens: Sequence[Token], at: int) -> int:
+    at = _behind(tokens, at, ";")
+    while _goes_on_declaring(tokens, at):
+        at = _behind(tokens, at, ";")
+    return at
+
+
+def _behind(tokens: Sequence[Token], at: int, key: str) -> int:
+    """Return the place behind the next token that reads so; the end without one."""
+    return next((number + 1 for number in range(at, len(tokens)) if tokens[number].key == key), len(tokens))
+
+
+def _end_of_statements(tokens: Sequence[Token], at: int, words: Vocabulary) -> int:
+    depth = 0
+    for number in range(at, len(tokens)):
+        if depth <= 0 and number > at and tokens[number - 1].key == ";" and _is_header(tokens[number], words):
+            return number
+        depth += _depth(tokens[number : number + 1])
+    return len(tokens)
+
+
+# ---- parsing -------------------------------------------------------------------------------------------------------
+
+
+class _Reader:
+    """Parses the parts of one input."""
+
+    def __init__(self, source: Source, std: Standard, names: Collection[str], procedures: Collection[str]) -> None:
+        self._source, self._std, self._names = source, std, set(names)
+        self._procedures = set(procedures)
+        self.headers: list[tree.Header] = []
+        self.statements: list[tree.Statement] = []
+        self.shown: list[int] = []
+        self.found: list[Diagnostic] = []
+
+    def headers_of(self, part: Sequence[Token]) -> None:
+        """Read declarations, units, an import or a procedure; the last ``;`` and the word VAR may be left out."""
+        first, last = part[0], part[-1]
+        var = _words("VAR", at=first.start) if first.kind is TokenKind.NAME else []
+        semicolon = [] if last.key in (";", ".") else _words(";", at=last.end)
+        tokens = [*var, *part]
+        if _depth(part) <= 0:
+            tokens += [*semicolon, *_words("BEGIN", "END", ".", at=last.end)]
+        program = self._parse(tokens, last.end, self._std)
+        self.headers += program.headers
+        for header in program.headers:
+            if isinstance(header, tree.Declaration):
+                self._names.update(name.key for name in header.names)
+            elif isinstance(header, tree.Procedure):
+                self._procedures.add(header.name.key)
+
+    def statements_of(self, part: Sequence[Token]) -> None:
+        """Read statements; an expression among them becomes a PRINT of it."""
+        std, tokens = self._std, _words("BEGIN", at=part[0].start)
+        pieces = list(_pieces(part))
+        for piece in pieces:
+            if not self._is_expression(piece, alone=len(pieces) == 1):
+                tokens += piece
+                continue
+            self.shown.append(piece[0].start)
+            std = Standard.RLO_2
+            rest = piece[:-1] if piece[-1].key == ";" else piece
+            start, end = rest[0].start, rest[-1].end
+            tokens += [*_words("PRINT", "(", at=start), *rest, *_words(")", at=end), *piece[len(rest) :]]
+        tokens += _words("END", ".", at=part[-1].end)
+        self.statements += self._parse(tokens, part[-1].end, std).statements
+
+    def _parse(self, tokens: list[Token], end: int, std: Standard) -> tree.Program:
+        """Parse what has a program around it already, up to the end of the text."""
+        tokens.append(Token(TokenKind.END, "", "", end, end))
+        program, found = parse(self._source, tokens, std, declared=self._names, procedures=self._procedures)
+        self.found += found
+        return program
+
+    def _is_expression(self, piece: Sequence[Token], *, alone: bool) -> bool:
+        """Whether what stands between two ``;`` is a value and no statement."""
+        first, rest = piece[0], [token for token in piece[1:] if token.key != ";"]
+        if self._std is Standard.RLO_83:
+            known = first.kind is TokenKind.ARM or (first.kind is TokenKind.NAME and first.key in self._names)
+            return alone and known and not rest
+        if first.kind is TokenKind.NAME:
+            return self._begins_value(first, _behind_brackets(rest))
+        if first.kind is TokenKind.ARM:
+            return not rest or rest[0].key not in _ASSIGNING
+        return first.kind in _BEGINNINGS or first.key in ("(", "-", "NOT")
+
+    def _begins_value(self, name: Token, rest: Sequence[Token]) -> bool:
+        """Whether a name with this behind it and its indices is a value."""
+        if not rest:
+            known = name.key in self._names
+            words = VOCABULARIES[self._std].statements
+            return name.key not in self._procedures and (known or closest(name.text, words) is None)
+        if rest[0].key == "(":
+            return name.key in FUNCTIONS and name.key not in self._procedures
+        return rest[0].key in _OPERATORS
+
+
+def _pieces(part: Sequence[Token]) -> Iterator[Sequence[Token]]:
+    """Cut a stretch of statements behind each ``;`` that is not inside one of them."""
+    first, depth = 0, 0
+    for at, token in enumerate(part):
+        depth += _depth((token,))
+        if token.key == ";" and depth <= 0:
+            yield part[first : at + 1]
+            first = at + 1
+    if first < len(part):
+        yield part[first:]
+
+
+def _behind_brackets(tokens: Sequence[Token]) -> Sequence[Token]:
+    """Return the tokens behind the indices that they begin with, if any."""
+    if not tokens or tokens[0].key != "[":
+        return tokens
+    depth = 0
+    for at, token in enumerate(tokens):
+        depth += (token.key == "[") - (token.key == "]")
+        if depth == 0:
+            return tokens[at + 1 :]
+    return ()
+
+
+def _words(*keys: str, at: int) -> list[Token]:
+    """Return words and signs that nobody has written."""
+    kinds = {True: TokenKind.KEYWORD, False: TokenKind.SYMBOL}
+    return [Token(kinds[key.isalpha()], key, key, at, at) for key in keys]

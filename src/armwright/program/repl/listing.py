@@ -1,0 +1,73 @@
+"""A session as a program: its declarations first, then its statements, in the order in which they were entered."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+from armwright.program.formatter.format import formatted
+from armwright.program.language.source import Source
+from armwright.program.language.words import Standard
+from armwright.program.syntax import tree
+
+
+def program_text(
+    source: Source,
+    headers: Sequence[tree.Header],
+    statements: Sequence[tree.Statement],
+    std: Standard,
+    *,
+    remark: str = "",
+    path_of: Callable[[str], str] = str,
+) -> str:
+    """Return a program that declares and does what a session has.
+
+    Args:
+        source: all that was entered.
+        headers: of the session.
+        statements: that were done.
+        std: the language.
+        remark: for the first line, if any.
+        path_of: how the program shall name a file that the session has imported.
+    """
+    rows = [f"// {' '.join(remark.split())}"] if remark else []
+    rows += _units(headers)
+    rows += [f'IMPORT "{path_of(one.path.value)}" ;' for one in headers if isinstance(one, tree.Import)]
+    variables = [one for one in headers if isinstance(one, tree.Declaration)]
+    rows += [("VAR " if one is variables[0] else "    ") + declaration(one) + " ;" for one in variables]
+    rows += [f"{as_written(source, one)} ;" for one in headers if isinstance(one, tree.Procedure)]
+    rows += ["BEGIN", *(f"{as_written(source, one)} ;" for one in statements), "END.", ""]
+    return formatted(Source(source.name, "\n".join(rows)), std=std)
+
+
+def _units(headers: Sequence[tree.Header]) -> list[str]:
+    units = [unit.text for header in headers if isinstance(header, tree.Units) for unit in header.units]
+    return [f"UNITS {', '.join(units)} ;"] if units else []
+
+
+def declaration(node: tree.Declaration) -> str:
+    """Return a declaration with the names that it has now."""
+    kind = str(node.type.key)
+    if node.type.sizes:
+        kind = f"ARRAY [{', '.join(size.text for size in node.type.sizes)}] OF {kind}"
+    return f"{', '.join(name.text for name in node.names)} : {kind}"
+
+
+def title(source: Source, node: tree.Header) -> str:
+    """Return a header in short."""
+    if isinstance(node, tree.Declaration):
+        return f"VAR {declaration(node)}"
+    return " ".join(source.slice(node.head if isinstance(node, tree.Procedure) else node.span).split())
+
+
+def as_written(source: Source, node: tree.Procedure | tree.Statement) -> str:
+    """Return a part of a session as it was entered, with the names that it uses now."""
+    pieces, done = [], node.span.start
+    for start, end, text in sorted(_changes(source, node)):
+        pieces += [source.text[done:start], text]
+        done = end
+    pieces.append(source.text[done : node.span.end])
+    return "".join(pieces)
+
+
+def _changes(source: Source, node: object) -> Iterator[tuple[int, int, str]]:
+    for one in tree.walk(node):
+        if isinstance(one, tree.Name) and source.slice(one.span) != one.text:
+            yield one.span.start, one.span.end, one.text

@@ -1,0 +1,182 @@
+"""Names that are declared anew in a session: what was done with the old one keeps it, under another name."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Any
+
+import attrs
+
+from armwright.program.language.source import Span
+from armwright.program.syntax import tree
+
+# Functions whose argument is an axis, not a variable.
+_WITH_AXIS = ("FORCE",)
+
+
+@attrs.frozen(kw_only=True)
+class Redeclared:
+    """What is left of a session when names are declared anew.
+
+    Attributes:
+        headers: without what they declared of these names.
+        statements: with other names for what they use of them.
+        renamed: new names of old variables and procedures that statements use, by their old ones.
+        dropped: names that no statement has used: there is nothing left of them.
+    """
+
+    headers: tuple[tree.Header, ...]
+    statements: tuple[tree.Statement, ...]
+    renamed: Mapping[str, str]
+    dropped: frozenset[str]
+
+
+def declared(headers: Iterable[tree.Header]) -> dict[str, tree.Name]:
+    """Return the names that headers declare, variables and procedures, by key."""
+    found: dict[str, tree.Name] = {}
+    for header in headers:
+        if isinstance(header, tree.Declaration):
+            found.update((name.key, name) for name in header.names)
+        elif isinstance(header, tree.Procedure):
+            found[header.name.key] = header.name
+    return found
+
+
+def redeclare(
+    headers: Sequence[tree.Header],
+    statements: Sequence[tree.Statement],
+    names: Collection[str],
+    *,
+    taken: Collection[str],
+    longest: int,
+) -> Redeclared:
+    """Make room for names that are declared anew.
+
+    Procedures mean the new ones from then on; the statements before get procedures of their own where these meant
+    an old one, so that the session remains the program that it was.
+
+    Args:
+        headers: of the session so far.
+        statements: of the session so far.
+        names: declared before, and now again.
+        taken: names that cannot be given.
+        longest: how long a name may be.
+    """
+    procedures = {header.name.key: header for header in headers if isinstance(header, tree.Procedure)}
+    mentions = {key: mentioned(procedure) - {key} for key, procedure in procedures.items()}
+    used = _reached(mentioned(tuple(statements)), mentions)
+    old = {key for key in names if key in used}
+    affected = {key for key in procedures if key in used and _reached(mentions[key], mentions) & old} - old
+    found, fresh = declared(headers), _Fresh(taken, longest)
+    new = {key: fresh.name(found[key].text) for key in sorted(old | affected)}
+    left: list[tree.Header] = []
+    for header in headers:
+        if isinstance(header, tree.Procedure):
+            key = header.name.key
+            if key in new:
+                left.append(renamed(header, new))
+            if key not in names:
+                left.append(header)
+        elif isinstance(header, tree.Declaration):
+            left += _declarations(header, names, new)
+        else:
+            left.append(header)
+    return Redeclared(
+        headers=tuple(left),
+        statements=tuple(renamed(statement, new) for statement in statements),
+        renamed={key: new[key].key for key in new},
+        dropped=frozenset(names) - old,
+    )
+
+
+def _declarations(
+    header: tree.Declaration, names: Collection[str], new: Mapping[str, tree.Name]
+) -> list[tree.Declaration]:
+    kept = [_named(name, new) for name in header.names if name.key not in names or name.key in new]
+    return [attrs.evolve(header, names=tuple(kept))] if kept else []
+
+
+def _reached(names: Collection[str], mentions: Mapping[str, Collection[str]]) -> set[str]:
+    """Return the names that some names lead to, through the procedures among them."""
+    reached, waiting = set(names), list(names)
+    while waiting:
+        for name in mentions.get(waiting.pop(), ()):
+            if name not in reached:
+                reached.add(name)
+                waiting.append(name)
+    return reached
+
+
+class _Fresh:
+    """Gives names that nothing has."""
+
+    def __init__(self, taken: Collection[str], longest: int) -> None:
+        self._taken, self._longest = set(taken), longest
+
+    def name(self, text: str) -> tree.Name:
+        number = 1
+        while True:
+            end = f"_{number}"
+            given = text[: self._longest - len(end)] + end
+            if given.upper() not in self._taken:
+                self._taken.add(given.upper())
+                return tree.Name(Span(0, 0), given, given.upper())
+            number += 1
+
+
+# ---- trees ---------------------------------------------------------------------------------------------------------
+
+
+def own_names(procedure: tree.Procedure) -> set[str]:
+    """Return the names that a procedure declares for itself."""
+    return {name.key for part in (*procedure.parameters, *procedure.declarations) for name in part.names}
+
+
+def mentioned(node: object) -> set[str]:
+    """Return the keys of the variables and procedures that a part of a program uses."""
+    match node:
+        case Span():
+            found = set()
+        case tree.Name(key=key):
+            found = {key}
+        case tree.Function(name=name, arguments=arguments):
+            found = set() if name.key in _WITH_AXIS else mentioned(arguments)
+        case tree.Procedure(body=body):
+            found = mentioned(body) - own_names(node)
+        case tuple():
+            found = set().union(*map(mentioned, node))
+        case _:
+            found = set().union(*map(mentioned, _values(node).values()))
+    return found
+
+
+def renamed(node: Any, new: Mapping[str, tree.Name]) -> Any:
+    """Return a part of a program that uses other names; devices, axes and a procedure's own names stay."""
+    changed = node
+    match node:
+        case Span():
+            pass
+        case tree.Name():
+            changed = _named(node, new)
+        case tree.Function(name=name, arguments=arguments):
+            if name.key not in _WITH_AXIS:
+                changed = attrs.evolve(node, arguments=renamed(arguments, new))
+        case tree.Procedure(name=name, body=body):
+            inner = {key: given for key, given in new.items() if key not in own_names(node)}
+            changed = attrs.evolve(node, name=_named(name, new), body=renamed(body, inner))
+        case tuple():
+            changed = tuple(renamed(item, new) for item in node)
+        case _ if fields := _values(node):
+            changed = attrs.evolve(node, **{name: renamed(value, new) for name, value in fields.items()})
+    return changed
+
+
+def _named(name: tree.Name, new: Mapping[str, tree.Name]) -> tree.Name:
+    given = new.get(name.key)
+    return name if given is None else attrs.evolve(name, text=given.text, key=given.key)
+
+
+def _values(node: object) -> dict[str, object]:
+    """Return the parts of a node in which there can be names of variables; none of anything else."""
+    kind = type(node)
+    if not attrs.has(kind) or isinstance(node, tree.Operate):
+        return {}
+    return {field.name: getattr(node, field.name) for field in attrs.fields(kind)}

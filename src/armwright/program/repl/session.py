@@ -1,0 +1,392 @@
+"""A session: statements are done in a simulated cell as they are entered, and can be taken back.
+
+What was entered stays a program at all times: every input is checked together with all that came before it, so
+that the checker knows values and affixments, and only what is new is translated and run. A state of the cell is a
+machine that nobody advances; each statement goes on in a twin of it. So an error, an interruption and an undo all
+come to the same: going on from an earlier state.
+"""
+
+from collections.abc import Callable, Mapping
+
+import attrs
+
+from armwright.cell.model import Cell
+from armwright.errors import ExitStatus
+from armwright.program.bytecode.codegen import translate
+from armwright.program.bytecode.instructions import Code
+from armwright.program.flow_analysis import analysis
+from armwright.program.flow_analysis.analysis import Flow
+from armwright.program.language.diagnostic import Diagnostic, in_order
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import Standard
+from armwright.program.repl.declarations import Heading, NotNowError, merged
+from armwright.program.repl.input import Entry, moved, read
+from armwright.program.repl.listing import program_text, title
+from armwright.program.repl.snapshots import (
+    bring,
+    forget,
+    fresh,
+    go_through,
+    new_warnings,
+    rename,
+    twin,
+    with_code,
+)
+from armwright.program.repl.undo_report import SILENT, taken_back
+from armwright.program.semantics import check
+from armwright.program.semantics.cell_symbols import Imported, ReadImport, known_cell
+from armwright.program.semantics.symbols import Symbols
+from armwright.program.syntax import tree
+from armwright.program.vm.machine import Limits, Machine, RunError
+from armwright.program.vm.recording import Effect
+
+# What a declaration is good for shows later than in a whole program.
+_TOO_EARLY = ("L304",)
+_NO_CELL = "no cell"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class State:
+    """Where a session has come to.
+
+    Attributes:
+        headers: declarations, units, imports and procedures.
+        statements: done so far.
+        spelling: how names are written, by key.
+        symbols: what names stand for.
+        cell: as programs are checked against it, without imported frames.
+        machine: the cell, the values and the clock.
+        text: what led here from the state before.
+    """
+
+    headers: tuple[tree.Header, ...] = ()
+    statements: tuple[tree.Statement, ...] = ()
+    spelling: Mapping[str, str] = attrs.field(factory=dict)
+    symbols: Symbols
+    cell: Cell
+    machine: Machine
+    text: str = ""
+
+
+@attrs.frozen(kw_only=True)
+class Answer:
+    """What came of an input.
+
+    Attributes:
+        complete: whether it was taken; otherwise it goes on in the next line, and nothing was done.
+        effects: what was done and stays done, in order; the PRINT of a value that was asked for among them.
+        diagnostics: what is wrong or odd.
+        source: the text that they are about.
+        remarks: what else is to be known, such as what an error took back.
+        refused: whether there was nothing wrong with it but that the program has come to a HALT.
+        failed: whether it was begun and could not go on.
+    """
+
+    complete: bool = True
+    effects: tuple[Effect, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
+    source: Source
+    remarks: tuple[str, ...] = ()
+    refused: bool = False
+    failed: bool = False
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether something in it could not be done."""
+        return self.refused or any(one.is_error for one in self.diagnostics)
+
+    @property
+    def status(self) -> ExitStatus:
+        """How a command ends with which nothing else was done."""
+        if self.refused or self.failed:
+            return ExitStatus.INFEASIBLE
+        return ExitStatus.PROGRAM_ERRORS if self.is_wrong else ExitStatus.DONE
+
+    @property
+    def printed(self) -> tuple[str, ...]:
+        """The lines that were printed."""
+        return tuple(str(effect.data["printed"]) for effect in self.effects if effect.kind == "PRINT")
+
+    @property
+    def trace(self) -> tuple[str, ...]:
+        """The lines of the trace, printed ones aside."""
+        return tuple(effect.text for effect in self.effects if effect.kind not in (*SILENT, "PRINT"))
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class _Checked:
+    """An input that can be done, with what the translator has to know."""
+
+    source: Source
+    entry: Entry
+    heading: Heading
+    cell: Cell
+    symbols: Symbols
+    flow: Flow
+    spelling: Mapping[str, str]
+
+    def code(self, *statements: tree.Statement) -> Code:
+        """Return the code of some statements, with all procedures."""
+        end = _end(self.source)
+        program = tree.Program(end, self.heading.headers, statements, end)
+        return translate(self.source, program, self.symbols, self.flow, self.spelling)
+
+    def state(self, machine: Machine, statements: tuple[tree.Statement, ...], text: str) -> State:
+        """Return the state that a part of the input leads to."""
+        return State(
+            headers=self.heading.headers,
+            statements=statements,
+            spelling=self.spelling,
+            symbols=self.symbols,
+            cell=self.cell,
+            machine=machine,
+            text=text,
+        )
+
+
+class Session:
+    """A program that is entered piece by piece, and the cell that it acts on."""
+
+    def __init__(
+        self,
+        cell: Cell | None = None,
+        std: Standard = Standard.RLO_2,
+        read_import: ReadImport | None = None,
+        *,
+        name: str = "session",
+        limits: Limits | None = None,
+    ) -> None:
+        """Begin in front of an empty program.
+
+        Args:
+            cell: in which it runs; without one there are only frames, until an IMPORT brings arms.
+            std: the language.
+            read_import: how to read what an IMPORT names.
+            name: of the session in messages.
+            limits: when a statement is taken to run for ever.
+        """
+        self.std, self.name = std, name
+        self.limits = limits or Limits()
+        self._read_import = read_import
+        self._imports: dict[str, Imported] = {}
+        self._text = ""
+        cell = cell or Cell(name=_NO_CELL, arms={})
+        empty = tree.Program(Span(0, 0), (), (), Span(0, 0))
+        symbols, _, _ = check.check(empty, known_cell(cell), std=std)
+        self._states = [State(symbols=symbols, cell=cell, machine=fresh(cell, self.source, self.limits))]
+        self._at = 0
+
+    # ---- what there is ---------------------------------------------------------------------------------------------
+
+    @property
+    def source(self) -> Source:
+        """All that was entered so far."""
+        return Source(self.name, self._text)
+
+    @property
+    def state(self) -> State:
+        """Where the session is."""
+        return self._states[self._at]
+
+    @property
+    def line(self) -> int:
+        """The number of the line that is entered next."""
+        return self._text.count("\n") + 1
+
+    def program(self, remark: str = "", path_of: Callable[[str], str] = str) -> str:
+        """Return the session as a program that runs to the same end in the same cell.
+
+        Args:
+            remark: for its first line, if any.
+            path_of: how it shall name a file that the session has imported.
+        """
+        headers, statements = self.state.headers, self.state.statements
+        return program_text(self.source, headers, statements, self.std, remark=remark, path_of=path_of)
+
+    def spelled(self, name: str) -> str:
+        """Return a name as the session writes it; of an element too."""
+        base, bracket, indices = name.partition("[")
+        return f"{self.state.spelling.get(base, base)}{bracket}{indices}"
+
+    # ---- back and forth --------------------------------------------------------------------------------------------
+
+    def undo(self, count: int = 1) -> tuple[str, ...]:
+        """Take back the last statements or declarations; return what they were, the last one first.
+
+        Frames, values, arms, the clock, the devices and the answers of the camera are as they were before.
+        """
+        count = min(count, self._at)
+        taken = self._states[self._at - count + 1 : self._at + 1]
+        self._at -= count
+        return tuple(state.text for state in reversed(taken))
+
+    def redo(self, count: int = 1) -> tuple[str, ...]:
+        """Let what was taken back last be done again; return what it was, the first one first."""
+        count = min(count, len(self._states) - 1 - self._at)
+        again = self._states[self._at + 1 : self._at + 1 + count]
+        self._at += count
+        return tuple(state.text for state in again)
+
+    def _go_on(self, state: State) -> None:
+        self._states = [*self._states[: self._at + 1], state]
+        self._at += 1
+
+    # ---- entering --------------------------------------------------------------------------------------------------
+
+    def pass_over(self, text: str) -> None:
+        """Count lines that say nothing to the cell, so that messages name the lines that people have seen."""
+        self._text += text if text.endswith("\n") or not text else f"{text}\n"
+
+    def enter(self, text: str, *, whole: bool = False) -> Answer:
+        """Take declarations, statements, or an expression whose value is to be shown.
+
+        Args:
+            text: an input; or its beginning, which is then given again with the next line behind it.
+            whole: whether nothing more comes, so that what is missing is an error.
+        """
+        return self._enter(text, whole=whole)
+
+    def load(self, file: Source, path_of: Callable[[str], str] = str) -> Answer:
+        """Take the text of a file, such as a whole program; messages about it name its own lines.
+
+        Args:
+            file: its name and text.
+            path_of: how the session shall name a file that this one imports.
+        """
+        start = len(self._text)
+        answer = self._enter(file.text, whole=True, is_file=True, path_of=path_of)
+        spans = [span for one in answer.diagnostics for span in (one.span, *(label.span for label in one.secondary))]
+        if any(span.start < start for span in spans):
+            return answer
+        own = tuple(moved(one, -start) for one in answer.diagnostics)
+        return attrs.evolve(answer, source=file, diagnostics=own)
+
+    def _enter(self, text: str, *, whole: bool, is_file: bool = False, path_of: Callable[[str], str] = str) -> Answer:
+        start, symbols = len(self._text), self.state.symbols
+        source = Source(self.name, self._text + (text if text.endswith("\n") else f"{text}\n"))
+        entry = read(source, start, self.std, names=symbols.types, procedures=symbols.procedures, is_file=is_file)
+        if not (entry.complete or whole):
+            return Answer(complete=False, source=source)
+        # Whatever becomes of it: the lines of the session keep their numbers.
+        self._text = source.text
+        try:
+            checked, said = self._check(source, start, entry, path_of)
+        except NotNowError as refused:
+            return Answer(source=source, diagnostics=(refused.diagnostic,))
+        if checked is None:
+            return Answer(source=source, diagnostics=said)
+        answer = self._do(checked)
+        remarks = (*checked.heading.remarks, *answer.remarks)
+        return attrs.evolve(answer, diagnostics=(*said, *answer.diagnostics), remarks=remarks)
+
+    # ---- checking --------------------------------------------------------------------------------------------------
+
+    def _check(
+        self, source: Source, start: int, entry: Entry, path_of: Callable[[str], str]
+    ) -> tuple[_Checked | None, tuple[Diagnostic, ...]]:
+        """Check an input together with all that came before it.
+
+        Returns:
+            What can be done, None if something is wrong; and what there is to say.
+        """
+        before = self.state
+        fixed = {*before.machine.cell.frames, *before.cell.visions, "STATION"}
+        heading = merged(before.headers, before.statements, entry, self.std, fixed=fixed, path_of=path_of)
+        spelling = {**entry.spelling, **before.spelling, **heading.spelling}
+        end = _end(source)
+        program = tree.Program(Span(0, end.end), heading.headers, (*heading.statements, *entry.statements), end)
+        cell, symbols, wrong = self._check_names(program)
+        found = [*entry.found, *wrong]
+        course = None
+        if not any(one.is_syntax for one in found):
+            course, odd = analysis.check(program, symbols, spelling, known_cell(cell), source=source)
+            found += odd
+        new = (one for one in found if one.is_error or (one.span.start >= start and one.code not in _TOO_EARLY))
+        said = in_order(new)
+        if course is None or any(one.is_error for one in said):
+            return None, said
+        checked = _Checked(
+            source=source, entry=entry, heading=heading, cell=cell, symbols=symbols, flow=course, spelling=spelling
+        )
+        return checked, said
+
+    def _check_names(self, program: tree.Program) -> tuple[Cell, Symbols, list[Diagnostic]]:
+        """Check names and types; where nothing was done yet, the arms of an imported cell are those of the session."""
+        cell = self.state.cell
+        read_import = None if self._read_import is None else self._import
+        symbols, found, imports = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
+        other = next((one.cell for one in imports if one.cell is not None and one.cell.arms), None)
+        if other is not None and not cell.arms and not self.state.statements:
+            cell = other
+            symbols, found, _ = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
+        return cell, symbols, found
+
+    def _import(self, path: str) -> Imported:
+        if path not in self._imports:
+            assert self._read_import is not None  # noqa: S101 - asked for only then
+            self._imports[path] = self._read_import(path)
+        return self._imports[path]
+
+    # ---- doing -----------------------------------------------------------------------------------------------------
+
+    def _do(self, checked: _Checked) -> Answer:
+        """Declare what an input declares and run its statements, one after the other, up to one that fails."""
+        source, entry = checked.source, checked.entry
+        if checked.heading.headers != self.state.headers:
+            self._declare(checked)
+        effects: list[Effect] = []
+        found: list[Diagnostic] = []
+        remarks: list[str] = []
+        refused = failed = False
+        for number, statement in enumerate(entry.statements):
+            before, shown = self.state, statement.span.start in entry.shown
+            if before.machine.over and not shown:
+                remarks.append("the program has come to a HALT; `:undo` goes back to before it")
+                refused = True
+                break
+            machine = with_code(before.machine, checked.code(statement), self.limits)
+            machine.over = False
+            try:
+                go_through(machine)
+            except RunError as error:
+                found.append(error.diagnostic)
+                failed = True
+                remarks += [*taken_back(before.machine, machine), *_left(len(entry.statements) - number - 1)]
+                break
+            effects += machine.effects[len(before.machine.effects) :]
+            found += new_warnings(before.machine, machine)
+            if not shown:
+                text = " ".join(source.slice(statement.span).split())
+                self._go_on(checked.state(machine, (*before.statements, statement), text))
+        return Answer(
+            source=source,
+            effects=tuple(effects),
+            diagnostics=tuple(found),
+            remarks=tuple(remarks),
+            refused=refused,
+            failed=failed,
+        )
+
+    def _declare(self, checked: _Checked) -> None:
+        before, heading, source = self.state, checked.heading, checked.source
+        changed = checked.cell is not before.cell
+        machine = fresh(checked.cell, source, self.limits) if changed else twin(before.machine)
+        rename(machine, heading.renamed)
+        forget(machine, heading.dropped)
+        for header in heading.imports:
+            brought = self._imports.get(header.path.value)
+            if brought is not None and brought.cell is not None:
+                bring(machine, brought.cell.frames, header.span)
+        machine = with_code(machine, checked.code(), self.limits)
+        text = "; ".join(title(source, header) for header in checked.entry.headers)
+        self._go_on(checked.state(machine, heading.statements, text))
+
+
+def _end(source: Source) -> Span:
+    return Span(len(source.text) - 1, len(source.text) - 1)
+
+
+def _left(count: int) -> list[str]:
+    if not count:
+        return []
+    return [f"not done: the {count} statements behind it" if count > 1 else "not done: the statement behind it"]

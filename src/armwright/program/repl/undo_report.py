@@ -1,0 +1,53 @@
+"""What a statement had done before it failed, in words."""
+
+import numpy as np
+
+from armwright.cell.frames import WORLD
+from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.vm.machine import Machine
+
+# Effects that say nothing of their own in a trace.
+SILENT = ("PLACE", "LOCK", "END", "STOP")
+# Nobody reads more of what is no longer so.
+_MOST_SAID = 10
+# What is nearer than this was not moved: rounding [m], [rad], and of entries of rotations.
+_ROUNDING = 1e-9
+
+
+def taken_back(before: Machine, after: Machine) -> list[str]:
+    """Say what a statement had done, none of which is so any more.
+
+    Args:
+        before: the state that holds again.
+        after: what the statement had come to.
+    """
+    done = [effect.text for effect in after.effects[len(before.effects) :] if effect.kind not in SILENT]
+    left = len(done) - _MOST_SAID
+    done = [*done[:_MOST_SAID], f"{left} more"] if left > 1 else done
+    said = [f"before that it had done: {'; '.join(done)}"] if done else []
+    back = _arms(before, after)
+    if frames := [after.spelled(name) for name in _frames(before, after)]:
+        back.append(f"{'frames' if len(frames) > 1 else 'frame'} {', '.join(frames)}")
+    if after.ticks > before.ticks:
+        back.append(f"the clock to {before.now:.3f} s")
+    return [*said, *([f"put back: {', '.join(back)}"] if back else [])]
+
+
+def _arms(before: Machine, after: Machine) -> list[str]:
+    """Return the arms that stand otherwise after than before."""
+    places = ((name, before.hardware.posture(name, before.now)) for name in after.hands)
+    return [name for name, q in places if np.abs(q - after.hardware.posture(name, after.now)).max() > _ROUNDING]
+
+
+def _frames(before: Machine, after: Machine) -> list[str]:
+    """Return the frames that stand or hang otherwise after than before, arms and their bases aside."""
+    names = [name for name in after.tree if name != WORLD and not is_arm(name) and not name.endswith(".BASE")]
+    return [name for name in names if name in before.tree and _differs(before, after, name)]
+
+
+def _differs(before: Machine, after: Machine, name: str) -> bool:
+    if before.has_place(name) != after.has_place(name) or before.tree.parent(name) != after.tree.parent(name):
+        return True
+    if not after.has_place(name):
+        return False
+    return not np.allclose(before.tree.world(name), after.tree.world(name), rtol=0, atol=_ROUNDING)

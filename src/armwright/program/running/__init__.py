@@ -1,1 +1,0 @@
-"""Programs at work: processes, motions, effects, and what a run leaves."""

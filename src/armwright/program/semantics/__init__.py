@@ -1,0 +1,1 @@
+"""Semantic analysis: symbols, scopes and types, one module for each family of statements."""

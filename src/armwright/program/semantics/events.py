@@ -1,0 +1,21 @@
+"""Events: signalled and waited for, and nothing else."""
+
+from armwright.program.semantics.expression_types import called, plain_keys
+from armwright.program.semantics.scopes import Names
+from armwright.program.syntax import tree
+
+_NOTE = "an EVENT counts signals; SIGNAL adds one, WAIT takes one"
+
+
+def refuse(names: Names, node: tree.Expression, what: str = "computed with") -> None:
+    """Say once that an EVENT is no value."""
+    keys = plain_keys(node)
+    if names.first("E223", *keys):
+        names.found.say(
+            "E223",
+            f"{called(node)} is an EVENT and cannot be {what}",
+            node.span,
+            "EVENT",
+            secondary=tuple(label for one in keys for label in names.where_declared(one)),
+            notes=(_NOTE,),
+        )

@@ -1,0 +1,117 @@
+"""What expressions are: the kinds of variables, and what is none of them; and how a message speaks of both."""
+
+import enum
+
+from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.syntax import tree
+
+# A longer expression is not repeated in a message; its place is marked anyway.
+_LONGEST_SHOWN = 32
+# In advice it is repeated up to here.
+_LONGEST_WRITTEN = 100
+# How tightly operations bind; comparisons stand between.
+_STRENGTH = {"OR": 1, "AND": 2, "+": 5, "-": 5, "*": 6, "/": 6}
+_COMPARISON, _NOT, _MINUS, _ATOM = 4, 3, 7, 8
+
+
+class Sort(enum.Enum):
+    """What the value of an expression is.
+
+    ``MATRIX`` is twelve numbers that may be a FRAME or a TRANS, ``INVERSE`` what INV makes of a FRAME: the step
+    from it back to the world, which makes sense in front of another FRAME only.
+    """
+
+    SCALAR = "a SCALAR"
+    TRANS = "a TRANS"
+    FRAME = "a FRAME"
+    EVENT = "an EVENT"
+    CONDITION = "a condition"
+    MATRIX = "a matrix"
+    INVERSE = "the inverse of a FRAME"
+
+    @property
+    def word(self) -> str:
+        """What it is called without an article."""
+        return self.value.split(" ", 1)[1]
+
+
+OF_KIND = {kind: Sort[kind.name] for kind in Kind}
+# What each kind of variable, parameter or operand takes.
+FITTING = {sort: frozenset({sort}) for sort in Sort} | {
+    Sort.FRAME: frozenset({Sort.FRAME, Sort.MATRIX}),
+    Sort.TRANS: frozenset({Sort.TRANS, Sort.MATRIX}),
+}
+
+
+def is_what(node: tree.Expression, sort: Sort) -> str:
+    """Return what an expression is, with its article: of arms and numbers in the words of users."""
+    if isinstance(node, tree.ArmName):
+        return "an arm"
+    return "a number" if isinstance(node, tree.Number) else sort.value
+
+
+def a_type(kind: Type) -> str:
+    """Return a type with its article, such as ``an ARRAY [2,3] OF FRAME``."""
+    return f"{'an' if kind.sizes or kind.kind is Kind.EVENT else 'a'} {kind}"
+
+
+def bare(words: str) -> str:
+    """Return words without their article where they are a type: ``FRAME``, but ``an arm``."""
+    last = words.split(" ", 1)[1]
+    return last if last.isupper() else words
+
+
+def plain_keys(node: tree.Expression) -> tuple[str, ...]:
+    """Return the key of a plain name; nothing for any other expression."""
+    return (node.key,) if isinstance(node, tree.Name) else ()
+
+
+def called(node: tree.Expression) -> str:
+    """Return how a message calls an expression: as it is written, when it is short."""
+    if isinstance(node, tree.Matrix):
+        return "this"
+    text = written(node)
+    return f"`{text}`" if len(text) <= _LONGEST_SHOWN else "this"
+
+
+def written(node: tree.Expression) -> str:
+    """Return an expression as one would write it, with no more parentheses than it takes; of a long one the start."""
+    text = _written(node)[0]
+    return text if len(text) <= _LONGEST_WRITTEN else f"{text[:_LONGEST_WRITTEN].rpartition(' ')[0]} ..."
+
+
+def _written(node: tree.Expression) -> tuple[str, int]:
+    """Return the text and how tightly its outermost operation binds."""
+    match node:
+        case tree.Unary(operation=operation, operand=operand):
+            strength, gap = (_NOT, " ") if operation == "NOT" else (_MINUS, "")
+            return f"{operation}{gap}{_inside(operand, strength)}", strength
+        case tree.Binary():
+            first, chain = tree.chain(node)
+            text, own = _written(first)
+            for one in chain:
+                strength = _STRENGTH.get(one.operation, _COMPARISON)
+                left = text if own >= strength + (strength == _COMPARISON) else f"({text})"
+                text, own = f"{left} {one.operation} {_inside(one.right, strength + 1)}", strength
+            return text, own
+        case _:
+            return _atom(node), _ATOM
+
+
+def _atom(node: tree.Expression) -> str:
+    match node:
+        case tree.Name(text=text) | tree.ArmName(text=text) | tree.Number(text=text):
+            return text
+        case tree.Index(name=name, indices=items):
+            return f"{name.text}[{','.join(map(written, items))}]"
+        case tree.Function(name=name, arguments=items):
+            return f"{name.text}({', '.join(map(written, items))})"
+        case tree.Matrix(items=items):
+            return f"({', '.join(map(written, items))})"
+        case _:
+            return "..."
+
+
+def _inside(node: tree.Expression, strength: int) -> str:
+    text, own = _written(node)
+    return text if own >= strength else f"({text})"

@@ -1,0 +1,214 @@
+"""What stands in front of BEGIN: variables with their types, units, imports, and the heads of procedures."""
+
+import math
+from collections.abc import Mapping
+
+from armwright.errors import ArmwrightError
+from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
+from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
+from armwright.program.semantics.scopes import Names, Procedure, Table
+from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.syntax import tree
+
+# More elements than this are a slip, and would take the memory of the machine.
+MOST_ELEMENTS = 1_000_000
+# How people call units, whose names in a program are shorter.
+_LONG_UNITS: Mapping[str, str] = {
+    **dict.fromkeys(("MILLIMETRE", "MILLIMETRES", "MILLIMETER", "MILLIMETERS"), "MM"),
+    **dict.fromkeys(("CENTIMETRE", "CENTIMETRES", "CENTIMETER", "CENTIMETERS"), "CM"),
+    **dict.fromkeys(("METRE", "METRES", "METER", "METERS"), "M"),
+    **dict.fromkeys(("INCH", "INCHES"), "IN"),
+    **dict.fromkeys(("DEGREE", "DEGREES"), "DEG"),
+    **dict.fromkeys(("RADIAN", "RADIANS"), "RAD"),
+}
+
+
+def declare(names: Names, program: tree.Program, read_import: ReadImport | None) -> list[Procedure]:
+    """Take up all that the headers declare, wherever they stand among each other.
+
+    Returns:
+        The procedures in the order of the text, those whose names are taken among them.
+    """
+    _units(names, program)
+    for header in program.headers:
+        if isinstance(header, tree.Import):
+            _import(names, header, read_import)
+    for declaration in program.declarations:
+        _variables(names, names.main, declaration)
+    return [_procedure(names, node) for node in program.procedures]
+
+
+# ---- variables -----------------------------------------------------------------------------------------------------
+
+
+def _variables(names: Names, table: Table, declaration: tree.Declaration) -> None:
+    """Take up the names of one declaration."""
+    kind = _type(names, declaration.type)
+    for name in declaration.names:
+        if name.key in table.declared:
+            _twice(names, name, table.declared[name.key])
+        elif name.key == WORLD or (name.key in PREDECLARED and not _is_frame(declaration.type)):
+            note = "the station may be declared again as a FRAME" if name.key == STATION else ""
+            text = f"`{name.text}` is predeclared as a FRAME"
+            names.found.say("E203", text, name.span, "declared again here", notes=(note,) if note else ())
+        elif table is names.main and name.key in names.imported and not _is_frame(declaration.type):
+            text = f"`{name.text}` is a FRAME that an IMPORT brings"
+            names.found.say("E203", text, name.span, "declared as something else here")
+        else:
+            table.declared[name.key] = name
+            table.types[name.key] = kind
+
+
+def _is_frame(written: tree.TypeName) -> bool:
+    """Whether a type is, or may have been meant as, a single FRAME."""
+    return written.key in (Kind.FRAME, None) and not written.sizes
+
+
+def _twice(names: Names, name: tree.Name, first: tree.Name) -> None:
+    names.found.say(
+        "E203",
+        f"`{name.text}` is declared twice",
+        name.span,
+        "again here",
+        secondary=(Label(first.span, "first declared here"),),
+    )
+
+
+def _type(names: Names, written: tree.TypeName) -> Type | None:
+    """Return what a declaration declares; None where something was wrong with it."""
+    sizes = [_size(names, number) for number in written.sizes]
+    if written.key is None or None in sizes:
+        return None
+    whole = tuple(size for size in sizes if size is not None)
+    count = 1
+    for size in whole:
+        count *= size
+    if count > MOST_ELEMENTS:
+        span = written.sizes[0].span.to(written.sizes[-1].span)
+        names.found.say(
+            "E222",
+            f"an array of {count} elements is too large",
+            span,
+            f"more than {MOST_ELEMENTS}",
+        )
+        return None
+    return Type(Kind(written.key), whole)
+
+
+def _size(names: Names, number: tree.Number) -> int | None:
+    if number.unit is not None:
+        text = f"the size of an array has no unit, but `{number.text}` has"
+        names.found.say("E224", text, number.span, "leave the unit out")
+        return None
+    if number.value >= 1 and number.value.is_integer():
+        return int(number.value)
+    # A number that was reported before is NaN.
+    if not math.isnan(number.value):
+        text = f"the size of an array must be a whole number from 1, not {number.text}"
+        names.found.say("E222", text, number.span, "no size")
+    return None
+
+
+# ---- units ---------------------------------------------------------------------------------------------------------
+
+
+def _units(names: Names, program: tree.Program) -> None:
+    """Read the UNITS lines; each dimension is settled once."""
+    first: dict[str, tree.Name] = {}
+    for header in program.headers:
+        for unit in header.units if isinstance(header, tree.Units) else ():
+            if unit.key not in DECLARABLE:
+                _no_unit(names, unit)
+                continue
+            earlier = first.setdefault(dimension(unit.key), unit)
+            if earlier is not unit:
+                what = f"{dimension(unit.key)}s"
+                names.found.say(
+                    "E224",
+                    f"a program has one unit of {dimension(unit.key)}, but UNITS names two",
+                    unit.span,
+                    "second",
+                    secondary=(Label(earlier.span, "first"),),
+                    helps=(
+                        f"leave one out; a number may carry a unit of its own where {what} are mixed: `25{unit.text}`",
+                    ),
+                )
+    chosen = {dimension: unit.key for dimension, unit in first.items()}
+    names.units = UnitSystem(length=chosen.get("length", "M"), angle=chosen.get("angle", "DEG"))
+
+
+def _no_unit(names: Names, unit: tree.Name) -> None:
+    if unit.key in UNITS:
+        what = {"time": "times are always in seconds", "force": "forces are always in newtons"}[dimension(unit.key)]
+        text = f"UNITS settles lengths and angles, but `{unit.text}` is a unit of {dimension(unit.key)}"
+        names.found.say("E224", text, unit.span, "leave this out", notes=(what,))
+        return
+    near = _LONG_UNITS.get(unit.key) or names.near(unit.text, lambda: DECLARABLE)
+    names.found.say(
+        "E224",
+        f"unknown unit `{unit.text}`",
+        unit.span,
+        "unknown unit",
+        notes=(f"units are {', '.join(DECLARABLE)}",),
+        helps=(f"did you mean `{near}`?",) if near else (),
+    )
+
+
+# ---- imports -------------------------------------------------------------------------------------------------------
+
+
+def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -> None:
+    path = header.path
+    if read_import is None:
+        names.open_import = True
+        names.found.say(
+            "W205",
+            f"the frames of `{path.value}` are not looked up",
+            header.span,
+            "not looked up",
+            severity=Severity.WARNING,
+            notes=("a name that is not declared may be one of them",),
+        )
+        return
+    try:
+        brought = read_import(path.value)
+    except ArmwrightError as error:
+        # What the file would have brought is unknown, so nothing is asked of unknown names.
+        names.open_import = True
+        names.found.say("E228", f"`{path.value}` cannot be imported", path.span, "not read", notes=(str(error),))
+        return
+    names.imports.append(brought)
+    for frame in brought.frames:
+        if frame in PREDECLARED:
+            continue
+        if frame in names.imported:
+            text = f"frame `{frame}` comes from two imports"
+            names.found.say("E228", text, path.span, "it comes from here too")
+        names.imported.add(frame)
+        names.main.types[frame] = Type(Kind.FRAME)
+
+
+# ---- procedures ----------------------------------------------------------------------------------------------------
+
+
+def _procedure(names: Names, node: tree.Procedure) -> Procedure:
+    """Take up a procedure and its own names; where its name is taken it cannot be called, but is checked."""
+    name, procedure = node.name, Procedure(node)
+    for declaration in (*node.parameters, *node.declarations):
+        _variables(names, procedure.own, declaration)
+    first = names.procedures.get(name.key)
+    variable = names.main.declared.get(name.key)
+    if first is not None or variable is not None:
+        _twice(names, name, variable or first.node.name)  # type: ignore[union-attr]
+    elif name.key in names.main.types:
+        where = "an IMPORT brings" if name.key in names.imported else "is predeclared"
+        names.found.say("E203", f"`{name.text}` is a FRAME that {where}", name.span, "a procedure of the same name")
+    elif name.key in FUNCTIONS:
+        text = f"`{name.text}` is a function of the language"
+        names.found.say("E203", text, name.span, "a procedure of the same name")
+    else:
+        names.procedures[name.key] = procedure
+    return procedure

@@ -1,0 +1,167 @@
+"""Names, types and clauses of one MOVE."""
+
+from armwright.program.bytecode.instructions import HIGHEST_SPEED, LOWEST_SPEED
+from armwright.program.language.diagnostic import Label
+from armwright.program.language.units import Dimension
+from armwright.program.language.words import Standard
+from armwright.program.semantics.expression_types import Sort, written
+from armwright.program.semantics.quantities import in_range, measure
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.type_check import need, quantity
+from armwright.program.syntax import tree
+
+_WORDS: dict[type, str] = {
+    tree.Directly: "DIRECTLY",
+    tree.Straightly: "STRAIGHTLY",
+    tree.Via: "VIA",
+    tree.Approach: "APPROACH",
+    tree.Departure: "DEPARTURE",
+    tree.Speed: "SPEED",
+    tree.Blend: "BLEND",
+    tree.Duration: "DURATION",
+}
+_GIVEN: dict[type, str] = {
+    tree.Straightly: "a straight line asked for here",
+    tree.Via: "via points given here",
+    tree.Approach: "approach point given here",
+    tree.Departure: "departure point given here",
+    tree.Blend: "rounded corners asked for here",
+}
+_NOT_ASKED: dict[type, str] = {
+    tree.Straightly: "asks for the shortest way of the joints",
+    tree.Via: "asks for no via points",
+    tree.Approach: "asks for no approach point",
+    tree.Departure: "asks for no departure point",
+    tree.Blend: "has no corners",
+}
+SPEED_NOTE = "100 is the normal speed and 120 the largest the arm allows"
+
+
+def check(names: Names, move: tree.Move) -> None:
+    """Check one MOVE, but for conditions and actions of ON."""
+    need(names, move.moved, Sort.FRAME, "E215", "MOVE moves an arm or a FRAME")
+    _place(names, move.goal, "E211", "a MOVE must go to a FRAME", move)
+    _combination(names, move.clauses)
+    for clause in move.clauses:
+        match clause:
+            case tree.Via(points=points):
+                for point in points:
+                    _place(names, point, "E212", "a via point must be a FRAME")
+            case tree.Approach(point=point):
+                _place(names, point, "E215", "an approach point must be a FRAME")
+            case tree.Departure(point=point):
+                _place(names, point, "E215", "a departure point must be a FRAME")
+            case tree.Speed(value=value):
+                _speed(names, value)
+            case tree.Blend() | tree.Duration():
+                _amount(names, clause)
+            case _:
+                pass
+
+
+def _place(names: Names, node: tree.Expression, code: str, what: str, move: tree.Move | None = None) -> None:
+    """Check a frame to come to; an arm as one is an expression of RLO-2."""
+    if isinstance(node, tree.ArmName) and names.std is Standard.RLO_83:
+        names.found.say(
+            "E214", f"`{node.text}` as a place belongs to RLO-2", node.span, "RLO-83 takes the name of a FRAME here"
+        )
+        return
+
+    def helps(found: Sort) -> str:
+        if move is None or found is not Sort.TRANS:
+            return ""
+        moved = "ARM_1" if isinstance(move.moved, tree.Poison) else written(move.moved)
+        step = written(node)
+        return f"to move by `{step}` from the present place write `MOVE {moved} TO {moved} * {step}`"
+
+    need(names, node, Sort.FRAME, code, what, helps=helps)
+
+
+def _speed(names: Names, node: tree.Expression) -> None:
+    if not need(names, node, Sort.SCALAR, "E216", "SPEED needs a number or a SCALAR"):
+        return
+    if not isinstance(node, tree.Number) or not measure(names, node, None, "a speed has no unit"):
+        return
+    # A number that was reported before is NaN and in no range, nor out of it.
+    if node.value < LOWEST_SPEED or node.value > HIGHEST_SPEED:
+        names.found.say(
+            "E207",
+            f"speed {node.text} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
+            node.span,
+            "out of range",
+            notes=(SPEED_NOTE,),
+        )
+
+
+def _amount(names: Names, clause: tree.Blend | tree.Duration) -> None:
+    wants: Dimension = "length" if isinstance(clause, tree.Blend) else "time"
+    what = _WORDS[type(clause)]
+    if quantity(names, clause.value, wants, f"{what} needs a {wants}"):
+        in_range(names, clause.value, f"a {what}", zero=False)
+
+
+def _combination(names: Names, clauses: tuple[tree.Clause, ...]) -> None:
+    """Check that no clause is given twice, and that those given go together."""
+    first: dict[type, tree.Clause] = {}
+    for clause in clauses:
+        # A motion may be guarded by several conditions.
+        if isinstance(clause, tree.On):
+            continue
+        if (earlier := first.setdefault(type(clause), clause)) is not clause:
+            names.found.say(
+                "E213",
+                f"{_WORDS[type(clause)]} is given twice in one MOVE",
+                clause.span,
+                "second",
+                secondary=(Label(earlier.span, "first"),),
+            )
+    if len(first) > 1 or tree.Blend in first:
+        _ways(names, first)
+        _times(names, first)
+
+
+def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
+    direct, straight, blend = first.get(tree.Directly), first.get(tree.Straightly), first.get(tree.Blend)
+    for kind, clause in first.items():
+        if direct and kind in _NOT_ASKED:
+            names.found.say(
+                "E208",
+                f"DIRECTLY cannot be combined with {_WORDS[kind]}",
+                clause.span,
+                _GIVEN[kind],
+                secondary=(Label(direct.span, _NOT_ASKED[kind]),),
+                helps=("remove one of the two",),
+            )
+        elif straight and kind in (tree.Via, tree.Approach, tree.Departure):
+            names.found.say(
+                "E209",
+                f"STRAIGHTLY cannot be combined with {_WORDS[kind]}",
+                clause.span,
+                _GIVEN[kind],
+                secondary=(Label(straight.span, "asks for one straight line"),),
+                helps=("write one `MOVE ... STRAIGHTLY` for each leg",),
+            )
+    if blend and not direct and tree.Via not in first:
+        names.found.say(
+            "E226",
+            "BLEND rounds the corners at via points, but there is no VIA",
+            blend.span,
+            "no corners to round",
+            helps=("add `VIA ( ... )`, or leave BLEND out",),
+        )
+
+
+def _times(names: Names, first: dict[type, tree.Clause]) -> None:
+    speed, duration = first.get(tree.Speed), first.get(tree.Duration)
+    if speed and duration:
+        earlier, later = sorted((speed, duration), key=lambda clause: clause.span.start)
+        words = _WORDS[type(later)], _WORDS[type(earlier)]
+        names.found.say(
+            "E230",
+            "SPEED cannot be combined with DURATION",
+            later.span,
+            f"{words[0]} given here",
+            secondary=(Label(earlier.span, f"{words[1]} given here"),),
+            notes=("each of them settles how long the motion takes",),
+            helps=("remove one of the two",),
+        )

@@ -1,0 +1,38 @@
+"""Numbers as they are written: units that measure what is asked for, and values in range."""
+
+from armwright.program.language.units import Dimension, dimension
+from armwright.program.semantics.scopes import Names
+from armwright.program.syntax import tree
+
+_WHAT: dict[Dimension, str] = {"length": "a length", "angle": "an angle", "time": "a time", "force": "a force"}
+
+
+def measure(names: Names, node: tree.Expression, wanted: Dimension | None, what: str) -> bool:
+    """Whether a number, if the expression is one, has no unit or one of the right dimension; say so if not.
+
+    Args:
+        names: for what is found.
+        node: any expression; only of numbers something is asked.
+        wanted: what it has to measure; None for a pure number.
+        what: the first half of the message, such as ``XYZ takes three lengths``.
+    """
+    if not isinstance(node, tree.Number) or node.unit is None or dimension(node.unit) == wanted:
+        return True
+    is_what = _WHAT[dimension(node.unit)]
+    names.found.say("E224", f"{what}, but `{node.text}` is {is_what}", node.span, is_what)
+    return False
+
+
+def in_range(names: Names, node: tree.Expression, what: str, *, zero: bool) -> None:
+    """Say that a number, if the expression is one, is negative, or zero where that has no meaning either.
+
+    Args:
+        names: for what is found.
+        node: any expression; only of numbers something is asked.
+        what: is in a range, such as ``a duration``.
+        zero: whether it may be zero.
+    """
+    # A number that was reported before is NaN, and neither positive nor negative.
+    if isinstance(node, tree.Number) and (node.value < 0 or (node.value == 0 and not zero)):
+        above = "may not be negative" if zero else "must be greater than zero"
+        names.found.say("E231", f"{what} {above}, but this is {node.text}", node.span, "out of range")

@@ -1,0 +1,235 @@
+"""Looking names up: what is known of them so far, and speaking once of each that is not what it should be."""
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
+
+from armwright.errors import closest
+from armwright.program.bytecode.instructions import Type
+from armwright.program.language.diagnostic import Findings, Label, Severity
+from armwright.program.language.units import UnitSystem
+from armwright.program.language.words import Standard
+from armwright.program.semantics.cell_symbols import Imported, KnownCell
+from armwright.program.semantics.symbols import PREDECLARED, ProcedureSymbols, Symbols
+from armwright.program.syntax import tree
+
+# Looking for what a name was meant to be takes time; a program that goes on like this gets no more advice.
+_MOST_COMPARISONS = 20_000
+
+
+class Table:
+    """The names that belong together: those of the program, or those of one procedure."""
+
+    def __init__(self, types: dict[str, Type | None]) -> None:
+        """Start with names that nobody has to declare."""
+        self.types = types
+        self.declared: dict[str, tree.Name] = {}
+        self.poisoned: set[str] = set()
+        self.used: set[str] = set()
+
+
+class Procedure:
+    """A procedure and its own names."""
+
+    def __init__(self, node: tree.Procedure) -> None:
+        """Start without names."""
+        self.node = node
+        self.parameters = tuple(name.key for declaration in node.parameters for name in declaration.names)
+        self.own = Table({})
+
+    @property
+    def symbols(self) -> ProcedureSymbols:
+        """The names as they are now."""
+        own = self.own
+        return ProcedureSymbols(
+            node=self.node,
+            parameters=self.parameters,
+            types=own.types,
+            declared=own.declared,
+            poisoned=frozenset(own.poisoned),
+        )
+
+
+class Names:
+    """What is known of the names so far, and what has been found."""
+
+    def __init__(self, cell: KnownCell | None, std: Standard = Standard.RLO_2) -> None:
+        """Start with the predeclared names."""
+        self.found = Findings()
+        self.main = Table(dict(PREDECLARED))
+        self.procedures: dict[str, Procedure] = {}
+        self.units = UnitSystem()
+        self.imports: list[Imported] = []
+        self.imported: set[str] = set()
+        self.std, self.cell = std, cell
+        # Whether some IMPORT was not looked up, so that any name may be that of a frame in it.
+        self.open_import = False
+        self._inside: Procedure | None = None
+        self._called: set[str] = set()
+        self._said: set[tuple[str, int, str]] = set()
+        self._comparisons = 0
+        self._undeclared_names: set[str] = set()
+
+    @property
+    def symbols(self) -> Symbols:
+        """The names as they are now."""
+        return Symbols(
+            types=self.main.types,
+            declared=self.main.declared,
+            procedures={key: procedure.symbols for key, procedure in self.procedures.items()},
+            poisoned=frozenset(self.main.poisoned),
+            units=self.units,
+            imported=frozenset(self.imported),
+            std=self.std,
+        )
+
+    @contextmanager
+    def inside(self, procedure: Procedure) -> Iterator[None]:
+        """Look names up as the statements of a procedure see them."""
+        self._inside = procedure
+        yield
+        self._inside = None
+
+    # ---- looking up ------------------------------------------------------------------------------------------------
+
+    def type(self, name: tree.Name) -> Type | None:
+        """Return what a name stands for; say once when it is not declared. None where that is unknown."""
+        key = name.key
+        table = self._table(key)
+        table.used.add(key)
+        if key not in table.types:
+            # Apart from the types: whoever looks for what a name was meant to be goes through all of those.
+            if not self.open_import and key not in self._undeclared_names:
+                self._undeclared(name)
+            self._undeclared_names.add(key)
+            table.poisoned.add(key)
+        return None if key in table.poisoned else table.types[key]
+
+    def peek(self, key: str) -> Type | None:
+        """Return what a name stands for, without asking anything of it."""
+        return self._table(key).types.get(key)
+
+    def use(self, keys: Iterable[str]) -> None:
+        """Take note that names are used."""
+        for key in keys:
+            self._table(key).used.add(key)
+            self._called.add(key)
+
+    def mention(self, keys: Iterable[str]) -> None:
+        """Take note of names in a part of the program that is passed over: used, and nothing is asked of them."""
+        for key in keys:
+            self._table(key).used.add(key)
+            self._called.add(key)
+            self.poison(key)
+
+    def poison(self, key: str) -> None:
+        """Ask nothing more of a name."""
+        self._table(key).poisoned.add(key)
+
+    def is_poisoned(self, key: str) -> bool:
+        """Whether nothing more is asked of a name."""
+        return key in self._table(key).poisoned
+
+    def call(self, key: str) -> Procedure | None:
+        """Return a procedure; a call from within itself does not count as use."""
+        procedure = self.procedures.get(key)
+        if procedure is not None and (self._inside is None or self._inside.node.name.key != key):
+            self._called.add(key)
+        return procedure
+
+    def first(self, code: str, *keys: str) -> bool:
+        """Whether a diagnostic of this code is news of any of these names; it is where there are none."""
+        news = {(code, id(self._table(key)), key) for key in keys} - self._said
+        self._said |= news
+        return bool(news) or not keys
+
+    # ---- words for messages ----------------------------------------------------------------------------------------
+
+    def where_declared(self, key: str) -> tuple[Label, ...]:
+        """Return a label on the declaration of a name, if it has one."""
+        declared = self._table(key).declared
+        return (Label(declared[key].span, "declared here"),) if key in declared else ()
+
+    def arms(self) -> list[str]:
+        """Return the arms there are, as far as is known; at least one."""
+        arms = set(self.cell.arms) if self.cell else set()
+        for brought in self.imports:
+            arms |= set(brought.cell.arms) if brought.cell else set()
+        return sorted(arms) or ["ARM_1"]
+
+    def spelled(self) -> list[str]:
+        """Return the variables that can be seen here, as they were declared."""
+        tables = [self.main] if self._inside is None else [self._inside.own, self.main]
+        return [
+            table.declared[key].text if key in table.declared else key
+            for table in tables
+            for key in table.types
+            if key in table.declared or table.types[key] is not None
+        ]
+
+    def _of_the_cell(self) -> list[str]:
+        """Return the frames that the cell has and the program has not."""
+        return [] if self.cell is None else [name for name in self.cell.frames if name not in self.main.types]
+
+    def near(self, text: str, known: Callable[[], Collection[str]]) -> str | None:
+        """Return what a name was probably meant to be; None where nothing is near, or too much was asked.
+
+        Args:
+            text: what was written.
+            known: gives what could have been meant.
+        """
+        if self._comparisons > _MOST_COMPARISONS:
+            return None
+        choices = known()
+        self._comparisons += len(choices)
+        return closest(text, choices)
+
+    # ---- at the end ------------------------------------------------------------------------------------------------
+
+    def unused(self) -> None:
+        """Point at names that are declared and never used."""
+        self._unused(self.main)
+        for key, procedure in self.procedures.items():
+            name = procedure.node.name
+            if key not in self._called:
+                self._lint(f"procedure `{name.text}` is never called", name)
+            self._unused(procedure.own)
+
+    def _unused(self, table: Table) -> None:
+        for key, name in table.declared.items():
+            if key not in table.used and table.types[key] is not None:
+                self._lint(f"`{name.text}` is never used", name)
+
+    def _lint(self, message: str, name: tree.Name) -> None:
+        self.found.say("L304", message, name.span, "declared here", severity=Severity.WARNING)
+
+    def _table(self, key: str) -> Table:
+        inside = self._inside
+        return inside.own if inside is not None and key in inside.own.types else self.main
+
+    def _owner(self, key: str) -> Procedure | None:
+        """Return a procedure that has a name of its own like this."""
+        if self._comparisons > _MOST_COMPARISONS:
+            return None
+        self._comparisons += len(self.procedures)
+        return next((one for one in self.procedures.values() if key in one.own.types), None)
+
+    def _undeclared(self, name: tree.Name) -> None:
+        helps: tuple[str, ...] = ("declare it in the VAR part",)
+        notes: tuple[str, ...] = ()
+        if name.key in self.procedures:
+            text = f"`{name.text}` is a procedure and no variable"
+            help_ = f"a procedure is called by a statement of its own: `{name.text}(...)`"
+            self.found.say("E227", text, name.span, "a procedure", helps=(help_,))
+            return
+        if not name.text.isascii():
+            # Told of as a name that cannot be one.
+            return
+        if self.cell is not None and name.key in self.cell.frames:
+            helps = (f"the cell has a frame of this name: declare it with `VAR {name.text} : FRAME ;`",)
+        elif near := self.near(name.text, lambda: [*self.spelled(), *self.arms()]):
+            helps = (f"did you mean `{near}`?",)
+        elif near := self.near(name.text, self._of_the_cell):
+            helps = (f"did you mean `{near}`, a frame of the cell? Declare it with `VAR {near} : FRAME ;`",)
+        elif (owner := self._owner(name.key)) is not None:
+            notes = (f"procedure `{owner.node.name.text}` has a name like this, which is known only there",)
+        self.found.say("E202", f"`{name.text}` is not declared", name.span, "unknown name", notes=notes, helps=helps)

@@ -1,0 +1,320 @@
+"""Parsing what stands in front of the statements: VAR parts, IMPORT, UNITS, procedures, and BEGIN itself."""
+
+from collections.abc import Callable, Mapping
+
+from armwright.errors import closest
+from armwright.program.language.diagnostic import Fix, Label
+from armwright.program.language.source import Span
+from armwright.program.syntax import rlo83, tree
+from armwright.program.syntax.control_flow import block
+from armwright.program.syntax.declarations import declarations, names_of, passed_over, type_name, var_part
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.operands import check_length
+from armwright.program.syntax.token_stream import LostError, Tokens, shown
+
+# What other languages call a procedure.
+_PROCEDURES = ("FUNCTION", "PROC", "SUB", "SUBROUTINE", "DEF")
+_BY_REFERENCE = (
+    "a procedure changes what it is given as a FRAME, an EVENT or an array, and all variables of the program"
+)
+
+
+def head(tokens: Tokens) -> list[tree.Header]:
+    """Read everything up to and including BEGIN; at the end of the text BEGIN may be missing."""
+    found: list[tree.Header] = []
+    while True:
+        _semicolons(tokens)
+        token, after = tokens.now, tokens.ahead()
+        if token.kind is TokenKind.KEYWORD and token.key in tokens.words.headers:
+            found += header(tokens)
+        elif not tokens.later and rlo83.starts_header(tokens):
+            rlo83.header(tokens)
+        elif token.kind is TokenKind.NAME and after.key in (",", ":"):
+            gap = Span(token.start, token.start)
+            tokens.found.say(
+                "E112", "missing `VAR` before the declarations", gap, "expected `VAR` here", fixes=(Fix(gap, "VAR "),)
+            )
+            found += declarations(tokens)
+        elif word := _misspelt_header(tokens):
+            _misspelt(tokens, word)
+            found += header(tokens)
+        elif tokens.at < tokens.begin() and not tokens.sees(*tokens.words.statements) and after.key != "=":
+            found.append(_nonsense(tokens))
+        else:
+            break
+    _begin(tokens)
+    return found
+
+
+def header(tokens: Tokens) -> list[tree.Header]:
+    """Read one part of what stands in front of BEGIN; what makes no sense is passed over."""
+    at, level, depth = tokens.at, len(tokens.waiting), tokens.depth
+    names: list[tree.Name | None] = []
+    try:
+        tokens.deep = -1
+        return _HEADERS[tokens.now.key](tokens)
+    except LostError:
+        del tokens.waiting[level:]
+        tokens.depth = depth
+        passed_over(tokens, names)
+    if tokens.at == at:
+        tokens.take()
+    return []
+
+
+def _semicolons(tokens: Tokens) -> None:
+    """Pass over each ``;`` in front of BEGIN, where RLO-2 has none to spare."""
+    while token := tokens.accept(";"):
+        if tokens.later:
+            fix = Fix(token.span, "")
+            tokens.found.say("E117", "`;` does not belong here", token.span, "leave it out", fixes=(fix,))
+        while tokens.accept(";"):
+            pass
+
+
+def _misspelt_header(tokens: Tokens) -> str | None:
+    """Return the word that was meant to start a part in front of BEGIN."""
+    token, after = tokens.now, tokens.ahead()
+    if token.kind is not TokenKind.NAME or after.kind not in (TokenKind.NAME, TokenKind.STRING):
+        return None
+    elsewhere = token.key in _PROCEDURES and tokens.later
+    near = "PROCEDURE" if elsewhere else closest(token.text, (*tokens.words.headers, "BEGIN"))
+    return near if near != "BEGIN" and (after.kind is TokenKind.NAME or near == "IMPORT") else None
+
+
+def _misspelt(tokens: Tokens, near: str) -> None:
+    token = tokens.now
+    tokens.found.say(
+        "E105", f"unknown word `{token.text}`", token.span, "not a word of RLO", helps=(f"did you mean `{near}`?",)
+    )
+    tokens.replace(near)
+
+
+def _nonsense(tokens: Tokens) -> tree.Declaration:
+    """Pass over what is neither a declaration nor BEGIN; the names in it may have been meant to be declared."""
+    start = tokens.take()
+    if not start.damaged:
+        tokens.found.say("E111", "expected `VAR` or `BEGIN`", start.span, f"found {shown(start)}")
+    names: list[tree.Name | None] = []
+    if start.kind is TokenKind.NAME:
+        names.append(tree.Name(start.span, start.text, start.key))
+    return passed_over(tokens, names)
+
+
+def _begin(tokens: Tokens) -> None:
+    if tokens.accept("BEGIN") or tokens.done:
+        return
+    if tokens.now.kind is TokenKind.NAME and tokens.ahead().key != "=" and closest(tokens.now.text, ["BEGIN"]):
+        _misspelt(tokens, "BEGIN")
+        tokens.take()
+        return
+    gap = Span(tokens.now.start, tokens.now.start)
+    fix = Fix(gap, "BEGIN ")
+    tokens.say_once("E115", "missing `BEGIN` before the first statement", gap, "expected `BEGIN` here", fixes=(fix,))
+
+
+# var_part = "VAR" decl { decl } ;
+def _variables(tokens: Tokens) -> list[tree.Header]:
+    return [*var_part(tokens)]
+
+
+# import = "IMPORT" string ";" ;
+def _import(tokens: Tokens) -> list[tree.Header]:
+    start = tokens.take()
+    token = tokens.now
+    if token.kind is not TokenKind.STRING:
+        helps = ('write `IMPORT "cell.json" ;`',)
+        tokens.lost("expected the name of a file after IMPORT", f"found {shown(token)}", helps=helps)
+    tokens.take()
+    path = tree.String(token.span, token.text[1:-1])
+    span = tokens.since(start)
+    _semicolon(tokens, "after the import")
+    return [tree.Import(span, path)]
+
+
+# units = "UNITS" unitname { "," unitname } ";" ;
+def _units(tokens: Tokens) -> list[tree.Header]:
+    start = tokens.take()
+    units = [_unit(tokens)]
+    while tokens.now.key == "," or (tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ";")):
+        if not tokens.accept(","):
+            tokens.insert(",", "between two units")
+        units.append(_unit(tokens))
+    span = tokens.since(start)
+    _semicolon(tokens, "after the units")
+    return [tree.Units(span, tuple(units))]
+
+
+def _unit(tokens: Tokens) -> tree.Name:
+    token = tokens.now
+    if token.kind is not TokenKind.NAME:
+        helps = ("write `UNITS MM, DEG ;`",)
+        tokens.lost(f"expected a unit after `{tokens.before.text}`", f"found {shown(token)}", helps=helps)
+    tokens.take()
+    return tree.Name(token.span, token.text, token.key)
+
+
+# procedure = "PROCEDURE" name [ "(" param { "," param } ")" ] ";" [ var_part ] block ";" ;
+def _procedure(tokens: Tokens) -> list[tree.Header]:
+    start = tokens.take()
+    name = _own_name(tokens)
+    tokens.procedures.add(name.key)
+    parameters = _parameters(tokens) if tokens.sees("(") else []
+    above = tokens.since(start)
+    _no_result(tokens)
+    _semicolon(tokens, "after the head of the procedure")
+    own = var_part(tokens) if tokens.sees("VAR") else []
+    while tokens.sees("VAR"):
+        again = tokens.now
+        fix = Fix(again.span, "")
+        tokens.found.say("E118", "a procedure has one VAR part", again.span, "leave the word out", fixes=(fix,))
+        own += var_part(tokens)
+    body = _body(tokens, above)
+    found = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
+    if tokens.sees("END") and tokens.ahead().key != ".":
+        tokens.say_once("E127", "`END` without BEGIN", tokens.now.span, "the procedure has ended before")
+        tokens.take()
+    if tokens.sees("."):
+        fix = Fix(tokens.now.span, ";")
+        tokens.say_once("E104", "a procedure ends with `;`", tokens.now.span, "write `;`", fixes=(fix,))
+        tokens.take()
+    else:
+        _semicolon(tokens, "after the procedure")
+    return [found]
+
+
+def _own_name(tokens: Tokens) -> tree.Name:
+    token = tokens.now
+    if token.kind is TokenKind.KEYWORD and tokens.ahead().key in ("(", ";"):
+        tokens.refuse_reserved()
+    elif token.key in ("(", ";"):
+        gap = tokens.gap()
+        tokens.say_once("E111", "expected the name of the procedure", gap, f"found {shown(token)}")
+        return tree.Name(gap, "", "")
+    elif token.kind is not TokenKind.NAME:
+        tokens.lost("expected the name of the procedure", f"found {shown(token)}")
+    tokens.take()
+    name = tree.Name(token.span, token.text, token.key)
+    check_length(tokens, name)
+    return name
+
+
+# param = name { "," name } ":" type ;
+def _parameters(tokens: Tokens) -> list[tree.Declaration]:
+    opening, depth = tokens.take(), tokens.depth
+    found: list[tree.Declaration] = []
+    if tokens.sees(")"):
+        fix = Fix(opening.span.to(tokens.now.span), "")
+        text = "a procedure without parameters is declared without `( )`"
+        tokens.say_once("E111", text, tokens.now.span, "nothing stands in between", fixes=(fix,))
+        tokens.take()
+        return found
+    while True:
+        start = tokens.now
+        if tokens.sees("VAR"):
+            text = "a parameter has no VAR in front"
+            tokens.say_once("E117", text, start.span, "leave it out", notes=(_BY_REFERENCE,))
+            tokens.take()
+        names: list[tree.Name | None] = []
+        try:
+            names_of(tokens, names)
+            kind = type_name(tokens)
+        except LostError:
+            tokens.depth = depth
+            while not tokens.done and not tokens.sees(")", ";", "BEGIN", *tokens.words.headers):
+                tokens.take()
+            kind = tree.TypeName(tokens.since(start), "", None)
+        found.append(tree.Declaration(tokens.since(start), tuple(name for name in names if name), kind))
+        if not _another(tokens):
+            break
+    if not tokens.accept(")"):
+        tokens.insert(")", "after the parameters")
+    return found
+
+
+def _no_result(tokens: Tokens) -> None:
+    """Pass over the type of what a procedure was meant to give back."""
+    if not tokens.sees(":"):
+        return
+    start = tokens.take()
+    while not tokens.done and not tokens.sees(";", "VAR", "BEGIN"):
+        tokens.take()
+    tokens.say_once(
+        "E117", "a procedure gives nothing back", tokens.since(start), "leave this out", notes=(_BY_REFERENCE,)
+    )
+
+
+def _another(tokens: Tokens) -> bool:
+    """Whether one more parameter follows."""
+    if tokens.accept(","):
+        return True
+    token = tokens.now
+    if token.key == ";" and tokens.ahead().kind is TokenKind.NAME and tokens.ahead(2).key in (",", ":"):
+        fix = Fix(token.span, ",")
+        tokens.say_once("E112", "expected `,` between two parameters", token.span, "write `,`", fixes=(fix,))
+        tokens.take()
+        return True
+    if token.kind is TokenKind.NAME and tokens.ahead().key in (",", ":"):
+        tokens.insert(",", "between two parameters")
+        return True
+    return False
+
+
+def _body(tokens: Tokens, above: Span) -> tree.Block:
+    """Read the statements of a procedure, also where BEGIN or END is missing."""
+    token = tokens.now
+    if token.kind is TokenKind.NAME and token.key not in tokens.declared and closest(token.text, ("BEGIN",)):
+        _misspelt(tokens, "BEGIN")
+    elif not tokens.sees("BEGIN"):
+        gap = tokens.gap()
+        fix = Fix(Span(token.start, token.start), "BEGIN ")
+        fixes = (fix,) if token.kind is TokenKind.NAME or tokens.sees(*tokens.words.statements) else ()
+        tokens.say_once("E115", "the procedure has no BEGIN", gap, "expected `BEGIN` here", fixes=fixes)
+        if not fixes:
+            return tree.Block(gap, (), gap)
+    tokens.in_procedure = True
+    found = block(tokens)
+    tokens.in_procedure = False
+    return _without_main(tokens, above, found)
+
+
+def _without_main(tokens: Tokens, above: Span, body: tree.Block) -> tree.Block:
+    """Give back the statements of the program itself, which a procedure without END has swallowed."""
+    last = body.statements[-1] if body.statements else None
+    open_ended = isinstance(last, tree.Block) and last.end.start == last.end.end
+    if not open_ended or last is None or body.end.start != body.end.end or not tokens.sees("END"):
+        return body
+    tokens.back_to(last.span.start)
+    tokens.found[:] = [one for one in tokens.found if one.span.start < last.span.start]
+    gap = tokens.gap()
+    label = Label(above, "this procedure")
+    tokens.say_once("E115", "the procedure has no END", gap, "expected `END ;` here", secondary=(label,))
+    tokens.hush()
+    return tree.Block(tokens.since(body.span), body.statements[:-1], gap)
+
+
+def _semicolon(tokens: Tokens, where: str) -> None:
+    if tokens.accept(";"):
+        return
+    gap = tokens.gap()
+    helps = (f"insert `;` after `{tokens.before.text}`",)
+    tokens.say_once("E104", f"missing `;` {where}", gap, "expected `;` here", helps=helps, fixes=(Fix(gap, ";"),))
+
+
+def late(tokens: Tokens) -> tree.Statement:
+    """Read a part that belongs in front of BEGIN, and keep what it declares."""
+    word: Token = tokens.now
+    what = "declarations belong" if word.key == "VAR" else "it belongs"
+    tokens.found.say("E118", f"{word.text} stands behind BEGIN", word.span, f"{what} in front of BEGIN")
+    tokens.late += header(tokens)
+    # It has its own ``;``.
+    tokens.hush()
+    return tree.Poison(word.span)
+
+
+_HEADERS: Mapping[str, Callable[[Tokens], list[tree.Header]]] = {
+    "VAR": _variables,
+    "IMPORT": _import,
+    "UNITS": _units,
+    "PROCEDURE": _procedure,
+}

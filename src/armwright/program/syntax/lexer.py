@@ -1,0 +1,390 @@
+"""From characters to tokens. Spans count characters of the text as written; comments and blanks leave no token."""
+
+import enum
+import math
+import re
+from collections import Counter
+
+import attrs
+
+from armwright.cell.names import arm_name
+from armwright.files.limits import beyond, limit
+from armwright.program.language.diagnostic import Diagnostic, Findings, Fix
+from armwright.program.language.source import Source, Span
+from armwright.program.language.units import UNITS
+from armwright.program.language.words import VOCABULARIES, Standard
+
+
+class TokenKind(enum.Enum):
+    """What a token is."""
+
+    NAME = "name"
+    KEYWORD = "keyword"
+    ARM = "arm"
+    NUMBER = "number"
+    STRING = "string"
+    SYMBOL = "symbol"
+    END = "end of text"
+
+
+# Not frozen, though nothing changes one: a program has a hundred thousand of them, and freezing trebles their price.
+@attrs.define
+class Token:
+    """One token.
+
+    Attributes:
+        kind: what it is.
+        text: as written.
+        key: as compared: upper case, ``ARM_1`` for ``arm-01``, the digits alone of a number with a unit.
+        start: its first character.
+        end: the one after its last.
+        damaged: whether something has been said about it already.
+    """
+
+    kind: TokenKind
+    text: str
+    key: str
+    start: int
+    end: int
+    damaged: bool = False
+
+    @property
+    def span(self) -> Span:
+        """Where it stands."""
+        return Span(self.start, self.end)
+
+
+@attrs.frozen(kw_only=True)
+class Scanned:
+    """What became of the characters of a text.
+
+    Attributes:
+        tokens: in order, the last being the end of the text; whatever can be guessed is a token all the same.
+        comments: where each stands, from its first mark to its last.
+        found: what is wrong.
+    """
+
+    tokens: tuple[Token, ...]
+    comments: tuple[Span, ...]
+    found: tuple[Diagnostic, ...]
+
+
+_BLANKS = " \t\r\n\f\v"
+_DIGITS = r"[0-9]+ (?:\.[0-9]+)? (?:[Ee][+-]?[0-9]+)?"
+_UNIT = "(?:" + "|".join("".join(f"[{letter}{letter.lower()}]" for letter in unit) for unit in UNITS) + ")"
+_NUMBERS = {Standard.RLO_83: _DIGITS, Standard.RLO_2: f"{_DIGITS} {_UNIT}?"}
+# In RLO-2 what other languages write for = <> AND OR is read whole, so that it can be called by its name.
+_FOREIGN_SIGNS = {Standard.RLO_83: "", Standard.RLO_2: r"| == | != | && | \|\| | =< | =>"}
+_PATTERNS = {
+    standard: re.compile(
+        rf"""
+        [{_BLANKS}]*+ (?:
+          ( [^\W\d_] \w* )                                                          # a word
+        | ( := | <= | >= | <> {_FOREIGN_SIGNS[standard]} | [;,)=:\[\]+*<>-] | \.(?![0-9]) | \((?!\*) | /(?![/*]) )
+        | ( {_NUMBERS[standard]} (?![\w.]) )
+        | ( \{{ [^}}]*+ \}} | //[^\r\n]* )                                          # a comment
+        | ( " [^"\r\n]* "? )
+        | ( \.?[0-9] (?: [\w.] | (?<=[Ee])[+-](?=[0-9]) )* )                        # like a number
+        | ( \{{ | \(\* | /\* )                                                      # a comment that is none
+        | ( . )
+        )
+        """,
+        re.VERBOSE | re.DOTALL,
+    )
+    for standard in Standard
+}
+_WORD, _SYMBOL, _NUMBER, _COMMENT, _STRING, _ODD_NUMBER, _OPEN, _STRAY = range(1, 9)
+
+_ARM = re.compile(r"ARM[-_]([0-9]+)(?!\w)", re.IGNORECASE)
+_NO_ARM = re.compile(r"ARM(?:[ \t]*[-_][ \t]*|[ \t]+)[0-9]+(?!\w)|ARM(?!\w)", re.IGNORECASE)
+_WITH_UNIT = re.compile(rf"({_DIGITS}){_UNIT}", re.VERBOSE)
+# Where a text that is not closed may have been meant to end.
+_AFTER_TEXT = re.compile(r"[ \t]*\)?[ \t]*;?[ \t]*\Z")
+
+# Characters of other keyboards that stand for one of the language; each takes one place, like the one it stands for.
+# Those of `"` and `}` are none: they may stand in a text or a comment without ending it.
+LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94) if chr(0x21 + i) not in '"}'} | {
+    ord(other): meant
+    for meant, others in {
+        " ": "\u00a0\u3000\u2002\u2003\u2009\u202f",
+        "-": "\u2010\u2011\u2012\u2013\u2014\u2212",
+        "_": "\u203f",
+        ".": "\u3002\uff61",
+        ",": "\u3001\uff64\u060c\u201a",
+        ";": "\u061b\u037e",
+        ":": "\u2236",
+        "*": "\u00d7\u2217",
+    }.items()
+    for other in others
+}
+_HINTS = {
+    "!": "a comment is written { ... } or // ...",
+    "#": "a comment is written { ... } or // ...",
+    "}": "no comment is open here",
+}
+# A text between the quotation marks of other languages, and of programs that set them by themselves.
+_TEXT_ELSEWHERE = re.compile(
+    '[\u201c\u201d\u201e\uff02\u00ab][^"\u201c\u201d\u201e\uff02\u00bb\r\n]*["\u201c\u201d\uff02\u00bb]'
+    "|(?<!\\w)['`\u2018][^\"'`\u2019\r\n]*['`\u2019]"
+)
+# What means nothing, neither here nor in other languages.
+_NONSENSE = re.compile(
+    rf"""[^\w\s;,()=:\[\]+*<>./{{"'`#!&|\u2018\u201c\u201d\u201e\u00ab\uff02{"".join(map(chr, LOOK_ALIKES))}-]+"""
+)
+_COMMENT_ELSEWHERE = re.compile(r"[#!](?=[ \t#!])[^\r\n]*")
+_QUOTES = {Standard.RLO_83: "RLO has no quotation marks", Standard.RLO_2: 'a text stands between two `"`'}
+
+
+def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> Scanned:
+    """Cut a text into tokens.
+
+    Args:
+        source: the program as written.
+        text: the same, as long, with line numbers blanked out.
+        standard: which words are reserved, and whether there are texts and units.
+    """
+    return _Scanner(source, text, standard).run()
+
+
+class _Scanner:
+    """One pass over a text."""
+
+    def __init__(self, source: Source, text: str, standard: Standard) -> None:
+        self._written = source.text
+        self._text = text if text.isascii() else text.translate(LOOK_ALIKES)
+        # A look-alike inside a comment is nobody's business, so they are looked for token by token.
+        self._foreign = not text.isascii()
+        self._standard = standard
+        self._reserved = VOCABULARIES[standard].reserved
+        self._most = limit("words")
+        self._unclosed = False
+        # Most words of a program stand there more than once: what they are is found out the first time.
+        self._known: dict[str, tuple[TokenKind, str]] = {}
+        self._tokens: list[Token] = []
+        self._comments: list[Span] = []
+        self._found = Findings()
+        # Of each character that does not belong to the language where the first stands, of those with a cure all.
+        self._strays: dict[str, list[Span]] = {}
+        self._counts: Counter[str] = Counter()
+        # By the number of tokens in front of such characters, where the last of them ends.
+        self._behind: dict[int, int] = {}
+        self._refused: set[str] = set()
+
+    def run(self) -> Scanned:
+        # Blanks at the end would be tried in vain from each of them.
+        position, last = 0, len(self._text.rstrip(_BLANKS))
+        while position < last:
+            position = self._stretch(position, last)
+        end = len(self._text)
+        self._tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
+        for character, spans in self._strays.items():
+            self._found.append(_stray(character, spans, max(len(spans), self._counts[character]), self._standard))
+        self._hush()
+        return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), found=tuple(self._found))
+
+    def _stretch(self, position: int, last: int) -> int:
+        """Read tokens one behind the other; return where the text goes on behind one that needs a closer look."""
+        known, tokens, foreign, most = self._known, self._tokens, self._foreign, self._most
+        add = tokens.append
+        for match in _PATTERNS[self._standard].finditer(self._text, position, last):
+            what = match.lastindex or _STRAY
+            word = match[what]
+            start, end = match.span(what)
+            if len(tokens) >= most:
+                return self._too_long(start, end, last)
+            if foreign:
+                # Of a comment only the blanks in front, of a text only its marks.
+                inside = what == _COMMENT or (what == _STRING and self._standard is Standard.RLO_2)
+                self._look_alikes(match.start(), start + (what == _STRING) if inside else end)
+            if (plain := known.get(word)) is not None:
+                add(Token(plain[0], word, plain[1], start, end))
+                continue
+            behind = self._closer_look(what, word, start, end)
+            if behind != end:
+                return behind
+        return last
+
+    def _too_long(self, start: int, end: int, last: int) -> int:
+        """Say that the text has too many words; what follows is passed over."""
+        # Nothing is said of the end that is not read.
+        self._unclosed = True
+        self._say("E119", f"the program is too long: {beyond('words')}", Span(start, end), "read up to here")
+        return last
+
+    def _closer_look(self, what: int, word: str, start: int, end: int) -> int:
+        """Make a token of a word seen for the first time; return where the text goes on."""
+        if what == _COMMENT:
+            self._comments.append(Span(start, end))
+            return end
+        if what == _OPEN:
+            return self._comment(word, start)
+        if what == _STRAY:
+            return self._stray(start, end)
+        if what == _STRING:
+            token = self._string(start, end)
+        elif what == _WORD:
+            token = self._word(word, start, end)
+        elif what == _SYMBOL:
+            token = Token(TokenKind.SYMBOL, word, word, start, end)
+        else:
+            token = self._number(word, start, end, odd=what == _ODD_NUMBER)
+        self._tokens.append(token)
+        if not token.damaged and token.text == word and what != _STRING:
+            self._known[word] = token.kind, token.key
+        return token.end
+
+    def _word(self, word: str, start: int, end: int) -> Token:
+        key = word.upper()
+        if key.startswith("ARM"):
+            if match := _ARM.match(self._text, start):
+                return Token(TokenKind.ARM, match[0], arm_name(match[1]), start, match.end())
+            if match := _NO_ARM.match(self._text, start):
+                return self._no_arm(match[0], start, match.end())
+        if word.isascii():
+            return Token(TokenKind.KEYWORD if key in self._reserved else TokenKind.NAME, word, key, start, end)
+        if key not in self._refused:
+            self._refused.add(key)
+            odd = next(character for character in word if not character.isascii())
+            self._say(
+                "E101",
+                f"a name cannot contain `{odd}`",
+                Span(start, end),
+                "names are made of the letters A to Z, digits and `_`",
+            )
+        return Token(TokenKind.NAME, word, key, start, end, damaged=True)
+
+    def _number(self, word: str, start: int, end: int, *, odd: bool) -> Token:
+        match = _WITH_UNIT.fullmatch(word)
+        digits = match[1] if match else word
+        if (match or not odd) and math.isfinite(float(digits)):
+            return Token(TokenKind.NUMBER, word, digits, start, end)
+        why = "too large" if _is_number(digits) else "not a number"
+        helps: tuple[str, ...] = ()
+        fixes: tuple[Fix, ...] = ()
+        if _is_number(word) and "." in (word[0], word[-1]):
+            cured = f"0{word}" if word[0] == "." else f"{word}0"
+            why, helps, fixes = (
+                "a digit is missing beside the point",
+                (f"write `{cured}`",),
+                (Fix(Span(start, end), cured),),
+            )
+        self._say("E113", f"`{word}` is not a number of RLO", Span(start, end), why, helps=helps, fixes=fixes)
+        return Token(TokenKind.NUMBER, word, "0", start, end, damaged=True)
+
+    def _string(self, start: int, end: int) -> Token:
+        written = self._written[start:end]
+        if self._standard is Standard.RLO_83:
+            return Token(TokenKind.STRING, self._text[start:end], self._text[start:end], start, end)
+        if len(written) > 1 and self._text[end - 1] == '"':
+            return Token(TokenKind.STRING, written, written, start, end)
+        match = _AFTER_TEXT.search(self._text, start + 1, end)
+        end = match.start() if match else end
+        self._say("E120", "this text is not closed", Span(start, end), "opened here", helps=('close it with `"`',))
+        return Token(TokenKind.STRING, f'{self._written[start:end]}"', '"', start, end, damaged=True)
+
+    def _no_arm(self, word: str, start: int, end: int) -> Token:
+        digits = word[3:].strip(" \t-_")
+        key = arm_name(digits or "1")
+        message, label = (
+            (f"`{word}` is not the name of an arm", "no blanks in the name of an arm")
+            if digits
+            else ("`ARM` alone is not a name", "which arm?")
+        )
+        fixes = (Fix(Span(start, end), key),) if digits else ()
+        self._say("E106", message, Span(start, end), label, helps=(f"write `{key}`",), fixes=fixes)
+        return Token(TokenKind.ARM, word, key, start, end, damaged=True)
+
+    def _comment(self, opening: str, start: int) -> int:
+        """Say what is wrong with a comment; return where the text goes on."""
+        closing = "}" if opening == "{" else opening[::-1].replace("(", ")")
+        end = self._text.find(closing, start + len(opening))
+        here = Span(start, start + len(opening))
+        if end < 0:
+            self._unclosed = True
+            self._say("E102", "this comment is not closed", here, "opened here", helps=(f"close it with `{closing}`",))
+            return len(self._text)
+        inside = self._text[start + 2 : end]
+        fixes = () if "}" in inside else (Fix(here, "{"), Fix(Span(end, end + 2), "}"))
+        self._say("E101", f"`{opening}` does not open a comment in RLO", here, "write `{ ... }`", fixes=fixes)
+        self._comments.append(Span(start, end + 2))
+        return end + 2
+
+    def _stray(self, start: int, end: int) -> int:
+        """Take note of a character that does not belong to the language; return where the text goes on."""
+        if run := _NONSENSE.match(self._written, start):
+            self._count(run[0], start)
+            return run.end()
+        text = _TEXT_ELSEWHERE.match(self._written, start) if self._standard is Standard.RLO_2 else None
+        if text is None:
+            character = self._written[start]
+            if ord(character) in LOOK_ALIKES:
+                self._strays.setdefault(character, []).append(Span(start, end))
+            else:
+                self._count(character, start)
+            comment = _COMMENT_ELSEWHERE.match(self._written, start)
+            return comment.end() if comment else end
+        first, last = Span(start, start + 1), Span(text.end() - 1, text.end())
+        fixes = (Fix(first, '"'), *([Fix(last, '"')] if text[0][-1] != '"' else []))
+        self._say("E101", f"`{text[0][0]}` does not open a text in RLO", first, 'write `"..."`', fixes=fixes)
+        self._tokens.append(Token(TokenKind.STRING, f'"{text[0][1:-1]}"', '"', start, text.end(), damaged=True))
+        return text.end()
+
+    def _count(self, characters: str, start: int) -> None:
+        """Count characters that mean nothing."""
+        self._counts.update(characters)
+        for character in set(characters) - self._strays.keys():
+            first = start + characters.index(character)
+            self._strays[character] = [Span(first, first + 1)]
+        self._behind[len(self._tokens)] = start + len(characters)
+
+    def _hush(self) -> None:
+        """Take what stands behind such a character, in its line, for something that has been told of."""
+        for at, end in self._behind.items():
+            token = self._tokens[at]
+            token.damaged |= self._written.find("\n", end, token.start) < 0
+
+    def _look_alikes(self, start: int, end: int) -> None:
+        if self._written[start:end] == self._text[start:end]:
+            return
+        for at in range(start, end):
+            # Line numbers have been blanked out and are no look-alikes.
+            if ord(self._written[at]) in LOOK_ALIKES:
+                self._strays.setdefault(self._written[at], []).append(Span(at, at + 1))
+
+    def _say(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        label: str,
+        *,
+        helps: tuple[str, ...] = (),
+        fixes: tuple[Fix, ...] = (),
+    ) -> None:
+        self._found.append(Diagnostic(code=code, message=message, span=span, label=label, helps=helps, fixes=fixes))
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return "_" not in word
+
+
+def _stray(character: str, spans: list[Span], count: int, standard: Standard) -> Diagnostic:
+    """Say once what a character is that does not belong to the language, and in how many places it stands."""
+    meant = LOOK_ALIKES.get(ord(character))
+    shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
+    more = f"it stands in {count} places" if count > 1 else ""
+    name = "a blank" if meant == " " else f"`{meant}`"
+    hint = _QUOTES[standard] if character in "'\u201c\u201d" else _HINTS.get(character, "has no meaning here")
+    return Diagnostic(
+        code="E101",
+        message=f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs"),
+        span=spans[0],
+        label=f"looks like {name}" if meant else hint,
+        notes=(more,) if more else (),
+        helps=(f"write {name}",) if meant else (),
+        fixes=tuple(Fix(span, meant) for span in spans) if meant else (),
+    )

@@ -1,0 +1,244 @@
+"""Parsing MOVE and its clauses, which come in any order."""
+
+# ruff: noqa: ERA001 - each rule of the grammar stands above its function
+
+from collections.abc import Callable
+
+from armwright.errors import closest
+from armwright.program.language.diagnostic import Fix
+from armwright.program.language.source import Span
+from armwright.program.language.words import LATER_WITH
+from armwright.program.syntax import rlo83, tree
+from armwright.program.syntax.control_flow import part
+from armwright.program.syntax.expressions import expression, listed
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.operands import equals, mobile, operand, parenthesised, signed, value
+from armwright.program.syntax.statement_list import nested
+from armwright.program.syntax.token_stream import Tokens, shown
+
+_FRAME = "the name of a FRAME"
+_SPEED = "a number or the name of a SCALAR"
+_ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
+_VALUES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
+    "APPROACH": tree.Approach,
+    "DEPARTURE": tree.Departure,
+    "SPEED": tree.Speed,
+    "BLEND": tree.Blend,
+    "DURATION": tree.Duration,
+}
+
+
+# move = "MOVE" mobile "TO" name { [","] clause } ;            (* RLO-83 *)
+# move = "MOVE" mobile "TO" expr { [","] clause } ;            (* RLO-2 *)
+def move(tokens: Tokens) -> tree.Move:
+    """Read one MOVE."""
+    start = tokens.take()
+    moved = mobile(tokens, "the name of a FRAME or an arm", "after MOVE")
+    tokens.expect("TO", "after what is moved")
+    goal = value(tokens, "a place" if tokens.later else _FRAME, "after TO")
+    clauses: list[tree.Clause] = []
+    while tokens.now.key != ";":
+        comma = tokens.accept(",")
+        if not _starts_clause(tokens):
+            if comma:
+                tokens.lost("expected a clause after `,`", f"found {shown(tokens.now)}")
+            break
+        if (clause := _clause(tokens)) is not None:
+            clauses.append(clause)
+    return tree.Move(tokens.since(start), moved, goal, tuple(clauses))
+
+
+def _starts_clause(tokens: Tokens) -> bool:
+    """Whether a clause stands here, rightly or wrongly spelt, and not the next statement."""
+    token, after = tokens.now, tokens.ahead()
+    words = tokens.words
+    if token.kind is TokenKind.KEYWORD:
+        return token.key in words.clauses
+    if token.kind is not TokenKind.NAME:
+        return False
+    if after.key in ("=", ":=") or (rlo83.starts_statement(tokens) if not tokens.later else after.key in ("(", "[")):
+        # WITH may be missing in front of a misspelt word: `, SPED = 5`.
+        comma = tokens.before.key == "," and tokens.later
+        return (comma and closest(token.text, words.with_clauses) is not None) or (
+            token.key == "ON" and not tokens.later
+        )
+    if tokens.later and token.key in tokens.declared and tokens.before.key != ",":
+        return False
+    if closest(token.text, words.clauses) or token.key == "ON":
+        return True
+    ends = (*words.statements, *words.closing) if tokens.later else words.statements
+    return tokens.same_line() and not closest(token.text, ends)
+
+
+# clause = "DIRECTLY" | "STRAIGHTLY"
+#        | "VIA" "(" name { "," name } ")"
+#        | "WITH" ( "APPROACH" | "DEPARTURE" ) "=" name
+#        | "WITH" "SPEED" "=" ( number | name ) ;                                               (* RLO-83 *)
+# In RLO-2 each name may be any expression, and there are more:
+# clause = ... | "WITH" ( "BLEND" | "DURATION" ) "=" expr | "ON" expr "DO" action ;
+def _clause(tokens: Tokens) -> tree.Clause | None:
+    """Read one clause; None when it has been reported and passed over."""
+    token = tokens.now
+    if tokens.sees_word("ON"):
+        rlo83.guard(tokens)
+        return None
+    if token.kind is TokenKind.NAME:
+        if not _meant(tokens, token):
+            _pass_over(tokens)
+            return None
+        token = tokens.now
+    key = token.key
+    if key == "ON":
+        return _guard(tokens)
+    tokens.take()
+    if key == "WITH":
+        return _with(tokens, token)
+    if key in tokens.words.with_clauses:
+        gap = Span(token.start, token.start)
+        if not token.damaged:
+            tokens.found.say(
+                "E116",
+                f"{key} needs WITH in front",
+                token.span,
+                "expected WITH before this",
+                helps=(f"write `WITH {key} = ...`",),
+                fixes=(Fix(gap, "WITH "),),
+            )
+        return _assigned(tokens, token, key)
+    return _plain(tokens, token, key)
+
+
+def _meant(tokens: Tokens, token: Token) -> bool:
+    """Put the clause word that a misspelt one was meant to be in its place; whether there is one."""
+    near = closest(token.text, tokens.words.clauses)
+    tokens.found.say(
+        "E108",
+        f"unknown clause `{token.text}`",
+        token.span,
+        "not a clause of MOVE",
+        helps=(
+            f"did you mean `{near}`?"
+            if near
+            else f"clauses are {', '.join((*tokens.words.plain_clauses, 'WITH ...'))}",
+        ),
+    )
+    if near:
+        tokens.replace(near)
+    return near is not None
+
+
+def _plain(tokens: Tokens, start: Token, key: str) -> tree.Clause | None:
+    if key == "DIRECTLY":
+        return tree.Directly(start.span)
+    if key == "STRAIGHTLY":
+        return tree.Straightly(start.span)
+    if key == "VIA":
+        points: tuple[tree.Expression, ...]
+        if tokens.later:
+            points = listed(tokens, expression, "a place", "after VIA")
+        else:
+            points = parenthesised(tokens, _FRAME, "after VIA")
+        return tree.Via(tokens.since(start), points)
+    return None
+
+
+def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
+    """Read what follows WITH."""
+    token = tokens.now
+    plain, with_words = tokens.words.plain_clauses, tokens.words.with_clauses
+    expected = f"expected {', '.join(with_words[:-1])} or {with_words[-1]}"
+    if tokens.sees(*plain):
+        tokens.found.say(
+            "E116",
+            f"{token.key} stands without WITH",
+            start.span,
+            "WITH does not belong here",
+            helps=(f"write `{token.key}` alone",),
+            fixes=(Fix(Span(start.start, token.start), ""),),
+        )
+        tokens.take()
+        return _plain(tokens, token, token.key)
+    key: str | None = token.key if tokens.sees(*with_words) else None
+    if tokens.sees_word(*LATER_WITH):
+        rlo83.report(tokens, f"WITH {token.key}", token.span, "RLO-83 has APPROACH, DEPARTURE and SPEED")
+        _pass_over(tokens)
+        return None
+    if key is None and token.kind is TokenKind.NAME:
+        key = closest(token.text, with_words)
+        tokens.found.say(
+            "E108",
+            f"unknown clause `WITH {token.text}`",
+            token.span,
+            expected,
+            helps=(f"did you mean `{key}`?",) if key else (),
+        )
+        if key is None:
+            _pass_over(tokens)
+            return None
+    if key is None:
+        tokens.lost("expected a clause after WITH", expected, code="E108")
+    tokens.take()
+    return _assigned(tokens, start, key)
+
+
+def _assigned(tokens: Tokens, start: Token, key: str) -> tree.Clause:
+    if tokens.now.key == "=":
+        tokens.take()
+    else:
+        equals(tokens, f"`WITH {key}`", f"WITH {key}")
+    found: tree.Expression
+    if tokens.later:
+        found = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a place", f"after {key} =")
+    elif key == "SPEED":
+        found = _speed(tokens)
+    else:
+        found = operand(tokens, _FRAME, f"after {key} =")
+    return _VALUES[key](tokens.since(start), found)
+
+
+# "ON" expr "DO" action
+# action = block | assign | call | "HALT" | "SIGNAL" lvalue | print ;
+def _guard(tokens: Tokens) -> tree.On:
+    """Read what a motion shall watch."""
+    start = tokens.take()
+    condition = part(tokens, "a condition", "after ON", "DO")
+    head = tokens.since(start)
+    tokens.expect("DO", "after the condition", statement=True)
+    word = tokens.now
+    action = nested(tokens, "DO")
+    if not isinstance(action, _ACTIONS):
+        opening, closing = Span(word.start, word.start), tokens.gap()
+        certain = not isinstance(action, tree.Move) or not action.clauses
+        tokens.found.say(
+            "E121",
+            f"{word.text} cannot be the action of ON",
+            word.span,
+            "expected a block, `=`, a call, HALT, SIGNAL or PRINT",
+            helps=(f"write `DO BEGIN {word.text} ... END`",),
+            fixes=(Fix(opening, "BEGIN "), Fix(closing, " END")) if certain else (),
+        )
+    return tree.On(tokens.since(start), head, condition, action)
+
+
+def _speed(tokens: Tokens) -> tree.Number | tree.Mobile:
+    signs = tokens.sees("-", "+")
+    number = tokens.ahead() if signs else tokens.now
+    behind = tokens.ahead(2 if signs else 1)
+    if number.kind is not TokenKind.NUMBER:
+        return operand(tokens, _SPEED, "after SPEED =")
+    if behind.kind is TokenKind.SYMBOL and behind.key in rlo83.OPERATORS:
+        return rlo83.expression(tokens, _SPEED)
+    return signed(tokens)
+
+
+def _pass_over(tokens: Tokens) -> None:
+    """Pass over the rest of a clause that is none."""
+    depth = 0
+    words = tokens.words
+    stops = (";", *words.closing, *words.statements, *words.plain_clauses, "WITH")
+    tokens.take()
+    while not tokens.done and not tokens.sees(*stops):
+        if depth == 0 and tokens.sees(","):
+            break
+        depth += tokens.sees("(") - tokens.sees(")")
+        tokens.take()

@@ -1,0 +1,137 @@
+"""The parser: one function for each rule of the grammar, with the rule above it. It never stops at the first error.
+
+What is missing and obvious is put in, what is misspelt is replaced, and what makes no sense is passed over up to the
+next statement; each is reported once.
+"""
+
+# ruff: noqa: ERA001 - each rule of the grammar stands above its function
+
+from collections.abc import Collection, Mapping, Sequence
+
+from armwright.program.language.diagnostic import Diagnostic, Fix
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import Standard
+from armwright.program.syntax import control_flow, simple_statements, tree
+from armwright.program.syntax.headers import head, late
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.move import move
+from armwright.program.syntax.split_names import joined
+from armwright.program.syntax.statement_list import statements
+from armwright.program.syntax.token_stream import Rule, Tokens
+
+# statement = init | affix | unfix | open | grasp | operate | read | move ;
+_RULES_83: Mapping[str, Rule] = {
+    "AFFIX": simple_statements.affix,
+    "UNFIX": simple_statements.unfix,
+    "OPEN": simple_statements.open_hand,
+    "GRASP": simple_statements.grasp,
+    "OPERATE": simple_statements.operate,
+    "READ": simple_statements.read,
+    "MOVE": move,
+    "VAR": late,  # reported: it belongs in front of BEGIN
+}
+# statement = assign | affix | ... | move | block | "IF" ... | "WHILE" ... | "REPEAT" ... | ... | name "(" ... ")" ;
+_RULES_2: Mapping[str, Rule] = {
+    **_RULES_83,
+    "BEGIN": control_flow.block,
+    "IF": control_flow.if_,
+    "WHILE": control_flow.while_,
+    "REPEAT": control_flow.repeat,
+    "FOR": control_flow.for_,
+    "COBEGIN": control_flow.cobegin,
+    "SIGNAL": simple_statements.signal,
+    "WAIT": simple_statements.wait,
+    "PAUSE": simple_statements.pause,
+    "LOCK": control_flow.lock,
+    "TRY": control_flow.try_,
+    "RETRY": simple_statements.retry,
+    "HALT": simple_statements.halt,
+    "PRINT": simple_statements.printing,
+    "IMPORT": late,
+    "UNITS": late,
+    "PROCEDURE": late,
+}
+_RULES = {Standard.RLO_83: _RULES_83, Standard.RLO_2: _RULES_2}
+
+
+def parse(
+    source: Source,
+    tokens: Sequence[Token],
+    standard: Standard = Standard.RLO_2,
+    *,
+    declared: Collection[str] = (),
+    procedures: Collection[str] = (),
+) -> tuple[tree.Program, list[Diagnostic]]:
+    """Return the syntax tree of a program and what is wrong with its syntax.
+
+    Args:
+        source: the text, for messages.
+        tokens: of the text, the last being its end.
+        standard: the language; the tokens are of the same.
+        declared: names of variables that were declared before this text.
+        procedures: names of procedures that were.
+    """
+    tokens, torn = joined(source, tokens, declared)
+    cursor = Tokens(source, tokens, standard, _RULES[standard])
+    cursor.found += torn
+    cursor.declared.update(declared)
+    cursor.procedures.update(procedures)
+    return program(cursor), cursor.found
+
+
+# program = { header } block "." ;
+# block   = "BEGIN" statements "END" ;
+def program(tokens: Tokens) -> tree.Program:
+    """Read a whole program."""
+    start = tokens.now
+    headers = head(tokens)
+    found: list[tree.Statement] = []
+    if not tokens.done:
+        found += _statements(tokens)
+        while not tokens.done and not _ends(tokens):
+            found += _statements(tokens)
+    elif not tokens.silent:
+        begun = tokens.before.key == "BEGIN"
+        at = tokens.gap() if headers or begun else Span(0, 0)
+        text = "the program has no statements" if headers else "there is no program here"
+        text, expected = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
+        tokens.found.say("E115", text, at, f"expected `{expected}`")
+    return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(found), tokens.before.span)
+
+
+def _statements(tokens: Tokens) -> tuple[tree.Statement, ...]:
+    """Read statements up to END, which stays."""
+    found = statements(tokens, "END")
+    if tokens.done:
+        tokens.say_once("E115", "the program has no END", tokens.gap(), "expected `END.` here")
+    return found
+
+
+def _ends(tokens: Tokens) -> bool:
+    """Read END and the point behind it; whether the program is over."""
+    end = tokens.take()
+    gap = tokens.gap()
+    if tokens.accept("."):
+        if not tokens.done:
+            last = tokens.now
+            tokens.found.say("E114", "text after the end of the program", last.span, "the program ended with `END.`")
+            while not tokens.done:
+                tokens.take()
+            return True
+    elif tokens.done or (tokens.sees(";") and tokens.ahead().kind is TokenKind.END):
+        if not tokens.now.damaged:
+            semicolon = tokens.accept(";")
+            tokens.found.say(
+                "E110",
+                "the program does not end with `.`",
+                gap,
+                "expected `.` here",
+                notes=("the last END of an RLO program is written `END.`",),
+                fixes=(Fix(gap.to(semicolon.span) if semicolon else gap, "."),),
+            )
+    else:
+        text, helps = "END closes the program, but more follows", ("leave it out, or write BEGIN before what it ends",)
+        tokens.found.say("E114", text, end.span, "the program would end here", helps=helps)
+        tokens.spare += 1
+        return False
+    return True

@@ -1,0 +1,144 @@
+"""Twelve numbers as a place: whether they are one, and what was probably meant where they are not."""
+
+import math
+from collections.abc import Sequence
+
+import attrs
+
+from armwright.program.language.diagnostic import Diagnostic, Fix, Severity
+from armwright.program.language.units import UnitSystem
+from armwright.program.syntax import tree
+from armwright.spatial.rotations import nearest_rotation
+
+# A rotation typed with six digits passes; one typed with two or three is repaired; worse is a slip.
+EXACT = 1e-6
+REPAIRABLE = 1e-2
+# `orthonormality_error` adds this for a mirror image.
+_MIRROR = 2.0
+
+_ROW_WISE_12 = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
+_COLUMNS_OF_16 = (0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14)
+_ROW_WISE_16 = (0, 4, 8, 1, 5, 9, 2, 6, 10, 3, 7, 11)
+_LENGTHS = {"MM": "millimetres", "CM": "centimetres", "M": "metres", "IN": "inches"}
+
+
+def check(matrix: tree.Matrix, units: UnitSystem | None = None) -> Diagnostic | None:
+    """Return what is wrong with a matrix; None if nothing is, or if its rotation is known only at run time.
+
+    Args:
+        matrix: of numbers and other expressions.
+        units: what the last three count; metres when left out.
+    """
+    values = [item.value for item in matrix.items if isinstance(item, tree.Number)]
+    # A number that was reported before is NaN.
+    if any(math.isnan(value) for value in values):
+        return None
+    found = None
+    if len(matrix.items) != 12:
+        found = _wrong_count(matrix, values)
+    elif all(isinstance(item, tree.Number) for item in matrix.items[:9]):
+        error = rotation_error(tuple(values[:9]))
+        found = _not_exact(matrix, values, error) if error > EXACT else None
+    if found is None or found.code != "E206":
+        return found
+    lengths = _LENGTHS[units.length if units else "M"]
+    note = f"the numbers are the columns n, o, a, p one after the other: n, o, a turn, p shifts, in {lengths}"
+    return attrs.evolve(found, notes=(note, *found.notes))
+
+
+def _not_exact(matrix: tree.Matrix, values: Sequence[float], error: float) -> Diagnostic:
+    if error <= REPAIRABLE:
+        return Diagnostic(
+            code="W206",
+            severity=Severity.WARNING,
+            message="the axes of this matrix are not quite of length 1 and at right angles",
+            span=matrix.span,
+            label=f"off by {error:.1g}; the nearest rotation is taken",
+            helps=("write more digits",),
+        )
+    if len(values) == 12 and is_rotation([values[index] for index in _ROW_WISE_12[:9]]):
+        return _rearranged(matrix, _ROW_WISE_12, "this matrix is written row by row")
+    if _MIRROR <= error <= _MIRROR + REPAIRABLE:
+        return _fault(
+            matrix, "this matrix is a mirror image, not a rotation", "n, o, a are left-handed", "a must be n times o"
+        )
+    return _fault(matrix, "the first nine numbers are not a rotation", _why(values))
+
+
+def constant(matrix: tree.Matrix) -> tuple[float, ...]:
+    """Return the twelve numbers of a checked matrix of numbers, the rotation repaired where that was promised."""
+    values = tuple(item.value for item in matrix.items if isinstance(item, tree.Number))
+    if rotation_error(values[:9]) <= EXACT:
+        return values
+    R = nearest_rotation([values[0:9:3], values[1:9:3], values[2:9:3]])
+    return (*R.T.ravel().tolist(), *values[9:])
+
+
+def rotation_error(nine: tuple[float, ...]) -> float:
+    """Return how far n, o, a are from the columns of a rotation, as ``orthonormality_error`` does of arrays.
+
+    A program has thousands of matrices, one at a time: numbers take a tenth of the time of arrays.
+    """
+    if max(map(abs, nine)) > 2.0:
+        return math.inf
+    n, o, a = nine[0:3], nine[3:6], nine[6:9]
+    lengths = max(abs(_dot(axis, axis) - 1) for axis in (n, o, a))
+    angles = max(abs(_dot(n, o)), abs(_dot(o, a)), abs(_dot(n, a)))
+    normal = (n[1] * o[2] - n[2] * o[1], n[2] * o[0] - n[0] * o[2], n[0] * o[1] - n[1] * o[0])
+    return max(lengths, angles) + (_MIRROR if _dot(normal, a) < 0 else 0.0)
+
+
+def _dot(x: Sequence[float], y: Sequence[float]) -> float:
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+
+
+def is_rotation(nine: Sequence[float]) -> bool:
+    """Whether n, o, a are near enough to a rotation to have been meant as one."""
+    return rotation_error(tuple(nine)) <= REPAIRABLE
+
+
+def _wrong_count(matrix: tree.Matrix, values: list[float]) -> Diagnostic:
+    count = len(matrix.items)
+    if len(values) == count == 16:
+        wholes = {
+            (values[3], values[7], values[11], values[15]): (_COLUMNS_OF_16, "this matrix has its bottom row"),
+            (values[12], values[13], values[14], values[15]): (_ROW_WISE_16, "this matrix is written row by row"),
+        }
+        for row, (order, message) in wholes.items():
+            if row == (0, 0, 0, 1) and is_rotation([values[index] for index in order[:9]]):
+                return _rearranged(matrix, order, message)
+    many = f"{count} number{'s' if count > 1 else ''}"
+    return _fault(matrix, f"a matrix has 12 numbers, not {count}", f"{many} here")
+
+
+def _rearranged(matrix: tree.Matrix, order: Sequence[int], message: str) -> Diagnostic:
+    numbers = [item for item in matrix.items if isinstance(item, tree.Number)]
+    texts = [numbers[index].text for index in order]
+    literal = "(" + ", ".join(",".join(texts[i : i + 3]) for i in range(0, 12, 3)) + ")"
+    whole = len(numbers) == 12
+    return Diagnostic(
+        code="E206",
+        message=message,
+        span=matrix.span,
+        label="n, o, a are no rotation this way" if whole else "16 numbers here",
+        notes=() if whole else ("the bottom row 0 0 0 1 is left out",),
+        helps=(f"write `{literal}`",),
+        fixes=(Fix(matrix.span, literal),),
+    )
+
+
+def _fault(matrix: tree.Matrix, message: str, label: str, help_: str = "") -> Diagnostic:
+    return Diagnostic(code="E206", message=message, span=matrix.span, label=label, helps=(help_,) if help_ else ())
+
+
+def _why(values: Sequence[float]) -> str:
+    """Name the first axis that is not of length 1, or the first two that are not at right angles."""
+    axes = {"n": values[0:3], "o": values[3:6], "a": values[6:9]}
+    for name, axis in axes.items():
+        length = math.hypot(*axis)
+        if abs(length - 1) > REPAIRABLE / 2:
+            return f"{name} has length {length:.4g}, not 1"
+    for first, second in (("n", "o"), ("o", "a"), ("n", "a")):
+        if abs(_dot(axes[first], axes[second])) > REPAIRABLE:
+            return f"{first} and {second} are not at right angles"
+    return "n, o, a are not at right angles"

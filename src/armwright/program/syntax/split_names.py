@@ -1,0 +1,96 @@
+"""Names torn apart by a blank: the report itself prints ``grasp 1`` and ``def 1`` for ``grasp1`` and ``def1``."""
+
+from collections.abc import Collection, Sequence
+
+from armwright.program.language.diagnostic import Diagnostic, Findings, Fix
+from armwright.program.language.source import Source, Span
+from armwright.program.syntax.lexer import Token, TokenKind
+
+_NAME, _KEYWORD, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.NUMBER
+# Behind these words a number may stand.
+_BEFORE_NUMBERS = frozenset(("PAUSE", "STEP", "TO", "PRIORITY", "IF", "WHILE", "UNTIL", "AND", "OR", "NOT", "ON", "AT"))
+# Behind these a name stands that an IMPORT may have brought.
+_BEFORE_NAMES = frozenset(("TO", "FROM", "AFFIX", "UNFIX", "MOVE", "READ", "=", "(", ","))
+_BLANKS = " \t"
+
+
+def joined(
+    source: Source, tokens: Sequence[Token], declared: Collection[str] = ()
+) -> tuple[Sequence[Token], list[Diagnostic]]:
+    """Put names together that a blank has torn apart, and say so.
+
+    A name and a number side by side never make sense, so they are one name where that name is declared. Where names
+    are declared nothing else can be meant at all.
+
+    Args:
+        source: the text.
+        tokens: of the text.
+        declared: names of variables that were declared before this text.
+
+    Returns:
+        The tokens with one in the place of each pair, and what was found.
+    """
+    pairs = [at for at in range(1, len(tokens)) if tokens[at].kind is _NUMBER and _is_pair(source, tokens, at)]
+    if not pairs:
+        return tokens, []
+    inside, names = _declarations(tokens, frozenset(pairs))
+    names |= set(declared)
+    imports = any(token.key == "IMPORT" and token.kind is _KEYWORD for token in tokens)
+    kept: list[Token] = []
+    found = Findings()
+    done = 0
+    for at in pairs:
+        first, number = tokens[at - 1], tokens[at]
+        key, before = f"{first.key}{number.key}", tokens[at - 2].key if at > 1 else ""
+        declared_here = at in inside
+        device = first.kind is _NAME and before == "OPERATE"
+        counts = first.kind is _KEYWORD and first.key in _BEFORE_NUMBERS
+        torn = key in names and first.key not in names and not counts
+        guessed = imports and first.kind is _NAME and first.key not in names and before in _BEFORE_NAMES
+        if not (declared_here or torn or device or guessed):
+            continue
+        text = f"{first.text}{number.text}"
+        kept += [*tokens[done : at - 1], Token(_NAME, text, key, first.start, number.end)]
+        done = at + 1
+        found.append(_torn(source, Span(first.start, number.end), text, certain=declared_here or torn or device))
+    return [*kept, *tokens[done:]], found
+
+
+def _is_pair(source: Source, tokens: Sequence[Token], at: int) -> bool:
+    """Whether a number without sign, point and unit stands behind a word, with nothing but blanks in between."""
+    first, number = tokens[at - 1], tokens[at]
+    if first.kind is not _NAME and first.kind is not _KEYWORD:
+        return False
+    whole = not number.damaged and not first.damaged and number.text.isdigit()
+    return whole and not source.text[first.end : number.start].strip(_BLANKS)
+
+
+def _declarations(tokens: Sequence[Token], pairs: frozenset[int]) -> tuple[set[int], set[str]]:
+    """Return which pairs stand where names are declared, and all names that are declared anywhere in the text."""
+    inside: set[int] = set()
+    names: set[str] = set()
+    declaring = False
+    for at, token in enumerate(tokens):
+        if token.kind is _KEYWORD:
+            # The types and words of a declaration do not end it, and neither do torn words.
+            declaring = token.key in ("VAR", "PROCEDURE") or (
+                declaring and token.key not in ("BEGIN", "IMPORT", "UNITS")
+            )
+        elif declaring and token.key in (",", ":"):
+            if at - 1 in pairs:
+                inside.add(at - 1)
+                names.add(f"{tokens[at - 2].key}{tokens[at - 1].key}")
+            elif tokens[at - 1].kind is _NAME:
+                names.add(tokens[at - 1].key)
+    return inside, names
+
+
+def _torn(source: Source, span: Span, text: str, *, certain: bool) -> Diagnostic:
+    return Diagnostic(
+        code="E106",
+        message=f"`{' '.join(source.slice(span).split())}` is not one name",
+        span=span,
+        label="no blanks in a name",
+        helps=(f"write `{text}`",),
+        fixes=(Fix(span, text),) if certain else (),
+    )

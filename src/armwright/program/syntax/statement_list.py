@@ -1,0 +1,349 @@
+"""Parsing a stretch of statements: what separates them, what ends them, and how to go on after nonsense."""
+
+from collections.abc import Callable
+from typing import NoReturn, TypeVar
+
+from armwright.errors import closest
+from armwright.program.language.diagnostic import Fix, Label
+from armwright.program.language.source import Span
+from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, LATER_STATEMENTS, OPENING
+from armwright.program.syntax import rlo83, tree
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.operands import assign
+from armwright.program.syntax.simple_statements import call
+from armwright.program.syntax.token_stream import DEEPEST, LostError, Tokens, TooDeepError, shown
+
+_Read = TypeVar("_Read")
+_NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.NUMBER
+# What stands behind a name that is given a value.
+ASSIGNING = ("=", ":=", "==")
+# What opens the stretch that a word ends, for one that ends none.
+_OPENED_BY = {
+    "UNTIL": "REPEAT",
+    "COEND": "COBEGIN",
+    "PRIORITY": "COBEGIN",
+    "RECOVER": "TRY",
+    "ELSE": "IF",
+    "THEN": "IF",
+    "DO": "WHILE or FOR",
+}
+
+
+# statements = [ statement ] { ";" [ statement ] } ;
+def statements(tokens: Tokens, *closing: str) -> tuple[tree.Statement, ...]:
+    """Read statements up to one of the ``closing`` words, which stays, or to where it is clearly missing."""
+    found: list[tree.Statement] = []
+    depth, level = tokens.depth, len(tokens.waiting)
+    tokens.waiting.append(closing)
+    while True:
+        while tokens.now.key == ";":
+            tokens.take()
+        if tokens.done or _ends_here(tokens):
+            break
+        if _ends_nothing(tokens):
+            continue
+        at = tokens.at
+        if not level:
+            tokens.deep = -1
+        try:
+            found.append(statement(tokens))
+            _separator(tokens)
+        except TooDeepError:
+            if level:
+                raise
+            _pass_over_all(tokens, at)
+        except LostError:
+            next_statement(tokens)
+        # Where nothing was lost, this is so already.
+        del tokens.waiting[level + 1 :]
+        tokens.depth = depth
+        if tokens.at == at:
+            tokens.take()
+    tokens.waiting.pop()
+    return tuple(found)
+
+
+def _ends_here(tokens: Tokens) -> bool:
+    """Whether the stretch of statements ends with the next token."""
+    token = tokens.now
+    if token.kind is _NAME:
+        return _misspelt_end(tokens)
+    if token.kind is not _KEYWORD:
+        return False
+    if token.key in tokens.words.closing:
+        return token.key == "END" or any(token.key in words for words in tokens.waiting)
+    # A procedure cannot hold another, so its own END is missing.
+    return tokens.in_procedure and token.key in tokens.words.headers and token.key != "VAR"
+
+
+def _ends_nothing(tokens: Tokens) -> bool:
+    """Pass over a word that ends a stretch that nothing has opened."""
+    token = tokens.now
+    if token.kind is not _KEYWORD or token.key not in _OPENED_BY:
+        return False
+    opening = _OPENED_BY[token.key]
+    # A missing COBEGIN leaves many words behind.
+    if opening not in tokens.missed:
+        tokens.say_once("E127", f"`{token.text}` without {opening}", token.span, f"no {opening} is open here")
+    if opening == "COBEGIN":
+        tokens.missed.add(opening)
+    tokens.take()
+    if token.key == "UNTIL" or (token.key == "PRIORITY" and tokens.now.kind is _NUMBER):
+        next_statement(tokens)
+    tokens.hush()
+    return True
+
+
+def _misspelt_end(tokens: Tokens) -> bool:
+    """Whether END or another word that is waited for stands here, misspelt."""
+    token, after = tokens.now, tokens.ahead()
+    if after.key in (*ASSIGNING, "(", "[") or token.key in ABSENT or _is_known(tokens, token):
+        return False
+    if after.key == ".":
+        near = closest(token.text, ("END",))
+    elif tokens.later:
+        near = closest(token.text, (*tokens.waiting[-1], *tokens.words.statements))
+        near = near if near in tokens.waiting[-1] else None
+    else:
+        return False
+    if near:
+        misspelt(tokens, near)
+    return near is not None
+
+
+def misspelt(tokens: Tokens, near: str) -> None:
+    """Say that a word is misspelt, and put the one that was meant in its place."""
+    token = tokens.now
+    helps = (f"did you mean `{near}`?",)
+    tokens.found.say("E105", f"unknown statement `{token.text}`", token.span, "not a statement", helps=helps)
+    tokens.replace(near)
+
+
+def statement(tokens: Tokens) -> tree.Statement:
+    """Read one statement.
+
+    Raises:
+        LostError: there is none.
+    """
+    token = tokens.now
+    if token.kind is _KEYWORD and token.key in tokens.rules:
+        if tokens.later and tokens.ahead().key in ASSIGNING:
+            return _reserved(tokens)
+        tokens.depth += 1
+        tokens.statement_depth = tokens.depth
+        if tokens.depth > DEEPEST:
+            tokens.too_deep()
+        found = tokens.rules[token.key](tokens)
+        tokens.depth -= 1
+        return found
+    after = tokens.ahead()
+    if token.kind is _ARM and after.key in ASSIGNING:
+        return assign(tokens)
+    if token.kind is _NAME:
+        return _named(tokens, after)
+    if not tokens.later and rlo83.starts_statement(tokens):
+        return rlo83.statement(tokens)
+    return _no_statement(tokens)
+
+
+def _named(tokens: Tokens, after: Token) -> tree.Statement:
+    """Read a statement that begins with a name."""
+    token = tokens.now
+    if after.key in ASSIGNING or (tokens.later and after.key == "["):
+        return assign(tokens)
+    if tokens.later and after.key == "(" and tokens.ahead(2).kind is not TokenKind.STRING:
+        return call(tokens)
+    known = token.key in tokens.declared or token.key in tokens.procedures
+    if not tokens.later and token.key in LATER_STATEMENTS and not known:
+        return rlo83.statement(tokens)
+    elsewhere = tokens.later and not known and (token.key in ELSEWHERE or token.key in ABSENT)
+    near = None if elsewhere or (known and tokens.later) else closest(token.text, tokens.words.statements)
+    # In front of a number or a matrix only the sign of equality is missing.
+    number = tokens.ahead(2) if after.key in ("(", "-") else after
+    valued = number.kind is _NUMBER or (number.key == "-" and number is not after)
+    if valued and not elsewhere and not (near and tokens.later):
+        return assign(tokens)
+    if not tokens.later and rlo83.starts_statement(tokens):
+        return rlo83.statement(tokens)
+    if number.kind is TokenKind.STRING and number is not after:
+        near = "PRINT"
+    if near:
+        misspelt(tokens, near)
+    return statement(tokens) if near else _no_statement(tokens)
+
+
+def _reserved(tokens: Tokens) -> tree.Statement:
+    """Read an assignment to a reserved word."""
+    tokens.refuse_reserved()
+    token = tokens.now
+    tokens.replace_by_name()
+    found = assign(tokens)
+    return tree.Assign(found.span, tree.Poison(token.span, frozenset((token.key,))), found.value)
+
+
+def _no_statement(tokens: Tokens) -> tree.Statement:
+    """Say that no statement starts here."""
+    token = tokens.now
+    if token.damaged:
+        raise LostError
+    if token.kind is _NAME:
+        text, label = f"unknown statement `{token.text}`", "not a statement"
+    else:
+        text, label = f"{shown(token)} does not start a statement", "expected a statement"
+    if tokens.later and token.key in tokens.procedures:
+        tokens.take()
+        tokens.insert("()", "behind the name of a procedure")
+        return tree.Call(token.span, tree.Name(token.span, token.text, token.key), ())
+    if _is_known(tokens, token):
+        _value_missing(tokens)
+    helps: tuple[str, ...] = (f"statements begin with {', '.join(tokens.words.statements)}, or with a name and `=`",)
+    if tokens.later and token.key in ELSEWHERE:
+        helps = (f"did you mean `{ELSEWHERE[token.key]}`?",)
+    elif tokens.later and token.key in ABSENT:
+        helps = (ABSENT[token.key],)
+    elif tokens.later:
+        helps = ("statements begin with a word such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`",)
+    notes = ("line numbers count only in a text whose first line has one",) if token.kind is _NUMBER else ()
+    tokens.found.say("E105", text, token.span, label, helps=helps, notes=notes)
+    raise LostError
+
+
+def _value_missing(tokens: Tokens) -> NoReturn:
+    """Say that a variable alone is no statement.
+
+    Raises:
+        LostError: always.
+    """
+    name, sign = tokens.now.text, tokens.ahead().key
+    helps = (f"write `{name} = {name} {sign} ...`",) if sign in ("+", "-", "*", "/") else ()
+    tokens.lost(f"`{name}` needs `=` and a value", "a name alone is no statement", code="E109", helps=helps)
+
+
+def nested(tokens: Tokens, behind: str) -> tree.Statement:
+    """Read the one statement behind a word such as THEN; one that makes no sense is passed over."""
+    token = tokens.now
+    if tokens.done or token.key == ";" or (token.kind is _KEYWORD and token.key in tokens.words.closing):
+        gap = tokens.gap()
+        tokens.say_once("E111", f"expected a statement after {behind}", gap, "expected a statement here")
+        tokens.hush()
+        return tree.Poison(gap)
+    found = salvaged(tokens, statement)
+    return tree.Poison(tokens.since(token)) if found is None else found
+
+
+def salvaged(tokens: Tokens, read: Callable[[Tokens], _Read]) -> _Read | None:
+    """Read something; pass over to the next statement where it makes no sense."""
+    depth, level = tokens.depth, len(tokens.waiting)
+    try:
+        return read(tokens)
+    except TooDeepError:
+        raise
+    except LostError:
+        del tokens.waiting[level:]
+        tokens.depth = depth
+        next_statement(tokens)
+        tokens.hush()
+        return None
+
+
+def close(tokens: Tokens, key: str, opening: Token) -> Span | None:
+    """Read the word that ends what ``opening`` opened; None when it is missing, which is said once for one place."""
+    token = tokens.now
+    if tokens.sees(key):
+        point = tokens.ahead()
+        if key != "END" or point.key != ".":
+            return tokens.take().span
+        if tokens.spare and tokens.ahead(2).kind is TokenKind.END:
+            # An END too many stands further above, and was reported.
+            tokens.spare -= 1
+            return None
+        if tokens.ahead(2).kind is not TokenKind.END:
+            # More follows, so this was not meant to be the last END.
+            tokens.take()
+            tokens.say_once("E114", "`.` ends the program, but more follows", point.span, "write `;`")
+            tokens.take()
+            tokens.hush()
+            return token.span
+    # An END that nothing else waits for was meant to be this word.
+    instead = key not in ("END", "RECOVER") and tokens.sees("END") and tokens.more_ends()
+    tokens.say_once(
+        "E115",
+        f"{opening.text} has no {key}",
+        token.span if instead else tokens.gap(),
+        f"expected `{key}` here",
+        secondary=(Label(opening.span, "opened here"),),
+        fixes=(Fix(token.span, key),) if instead and key == "COEND" else (),
+    )
+    if instead:
+        tokens.take()
+    tokens.hush()
+    return None
+
+
+def _separator(tokens: Tokens) -> None:
+    """Read ``;``; put it in where the next statement begins without one."""
+    token = tokens.now
+    if token.key == ";":
+        tokens.take()
+        return
+    if tokens.done or (token.kind is _KEYWORD and token.key in tokens.words.closing):
+        return
+    if token.kind is _NAME and _misspelt_end(tokens):
+        return
+    if _starts_statement(tokens):
+        gap = tokens.gap()
+        tokens.say_once(
+            "E104",
+            "missing `;` between two statements",
+            gap,
+            "expected `;` here",
+            secondary=(Label(token.span, "a new statement starts here"),),
+            fixes=(Fix(gap, ";"),),
+        )
+        return
+    helps = (ABSENT[token.key],) if tokens.later and token.key in ABSENT else ()
+    tokens.lost(f"{shown(token)} does not belong here", "expected `;`", code="E117", helps=helps)
+
+
+def _starts_statement(tokens: Tokens) -> bool:
+    token, after = tokens.now, tokens.ahead()
+    if token.kind is _KEYWORD:
+        return token.key in (*tokens.words.statements, *tokens.words.headers, "BEGIN")
+    if token.kind is not _NAME and token.kind is not _ARM:
+        return False
+    if after.key in ASSIGNING or not tokens.same_line():
+        return True
+    if after.key in ("(", "[") and tokens.later:
+        return after.key == "[" or token.key in tokens.procedures
+    if not tokens.later and rlo83.starts_statement(tokens):
+        return True
+    wrong = token.kind is _NAME and not _is_known(tokens, token)
+    return wrong and closest(token.text, tokens.words.statements) is not None
+
+
+def _is_known(tokens: Tokens, token: Token) -> bool:
+    """Whether a name has been declared in RLO-2, so that it is no misspelt word."""
+    return tokens.later and (token.key in tokens.declared or token.key in tokens.procedures)
+
+
+def next_statement(tokens: Tokens) -> None:
+    """Pass over tokens up to the next ``;``, word that ends something, or start of a statement."""
+    stops = {";", "BEGIN", *tokens.words.closing, *tokens.words.headers, *tokens.words.statements}
+    while not tokens.done:
+        token = tokens.now
+        if token.key in stops and (token.kind is _KEYWORD or token.key == ";"):
+            return
+        tokens.take()
+
+
+def _pass_over_all(tokens: Tokens, at: int) -> None:
+    """Pass over a statement from its start with all that is in it, at least to where it was too deep."""
+    tokens.back(at)
+    depth = 0
+    while not tokens.done:
+        token = tokens.now
+        last = token.key == "END" and tokens.ahead().key == "."
+        if tokens.at >= tokens.deep and (last or (depth <= 0 and token.key in (";", "END"))):
+            return
+        depth += (token.key in OPENING) - (token.key in CLOSING)
+        tokens.take()

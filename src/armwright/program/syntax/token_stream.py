@@ -1,0 +1,321 @@
+"""The parser's finger on the tokens: looking, taking, and saying what is missing."""
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import accumulate
+from typing import NoReturn, TypeAlias
+
+from armwright.errors import closest
+from armwright.program.language.diagnostic import Findings, Fix, Label
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import VOCABULARIES, Standard, is_later
+from armwright.program.syntax import tree
+from armwright.program.syntax.lexer import Token, TokenKind
+
+# How deep statements, parentheses and operations may lie in one another.
+DEEPEST = 100
+
+_NAME, _KEYWORD, _SYMBOL, _END = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.SYMBOL, TokenKind.END
+
+
+class LostError(Exception):
+    """The parser has said what is wrong and cannot go on here; it looks for the next statement."""
+
+
+class TooDeepError(LostError):
+    """Statements lie too deep in one another; the outermost is passed over."""
+
+
+class Tokens:
+    """The tokens of a program, the place the parser has come to, and what it has found.
+
+    Attributes:
+        source: the text.
+        later: whether the program is in RLO-2.
+        words: those of its language.
+        rules: how to read each statement, by the word that starts it.
+        found: what is wrong.
+        at: how many tokens have been read.
+        now: the token to be read next.
+        before: the token read last; the first one where none has been read.
+        depth: how deep the place lies in statements, parentheses and operations.
+        statement_depth: how deep the statement lies that was begun last.
+        height: how deep the expression is that was read last.
+        waiting: the words that the open statements around the place wait for, the innermost last.
+        deep: where the outermost statement was last found to be too deep; -1 if it was not.
+        late: headers that stand behind BEGIN.
+        declared: the names declared so far.
+        procedures: the names of the procedures read so far.
+        missed: the words whose absence has been reported.
+        in_procedure: whether the place lies in one.
+        spare: how many ENDs have been reported that close nothing but the program.
+    """
+
+    def __init__(
+        self, source: Source, tokens: Sequence[Token], standard: Standard, rules: "Mapping[str, Rule]"
+    ) -> None:
+        """Start at the first token; the last must be the end of the text."""
+        self.source = source
+        self.later = standard is Standard.RLO_2
+        self.words = VOCABULARIES[standard]
+        self.rules = rules
+        self.found = Findings()
+        self.at = 0
+        self._tokens = list(tokens)
+        self._last = len(tokens) - 1
+        self.now = self.before = self._tokens[0]
+        self.depth = self.statement_depth = self.height = 0
+        self.waiting: list[tuple[str, ...]] = []
+        self.deep = -1
+        self.late: list[tree.Header] = []
+        self.declared: set[str] = set()
+        self.procedures: set[str] = set()
+        self.missed: set[str] = set()
+        self.in_procedure = False
+        self.spare = 0
+        self._refused: set[str] = set()
+        self._silent = -1
+        self._next_begin = -1
+        self._to_close: list[int] | None = None
+
+    # ---- looking and taking
+
+    def ahead(self, steps: int = 1) -> Token:
+        """Return a token further on or, with less than no steps, back; behind the end it is always the end."""
+        at = self.at + steps
+        return self._tokens[at] if at < self._last else self._tokens[-1]
+
+    @property
+    def done(self) -> bool:
+        """Whether everything has been read."""
+        return self.now.kind is _END
+
+    def take(self) -> Token:
+        """Read one token; the end stays."""
+        token = self.now
+        if self.at < self._last:
+            self.at += 1
+            self.before = token
+            self.now = self._tokens[self.at]
+        return token
+
+    def back(self, at: int) -> None:
+        """Return to where ``at`` tokens had been read."""
+        self.at = at
+        self.now = self._tokens[at]
+        self.before = self._tokens[max(0, at - 1)]
+
+    def back_to(self, offset: int) -> None:
+        """Return to the token that begins at a character."""
+        while self.now.start > offset:
+            self.back(self.at - 1)
+
+    def sees(self, *keys: str) -> bool:
+        """Whether the next token is one of these keywords or symbols."""
+        token = self.now
+        return token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD)
+
+    def sees_word(self, *keys: str) -> bool:
+        """Whether the next token is a name that reads so: a word with a meaning in this place only."""
+        return self.now.kind is _NAME and self.now.key in keys
+
+    def accept(self, *keys: str) -> Token | None:
+        """Read the next token if it is one of these keywords or symbols."""
+        token = self.now
+        if token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD):
+            return self.take()
+        return None
+
+    def accept_word(self, *keys: str) -> Token | None:
+        """Read the next token if it is a name that reads so."""
+        return self.take() if self.sees_word(*keys) else None
+
+    def replace(self, key: str) -> None:
+        """Put the keyword that was meant in the place of the next token, which has been reported."""
+        token = self.now
+        self.now = Token(_KEYWORD, token.text, key, token.start, token.end, damaged=True)
+        self._tokens[self.at] = self.now
+
+    def replace_by_name(self) -> None:
+        """Take the next token, which has been reported, for a name."""
+        token = self.now
+        self.now = Token(_NAME, token.text, token.key, token.start, token.end, damaged=True)
+        self._tokens[self.at] = self.now
+
+    def begin(self) -> int:
+        """Return where the next BEGIN stands; -1 if there is none."""
+        if self._next_begin < self.at:
+            rest = range(max(self.at, self._next_begin), self._last)
+            here = (at for at in rest if self._tokens[at].key == "BEGIN")
+            self._next_begin = next(here, self._last)
+        return self._next_begin if self._next_begin < self._last else -1
+
+    def more_ends(self) -> bool:
+        """Whether more ENDs follow than the statements around this place and those further on wait for."""
+        if self._to_close is None:
+            steps = [(token.key == "END") - (token.key in ("BEGIN", "TRY")) for token in reversed(self._tokens)]
+            self._to_close = list(accumulate(steps))[::-1]
+        waiting = sum("END" in words or "RECOVER" in words for words in self.waiting)
+        return self._to_close[self.at] > waiting
+
+    # ---- places
+
+    def gap(self) -> Span:
+        """Return the place right behind the token read last, where a missing thing belongs."""
+        end = self.before.end if self.at else self.now.start
+        return Span(end, end)
+
+    def since(self, start: Token | Span) -> Span:
+        """Return the stretch from ``start`` to the token read last."""
+        first, end = start.start, self.before.end
+        return Span(first, max(first, end))
+
+    def same_line(self) -> bool:
+        """Whether the next token stands in the line of the one read last."""
+        return self.source.line(self.before.start) == self.source.line(self.now.start)
+
+    # ---- depth
+
+    def enter(self) -> None:
+        """Go one step deeper.
+
+        Raises:
+            LostError: it would be too deep.
+        """
+        self.depth += 1
+        if self.depth > DEEPEST:
+            self.too_deep()
+
+    def too_deep(self) -> NoReturn:
+        """Say that the nesting is too deep.
+
+        Raises:
+            LostError: always; where most of the depth is that of statements, all of them are to be given up.
+        """
+        statement = self.statement_depth > DEEPEST // 2
+        what = "statements" if statement else "parentheses and operations"
+        if self.deep < 0:
+            self.say_once(
+                "E119",
+                f"{what} lie too deep in one another here",
+                self.now.span,
+                f"more than {DEEPEST} deep",
+                helps=("give a part of it to a procedure",) if statement else ("split the expression",),
+            )
+        self.deep = self.at
+        raise TooDeepError if statement else LostError
+
+    # ---- saying what is wrong
+
+    @property
+    def silent(self) -> bool:
+        """Whether something has been said about this place already."""
+        broken_text = self.before.damaged and self.before.kind is TokenKind.STRING
+        return self.now.damaged or self._silent == self.at or broken_text
+
+    def hush(self) -> None:
+        """Take this place for one about which something has been said."""
+        self._silent = self.at
+
+    def say_once(
+        self,
+        code: str,
+        message: str,
+        span: Span,
+        label: str,
+        *,
+        secondary: tuple[Label, ...] = (),
+        notes: tuple[str, ...] = (),
+        helps: tuple[str, ...] = (),
+        fixes: tuple[Fix, ...] = (),
+    ) -> None:
+        """Add an error, unless something has been said about this place; the arguments are those of ``Diagnostic``."""
+        if not self.silent:
+            self.found.say(code, message, span, label, secondary=secondary, notes=notes, helps=helps, fixes=fixes)
+        self._silent = self.at
+
+    def lost(self, message: str, label: str, *, code: str = "E111", helps: tuple[str, ...] = ()) -> NoReturn:
+        """Say what is missing at the next token, unless that was reported before, and give up the statement.
+
+        Raises:
+            LostError: always.
+        """
+        # At the end of the text there is nothing to mark; the gap before it is the place.
+        span = self.gap() if self.done else self.now.span
+        self.say_once(code, message, span, label, helps=helps)
+        raise LostError
+
+    def insert(
+        self, key: str, what: str, *, code: str = "E112", helps: tuple[str, ...] = (), alone: bool = True
+    ) -> None:
+        """Say that ``key`` is missing behind the token read last, and go on as if it had been there.
+
+        Args:
+            key: what is missing.
+            what: the place in words.
+            code: of the diagnostic.
+            helps: of the diagnostic.
+            alone: whether nothing else is missing, so that putting it in is a cure.
+        """
+        gap = self.gap()
+        # A word needs blanks around it; a sign goes where it is missing.
+        fixes = (Fix(gap, f" {key}" if key[0].isalpha() else key),) if alone else ()
+        self.say_once(code, f"missing `{key}` {what}", gap, f"expected `{key}` here", helps=helps, fixes=fixes)
+
+    def expect(self, key: str, where: str, *, statement: bool = False) -> None:
+        """Read ``key``; or say that it is missing, and go on as if it had been there.
+
+        Args:
+            key: a keyword or symbol.
+            where: the place in words, such as ``after the name``.
+            statement: whether statements follow.
+
+        Raises:
+            LostError: nothing that could stand behind ``key`` follows either.
+        """
+        if self.accept(key):
+            return
+        if self._misspelt(key):
+            self.found.say(
+                "E112", f"expected `{key}` {where}", self.now.span, f"expected `{key}`", helps=(f"write `{key}`",)
+            )
+            self.take()
+            return
+        closing = key in (")", "]")
+        ends = not closing and not statement and (self.done or self.sees(";", "END", *self.words.statements))
+        # What a word stands in front of begins with no sign but a parenthesis.
+        alone = not key[0].isalpha() or not (ends or (self.now.kind is _SYMBOL and self.now.key != "("))
+        self.insert(key, where, helps=(f"insert `{key}` after `{self.before.text}`",), alone=alone)
+        if ends:
+            raise LostError
+
+    def _misspelt(self, key: str) -> bool:
+        """Whether a name stands where a keyword should: one like it, or any with another name or arm behind it."""
+        token, after = self.now, self.ahead()
+        if token.kind is not _NAME or not key[0].isalpha() or after.key in ("=", ":=", "(", "["):
+            return False
+        if self.later and closest(token.text, (key,)):
+            return True
+        return after.kind in (_NAME, TokenKind.ARM) and self.same_line()
+
+    def refuse_reserved(self) -> None:
+        """Say once of the word that stands here that it cannot be a name."""
+        token = self.now
+        if token.key in self._refused:
+            return
+        self._refused.add(token.key)
+        helps: tuple[str, ...] = ()
+        # Only what looks alike: T0 for TO.
+        if near := closest(token.text, self.declared, limit=0):
+            helps = (f"did you mean `{near}`?",)
+        elif self.later and is_later(token.key):
+            helps = (f"take another name; a program of RLO-83 that uses `{token.text}` is translated with `--std=83`",)
+        text = f"`{token.text}` is a reserved word and cannot be a name"
+        self.found.say("E107", text, token.span, "a word of the language", helps=helps)
+
+
+Rule: TypeAlias = Callable[[Tokens], tree.Statement]
+
+
+def shown(token: Token) -> str:
+    """Return how a token is called in a message."""
+    return "the end of the text" if token.kind is TokenKind.END else f"`{token.text}`"

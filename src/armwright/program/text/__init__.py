@@ -1,1 +1,0 @@
-"""The text of a program: characters, places in them, line numbers, words, tokens, colours."""

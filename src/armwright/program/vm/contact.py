@@ -1,0 +1,217 @@
+"""Arms that are stopped on their way: within their limits, along their paths, and what they press on meanwhile."""
+
+import math
+from collections.abc import Sequence
+from typing import NoReturn
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.hardware import Press
+from armwright.cell.model import base_name
+from armwright.kinematics.forward import forward
+from armwright.motion.braking import brake
+from armwright.motion.plan import hand_length
+from armwright.motion.trajectory import Trajectory, hold, join
+from armwright.program.language.source import Span
+from armwright.program.vm.machine import Machine
+from armwright.program.vm.process import Motion, Process
+from armwright.program.vm.recording import Push, Run, efforts, peaks_of
+
+# A duration so little too short is rounding.
+_ROUNDING = 1e-9
+# A speed that is advised leaves this part of the depth in hand.
+_IN_HAND = 0.8
+_SLOWEST = 1.0
+
+
+def stop(run: Machine, process: Process, span: Span) -> int:
+    """Stop the arm of a process in a controlled way; return when it is at rest [ticks].
+
+    The frame table holds the place where it comes to rest from now on. An arm that is being stopped already is left to
+    it.
+    """
+    motion, period = process.motion, run.cell.period
+    assert motion is not None  # noqa: S101 - asked for only then
+    if motion.rest is None:
+        note_contact(run, motion)
+        runs = run.runs[motion.arm]
+        local = run.now - runs[-1].t0 if runs else 0.0
+        motion.rest = run.ticks
+        if runs and local < runs[-1].duration - _ROUNDING:
+            motion.rest += _stop_on_the_way(run, motion, local)
+        else:
+            _begin(run, motion, hold(run.hardware.posture(motion.arm, run.now), period))
+    end = max(motion.rest, run.ticks)
+    run.set_hand(motion.arm, span, at=end)
+    return end
+
+
+def _stop_on_the_way(run: Machine, motion: Motion, local: float) -> int:
+    """Stop an arm in the middle of its stage; return how many ticks it takes."""
+    arm, runs, period = run.cell.arms[motion.arm].arm, run.runs[motion.arm], run.cell.period
+    last = runs[-1]
+    braking = brake(last.trajectory, local, arm.limit("acceleration"), period=period)
+    tau = efforts(arm, braking, period, _begin(run, motion, braking))
+    runs[-1] = attrs.evolve(last, duration=local)
+    runs.append(Run(t0=run.now, trajectory=braking, duration=braking.duration, tau=tau))
+    if motion.record >= 0:
+        done = join([last.trajectory.until(local), braking])
+        before = [] if last.tau is None else [last.tau[: round(local / period)]]
+        peak, when = peaks_of(np.concatenate([*before, tau]), period)
+        run.stages[motion.record] = attrs.evolve(
+            run.stages[motion.record],
+            motion=done,
+            length=hand_length(arm, done),
+            peak_effort=peak,
+            peak_time=when,
+            stopped=True,
+        )
+    return math.ceil(braking.duration / period - _ROUNDING)
+
+
+def _begin(run: Machine, motion: Motion, trajectory: Trajectory) -> Push:
+    push = send(run, motion, trajectory)
+    look_out(run, motion)
+    return push
+
+
+def send(run: Machine, motion: Motion, trajectory: Trajectory) -> Push:
+    """Let the arm of a motion follow a trajectory in place of what it does now; return what will push on its hand."""
+    run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
+    return _pushed(run, motion.arm)
+
+
+def _pushed(run: Machine, arm: str) -> Push:
+    """Look at what pushes on the hand of an arm from now on, and remember it."""
+    push = Push(run.now, run.hardware.wrenches(arm, run.now))
+    run.pushes[arm].append(push)
+    return push
+
+
+def pushed_otherwise(run: Machine, arm: str, records: Sequence[int]) -> None:
+    """Work out anew what the motors of an arm give from now on: what it pressed with may have been let go.
+
+    Args:
+        run: the program.
+        arm: its name.
+        records: numbers of the stages that it is on.
+    """
+    if not any(push.wrenches.any() for push in run.pushes[arm]):
+        return
+    push, period, last = _pushed(run, arm), run.cell.period, run.runs[arm][-1]
+    done = round((run.now - last.t0) / period)
+    if last.tau is None or done >= len(last.tau):
+        return
+    later = Push(last.t0, np.concatenate([np.zeros((done, 6)), push.wrenches]))
+    tau = efforts(run.cell.arms[arm].arm, last.trajectory, period, later, len(last.tau) - 1)
+    tau[:done] = last.tau[:done]
+    run.runs[arm][-1] = attrs.evolve(last, tau=tau)
+    peak, when = peaks_of(tau, period)
+    for record in records:
+        run.stages[record] = attrs.evolve(run.stages[record], peak_effort=peak, peak_time=when)
+
+
+# ---- contact -------------------------------------------------------------------------------------------------------
+
+
+def look_out(run: Machine, motion: Motion) -> None:
+    """See when an arm presses too deep by what it has begun to do, if it ever does."""
+    deep = run.hardware.too_deep_at(motion.arm)
+    motion.alarm = None if deep is None else max(run.ticks, math.ceil(deep / run.cell.period - _ROUNDING))
+
+
+def note_contact(run: Machine, motion: Motion, at: int | None = None) -> None:
+    """Remember how hard an arm has pressed by now, or by a later tick, before it begins something else."""
+    pressed = run.hardware.pressed(motion.arm, run.now if at is None else at * run.cell.period)
+    if pressed.depth > motion.pressed.depth:
+        motion.pressed = pressed
+
+
+def contact_of(motion: Motion) -> tuple[str, dict[str, object]]:
+    """Return what the trace says of the contact of a motion, and its facts [m] and [N]; nothing without one."""
+    depth, force = motion.pressed
+    if depth <= 0:
+        return "", {}
+    return f"; pressed {_deep(motion.pressed)}", {"contact": {"depth": depth, "force": force}}
+
+
+def _deep(pressed: Press) -> str:
+    return f"{pressed.depth * 1e3:.3g} mm deep, {pressed.force:.3g} N"
+
+
+def too_deep(run: Machine, process: Process, motion: Motion) -> NoReturn:
+    """Stop an arm that presses deeper than the cell allows, and say so.
+
+    Raises:
+        RunError: always.
+    """
+    motion.alarm = None
+    end = stop(run, process, motion.span)
+    note_contact(run, motion, end)
+    # On its way to rest it may come deeper; that is said now.
+    motion.alarm = None
+    allowed = run.cell.contact_deepest
+    least = _least_depth(run, motion)
+    notes = [f"the arm is stopped within its limits, and has pressed {_deep(motion.pressed)} then"]
+    helps = ["stop sooner: at a smaller force, or at a lower speed"]
+    if least is not None and least > allowed:
+        notes.append(
+            f"at this speed that cannot be avoided: stopped from the first contact on, it presses {least * 1e3:.3g} mm "
+            "deep"
+        )
+        helps = _slower(motion, allowed / least)
+    elif least is not None:
+        notes.append(f"stopped from the first contact on, it would press {least * 1e3:.3g} mm deep")
+    run.fail(
+        process,
+        "E404",
+        f"`{run.spelled(motion.moved)}` presses into the plane{_height(run)} deeper than {allowed * 1e3:g} mm",
+        motion.span,
+        "this MOVE is stopped there",
+        notes=notes,
+        helps=helps,
+    )
+
+
+def _slower(motion: Motion, share: float) -> list[str]:
+    """Advise a speed for a depth that is this share of the least there is: the depth grows with its square."""
+    speed = math.floor(motion.speed * math.sqrt(_IN_HAND * share))
+    if speed < _SLOWEST:
+        return ["end this MOVE above the plane"]
+    return [f"come down more slowly: `WITH SPEED = {speed}`"]
+
+
+def _least_depth(run: Machine, motion: Motion) -> float | None:
+    """Return how deep a stop from the first servo tick in contact on presses [m]; None where nothing came down."""
+    if motion.touch is None or run.cell.contact_height is None:
+        return None
+    trajectory, local = motion.touch
+    place, period = run.cell.arms[motion.arm], run.cell.period
+    tick = min(math.ceil(local / period - _ROUNDING) * period, trajectory.duration)
+    braking = brake(trajectory, tick, place.arm.limit("acceleration"), period=period)
+    q: Array = braking(np.arange(round(braking.duration / period) + 1) * period)
+    X_WT = run.tree.world(base_name(motion.arm)) @ forward(place.arm, q) @ motion.tip
+    return run.cell.contact_height - float(X_WT[:, 2, 3].min())
+
+
+def comes_down(run: Machine, process: Process, motion: Motion, to: str) -> NoReturn:
+    """Refuse a stage that would come down on the plane, or press too deep into it, where no ON looks out for that.
+
+    Raises:
+        RunError: always.
+    """
+    run.fail(
+        process,
+        "E404",
+        f"`{run.spelled(motion.moved)}` comes down on the plane{_height(run)} on its way to `{to}`",
+        motion.span,
+        "this MOVE is stopped there, and no ON of this MOVE looks out for it",
+        helps=["look out for the contact: `ON FORCE(Z) > 10 DO HALT`"],
+    )
+
+
+def _height(run: Machine) -> str:
+    plane = run.cell.contact_height
+    return "" if plane is None else f" at z = {plane * 1e3:g} mm"

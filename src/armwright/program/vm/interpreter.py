@@ -1,0 +1,207 @@
+"""The interpreter: intermediate code acts on the frame tree and on a cell, and leaves a recording.
+
+All processes of a program share one clock. Of those that are due at the same tick the one with the highest priority is
+served first, then the one that comes first in the text; so a run is the same on any machine.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.cell.hardware import Hardware
+from armwright.cell.model import Cell
+from armwright.program.bytecode.instructions import Code
+from armwright.program.language.diagnostic import Diagnostic, Severity
+from armwright.program.vm.contact import too_deep
+from armwright.program.vm.control_flow import HANDLERS, recover, rest, words_of
+from armwright.program.vm.machine import Limits, Machine, RunError
+from armwright.program.vm.move import go_on
+from armwright.program.vm.move_diagnostics import detour_warning, stops_warning
+from armwright.program.vm.process import Process
+from armwright.program.vm.recording import Effect, Failure, Recording, RunStage, in_order
+from armwright.program.vm.synchronization import deadlock
+
+# No TRY helps a program that runs for ever: what is tried again would run for ever again.
+_FINAL = ("E504", "E506")
+# A time this part of a period before a tick is on it.
+_ON_A_TICK = 1e-6
+
+# Called now and then: the time on the clock [s], the line of the next statement.
+Progress = Callable[[float, int], None]
+
+__all__ = ["Limits", "Machine", "Progress", "RunError", "advance", "due", "interpret", "ready", "run", "warnings"]
+
+
+def interpret(
+    code: Code, cell: Cell, hardware: Hardware, progress: Progress | None = None, *, limits: Limits | None = None
+) -> Recording:
+    """Run a program in a cell.
+
+    Args:
+        code: translated without errors against this cell.
+        cell: arms, frames, servo period and deviation.
+        hardware: the cell at work, simulated or real.
+        progress: told before each statement.
+        limits: when a program is taken to run for ever.
+
+    Returns:
+        All that happened, tick by tick.
+
+    Raises:
+        RunError: a goal is out of reach, a joint would pass its limits, the camera found nothing, a device is
+            missing, a value is missing or out of range, processes wait for one another, or a limit of the run is
+            passed, and no TRY was around it. The arms are at rest and the devices off then, as at the end.
+    """
+    machine = Machine(code, cell, hardware, limits)
+    run(machine, progress)
+    return machine.recording()
+
+
+def run(machine: Machine, progress: Progress | None = None) -> None:
+    """Run a program on to its end.
+
+    Raises:
+        RunError: as ``interpret`` does.
+    """
+    instructions = machine.code.instructions
+    while not machine.over:
+        process = due(machine)
+        if progress and instructions[process.at].begins:
+            progress(machine.now, machine.code.line(instructions[process.at]))
+        advance(machine, process)
+
+
+def due(machine: Machine) -> Process:
+    """Return the process that is served next.
+
+    Raises:
+        RunError: all wait for one another.
+    """
+    process = ready(machine)
+    if process is None:
+        raise _stopped(machine, deadlock(machine), machine.program, None)
+    return process
+
+
+def ready(machine: Machine) -> Process | None:
+    """Return the process that is served next; None where all wait for one another."""
+    best = None
+    for process in machine.processes:
+        if (due := process.due) is not None:
+            rank = (due, -process.priority, process.path)
+            if best is None or rank < best[0]:
+                best = (rank, process)
+    return None if best is None else best[1]
+
+
+def advance(machine: Machine, process: Process) -> None:
+    """Let a process do its next instruction, or what its time has come for.
+
+    Raises:
+        RunError: something went wrong that no TRY is around.
+    """
+    try:
+        _advance(machine, process)
+    except RunError as error:
+        if error.diagnostic.code in _FINAL or not recover(machine, process, error):
+            raise _stopped(machine, error, process, process.last_arm) from None
+
+
+def _advance(machine: Machine, process: Process) -> None:
+    if process.due is not None and process.due > machine.ticks:
+        last = machine.limits.time / machine.cell.period + _ON_A_TICK
+        machine.ticks, machine.idle = process.due, 0
+        if machine.ticks > last:
+            # The clock stops there, and arms that are on their way have come as far as that.
+            machine.ticks = max(0, math.floor(last))
+            under_way = process.pending or process.motion or machine.code.instructions[process.at]
+            text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
+            machine.fail(process, "E506", text, under_way.span, "it has come to here")
+    if process.motion is not None and process.motion.alarm is not None and process.motion.alarm <= machine.ticks:
+        too_deep(machine, process, process.motion)
+    if (pending := process.pending) is not None:
+        process.pending = None
+        if pending.place is not None:
+            machine.place(process, *pending.place, pending.span)
+        machine.effect(
+            process,
+            pending.kind,
+            pending.text,
+            pending.span,
+            since=pending.since,
+            arm=pending.arm,
+            data=pending.data,
+        )
+        return
+    if process.follows is not None:
+        go_on(machine, process)
+        return
+    step = machine.code.instructions[process.at]
+    machine.idle += 1
+    if machine.idle > machine.limits.steps:
+        text = f"the program has done {machine.limits.steps} steps and no time has gone by"
+        help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
+        machine.fail(process, "E504", text, step.span, "it is still running here", helps=[help_])
+    process.at += 1
+    HANDLERS[step.op](machine, process, step)
+
+
+def _stopped(machine: Machine, error: RunError, process: Process, arm: str | None) -> RunError:
+    """Return the error with the frames as they are when all arms are at rest and all devices off."""
+    off = rest(machine, error.diagnostic.span)
+    failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm, process=process.title)
+    return RunError(error.diagnostic, machine.tree, machine.now, lambda: _failed(machine, failure, off))
+
+
+def _failed(machine: Machine, failure: Failure, off: Sequence[str]) -> Recording:
+    """Return all that happened up to a failure, and as the last thing the failure, with the devices it switched off."""
+    found, recording = failure.diagnostic, machine.recording()
+    text = f"{found.code} in line {machine.code.source.line(found.span.start)}: {found.message}{words_of(machine, off)}"
+    data = {"code": found.code, "failed_at": failure.time, "switched_off": list(off)}
+    end = Effect(
+        t0=failure.time,
+        t1=machine.now,
+        kind="ERROR",
+        span=found.span,
+        text=text,
+        process=failure.process,
+        order=machine.starts().order,
+        arm=failure.arm,
+        data=data,
+    )
+    return attrs.evolve(recording, effects=in_order((*recording.effects, end)), failure=failure)
+
+
+def warnings(recording: Recording) -> tuple[Diagnostic, ...]:
+    """Return the warnings about a run.
+
+    For every straight line that was gone round, every VIA with stops because corners cannot be rounded, and every
+    joint asked for too much effort.
+    """
+    found = []
+    for stage in recording.stages:
+        found += [warning for warning in (detour_warning(stage), stops_warning(stage)) if warning is not None]
+        arm = recording.cell.arms[stage.arm].arm
+        over = stage.peak_effort / arm.limit("effort")
+        if (over <= 1).all():
+            continue
+        found += [_effort_warning(stage, arm, joint) for joint in np.flatnonzero(over > 1).tolist()]
+    return tuple(found)
+
+
+def _effort_warning(stage: RunStage, arm: Arm, joint: int) -> Diagnostic:
+    needed = float(stage.peak_effort[joint])
+    unit = "N m" if arm.joints[joint].revolute else "N"
+    limit = arm.joints[joint].limits.effort
+    return Diagnostic(
+        code="W401",
+        severity=Severity.WARNING,
+        message=f"{arm.called(joint)} of {stage.arm} would need {needed:.1f} {unit}, "
+        f"{(needed / limit - 1) * 100:.0f} % more than its {limit:g} {unit}",
+        span=stage.span,
+        label=f"at {stage.t0 + stage.peak_time[joint]:.3f} s, in {stage.stage.kind} to {stage.to[-1]}",
+        helps=(f"a lower speed than {stage.speed:g} asks for less where it is motion and not weight that costs",),
+    )

@@ -1,0 +1,394 @@
+"""The state of a running program: clock, frames, values, processes, and what it has left so far."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.frames import WORLD, FrameTree
+from armwright.cell.hardware import Hardware
+from armwright.cell.model import Cell, base_name
+from armwright.errors import ArmwrightError
+from armwright.kinematics.forward import forward
+from armwright.program.bytecode.instructions import Code, Instruction, Kind, Operand, Type
+from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.diagnostic import Diagnostic, Label
+from armwright.program.language.source import Span
+from armwright.program.vm.process import Activation, Element, Pending, Process, Start, Value
+from armwright.program.vm.recording import (
+    Effect,
+    EffectKind,
+    Push,
+    Recording,
+    Run,
+    RunStage,
+    in_order,
+    stream,
+    thinned,
+)
+from armwright.program.vm.value_text import shown
+from armwright.spatial.poses import from_noap, to_noap
+
+# A time this part of a period behind a tick is on it.
+_ON_A_TICK = 1e-9
+# Frame trees that are kept; a page shows fewer.
+_MOST_TREES = 2000
+
+
+class RunError(ArmwrightError, RuntimeError):
+    """A program could not go on.
+
+    Attributes:
+        diagnostic: what happened, where.
+        tree: the frame tree at that moment.
+        time: of the cell's clock [s].
+        recording: returns all that happened up to it; None before the arms are at rest.
+    """
+
+    def __init__(
+        self,
+        diagnostic: Diagnostic,
+        tree: FrameTree,
+        time: float,
+        recording: Callable[[], Recording] | None = None,
+    ) -> None:
+        """Keep the circumstances; the text is the diagnostic's message."""
+        self.diagnostic, self.tree, self.time, self.recording = diagnostic, tree, time, recording
+        super().__init__(diagnostic.message)
+
+
+@attrs.frozen(kw_only=True)
+class Limits:
+    """When a program is taken to run for ever.
+
+    Attributes:
+        steps: instructions without any time going by; a MOVE counts as many of them, because it is planned.
+        depth: procedures inside procedures.
+        processes: processes side by side, and COBEGINs inside COBEGINs a tenth of that.
+        time: on the clock of the cell [s].
+    """
+
+    steps: int = 1_000_000
+    depth: int = 1000
+    processes: int = 1000
+    time: float = 3600.0
+
+
+@attrs.define
+class Hand:
+    """The fingers of an arm: at which frame the hand arrived last, and what they closed on."""
+
+    at: str | None = None
+    holds: str | None = None
+
+    def forget(self, name: str) -> None:
+        """Know nothing any more of a frame that there is no more."""
+        self.at = None if self.at == name else self.at
+        self.holds = None if self.holds == name else self.holds
+
+
+class Machine:
+    """A program on its way in a cell."""
+
+    def __init__(self, code: Code, cell: Cell, hardware: Hardware, limits: Limits | None = None) -> None:
+        """Stand in front of the first instruction."""
+        self.code, self.cell, self.hardware = code, cell, hardware
+        self.limits = limits or Limits()
+        self.types: dict[str, Type] = dict(code.types)
+        self.tree = cell.tree()
+        for name, kind in code.types.items():
+            if kind == Type(Kind.FRAME):
+                self.tree = self.tree.declare(name)
+        self.constants = [from_noap(value) if isinstance(value, tuple) else float(value) for value in code.constants]
+        self.values: dict[str, float | Array] = {}
+        self.events: dict[str, int] = {}
+        self.locks: dict[str, Process] = {}
+        self.owners: dict[str, list[Process]] = {}
+        self.hands: dict[str, Hand] = {name: Hand() for name in cell.arms}
+        self.ticks, self.idle, self.activations, self.begun = 0, 0, 0, 0
+        self.over = False
+        self.written: dict[str, Span] = {}  # where each frame last got its place or its parent
+        self.effects: list[Effect] = []
+        self.stages: list[RunStage] = []
+        self.runs: dict[str, list[Run]] = {name: [] for name in cell.arms}
+        self.pushes: dict[str, list[Push]] = {name: [] for name in cell.arms}
+        self.trees = [(0.0, self.tree)]
+        self.program = Process(path=(), priority=0.0, at=0, wake=0, stack=[Activation(kind="main")])
+        self.processes = [self.program]
+
+    @property
+    def now(self) -> float:
+        """The time [s]."""
+        return self.ticks * self.cell.period
+
+    def recording(self) -> Recording:
+        """Return all that happened so far."""
+        cell = self.cell
+        return Recording(
+            cell=cell,
+            duration=self.now,
+            effects=in_order(self.effects),
+            stages=tuple(self.stages),
+            streams=tuple(
+                stream(name, place, self.runs[name], self.pushes[name], duration=self.now, period=cell.period)
+                for name, place in cell.arms.items()
+            ),
+            trees=tuple(self.trees),
+            postures={name: self.hardware.posture(name, self.now) for name in cell.arms},
+        )
+
+    # ---- names and values ------------------------------------------------------------------------------------------
+
+    def name(self, process: Process, operand: Operand) -> str:
+        """Return what an operand names: where a variable or element is kept, an arm, a device."""
+        assert isinstance(operand, str)  # noqa: S101 - the translator names what is written
+        if operand.startswith("%"):
+            element = process.now.passing[operand]
+            assert isinstance(element, Element)  # noqa: S101 - only elements are written in passing
+            return element.name
+        return process.now.bindings.get(operand, operand)
+
+    def names_variable(self, process: Process, operand: Operand) -> bool:
+        """Whether an operand stands for something that can be written."""
+        if not isinstance(operand, str):
+            return False
+        return not operand.startswith("%") or isinstance(process.now.passing[operand], Element)
+
+    def type_of(self, name: str) -> Type:
+        """Return what a kept name holds; of an element, what the element holds."""
+        base, bracket, _ = name.partition("[")
+        if is_arm(name) or base not in self.types:
+            return Type(Kind.FRAME)
+        return Type(self.types[base].kind) if bracket else self.types[base]
+
+    def read(self, process: Process, operand: Operand, step: Instruction) -> Value:
+        """Return the value of an operand.
+
+        Raises:
+            RunError: a variable has no value yet.
+        """
+        if not isinstance(operand, str):
+            assert isinstance(operand, float | int)  # noqa: S101 - nothing else has a value
+            return float(operand)
+        if operand.startswith("%"):
+            value = process.now.passing[operand]
+            return self.held(value.name, step, process) if isinstance(value, Element) else value
+        return self.held(process.now.bindings.get(operand, operand), step, process)
+
+    def held(self, name: str, step: Instruction, process: Process) -> Value:
+        """Return what a kept name holds."""
+        if self.type_of(name).kind is Kind.FRAME:
+            self.look(process, name)
+            if not self.has_place(name):
+                text = f"frame `{self.spelled(name)}` is used before it has a value"
+                self.fail(process, "E304", text, step.span, "no value here")
+            return self.tree.world(name)
+        if (value := self.values.get(name)) is None:
+            text = f"`{self.spelled(name)}` is used before it has a value"
+            self.fail(process, "E303", text, step.span, "no value here")
+        return value
+
+    def number(self, process: Process, operand: Operand, step: Instruction) -> float:
+        """Return the value of an operand that is a number."""
+        value = self.read(process, operand, step)
+        assert isinstance(value, float | int)  # noqa: S101 - the checker knows the kinds
+        return float(value)
+
+    def pose(self, process: Process, operand: Operand, step: Instruction) -> Array:
+        """Return the value of an operand that is a place or a step."""
+        value = self.read(process, operand, step)
+        assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
+        return value
+
+    def write(self, process: Process, operand: Operand, value: Value, step: Instruction) -> None:
+        """Give a variable, an element or a value in passing its value."""
+        assert isinstance(operand, str)  # noqa: S101 - the translator names what is written
+        if operand.startswith("%") and not isinstance(process.now.passing.get(operand), Element):
+            process.now.passing[operand] = value
+            process.now.wrote[operand] = step.span
+            return
+        name = self.name(process, operand)
+        if self.type_of(name).kind is not Kind.FRAME:
+            assert not isinstance(value, Element)  # noqa: S101 - elements are read before they are written
+            self.values[name] = value
+            return
+        assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
+        self.place(process, name, value, step.span)
+        self.effect(
+            process,
+            "PLACE",
+            f"{self.spelled(name)} = {shown(value, self.code.units)}",
+            step.span,
+            data={"frame": name, "pose": to_noap(value).tolist()},
+        )
+
+    def has_place(self, name: str) -> bool:
+        """Whether a frame stands somewhere."""
+        return name in self.tree and self.tree.has_value(name)
+
+    def label(self, process: Process, operand: Operand) -> str:
+        """Return what an operand is called in the trace: as the program writes it."""
+        if isinstance(operand, str) and not self.names_variable(process, operand):
+            return " ".join(self.code.source.slice(process.now.wrote[operand]).split())
+        return self.spelled(self.name(process, operand))
+
+    def spelled(self, name: str) -> str:
+        """Return a kept name as the program writes it."""
+        return self.code.spelled(name)
+
+    def place(self, process: Process, name: str, X: Array, span: Span) -> None:
+        """Give a frame another place.
+
+        Raises:
+            RunError: it cannot be placed.
+        """
+        self.look(process, name)
+        leader = self.tree.leader(name)
+        if is_arm(name) or name == WORLD:
+            text = f"`{self.spelled(name)}` cannot be given a value"
+            self.fail(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
+        if leader != name and (is_arm(leader) or leader == WORLD):
+            text = f"`{self.spelled(name)}` hangs rigidly on {self.spelled(leader)}, which no value moves"
+            self.fail(process, "E310", text, span, "cannot be placed")
+        self.grow(self.tree.place(name, X), name, span)
+
+    def set_hand(self, arm: str, span: Span, *, at: int | None = None) -> None:
+        """Let the frame table know where an arm is now, or will be at a later tick."""
+        q = self.hardware.posture(arm, self.now if at is None else at * self.cell.period)
+        X_BH = forward(self.cell.arms[arm].arm, q)
+        self.grow(self.tree.place(arm, self.tree.world(base_name(arm)) @ X_BH), arm, span)
+
+    def look(self, process: Process, name: str) -> None:
+        """Let the frame table know where a frame is now, if an arm that is on its way carries it."""
+        if name not in self.tree or not any(one.motion for one in self.processes):
+            return
+        arm = next((one for one in (name, *self.tree.ancestors(name)) if is_arm(one)), None)
+        mover = next((one for one in self.processes if one.motion and one.motion.arm == arm), None)
+        # A condition of a MOVE finds the arm of this MOVE where it is.
+        if arm is not None and mover is not None and not (mover is process and process.now.kind == "condition"):
+            X_BH = forward(self.cell.arms[arm].arm, self.hardware.posture(arm, self.now))
+            self.tree = self.tree.place(arm, self.tree.world(base_name(arm)) @ X_BH)
+
+    def grow(self, tree: FrameTree, name: str, span: Span) -> None:
+        """Take another frame tree, in which ``name`` got its place or its parent."""
+        self.tree = tree
+        self.written[name] = span
+        if len(self.trees) > 1 and self.trees[-1][0] == self.now:
+            self.trees.pop()
+        self.trees.append((self.now, tree))
+        if len(self.trees) > 2 * _MOST_TREES:
+            self.trees = thinned(self.trees, self.now / _MOST_TREES)
+
+    # ---- arms and time ---------------------------------------------------------------------------------------------
+
+    def claim(self, process: Process, arm: str, span: Span, moved: str | None = None) -> None:
+        """Let a process use an arm.
+
+        Args:
+            process: that uses it.
+            arm: the arm.
+            span: the statement.
+            moved: the frame on the arm that the statement moves, if it does not name the arm itself.
+
+        Raises:
+            RunError: the cell has no such arm, or it belongs to another branch.
+        """
+        if arm not in self.cell.arms:
+            known = ", ".join(sorted(self.cell.arms)) or "none"
+            self.fail(process, "E302", f"the cell has no arm {arm}", span, "no such arm", notes=[f"arms: {known}"])
+        process.last_arm = arm
+        owners = self.owners.setdefault(arm, [])
+        owners[:] = [owner for owner in owners if not owner.done]
+        for owner in owners:
+            if not (owner.descends_from(process) or process.descends_from(owner)):
+                text = f"{arm} is used by {owner.title} and by {process.title} of one COBEGIN"
+                note = "each arm belongs to one process at a time"
+                hung = self._hung(moved, arm)
+                self.fail(process, "E503", text, span, f"belongs to {owner.title}", secondary=hung, notes=[note])
+        if process not in owners:
+            owners.append(process)
+
+    def _hung(self, moved: str | None, arm: str) -> list[Label]:
+        """Return where a frame, or what it hangs on, was hung on an arm."""
+        if moved is None or moved == arm:
+            return []
+        above = [moved, *self.tree.ancestors(moved)]
+        name = above[above.index(arm) - 1]
+        text = f"{self.spelled(name)} was affixed to {arm} here"
+        return [Label(self.written[name], text)] if name in self.written else []
+
+    def take_time(self, process: Process, seconds: float, pending: Pending) -> None:
+        """Let the time of a statement go by before it takes effect."""
+        process.pending = pending
+        process.wake = self.ticks + math.ceil(seconds / self.cell.period - _ON_A_TICK)
+
+    def starts(self) -> Start:
+        """Return the present tick as the start of what takes time, behind all that has begun before."""
+        self.begun += 1
+        return Start(self.ticks, self.begun)
+
+    def effect(
+        self,
+        process: Process,
+        kind: EffectKind,
+        text: str,
+        span: Span,
+        *,
+        since: Start | None = None,
+        until: int | None = None,
+        arm: str | None = None,
+        data: dict[str, object] | None = None,
+    ) -> None:
+        """Record what a process did up to now, or does up to a later tick."""
+        start, period = since or self.starts(), self.cell.period
+        self.effects.append(
+            Effect(
+                t0=start.tick * period,
+                t1=self.now if until is None else until * period,
+                kind=kind,
+                span=span,
+                text=text,
+                process=process.title,
+                order=start.order,
+                arm=arm,
+                data=data or {},
+            )
+        )
+
+    # ---- errors ----------------------------------------------------------------------------------------------------
+
+    def fail(
+        self,
+        process: Process,
+        code: str,
+        message: str,
+        span: Span,
+        label: str,
+        *,
+        secondary: Sequence[Label] = (),
+        notes: Sequence[str] = (),
+        helps: Sequence[str] = (),
+    ) -> NoReturn:
+        """Say why a process cannot go on.
+
+        Raises:
+            RunError: always.
+        """
+        calls = [
+            Label(one.called, f"{self.spelled(one.name)} is called here")
+            for one in process.stack[:0:-1]
+            if one.kind == "procedure" and one.called
+        ]
+        diagnostic = Diagnostic(
+            code=code,
+            message=message,
+            span=span,
+            label=label,
+            secondary=(*secondary, *list(dict.fromkeys(calls))[:3]),
+            notes=tuple(notes),
+            helps=tuple(helps),
+        )
+        raise RunError(diagnostic, self.tree, self.now)

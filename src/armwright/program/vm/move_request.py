@@ -1,0 +1,130 @@
+"""What the instructions of one MOVE ask for, gathered and checked."""
+
+from typing import NamedTuple
+
+from armwright.program.bytecode.instructions import (
+    HIGHEST_SPEED,
+    LOWEST_SPEED,
+    NORMAL_SPEED,
+    Form,
+    Instruction,
+    Op,
+    Operand,
+    Place,
+)
+from armwright.program.language.source import Span
+from armwright.program.vm.machine import Machine
+from armwright.program.vm.process import Guard, Process
+
+# The longest MOVE; more is a slip of units [s].
+_LONGEST = 1e6
+
+
+class Goal(NamedTuple):
+    """One frame of a MOVE: as its stages are called by, its operand, the clause that names it."""
+
+    label: str
+    operand: Operand
+    step: Instruction
+
+
+class Asked(NamedTuple):
+    """What the instructions of one MOVE ask for."""
+
+    begin: Instruction
+    form: Form
+    goals: dict[str, Goal]
+    speed: float
+    blend: float | None
+    duration: float | None
+    guards: list[Guard]
+    span: Span
+
+
+def asked_of(run: Machine, process: Process, step: Instruction) -> Asked:
+    """Gather the instructions of a MOVE, from MVBEG to MVEND."""
+    instructions, at = run.code.instructions, process.at - 1
+    first = at
+    while instructions[first].op is not Op.MVBEG:
+        first -= 1
+    begin, parts = instructions[first], instructions[first + 1 : at]
+    goals: dict[str, list[Goal]] = {"goal": [_goal(run, process, begin.operands[1], begin)]}
+    numbers: dict[Op, float] = {}
+    guards = []
+    for part in parts:
+        if part.op in (Op.MVVIA, Op.MVAPP, Op.MVDEP):
+            goals[part.op] = [_goal(run, process, operand, part) for operand in part.operands]
+        elif part.op in (Op.MVSPD, Op.MVBLD, Op.MVDUR):
+            numbers[part.op] = _quantity(run, process, part)
+        elif part.op is Op.MVON:
+            guards.append(_guard(run, part))
+    goals = _told_apart(goals)
+    form = Form(
+        goal=goals["goal"][0].label,
+        via=tuple(goal.label for goal in goals.get(Op.MVVIA, ())),
+        approach=goals[Op.MVAPP][0].label if Op.MVAPP in goals else None,
+        departure=goals[Op.MVDEP][0].label if Op.MVDEP in goals else None,
+        straight=any(part.op is Op.MVSTR for part in parts),
+        blend=Op.MVBLD in numbers,
+    )
+    duration = numbers.get(Op.MVDUR)
+    return Asked(
+        begin=begin,
+        form=form,
+        goals={goal.label: goal for several in goals.values() for goal in several},
+        speed=numbers.get(Op.MVSPD, NORMAL_SPEED if duration is None else HIGHEST_SPEED),
+        blend=numbers.get(Op.MVBLD),
+        duration=duration,
+        guards=guards,
+        span=step.span,
+    )
+
+
+def _goal(run: Machine, process: Process, operand: Operand, step: Instruction) -> Goal:
+    span = step.span
+    if isinstance(operand, str) and operand.startswith("%"):
+        span = process.now.wrote[operand]
+    where = Instruction(op=step.op, operands=step.operands, span=span)
+    return Goal(run.label(process, operand), operand, where if step.op is not Op.MVBEG else step)
+
+
+def _told_apart(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
+    """Return the goals with a label of its own for each, also where a program names two places alike."""
+    seen: dict[str, Operand] = {}
+    for several in goals.values():
+        for at, goal in enumerate(several):
+            label = goal.label
+            while seen.setdefault(label, goal.operand) != goal.operand:
+                label += "'"
+            several[at] = goal._replace(label=label)
+    return goals
+
+
+def _quantity(run: Machine, process: Process, part: Instruction) -> float:
+    """Return speed, blend [m] or duration [s], checked."""
+    operand = part.operands[0]
+    value = run.number(process, operand, part)
+    name = f"{run.label(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
+    if part.op is Op.MVSPD:
+        if not LOWEST_SPEED <= value <= HIGHEST_SPEED:
+            message = f"speed {name} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
+            run.fail(process, "E207", message, part.span, "out of range")
+        return value
+    what = "the blend" if part.op is Op.MVBLD else "the duration"
+    if part.op is Op.MVDUR and value > _LONGEST:
+        text = f"{what} {name} s is not possible"
+        run.fail(process, "E231", text, part.span, f"expected {_LONGEST:g} s or less")
+    if value <= 0:
+        run.fail(process, "E231", f"{what} {name} is not above 0", part.span, "expected more than 0")
+    return value * run.code.units.metres if part.op is Op.MVBLD else value
+
+
+def _guard(run: Machine, part: Instruction) -> Guard:
+    condition, truth, action = part.operands
+    assert isinstance(condition, Place)  # noqa: S101 - the translator lands them
+    assert isinstance(action, Place)  # noqa: S101
+    at, looks = condition.index, False
+    while (step := run.code.instructions[at]).op is not Op.RET:
+        looks = looks or step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV)
+        at += 1
+    return Guard(condition=condition.index, truth=str(truth), action=action.index, looks=looks)

@@ -1,0 +1,124 @@
+"""What the operations on values do: numbers, truth values, places and steps."""
+
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.program.bytecode.instructions import Op
+from armwright.program.language.units import UnitSystem
+from armwright.program.syntax.pose_literals import EXACT, REPAIRABLE
+from armwright.spatial.poses import from_noap, inverse, pose
+from armwright.spatial.rotations import nearest_rotation, orthonormality_error
+
+# Numbers beyond this are a slip, and squares of them would overflow.
+LARGEST = 1e100
+# Points nearer than this part of their distance from the origin, or of a metre, are the same point.
+_ROUNDING = 1e-12
+
+
+class ValueFault(Exception):  # noqa: N818 - it never leaves the interpreter
+    """An operation has no value; the code of the diagnostic, its message and the word at the place."""
+
+    def __init__(self, code: str, message: str, label: str) -> None:
+        """Keep what to say."""
+        super().__init__(message)
+        self.code, self.message, self.label = code, message, label
+
+
+def _multiply(a: Any, b: Any) -> Any:
+    return _number(a * b) if isinstance(a, float) else _near(a @ b)
+
+
+def _divide(a: float, b: float) -> float:
+    if b == 0:
+        raise ValueFault("E240", f"{a:g} cannot be divided by 0", "divided by 0 here")
+    return _number(a / b)
+
+
+def _number(value: float) -> float:
+    if not abs(value) <= LARGEST:
+        raise ValueFault("E240", "the result is larger than any number of a robot", "too large")
+    return value
+
+
+def _near(X: Array) -> Array:
+    """Return a place or a step whose lengths are numbers of a robot."""
+    _number(float(np.abs(X[:3, 3]).max()))
+    return X
+
+
+def _turn(axis: int) -> Callable[[float, UnitSystem], Array]:
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+
+    def turn(angle: float, units: UnitSystem) -> Array:
+        # Whole quarter turns are exact: 90 degrees leave no 6e-17 in a program's places.
+        quarters = angle / (math.pi / 2 / units.radians)
+        exact = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
+        whole = quarters == round(quarters)
+        radians = angle * units.radians
+        c, s = exact[round(quarters) % 4] if whole else (math.cos(radians), math.sin(radians))
+        X = np.eye(4)
+        X[first, first], X[first, second], X[second, first], X[second, second] = c, -s, s, c
+        return X
+
+    return turn
+
+
+def _shift(x: float, y: float, z: float, units: UnitSystem) -> Array:
+    X = np.eye(4)
+    X[:3, 3] = x * units.metres, y * units.metres, z * units.metres
+    return X
+
+
+def _distance(p: Array, q: Array) -> float:
+    """Return how far two points are apart [m]: nothing, where rounding alone may have put them apart.
+
+    Where a hand stands is worked out through joints and frames some metres long, each of which rounds.
+    """
+    apart = float(np.linalg.norm(p - q))
+    scale = max(1.0, float(np.abs(p).max()), float(np.abs(q).max()))
+    return apart if apart > _ROUNDING * scale else 0.0
+
+
+def matrix(numbers: Sequence[float], units: UnitSystem) -> Array:
+    """Return twelve numbers as a place, the rotation made exact where it nearly is one.
+
+    Raises:
+        ValueFault: the first nine are no rotation.
+    """
+    X = from_noap([*numbers[:9], *(length * units.metres for length in numbers[9:])])
+    error = float(orthonormality_error(X[:3, :3]))
+    if error > REPAIRABLE:
+        raise ValueFault("E206", "the first nine numbers are not a rotation", f"off by {error:.2g}")
+    return X if error <= EXACT else pose(nearest_rotation(X[:3, :3]), X[:3, 3])
+
+
+# Operations on values alone.
+PLAIN: Mapping[Op, Callable[..., Any]] = {
+    Op.MUL: _multiply,
+    Op.DIV: _divide,
+    Op.ADD: lambda a, b: _number(a + b),
+    Op.SUB: lambda a, b: _number(a - b),
+    Op.NEG: operator.neg,
+    Op.INV: inverse,
+    Op.LT: operator.lt,
+    Op.LE: operator.le,
+    Op.EQ: operator.eq,
+    Op.NE: operator.ne,
+    Op.GE: operator.ge,
+    Op.GT: operator.gt,
+    Op.NOT: operator.not_,
+}
+# Operations that count in the program's units, given as the last argument.
+IN_UNITS: Mapping[Op, Callable[..., Any]] = {
+    Op.XYZ: _shift,
+    Op.ROTX: _turn(0),
+    Op.ROTY: _turn(1),
+    Op.ROTZ: _turn(2),
+    Op.DIST: lambda f, g, units: _distance(f[:3, 3], g[:3, 3]) / units.metres,
+    Op.MATX: lambda *given: matrix(given[:-1], given[-1]),
+}

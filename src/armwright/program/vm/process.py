@@ -1,0 +1,254 @@
+"""What a running program consists of: processes, the procedures they are in, the motions they make."""
+
+from typing import Literal, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.cell.hardware import Press
+from armwright.motion.plan import Stage
+from armwright.motion.trajectory import Trajectory
+from armwright.program.language.source import Span
+
+
+@attrs.frozen
+class Start:
+    """When something began.
+
+    Attributes:
+        tick: of the servo.
+        order: counts all that has begun; of the same tick, what began first has the smaller number.
+    """
+
+    tick: int
+    order: int
+
+
+@attrs.frozen
+class Element:
+    """An element of an array, or a variable, as a value in passing: what it names is read and written."""
+
+    name: str
+
+
+# Numbers, truth values, places and steps (4, 4), elements.
+Value: TypeAlias = float | bool | Array | Element
+
+
+@attrs.frozen
+class Attempt:
+    """A TRY that a process is in.
+
+    Attributes:
+        start: its first instruction.
+        recovery: of its RECOVER part.
+        recovering: whether that part is running.
+        locks: how many locks the process held when it began.
+    """
+
+    start: int
+    recovery: int
+    recovering: bool
+    locks: int
+
+
+@attrs.define
+class Activation:
+    """One run of a procedure, of the main program, or of a condition or action inside a motion.
+
+    Attributes:
+        kind: what it is.
+        name: of the procedure; empty for others.
+        bindings: where the procedure's own names are kept.
+        passing: values in passing, by name.
+        wrote: the part of the program that gave each of them.
+        back: the instruction to go on with afterwards.
+        attempts: the TRYs it is in, innermost last.
+        called: the statement that called it; of an action, its MOVE.
+        own: where its own variables are kept, gone with it.
+        locks: how many locks the process held when it began.
+    """
+
+    kind: Literal["main", "procedure", "condition", "action"]
+    name: str = ""
+    bindings: dict[str, str] = attrs.field(factory=dict)
+    passing: dict[str, Value] = attrs.field(factory=dict)
+    wrote: dict[str, Span] = attrs.field(factory=dict)
+    back: int = -1
+    attempts: list[Attempt] = attrs.field(factory=list)
+    called: Span | None = None
+    own: tuple[str, ...] = ()
+    locks: int = 0
+
+
+@attrs.define
+class Guard:
+    """``ON condition DO action`` of a motion under way.
+
+    Attributes:
+        condition: first instruction of the condition.
+        truth: the value in passing that it leaves.
+        action: first instruction of the action.
+        looks: whether the condition looks at places, and not only at forces and numbers.
+        done: whether the action has been begun.
+    """
+
+    condition: int
+    truth: str
+    action: int
+    looks: bool
+    done: bool = False
+
+
+@attrs.define
+class Motion:
+    """A MOVE under way.
+
+    Attributes:
+        arm: the arm that moves.
+        moved: the frame that shall come to the goal; the arm itself or what hangs on it.
+        tip: (4, 4) that frame seen from the hand.
+        span: the statement.
+        text: what the trace says of it.
+        data: further facts for the trace.
+        stages: what is still to do after the present stage, with the names of where they lead.
+        speed: as asked for.
+        depth: how many activations its process had when it began; those after them belong to its actions.
+        begun: when the MOVE began.
+        since: when the present stage began [ticks].
+        until: when it will end [ticks].
+        guards: to be looked at on every tick.
+        hands: (k, 4, 4) poses of the hand in the world on the ticks of the present stage, for guards that look.
+        record: number of the present stage among those recorded.
+        rest: when the arm is at rest [ticks], once it is being stopped; None before.
+        alarm: when the arm presses deeper than the cell allows [ticks], if it goes on as it does; None if it does not.
+        touch: the trajectory of a stage that comes into contact, and when on it [s]; None before.
+        pressed: the deepest contact so far.
+    """
+
+    arm: str
+    moved: str
+    tip: Array
+    span: Span
+    text: str
+    data: dict[str, object]
+    stages: list[tuple[Stage, tuple[str, ...]]]
+    speed: float
+    depth: int
+    begun: Start
+    since: int
+    until: int
+    guards: list[Guard]
+    hands: Array = attrs.field(factory=lambda: np.empty((0, 4, 4)))
+    record: int = -1
+    rest: int | None = None
+    alarm: int | None = None
+    touch: tuple[Trajectory, float] | None = None
+    pressed: Press = attrs.field(factory=lambda: Press(0.0, 0.0))
+
+
+@attrs.frozen
+class Waiting:
+    """Why a process does not go on.
+
+    Attributes:
+        what: for an event, for locks, or for the processes that it has begun.
+        names: of the event or the locked variables.
+        span: the statement.
+        since: when it began to wait.
+    """
+
+    what: Literal["event", "locks", "branches"]
+    names: tuple[str, ...]
+    span: Span
+    since: Start
+
+
+@attrs.frozen(kw_only=True)
+class Pending:
+    """What takes effect when the time of a statement is over.
+
+    Attributes:
+        kind: of the effect.
+        text: of the trace.
+        since: when it began.
+        span: the statement.
+        arm: the arm that does it, or None.
+        place: a frame that gets a place then, and the place.
+        data: further facts for the events.
+    """
+
+    kind: Literal["OPEN", "GRASP", "OPERATE", "READ", "PAUSE"]
+    text: str
+    since: Start
+    span: Span
+    arm: str | None = None
+    place: tuple[str, Array] | None = None
+    data: dict[str, object] = attrs.field(factory=dict)
+
+
+@attrs.define(eq=False)
+class Process:
+    """One thread of a program.
+
+    Attributes:
+        path: its place among the branches of the text: ``()`` for the program, ``(1,)`` for the second branch.
+        priority: served first when larger.
+        at: the next instruction.
+        wake: when it goes on [ticks].
+        stack: activations, the present one last.
+        parent: the process that began it.
+        waiting: why it does not go on; None when only the clock holds it.
+        unmet: the event or the locks that it has not got yet, also while it is about to look again.
+        motion: the MOVE under way.
+        pending: what takes effect at ``wake``.
+        last_arm: named or moved last.
+        locks: the variables it has locked, in the order of taking.
+        branches: processes begun and not yet joined.
+        done: whether it has ended.
+    """
+
+    path: tuple[int, ...]
+    priority: float
+    at: int
+    wake: int
+    stack: list[Activation]
+    parent: "Process | None" = None
+    waiting: Waiting | None = None
+    unmet: Waiting | None = None
+    motion: Motion | None = None
+    pending: Pending | None = None
+    last_arm: str | None = None
+    locks: list[str] = attrs.field(factory=list)
+    branches: list["Process"] = attrs.field(factory=list)
+    done: bool = False
+
+    @property
+    def now(self) -> Activation:
+        """The present activation."""
+        return self.stack[-1]
+
+    @property
+    def due(self) -> int | None:
+        """When it is served next [ticks], or its arm has to be stopped; None where it waits for others."""
+        alarm = None if self.motion is None else self.motion.alarm
+        wake = None if self.waiting is not None else self.wake
+        return min((tick for tick in (alarm, wake) if tick is not None), default=None)
+
+    @property
+    def title(self) -> str:
+        """How people call it: ``program``, or ``branch 2``, ``branch 2.1``."""
+        return f"branch {'.'.join(str(number + 1) for number in self.path)}" if self.path else "program"
+
+    @property
+    def follows(self) -> Motion | None:
+        """The MOVE that is followed now; None in an action of it, or in a procedure that an action calls."""
+        motion = self.motion
+        if motion is None or any(one.kind == "action" for one in self.stack[motion.depth :]):
+            return None
+        return motion
+
+    def descends_from(self, other: "Process") -> bool:
+        """Whether another process began this one, directly or through others, or is this one."""
+        return self.path[: len(other.path)] == other.path

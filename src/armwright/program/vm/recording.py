@@ -1,0 +1,346 @@
+"""What a run leaves: every effect with its place in the program, every stage, every servo tick of every arm."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.cell.frames import FrameTree
+from armwright.cell.model import Cell, CellArm
+from armwright.dynamics.newton_euler import inverse_dynamics
+from armwright.motion.plan import Stage
+from armwright.motion.trajectory import Trajectory
+from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.source import Span
+
+# Rows that are computed and written together.
+_ROWS_AT_ONCE = 16384
+# A time this part of a period behind a tick is on it.
+_ON_A_TICK = 1e-6
+
+EffectKind: TypeAlias = Literal[
+    "PLACE",
+    "AFFIX",
+    "UNFIX",
+    "OPEN",
+    "GRASP",
+    "OPERATE",
+    "READ",
+    "MOVE",
+    "STOP",
+    "SIGNAL",
+    "WAIT",
+    "PAUSE",
+    "LOCK",
+    "PRINT",
+    "ERROR",
+    "END",
+]
+# Not of the trace: assignments, locks and the end of the text.
+_SILENT = ("PLACE", "LOCK", "END")
+
+
+@attrs.frozen(kw_only=True)
+class Effect:
+    """One thing a program did.
+
+    Attributes:
+        t0: when it began [s].
+        t1: when it was done [s].
+        kind: what it was.
+        span: the statement in the program.
+        text: one line of the trace, such as ``ARM_1 [obj1] MOVE: PTP obj2 @100``.
+        process: that did it, as people call it: ``program``, ``branch 2``.
+        order: counts all that has begun; of the same time, what began first has the smaller number.
+        arm: the arm that did it, or None.
+        data: further facts by name, as JSON can carry them.
+    """
+
+    t0: float
+    t1: float
+    kind: EffectKind
+    span: Span
+    text: str
+    process: str = "program"
+    order: int = 0
+    arm: str | None = None
+    data: Mapping[str, Any] = attrs.field(factory=dict)
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class RunStage:
+    """One stage of a MOVE, as it was run.
+
+    Attributes:
+        t0: when it began [s].
+        arm: the arm that made it.
+        span: the MOVE in the program.
+        to: the frames it went to, as the program spells them.
+        speed: that was asked for, 100 being normal.
+        stage: as it was planned, with what was found about its path.
+        motion: of the joints as it was run: all of the plan, or as far as it came before it was stopped, and its stop.
+            A stop keeps to the path of the plan, so the path deviation of the plan holds for it too.
+        length: of the way that the hand went [m].
+        peak_effort: (n,) largest efforts on the servo ticks of that motion, with what pushes on the hand [N m] or [N].
+        peak_time: (n,) when, since it began [s].
+        stopped: whether it was stopped on its way.
+    """
+
+    t0: float
+    arm: str
+    span: Span
+    to: tuple[str, ...]
+    speed: float
+    stage: Stage
+    motion: Trajectory
+    length: float
+    peak_effort: Array
+    peak_time: Array
+    stopped: bool = False
+
+    @property
+    def duration(self) -> float:
+        """How long it ran [s]."""
+        return self.motion.duration
+
+    @property
+    def t1(self) -> float:
+        """When it ended [s]."""
+        return self.t0 + self.duration
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Run:
+    """What one arm did for a while: a trajectory, as far as it came.
+
+    Attributes:
+        t0: when it began [s].
+        trajectory: from then on.
+        duration: how long the arm followed it [s]; then it rested.
+        tau: (k, n) efforts on its first servo ticks, as far as they are known [N m] or [N].
+    """
+
+    t0: float
+    trajectory: Trajectory
+    duration: float
+    tau: Array | None = None
+
+
+class Push(NamedTuple):
+    """What pushes on the tool of an arm from some time on.
+
+    Attributes:
+        t0: from when [s].
+        wrenches: (k, 6) forces [N] and moments [N m] at the tool point, along the axes of the base, on this and the
+            following servo ticks; the last one stays.
+    """
+
+    t0: float
+    wrenches: Array
+
+    def on(self, ticks: int) -> Array:
+        """Return the wrenches (ticks, 6) on so many servo ticks from then on."""
+        return self.wrenches[np.minimum(np.arange(ticks), len(self.wrenches) - 1)]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Stream:
+    """What one arm does at every servo tick.
+
+    Attributes:
+        arm: its name.
+        t: (N,) [s].
+        q: (N, n) joint positions [rad] or [m].
+        qd: (N, n) speeds.
+        qdd: (N, n) accelerations; at a tick where they jump, those just after it.
+        tau: (N, n) efforts by inverse dynamics, drives and what pushes on the hand included [N m] or [N].
+    """
+
+    arm: str
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+
+
+@attrs.frozen(kw_only=True)
+class Failure:
+    """Why a run did not come to its end.
+
+    Attributes:
+        diagnostic: what happened, at which statement.
+        time: when [s]; the arms came to rest after it.
+        arm: the arm that was to move; None where none was.
+        process: in which it happened, as people call it.
+    """
+
+    diagnostic: Diagnostic
+    time: float
+    arm: str | None = None
+    process: str = "program"
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Recording:
+    """A run.
+
+    Attributes:
+        cell: in which it ran.
+        duration: [s], a whole number of servo periods.
+        effects: in the order in which they began.
+        stages: in the order in which they began.
+        streams: one per arm.
+        trees: the frame tree at the start and after each change, with the time of the change [s]; of very many
+            changes the last in every two-thousandth of the run.
+        postures: by arm, the posture (n,) at the end.
+        failure: why it did not come to its end; None where it did.
+    """
+
+    cell: Cell
+    duration: float
+    effects: tuple[Effect, ...]
+    stages: tuple[RunStage, ...]
+    streams: tuple[Stream, ...]
+    trees: tuple[tuple[float, FrameTree], ...]
+    postures: Mapping[str, Array]
+    failure: Failure | None = None
+
+    @property
+    def processes(self) -> tuple[str, ...]:
+        """The processes that did anything, in the order in which they began."""
+        return tuple(dict.fromkeys(one.process for one in self.effects))
+
+    @property
+    def tree(self) -> FrameTree:
+        """The frame tree at the end."""
+        return self.trees[-1][1]
+
+    def trace(self) -> list[str]:
+        """Return the lines of the trace."""
+        return [effect.text for effect in self.effects if effect.kind not in _SILENT]
+
+
+def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Return effects in the order in which they began."""
+    return tuple(sorted(effects, key=lambda one: (one.t0, one.order)))
+
+
+def thinned(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[float, FrameTree]]:
+    """Return the frame tree at the start, and the last of those that began within the same gap.
+
+    Args:
+        trees: with the time from which on each holds [s], in order.
+        gap: [s].
+    """
+    kept = {int(time / gap): (time, tree) for time, tree in trees[1:]}
+    return [trees[0], *kept.values()]
+
+
+def stream(
+    name: str,
+    place: CellArm,
+    runs: Sequence[Run],
+    pushes: Sequence[Push],
+    *,
+    duration: float,
+    period: float,
+) -> Stream:
+    """Sample what an arm does at every servo tick.
+
+    Args:
+        name: of the arm in the cell.
+        place: its model, and its posture at the start.
+        runs: in order; the arm rests between.
+        pushes: in order; each counts until the next.
+        duration: of the whole run [s].
+        period: of the servo [s].
+    """
+    arm, ticks = place.arm, round(duration / period) + 1
+    q = np.empty((ticks, arm.n))
+    qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
+    tau, known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
+    first, posture = 0, place.start
+    for run in runs:
+        # A run that was stopped by an obstacle ends between two ticks.
+        begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _ON_A_TICK)
+        q[first:begin] = posture
+        local = np.arange(end - begin) * period
+        q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))
+        if run.tau is not None:
+            done = min(end - begin, len(run.tau))
+            tau[begin : begin + done], known[begin : begin + done] = run.tau[:done], True
+        first, posture = end, run.trajectory(run.duration)
+    q[first:] = posture
+    t: Array = np.arange(ticks, dtype=np.float64) * period
+    wrench = np.zeros((ticks, 6))
+    for push in pushes:
+        begin = round(push.t0 / period)
+        wrench[begin:] = push.on(max(ticks - begin, 0))
+    left = np.flatnonzero(~known)
+    tau[left] = _tau(arm, (q[left], qd[left], qdd[left]), wrench[left])
+    return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
+
+
+def efforts(arm: Arm, trajectory: Trajectory, period: float, push: Push, ticks: int | None = None) -> Array:
+    """Return the efforts (k, n) on the servo ticks of a trajectory, the last tick included.
+
+    Args:
+        arm: that follows it.
+        trajectory: on whole servo periods.
+        period: of the servo [s].
+        push: what pushes on the hand from the start of it on.
+        ticks: how far; to its end when left out.
+    """
+    ticks = round(trajectory.duration / period) if ticks is None else ticks
+    t: Array = np.arange(ticks + 1, dtype=np.float64) * period
+    return _tau(arm, (trajectory(t), trajectory(t, 1), trajectory(t, 2)), push.on(len(t)))
+
+
+def _tau(arm: Arm, states: tuple[Array, Array, Array], wrench: Array) -> Array:
+    """Return the efforts (k, n) of positions, speeds and accelerations (k, n), with wrenches (k, 6) on the tool."""
+    tau = np.empty_like(states[0])
+    for rows in _chunks(len(tau)):
+        q, qd, qdd = (each[rows] for each in states)
+        tau[rows] = inverse_dynamics(arm, q, qd, qdd, wrench=wrench[rows] if wrench[rows].any() else None)
+    return tau
+
+
+def peaks_of(tau: Array, period: float) -> tuple[Array, Array]:
+    """Return the largest efforts (n,) on servo ticks (k, n), and when, since the first [s]."""
+    sizes = np.abs(tau)
+    return sizes.max(axis=0), sizes.argmax(axis=0) * period
+
+
+def motion_rows(streams: Iterable[Stream], kept: slice = slice(None)) -> Iterable[str]:
+    """Give the lines of motion.csv: time, arm, and per joint position, speed, acceleration and effort, in SI.
+
+    Args:
+        streams: one per arm.
+        kept: which ticks of each.
+    """
+    streams = tuple(streams)
+    joints = max((s.q.shape[1] for s in streams), default=0)
+    columns = [f"{quantity}{i + 1}" for quantity in ("q", "qd", "qdd", "tau") for i in range(joints)]
+    yield ",".join(["t", "arm", *columns]) + "\n"
+    for s in streams:
+        n = s.q.shape[1]
+        # Twelve digits hold a position to 1e-12, so that differences over a tick still show the speed.
+        blank = "," * (joints - n)
+        cell = ",".join(["%.12g"] * n) + blank
+        line = f"%.12g,{s.arm},{cell},{cell},{cell},{cell}\n"
+        first, end, _ = kept.indices(len(s.t))
+        for part in _chunks(end - first):
+            rows = slice(first + part.start, min(first + part.stop, end))
+            block = np.concatenate([s.t[rows, None], s.q[rows], s.qd[rows], s.qdd[rows], s.tau[rows]], axis=1)
+            # Adding 0 turns -0 into 0, which reads better.
+            yield from (line % tuple(row) for row in (block + 0.0).tolist())
+
+
+def _chunks(count: int) -> Iterator[slice]:
+    """Cut so many rows into pieces that a long run needs no more memory than its own arrays."""
+    return (slice(first, first + _ROWS_AT_ONCE) for first in range(0, count, _ROWS_AT_ONCE))
