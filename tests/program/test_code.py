@@ -5,7 +5,8 @@ import pytest
 
 from armwright.program import KnownCell, Source
 from armwright.program import compile as translate
-from armwright.program.bytecode.instructions import Code, Constant, Kind, Op, Trajectory, Type, listing
+from armwright.program.bytecode.instructions import Code, Constant, MotionKind, Op, listing
+from armwright.program.language.kinds import VariableKind, VariableType
 from program.shelf import BARE
 
 # Twelve numbers as the program writes them come through unchanged, or as the nearest rotation to rounding.
@@ -93,9 +94,9 @@ def test_every_statement() -> None:
         ("STOP",),
     ]
     assert code.constants == (60.0, (1, 0, 0, 0, 1, 0, 0, 0, 1, -1, -1, -1))
-    assert code.types["G"] == Type(Kind.FRAME)
-    assert code.types["T"] == Type(Kind.TRANS)
-    assert code.types["N"] == Type(Kind.SCALAR)
+    assert code.types["G"] == VariableType(VariableKind.FRAME)
+    assert code.types["T"] == VariableType(VariableKind.TRANS)
+    assert code.types["N"] == VariableType(VariableKind.SCALAR)
     assert code.spelled("TOOL1") == "Tool1"
     assert code.spelled("STATION") == "station"
 
@@ -152,7 +153,7 @@ def test_listing_of_names_and_numbers() -> None:
 
 def test_trajectories() -> None:
     """There are the three basic trajectories of the report, and one with rounded corners."""
-    assert [kind.value for kind in Trajectory] == ["PTP", "LINE", "SPLINE", "BLEND"]
+    assert [kind.value for kind in MotionKind] == ["PTP", "LINE", "SPLINE", "BLEND"]
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,8 @@
 
 import pytest
 
-from armwright.program.bytecode.instructions import Kind, Type
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.semantics import check
@@ -16,14 +16,14 @@ from armwright.program.syntax.lexer import scan
 from armwright.program.syntax.parser import parse
 
 DECLARED = {
-    "F": Type(Kind.FRAME),
-    "G": Type(Kind.FRAME),
-    "T": Type(Kind.TRANS),
-    "U": Type(Kind.TRANS),
-    "N": Type(Kind.SCALAR),
-    "E": Type(Kind.EVENT),
-    "SLOT": Type(Kind.FRAME, (2, 3)),
-    "COUNT": Type(Kind.SCALAR, (4,)),
+    "F": VariableType(VariableKind.FRAME),
+    "G": VariableType(VariableKind.FRAME),
+    "T": VariableType(VariableKind.TRANS),
+    "U": VariableType(VariableKind.TRANS),
+    "N": VariableType(VariableKind.SCALAR),
+    "E": VariableType(VariableKind.EVENT),
+    "SLOT": VariableType(VariableKind.FRAME, (2, 3)),
+    "COUNT": VariableType(VariableKind.SCALAR, (4,)),
 }
 UNIT = "(1,0,0, 0,1,0, 0,0,1, 0,0,0)"
 
@@ -175,10 +175,10 @@ def test_scopes() -> None:
 
     assert found == []
     assert symbols.procedures["WORK"].parameters == ("F",)
-    assert (main.type("F"), inside.type("F")) == (Type(Kind.FRAME), Type(Kind.TRANS))
-    assert (main.type("N"), inside.type("N")) == (None, Type(Kind.SCALAR))
+    assert (main.type("F"), inside.type("F")) == (VariableType(VariableKind.FRAME), VariableType(VariableKind.TRANS))
+    assert (main.type("N"), inside.type("N")) == (None, VariableType(VariableKind.SCALAR))
     assert (main.is_local("F"), inside.is_local("F"), inside.is_local("G")) == (False, True, False)
-    assert inside.type("G") == Type(Kind.FRAME)
+    assert inside.type("G") == VariableType(VariableKind.FRAME)
     assert inside.declared("F") != main.declared("F")
     assert inside.declared("G") == main.declared("G") != None  # noqa: E711
     assert inside.declared("STATION") is None

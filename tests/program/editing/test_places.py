@@ -6,8 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
-from armwright.program.language_server.positions import NO_DRIFT, Edit, Ruler, drift, edited
+from armwright.program.language.text_edits import Edit, apply_edits
+from armwright.program.language_server.edit_map import NO_DRIFT, drift
 
 TEXTS = st.text(st.sampled_from(["a", "b", " ", "\n", "\r", "é", "€", "🤖", "\u2028", "\f"]), max_size=30)
 ENCODINGS = st.sampled_from(["utf-8", "utf-16", "utf-32"])
@@ -16,7 +18,7 @@ ENCODINGS = st.sampled_from(["utf-8", "utf-16", "utf-32"])
 @given(text=TEXTS, encoding=ENCODINGS)
 def test_there_and_back(text: str, encoding: str) -> None:
     """The line and column of every character lead back to it, unless it stands inside of a line end."""
-    ruler = Ruler(text, encoding)
+    ruler = PositionCodec(text, encoding)
     for offset in range(len(text) + 1):
         line, column = ruler.place(offset)
         if text[offset - 1 : offset + 1] != "\r\n" or offset == 0:
@@ -28,7 +30,7 @@ def test_columns_are_what_the_encoding_takes(text: str, encoding: str) -> None:
     """A column counts the units of the encoding in front of it in the line."""
     size = {"utf-8": 1, "utf-16": 2, "utf-32": 4}[encoding]
     codec = encoding if encoding == "utf-8" else f"{encoding}-le"
-    ruler = Ruler(text, encoding)
+    ruler = PositionCodec(text, encoding)
     for offset in range(len(text)):
         line, column = ruler.place(offset)
         assert column == len(text[ruler.starts[line] : offset].encode(codec)) // size
@@ -40,7 +42,7 @@ def test_columns_are_what_the_encoding_takes(text: str, encoding: str) -> None:
 )
 def test_places_that_are_not_there(line: int, column: int, offset: int) -> None:
     """What lies behind a line is its end, what lies behind the text its end, what lies inside a character its start."""
-    assert Ruler("ab\r\n🤖a").offset(line, column) == offset
+    assert PositionCodec("ab\r\n🤖a").offset(line, column) == offset
 
 
 @given(text=TEXTS, new=TEXTS, data=st.data())
@@ -48,10 +50,10 @@ def test_ruler_of_a_changed_text(text: str, new: str, data: st.DataObject) -> No
     """A ruler that has followed a change is the ruler of the changed text."""
     start = data.draw(st.integers(0, len(text)))
     end = data.draw(st.integers(start, len(text)))
-    changed = Ruler(text).changed(start, end, new)
+    changed = PositionCodec(text).changed(start, end, new)
 
     assert changed.text == text[:start] + new + text[end:]
-    assert changed.starts == Ruler(changed.text).starts
+    assert changed.starts == PositionCodec(changed.text).starts
 
 
 @given(text=TEXTS, seed=st.integers(0, 1000))
@@ -79,4 +81,4 @@ def test_edits() -> None:
     """Changes are all counted in the text as it was; of two that overlap the first is made."""
     edits = (Edit(Span(4, 5), "!"), Edit(Span(0, 1), "XY"), Edit(Span(0, 2), "no"), Edit(Span(2, 2), "-"))
 
-    assert edited("abcde", edits) == "XYb-cd!"
+    assert apply_edits("abcde", edits) == "XYb-cd!"

@@ -9,7 +9,9 @@ import pytest
 from armwright.errors import InvalidValueError
 from armwright.program import KnownCell, Source
 from armwright.program import compile as translate
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
+from armwright.program.language.text_edits import apply_edits
 from armwright.program.language.words import VOCABULARIES, Standard
 from armwright.program.language_server.analyse import Settings, analyse
 from armwright.program.language_server.analysis import Analysis, View
@@ -20,7 +22,6 @@ from armwright.program.language_server.hover import hover
 from armwright.program.language_server.inlay_hints import hints
 from armwright.program.language_server.keyword_docs import WORDS, explained
 from armwright.program.language_server.outline import folds, outline
-from armwright.program.language_server.positions import Ruler, edited
 from armwright.program.language_server.rename import rename
 from armwright.program.language_server.semantic_tokens import difference, encoded, line_stretches, patched
 from armwright.program.language_server.signature_help import signature_at
@@ -232,7 +233,7 @@ def test_rename_keeps_the_code() -> None:
     text = SCOPES
     for old, new in (("a, b", "first"), ("b : SCALAR", "second"), ("c : SCALAR", "third"), ("p (", "act")):
         analysis = analysis_of(text)
-        text = edited(text, rename(analysis, text.index(old.replace("a, b", ", ") if old == "a, b" else old), new))
+        text = apply_edits(text, rename(analysis, text.index(old.replace("a, b", ", ") if old == "a, b" else old), new))
     before, after = analysis_of(SCOPES).compiled.code, analysis_of(text).compiled.code
 
     assert before is not None
@@ -246,7 +247,7 @@ def test_names_of_rlo_83_are_short() -> None:
     text = "VAR f : FRAME ; BEGIN READ VISIONS (f) ; END."
     analysis = analysis_of(text, std=Standard.RLO_83)
 
-    assert edited(text, rename(analysis, 4, "while")) == text.replace("f :", "while :").replace("(f)", "(while)")
+    assert apply_edits(text, rename(analysis, 4, "while")) == text.replace("f :", "while :").replace("(f)", "(while)")
     with pytest.raises(InvalidValueError, match="at most 9 characters in RLO-83"):
         rename(analysis, 4, "x" * 10)
 
@@ -305,7 +306,7 @@ def test_words_that_were_meant(line: str, title: str) -> None:
     assert fix.title == title
     assert not fix.diagnostic.fixes
     [edit] = fix.edits
-    mended = translate(Source("t.rlo", edited(text, fix.edits)), cell)
+    mended = translate(Source("t.rlo", apply_edits(text, fix.edits)), cell)
     assert edit.text in mended.source.text
     assert {one.code for one in mended.diagnostics} <= {"E202"}
     assert all_fixes(analysis.compiled.diagnostics) == ()
@@ -318,7 +319,7 @@ def ask_everything(analysis: Analysis, text: str, offset: int, new: str) -> None
         assert one.span.start <= offset == one.span.end
     signature = signature_at(view, offset)
     assert signature is None or all(start < end <= len(signature.label) for start, end in signature.parameters)
-    assert len(patched(view, line_stretches(analysis, "utf-16"), "utf-16")) == len(Ruler(text).starts)
+    assert len(patched(view, line_stretches(analysis, "utf-16"), "utf-16")) == len(PositionCodec(text).starts)
     place = min(offset, len(analysis.text))
     found = hover(analysis, place)
     assert found is None or found.span.start <= place <= found.span.end
@@ -328,7 +329,7 @@ def ask_everything(analysis: Analysis, text: str, offset: int, new: str) -> None
         assert entry.span.start <= entry.place.start <= entry.place.end <= entry.span.end
     assert all(fold.first < fold.last for fold in folds(analysis))
     quickfixes(analysis, Span(place, place))
-    edited(analysis.text, all_fixes(analysis.compiled.diagnostics))
+    apply_edits(analysis.text, all_fixes(analysis.compiled.diagnostics))
     try:
         rename(analysis, place, new)
     except InvalidValueError as error:

@@ -17,14 +17,13 @@ from armwright.program.bytecode.instructions import (
     Code,
     Constant,
     Instruction,
-    Kind,
+    JumpTarget,
     Op,
     Operand,
-    Place,
     ProcedureCode,
     Text,
-    Type,
 )
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import DECLARABLE, UnitSystem, dimension
 from armwright.program.language.words import Standard
@@ -84,7 +83,7 @@ def _written(operand: Operand) -> str:
             return operand
         case Constant(index=index):
             return f"c{index}"
-        case Place(index=index):
+        case JumpTarget(index=index):
             return f"@{index:04d}"
         case Text(value=value):
             return json.dumps(value, ensure_ascii=False)
@@ -113,7 +112,7 @@ def assemble(text: str, name: str = "code") -> Code:
 class _Procedure:
     start: int
     parameters: list[str] = attrs.field(factory=list)
-    types: dict[str, Type] = attrs.field(factory=dict)
+    types: dict[str, VariableType] = attrs.field(factory=dict)
 
 
 class _Reader:
@@ -126,7 +125,7 @@ class _Reader:
         self._units = UnitSystem()
         self._standard = Standard.RLO_2
         self._spelling: dict[str, str] = {}
-        self._types: dict[str, Type] = {}
+        self._types: dict[str, VariableType] = {}
         self._procedures: dict[str, _Procedure] = {}
         self._constants: list[tuple[float, ...] | float] = []
         self._steps: list[tuple[int, Op, tuple[Operand, ...], tuple[int, int, int], bool]] = []
@@ -252,7 +251,7 @@ class _Reader:
         if _STRING.fullmatch(word):
             return Text(self._string(word))
         if word[0] == "@" and word[1:].isdecimal():
-            return Place(int(word[1:10]))
+            return JumpTarget(int(word[1:10]))
         if re.fullmatch(r"c[0-9]+", word):
             return Constant(int(word[1:10]))
         if _PASSING.fullmatch(word):
@@ -294,14 +293,14 @@ class _Reader:
             self._fail(fault)
         return code
 
-    def _type(self, text: str) -> Type:
+    def _type(self, text: str) -> VariableType:
         match = _TYPE.fullmatch(text.strip())
-        if match is None or match["kind"] not in Kind.__members__:
+        if match is None or match["kind"] not in VariableKind.__members__:
             self._fail(f"unknown type {text!r}")
         sizes = tuple(int(size[:9]) for size in (match["sizes"] or "").split(",") if size)
         if sizes and not 1 <= math.prod(sizes) <= _MOST_ELEMENTS:
             self._fail(f"an array has 1 to {_MOST_ELEMENTS} elements")
-        return Type(Kind[match["kind"]], sizes)
+        return VariableType(VariableKind[match["kind"]], sizes)
 
     def _name(self, text: str) -> str:
         if not _NAME.fullmatch(text):
@@ -384,7 +383,7 @@ def _letter(operand: Operand) -> str:
             return "q" if operand.startswith("%") else "w"
         case Constant():
             return "k"
-        case Place():
+        case JumpTarget():
             return "p"
         case Text():
             return "s"
@@ -399,7 +398,7 @@ def faults(code: Code) -> Iterator[tuple[int, str]]:
         if not _PATTERNS[step.op].fullmatch("".join(map(_letter, step.operands))):
             yield at, f"{step.op} does not take these operands"
         for operand in step.operands:
-            if isinstance(operand, Place) and not 0 <= operand.index < last:
+            if isinstance(operand, JumpTarget) and not 0 <= operand.index < last:
                 yield at, f"there is no instruction @{operand.index:04d}"
             if isinstance(operand, Constant) and operand.index >= len(code.constants):
                 yield at, f"there is no constant c{operand.index}"

@@ -3,9 +3,10 @@
 from collections.abc import Callable, Mapping
 
 from armwright.program.bytecode.emitter import LATER, Emitter
-from armwright.program.bytecode.instructions import Code, Form, Op, Operand, ProcedureCode, Text, Type, stages_text
+from armwright.program.bytecode.instructions import Code, Form, Op, Operand, ProcedureCode, Text, stages_text
 from armwright.program.flow_analysis.analysis import Flow
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.kinds import VariableType
+from armwright.program.language.names import is_arm
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.syntax import tree
@@ -45,7 +46,7 @@ def translate(source: Source, program: tree.Program, symbols: Symbols, flow: Flo
     )
 
 
-def _known(types: Mapping[str, Type | None]) -> dict[str, Type]:
+def _known(types: Mapping[str, VariableType | None]) -> dict[str, VariableType]:
     return {key: kind for key, kind in types.items() if kind is not None}
 
 

@@ -1,12 +1,12 @@
 """Writing instructions: places that are known later, values in passing, and the code of expressions."""
 
-from armwright.program.bytecode.instructions import Constant, Instruction, Op, Operand, Place
+from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Operand
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import UnitSystem, convert
 from armwright.program.syntax import pose_literals, tree
 
 # A place that will be known later.
-LATER = Place(-1)
+LATER = JumpTarget(-1)
 
 _OPERATIONS = {
     "*": Op.MUL,
@@ -34,9 +34,9 @@ class Emitter:
         self._begins = False
 
     @property
-    def here(self) -> Place:
+    def here(self) -> JumpTarget:
         """Where the next instruction will stand."""
-        return Place(len(self.instructions))
+        return JumpTarget(len(self.instructions))
 
     def begin(self) -> None:
         """A statement begins: its first instruction is marked."""
@@ -80,7 +80,7 @@ class Emitter:
         """
         match node:
             case tree.Number() | tree.Name() | tree.ArmName():
-                operand = convert(node, self.units) if isinstance(node, tree.Number) else node.key
+                operand = convert(node.value, node.unit, self.units) if isinstance(node, tree.Number) else node.key
                 if into is None:
                     return operand
                 self.emit(Op.COPY, into, operand, span=node.span)
@@ -147,7 +147,11 @@ class Emitter:
         if all(isinstance(item, tree.Number) for item in node.items):
             numbers = pose_literals.constant(node)
             metres = self.units.metres
-            shift = [convert(item, self.units) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
+            shift = [
+                convert(item.value, item.unit, self.units) * metres
+                for item in node.items[9:]
+                if isinstance(item, tree.Number)
+            ]
             self.emit(Op.LOADM, to, self.constant((*numbers[:9], *shift)), span=node.span)
         else:
             self.emit(Op.MATX, to, *(self.value(item) for item in node.items), span=node.span)

@@ -7,12 +7,10 @@ from typing import TypeAlias
 
 import attrs
 
+from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import UnitSystem
 from armwright.program.language.words import Standard
-
-NORMAL_SPEED = 100.0
-LOWEST_SPEED, HIGHEST_SPEED = 1.0, 120.0
 
 
 class Op(enum.StrEnum):
@@ -89,33 +87,6 @@ class Op(enum.StrEnum):
     PRINT = "PRINT"  # values and texts
 
 
-class Kind(enum.StrEnum):
-    """What a name stands for."""
-
-    SCALAR = "SCALAR"
-    TRANS = "TRANS"
-    FRAME = "FRAME"
-    EVENT = "EVENT"
-
-
-@attrs.frozen
-class Type:
-    """What a variable holds.
-
-    Attributes:
-        kind: of the thing, or of each element.
-        sizes: of an array, one for each index; empty for a single thing.
-    """
-
-    kind: Kind
-    sizes: tuple[int, ...] = ()
-
-    def __str__(self) -> str:
-        """Return the type as a declaration writes it."""
-        sizes = ",".join(map(str, self.sizes))
-        return f"ARRAY [{sizes}] OF {self.kind}" if sizes else str(self.kind)
-
-
 @attrs.frozen
 class Constant:
     """An operand: the constant of that number."""
@@ -124,7 +95,7 @@ class Constant:
 
 
 @attrs.frozen
-class Place:
+class JumpTarget:
     """An operand: the instruction of that number."""
 
     index: int
@@ -139,10 +110,10 @@ class Text:
 
 # A name in upper case (a variable, an arm, a device, a procedure, a word such as RIGIDLY), a value in passing
 # (``%3``), a number, or one of the above.
-Operand: TypeAlias = str | float | Constant | Place | Text
+Operand: TypeAlias = str | float | Constant | JumpTarget | Text
 
 
-class Trajectory(enum.StrEnum):
+class MotionKind(enum.StrEnum):
     """The basic trajectories.
 
     ``PTP``: all joints at once, at rest at both ends. ``LINE``: the moved frame on a straight line.
@@ -187,7 +158,7 @@ class Form:
 class StagePlan:
     """One stage of a motion: a basic trajectory and the frames it leads to, the last being its end."""
 
-    kind: Trajectory
+    kind: MotionKind
     frames: tuple[str, ...]
 
 
@@ -199,14 +170,14 @@ def stages_of(form: Form) -> tuple[StagePlan, ...]:
     """
     stages = []
     if form.departure:
-        stages.append(StagePlan(kind=Trajectory.LINE, frames=(form.departure,)))
+        stages.append(StagePlan(kind=MotionKind.LINE, frames=(form.departure,)))
     end = form.approach or form.goal
-    gross = Trajectory.LINE if form.straight else Trajectory.PTP
+    gross = MotionKind.LINE if form.straight else MotionKind.PTP
     if form.via:
-        gross = Trajectory.BLEND if form.blend else Trajectory.SPLINE
+        gross = MotionKind.BLEND if form.blend else MotionKind.SPLINE
     stages.append(StagePlan(kind=gross, frames=(*form.via, end)))
     if form.approach:
-        stages.append(StagePlan(kind=Trajectory.LINE, frames=(form.goal,)))
+        stages.append(StagePlan(kind=MotionKind.LINE, frames=(form.goal,)))
     return tuple(stages)
 
 
@@ -246,7 +217,7 @@ class ProcedureCode:
 
     start: int
     parameters: tuple[str, ...]
-    types: Mapping[str, Type]
+    types: Mapping[str, VariableType]
 
 
 @attrs.frozen(kw_only=True)
@@ -266,7 +237,7 @@ class Code:
 
     instructions: tuple[Instruction, ...]
     constants: tuple[tuple[float, ...] | float, ...] = ()
-    types: Mapping[str, Type] = attrs.field(factory=dict)
+    types: Mapping[str, VariableType] = attrs.field(factory=dict)
     procedures: Mapping[str, ProcedureCode] = attrs.field(factory=dict)
     units: UnitSystem = attrs.field(factory=UnitSystem)
     spelling: Mapping[str, str] = attrs.field(factory=dict)
@@ -314,7 +285,7 @@ def shown_operands(code: Code, step: Instruction) -> Iterator[str]:
                 yield code.spelled(operand)
             case Constant(index=index):
                 yield f"c{index}"
-            case Place(index=index):
+            case JumpTarget(index=index):
                 yield f"@{index:04d}"
             case Text(value=value):
                 yield json.dumps(value, ensure_ascii=False)

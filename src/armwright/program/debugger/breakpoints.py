@@ -9,10 +9,10 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import ArmwrightError
-from armwright.program.bytecode.instructions import Kind
 from armwright.program.debugger.history import Path
 from armwright.program.debugger.snapshot import mover
 from armwright.program.debugger.statements import Start
+from armwright.program.language.kinds import VariableKind
 from armwright.program.vm.machine import Machine
 
 # A frame that is farther from where it was than this has moved [m], and entries of rotations.
@@ -138,9 +138,9 @@ class Watch:
 
 def _value(view: Machine, kept: str) -> "Array | float | None":
     kind = view.type_of(kept).kind
-    if kind is Kind.FRAME:
+    if kind is VariableKind.FRAME:
         return view.tree.world(kept) if view.has_place(kept) else None
-    if kind is Kind.EVENT:
+    if kind is VariableKind.EVENT:
         return float(view.events.get(kept, 0))
     return view.values.get(kept)
 

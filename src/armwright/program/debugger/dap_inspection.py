@@ -11,7 +11,7 @@ from armwright.program.debugger.expressions import names_at
 from armwright.program.debugger.history import Path
 from armwright.program.debugger.variables import Shown
 from armwright.program.diagnostics.render import render
-from armwright.program.language_server.positions import UTF_16, Ruler
+from armwright.program.language.position_codec import UTF_16, PositionCodec
 from armwright.program.semantics.builtins import FUNCTIONS
 
 # So many elements are sent to an editor that does not say how many it wants.
@@ -122,7 +122,7 @@ def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``completions``: names that begin with what has been typed."""
     debugger = session.standing
     column = arguments.whole("column") - session.first_column
-    ruler = Ruler(arguments.text("text"), UTF_16)
+    ruler = PositionCodec(arguments.text("text"), UTF_16)
     end = ruler.offset(arguments.whole("line", session.first_line) - session.first_line, column)
     match = _WORD.search(ruler.text[:end])
     typed = match[0] if match else ""

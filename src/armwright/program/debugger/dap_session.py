@@ -17,9 +17,9 @@ from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Shown
 from armwright.program.diagnostics.render import render
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.position_codec import UTF_16, PositionCodec, columns
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
-from armwright.program.language_server.positions import UTF_16, Ruler, columns
 from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
 from armwright.program.vm.recording import Effect, Recording
 
@@ -370,7 +370,7 @@ class EditorSession:
         if "column" in wanted:
             source = self.debugger.code.source
             text = source.line_text(line) if 0 < line <= len(source.line_starts) else ""
-            column = Ruler(text, UTF_16).offset(0, wanted.whole("column") - self.first_column) + 1
+            column = PositionCodec(text, UTF_16).offset(0, wanted.whole("column") - self.first_column) + 1
         found: Breakpoint = self.debugger.break_at(
             line,
             column,

@@ -10,7 +10,7 @@ import numpy as np
 
 from armwright.cell.model import Cell
 from armwright.errors import ArmwrightError
-from armwright.program.bytecode.instructions import Code, Kind
+from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger import variables
 from armwright.program.debugger.breakpoints import Breakpoint, CountError, Watch, counts
 from armwright.program.debugger.execution import Going, Position, Way
@@ -29,7 +29,8 @@ from armwright.program.debugger.statements import Start
 from armwright.program.debugger.step_rules import step_of
 from armwright.program.debugger.stop_reason import Stop
 from armwright.program.debugger.variables import Shown
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import is_arm
 from armwright.program.vm.interpreter import Limits, RunError
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Element, Process
@@ -356,16 +357,16 @@ class Debugger:
         self._standing()
         frame, view = self._frame(path, level), self.view
         kind = view.type_of(kept)
-        if kind.sizes or kind.kind is Kind.EVENT or self.over:
+        if kind.sizes or kind.kind is VariableKind.EVENT or self.over:
             raise ExpressionError(f"`{view.spelled(kept)}` cannot be given a value here")
-        moving = mover(view, kept) if kind.kind is Kind.FRAME else None
+        moving = mover(view, kept) if kind.kind is VariableKind.FRAME else None
         if moving is not None and not is_arm(kept):
             raise ExpressionError(f"`{view.spelled(kept)}` is being moved; it can be placed when the MOVE is over")
         value = value_for(view, self._process(path), frame, text, kind.kind)
 
         def change(machine: Machine) -> None:
             assert not isinstance(value, Element)  # noqa: S101 - elements have been read
-            if isinstance(value, np.ndarray) and kind.kind is Kind.FRAME:
+            if isinstance(value, np.ndarray) and kind.kind is VariableKind.FRAME:
                 machine.place(process_of(machine, path) or machine.program, kept, value, frame.span)
             else:
                 machine.values[kept] = value

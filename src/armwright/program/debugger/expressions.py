@@ -7,9 +7,10 @@ import attrs
 
 from armwright.errors import ArmwrightError
 from armwright.program.bytecode.emitter import Emitter
-from armwright.program.bytecode.instructions import Code, Instruction, Kind, Op, Operand, Type
+from armwright.program.bytecode.instructions import Code, Instruction, Op, Operand
 from armwright.program.debugger.snapshot import Frame
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.semantics import type_check
@@ -45,15 +46,15 @@ class Parsed:
     sort: Sort | None
 
 
-def names_at(machine: Machine, procedure: str | None) -> dict[str, Type]:
+def names_at(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
     """Return what can be named: frames of the cell, arms aside, names of the program, and of the procedure if any."""
     inner = (name for name in machine.tree if not set(name) & set(".'["))
     own = {} if procedure is None else machine.code.procedures[procedure].types
-    cell = {name: Type(Kind.FRAME) for name in inner if name not in machine.cell.arms}
+    cell = {name: VariableType(VariableKind.FRAME) for name in inner if name not in machine.cell.arms}
     return {**cell, **PREDECLARED, **machine.code.types, **own}
 
 
-def parse(text: str, types: Mapping[str, Type], code: Code) -> Parsed:
+def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
     """Read an expression and check what it is made of.
 
     Args:
@@ -129,7 +130,7 @@ def kept_name(machine: Machine, process: Process, frame: Frame, parsed: Parsed) 
     return here.name(asking, operand)
 
 
-def value_for(machine: Machine, process: Process, frame: Frame, text: str, kind: Kind) -> Value:
+def value_for(machine: Machine, process: Process, frame: Frame, text: str, kind: VariableKind) -> Value:
     """Return the value of an expression that a variable of some kind shall get.
 
     Raises:
@@ -143,7 +144,7 @@ def value_for(machine: Machine, process: Process, frame: Frame, text: str, kind:
     return compute(machine, process, frame, parsed)
 
 
-def condition(text: str, types: Mapping[str, Type], code: Code) -> Parsed:
+def condition(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
     """Read a condition, or a number that may be 0.
 
     Raises:

@@ -17,14 +17,15 @@ from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
 from armwright.motion.plan import Stage
 from armwright.motion.trajectory import Trajectory
-from armwright.program.bytecode.instructions import Code, Op, Type
+from armwright.program.bytecode.instructions import Code, Op
+from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
 from armwright.program.vm.interpreter import Limits, Machine, advance, due, ready
 from armwright.program.vm.process import Process
 from armwright.program.vm.recording import Effect, Run, RunStage
 
 # Things that never change are not copied but held.
-_HELD = (Code, Cell, FrameTree, Stage, Trajectory, Limits, Type, Effect, Run, RunStage, Span, np.ndarray)
+_HELD = (Code, Cell, FrameTree, Stage, Trajectory, Limits, VariableType, Effect, Run, RunStage, Span, np.ndarray)
 # A moment is kept when the way from the last one has taken so long [s], or so many times what keeping one takes.
 _OFTEN = 0.05
 _SHARE = 20.0

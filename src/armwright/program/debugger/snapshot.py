@@ -8,7 +8,7 @@ from armwright.cell.model import base_name
 from armwright.kinematics.forward import forward
 from armwright.program.debugger.history import Path
 from armwright.program.debugger.statements import Statements
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Activation, Process

@@ -10,8 +10,8 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.model import base_name
 from armwright.kinematics.forward import forward
-from armwright.program.bytecode.instructions import Kind, Type
 from armwright.program.debugger.snapshot import Frame
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Process, Value
 from armwright.spatial.poses import to_noap
@@ -56,7 +56,7 @@ def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
     own = {} if frame.procedure is None else machine.code.procedures[frame.procedure].types
     # Of a branch in the program itself, or of a procedure that has no names, there is nothing own to be seen.
     local = {key: frame.activation.bindings.get(key, key) for key in own if key in frame.activation.bindings}
-    values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not Kind.FRAME}
+    values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not VariableKind.FRAME}
     parts: list[tuple[str, Callable[[], Sequence[Shown]]]] = [
         ("Locals", lambda: [variable(machine, kept, name=machine.spelled(key)) for key, kept in local.items()]),
         ("Variables", lambda: [variable(machine, kept) for kept in values]),
@@ -85,10 +85,10 @@ def variable(machine: Machine, kept: str, *, name: str = "") -> Shown:
     called = name or machine.spelled(kept)
     if kind.sizes:
         return _array(machine, kept, called, kind)
-    if kind.kind is Kind.EVENT:
+    if kind.kind is VariableKind.EVENT:
         count = str(machine.events.get(kept, 0))
         return Shown(name=called, value=count, type="EVENT", expression=called, kept=kept)
-    if kind.kind is Kind.FRAME:
+    if kind.kind is VariableKind.FRAME:
         return _frame(machine, kept, called)
     value = machine.values.get(kept)
     if value is None:
@@ -187,7 +187,7 @@ def _place(machine: Machine, name: str) -> str:
     return f"({', '.join(_numbers(machine, machine.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
 
 
-def _array(machine: Machine, kept: str, called: str, kind: Type) -> Shown:
+def _array(machine: Machine, kept: str, called: str, kind: VariableType) -> Shown:
     count = math.prod(kind.sizes)
     return Shown(
         name=called,
@@ -203,7 +203,7 @@ def _array(machine: Machine, kept: str, called: str, kind: Type) -> Shown:
 class _Elements(Sequence[Shown]):
     """The elements of an array, made when they are looked at: there may be a million."""
 
-    def __init__(self, machine: Machine, kept: str, called: str, kind: Type) -> None:
+    def __init__(self, machine: Machine, kept: str, called: str, kind: VariableType) -> None:
         self._machine, self._kept, self._called, self._sizes = machine, kept, called, kind.sizes
 
     def __len__(self) -> int:

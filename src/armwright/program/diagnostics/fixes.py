@@ -10,7 +10,7 @@ import attrs
 from armwright.program.api import Compilation
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source
-from armwright.program.language_server.positions import Edit, edited
+from armwright.program.language.text_edits import Edit, apply_edits
 
 # How often a program is looked at again: one cure may bring the next slip to light.
 ROUNDS = 10
@@ -108,7 +108,7 @@ def _touches(span: tuple[int, int], taken: Sequence[tuple[int, int]]) -> bool:
 def _with(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
     """Return a program with the changes made that diagnostics offer."""
     edits = tuple(Edit(fix.span, fix.replacement) for one in diagnostics for fix in one.fixes)
-    return Source(source.name, edited(source.text, edits))
+    return Source(source.name, apply_edits(source.text, edits))
 
 
 def _helps(wanted: Sequence[Diagnostic], before: Compilation, after: Compilation) -> bool:

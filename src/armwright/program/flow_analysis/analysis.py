@@ -9,15 +9,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind
 from armwright.program.flow_analysis import concurrency, data_races, devices, frames
 from armwright.program.flow_analysis.calls import Calling
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
-from armwright.program.flow_analysis.facts import UNKNOWN, Parting, is_any, is_arm
+from armwright.program.flow_analysis.facts import UNKNOWN, Parting
 from armwright.program.flow_analysis.lattice import Outcome, Shaky
 from armwright.program.flow_analysis.side_effects import ANY_ARM, ANYTHING, NOTHING, Writes, every
 from armwright.program.flow_analysis.state import LAST, Course, Uses
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.cell_symbols import KnownCell
 from armwright.program.semantics.symbols import Symbols
@@ -273,7 +274,7 @@ class _Follower:
         course = self._course
         need(course, node.first, node.last, node.step)
         passes = course.passes(node)
-        variable = course.variable(node.variable, Kind.SCALAR)
+        variable = course.variable(node.variable, VariableKind.SCALAR)
         if passes == 0:
             return
         if variable is not None:

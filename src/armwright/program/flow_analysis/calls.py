@@ -2,19 +2,19 @@
 
 from collections.abc import Callable
 
-from armwright.program.bytecode.instructions import Kind, Type
 from armwright.program.flow_analysis import plausibility
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.frames import give
 from armwright.program.flow_analysis.lattice import EVERYTHING, Shaky
 from armwright.program.flow_analysis.state import LAST, Activation, Called, Course
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import ProcedureSymbols
 from armwright.program.syntax import tree
 
 # Calls inside calls that are followed, and statements of procedures that are followed in all.
 _DEEPEST, _MOST_STATEMENTS = 6, 20_000
-_BY_VALUE = (Kind.SCALAR, Kind.TRANS)
+_BY_VALUE = (VariableKind.SCALAR, VariableKind.TRANS)
 
 
 class Calling:
@@ -128,25 +128,25 @@ class Calling:
                 bindings[key] = self._bound(argument, kind, own, node.span if node else argument.span)
         return Activation(scope=course.symbols.scope(procedure.node.name.key), bindings=bindings)
 
-    def _bound(self, argument: tree.Expression, kind: Type | None, own: str, span: Span) -> str | None:
+    def _bound(self, argument: tree.Expression, kind: VariableType | None, own: str, span: Span) -> str | None:
         """Return where a parameter is kept: where its argument is, or in a place of its own."""
         course = self._course
         if kind is None:
             return None
-        if kind.sizes or kind.kind is Kind.EVENT:
+        if kind.sizes or kind.kind is VariableKind.EVENT:
             return course.bound(argument.key) if isinstance(argument, tree.Name) else None
-        if kind.kind is Kind.FRAME:
+        if kind.kind is VariableKind.FRAME:
             if isinstance(argument, tree.Name | tree.Index | tree.ArmName | tree.Poison):
                 return course.frame(argument)
             course.table.has(own)
             course.table.links.put(own, None)
             return own
-        give(course, own, course.number(argument) if kind.kind is Kind.SCALAR else None, span)
+        give(course, own, course.number(argument) if kind.kind is VariableKind.SCALAR else None, span)
         return own
 
     def _leave(self, procedure: ProcedureSymbols, activation: Activation) -> None:
         """Take the procedure's own frames away."""
         for key, kind in procedure.types.items():
             kept = activation.bindings[key]
-            if kept is not None and "'" in kept and kind is not None and kind.kind is Kind.FRAME:
+            if kept is not None and "'" in kept and kind is not None and kind.kind is VariableKind.FRAME:
                 self._course.table.drop(kept, array=bool(kind.sizes))

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
 from armwright.program.flow_analysis.state import Course, Use, Uses
 from armwright.program.language.diagnostic import Diagnostic, Findings, Label, Severity
+from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Source
 from armwright.program.semantics.expression_types import written
 from armwright.program.semantics.symbols import Scope, Symbols
@@ -219,7 +219,13 @@ def _never_signalled(found: Findings, events: _Events) -> None:
         key = head(name).rpartition(".")[2]
         kind, procedure = scope.type(key), scope.procedure
         given = procedure is not None and scope.is_local(key) and key in procedure.parameters
-        if kind is None or kind.kind is not Kind.EVENT or given or events.is_signalled(name) or head(name) in said:
+        if (
+            kind is None
+            or kind.kind is not VariableKind.EVENT
+            or given
+            or events.is_signalled(name)
+            or head(name) in said
+        ):
             continue
         said.add(head(name))
         declared, text = scope.declared(key), written(node.event)

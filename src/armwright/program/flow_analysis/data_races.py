@@ -5,9 +5,9 @@ from itertools import combinations, islice, product
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
 from armwright.program.language.diagnostic import Diagnostic, Findings, Label, Severity
+from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
@@ -222,7 +222,7 @@ def _writes(step: _Step, scope: Scope) -> Iterator[_Write]:
         head = target.name if isinstance(target, tree.Index) else target
         kind = own.type(head.key)
         # In a procedure that is called only the variables of the program are those of everybody.
-        if kind is None or kind.kind is Kind.EVENT or (own is not scope and own.is_local(head.key)):
+        if kind is None or kind.kind is VariableKind.EVENT or (own is not scope and own.is_local(head.key)):
             continue
         is_locked = bool(step.locked & {name, name.partition("[")[0]})
         span = node.head if isinstance(node, tree.For) else node.span

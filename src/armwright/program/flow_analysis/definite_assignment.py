@@ -1,9 +1,10 @@
 """What has no value where it needs one, certainly or on some of the ways that lead there."""
 
-from armwright.program.bytecode.instructions import Kind
-from armwright.program.flow_analysis.facts import Parting, is_any, is_arm
+from armwright.program.flow_analysis.facts import Parting
 from armwright.program.flow_analysis.state import Course
 from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import is_any, is_arm
 from armwright.program.semantics.expression_types import written
 from armwright.program.syntax import tree
 
@@ -38,10 +39,10 @@ def need_indices(course: Course, *nodes: object) -> None:
             need(course, *node.indices)
 
 
-def _kind(course: Course, node: tree.Expression) -> Kind | None:
+def _kind(course: Course, node: tree.Expression) -> VariableKind | None:
     key = node.name.key if isinstance(node, tree.Index) else getattr(node, "key", "")
     kind = course.now.scope.type(key)
-    return None if kind is None or kind.kind is Kind.EVENT else kind.kind
+    return None if kind is None or kind.kind is VariableKind.EVENT else kind.kind
 
 
 def _need_variable(course: Course, node: tree.Name | tree.Index) -> None:
@@ -60,7 +61,7 @@ def _need_variable(course: Course, node: tree.Name | tree.Index) -> None:
         return
     declared = scope.declared(head.key)
     secondary = (Label(declared.span, "declared here"),) if declared else ()
-    if kind is Kind.FRAME:
+    if kind is VariableKind.FRAME:
         _no_place(course, node, secondary, from_cell=kept == head.key and head is node)
         return
     course.say(
@@ -69,7 +70,7 @@ def _need_variable(course: Course, node: tree.Name | tree.Index) -> None:
         node.span,
         "no value here",
         secondary=secondary,
-        helps=(f"write `{written(node)} = {'100' if kind is Kind.SCALAR else '( twelve numbers )'} ;` before",),
+        helps=(f"write `{written(node)} = {'100' if kind is VariableKind.SCALAR else '( twelve numbers )'} ;` before",),
     )
 
 
@@ -78,7 +79,7 @@ def _uncertain(course: Course, node: tree.Name | tree.Index, name: str, parting:
 
     Where the use depends on a condition too, nothing is said: that may be the one on which it has the value.
     """
-    open_cell = course.cell is None and _kind(course, node) is Kind.FRAME
+    open_cell = course.cell is None and _kind(course, node) is VariableKind.FRAME
     if open_cell or not course.settle(name):
         return
     course.say(

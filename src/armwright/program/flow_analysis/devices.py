@@ -1,13 +1,14 @@
 """What arms, tools and sensors do in the course of a program: who carries what, and whether it can be moved."""
 
 from armwright.errors import closest
-from armwright.program.bytecode.instructions import HIGHEST_SPEED, LOWEST_SPEED
 from armwright.program.flow_analysis import plausibility
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
-from armwright.program.flow_analysis.facts import UNKNOWN, is_any, is_arm
+from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import leaves, place
 from armwright.program.flow_analysis.state import LAST, Course
 from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.names import is_any, is_arm
+from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import written

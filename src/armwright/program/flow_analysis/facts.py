@@ -113,13 +113,3 @@ def joined_grips(one: Grip | None, other: Grip | None) -> Grip | None:
     if one is None or other is None or one.frame != other.frame:
         return one if one == other else ANY_GRIP
     return one
-
-
-def is_arm(name: str) -> bool:
-    """Whether a canonical name is that of an arm; no other name has its form."""
-    return name.startswith("ARM_") and name[4:].isdecimal()
-
-
-def is_any(name: str) -> bool:
-    """Whether a name stands for some element of an array, nobody knows which."""
-    return name.endswith("[]")

@@ -16,14 +16,13 @@ from armwright.program.flow_analysis.facts import (
     Hand,
     Link,
     Parting,
-    is_any,
-    is_arm,
     joined_grips,
     joined_hands,
     joined_links,
 )
 from armwright.program.flow_analysis.lattice import Book, Facts, either, same
 from armwright.program.flow_analysis.poses import HERE, Place, after, inverse
+from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
 

@@ -1,11 +1,11 @@
 """What gives frames their places and hangs them on one another in the course of a program."""
 
-from armwright.program.bytecode.instructions import Kind
 from armwright.program.flow_analysis import plausibility, poses
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
-from armwright.program.flow_analysis.facts import is_any, is_arm
 from armwright.program.flow_analysis.state import Course
 from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import written
@@ -25,9 +25,9 @@ def assign(course: Course, node: tree.Assign) -> None:
         course.table.stand(frame, stands)
         plausibility.placed(course, frame, node.value)
         return
-    if (name := course.variable(target, Kind.SCALAR)) is not None:
+    if (name := course.variable(target, VariableKind.SCALAR)) is not None:
         give(course, name, course.number(node.value), node.span)
-    elif (name := course.variable(target, Kind.TRANS)) is not None:
+    elif (name := course.variable(target, VariableKind.TRANS)) is not None:
         plausibility.lengths(course, node.value)
         step = poses.certain(course, node.value)
         give(course, name, None, node.span)

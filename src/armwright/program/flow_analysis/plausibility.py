@@ -3,9 +3,10 @@
 import math
 from collections.abc import Iterator
 
-from armwright.program.flow_analysis.facts import UNKNOWN, is_any, is_arm
+from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.state import Course
 from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.units import convert
 from armwright.program.syntax import tree
 
@@ -44,7 +45,7 @@ def lengths(course: Course, *nodes: tree.Expression | None) -> None:
         return
     for node in nodes:
         for numbers in () if node is None else _typed(node):
-            away = math.hypot(*(convert(one, units) * units.metres for one in numbers))
+            away = math.hypot(*(convert(one.value, one.unit, units) * units.metres for one in numbers))
             if away > _FAR * reach:
                 what = "this place is {} from its origin" if isinstance(node, tree.Matrix) else "this step is {} long"
                 advice = f"write the lengths in {_UNITS[units.length]}"

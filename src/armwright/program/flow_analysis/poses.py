@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-from armwright.program.bytecode.instructions import Kind
+from armwright.program.language.kinds import VariableKind
 from armwright.program.language.units import convert
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.syntax import tree
@@ -46,9 +46,9 @@ def certain(course: "Course", node: tree.Expression) -> Place | None:
         return _function(course, node)
     if isinstance(node, tree.Name) and node.key == WORLD:
         return HERE
-    if (name := course.variable(node, Kind.FRAME)) is not None:
+    if (name := course.variable(node, VariableKind.FRAME)) is not None:
         return course.table.where(name)
-    name = course.variable(node, Kind.TRANS)
+    name = course.variable(node, VariableKind.TRANS)
     return None if name is None else course.steps[name]
 
 
@@ -105,7 +105,7 @@ def _amounts(course: "Course", nodes: Sequence[tree.Expression]) -> tuple[float,
     found = []
     for node in nodes:
         if isinstance(node, tree.Number):
-            number = None if math.isnan(node.value) else convert(node, course.symbols.units)
+            number = None if math.isnan(node.value) else convert(node.value, node.unit, course.symbols.units)
         else:
             known = course.number(node)
             number = None if known is None else known[0]

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import is_arm
 from armwright.program.semantics.symbols import Scope, Symbols
 from armwright.program.syntax import tree
 
@@ -176,7 +176,7 @@ def _assigned(scope: Scope, node: tree.Assign) -> Writes:
     names = _names(scope, node.target)
     head = node.target.name if isinstance(node.target, tree.Index) else node.target
     kind = scope.type(head.key) if isinstance(head, tree.Name) else None
-    is_frame = kind is None or kind.kind is Kind.FRAME
+    is_frame = kind is None or kind.kind is VariableKind.FRAME
     return Writes(placed=names if is_frame else frozenset(), values=frozenset() if is_frame else names)
 
 

@@ -5,14 +5,15 @@ from contextlib import contextmanager
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind
 from armwright.program.flow_analysis import constants
-from armwright.program.flow_analysis.facts import UNKNOWN, Parting, is_any, is_arm
+from armwright.program.flow_analysis.facts import UNKNOWN, Parting
 from armwright.program.flow_analysis.frame_state import Hanging
 from armwright.program.flow_analysis.lattice import EVERYTHING, Book, Facts, same
 from armwright.program.flow_analysis.poses import Place
 from armwright.program.flow_analysis.side_effects import ANY_ARM, Writes, Writing
 from armwright.program.language.diagnostic import Findings, Label, Severity
+from armwright.program.language.kinds import VariableKind
+from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.cell_symbols import KnownCell
 from armwright.program.semantics.symbols import Scope, Symbols
@@ -143,7 +144,7 @@ class Course:
         now = self.now
         return now.bindings.get(key) if now.scope.is_local(key) else key
 
-    def variable(self, node: object, kind: Kind | None = None) -> str | None:
+    def variable(self, node: object, kind: VariableKind | None = None) -> str | None:
         """Return where a single variable or an element is kept; None for anything else.
 
         ``SLOT[1,2]`` is an element, ``SLOT[]`` one of which the indices are unknown.
@@ -162,7 +163,7 @@ class Course:
         found = self.now.scope.type(key)
         if found is None or bool(found.sizes) is not bool(indices):
             return None
-        if found.kind is not kind if kind else found.kind is Kind.EVENT:
+        if found.kind is not kind if kind else found.kind is VariableKind.EVENT:
             return None
         kept = self.bound(key)
         if not indices or kept is None:
@@ -173,7 +174,7 @@ class Course:
 
     def frame(self, node: object) -> str | None:
         """Return where a FRAME is kept, or an arm; None for anything else or what is unknown."""
-        return node.key if isinstance(node, tree.ArmName) else self.variable(node, Kind.FRAME)
+        return node.key if isinstance(node, tree.ArmName) else self.variable(node, VariableKind.FRAME)
 
     def number(self, node: tree.Expression) -> tuple[float, Span] | None:
         """Return a number that is certain, and where it comes from."""
@@ -183,7 +184,7 @@ class Course:
         if isinstance(node, tree.Binary | tree.Unary):
             found = constants.value(node, self._known)
             return None if found is None else (found, node.span)
-        name = self.variable(node, Kind.SCALAR)
+        name = self.variable(node, VariableKind.SCALAR)
         return None if name is None or is_any(name) else self.numbers[name]
 
     def holds(self, node: tree.Expression) -> bool | None:

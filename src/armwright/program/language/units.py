@@ -6,8 +6,6 @@ from typing import Literal, TypeAlias
 
 import attrs
 
-from armwright.program.syntax import tree
-
 Dimension: TypeAlias = Literal["length", "angle", "time", "force"]
 
 # Each unit by its dimension, and what it is worth in m, rad, s or N.
@@ -24,6 +22,9 @@ UNITS: Mapping[str, tuple[Dimension, float]] = {
 }
 # What a UNITS line may name: times are always seconds and forces newtons.
 DECLARABLE = tuple(unit for unit, (dimension, _) in UNITS.items() if dimension in ("length", "angle"))
+# Speeds of a MOVE, in per cent of the normal one.
+NORMAL_SPEED = 100.0
+LOWEST_SPEED, HIGHEST_SPEED = 1.0, 120.0
 
 
 @attrs.frozen(kw_only=True)
@@ -54,13 +55,13 @@ def dimension(unit: str) -> Dimension:
     return UNITS[unit][0]
 
 
-def convert(number: tree.Number, system: UnitSystem) -> float:
+def convert(value: float, unit: str | None, system: UnitSystem) -> float:
     """Return what a number is worth in the units of the program: ``2cm`` is 20 after ``UNITS MM``."""
-    if number.unit is None:
-        return number.value
-    kind, worth = UNITS[number.unit]
+    if unit is None:
+        return value
+    kind, worth = UNITS[unit]
     own = {"length": system.length, "angle": system.angle}.get(kind)
-    if own == number.unit or own is None:
+    if own == unit or own is None:
         # Nothing to convert, so nothing to round.
-        return number.value * (worth if own is None else 1.0)
-    return number.value * worth / UNITS[own][1]
+        return value * (worth if own is None else 1.0)
+    return value * worth / UNITS[own][1]

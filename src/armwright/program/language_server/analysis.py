@@ -13,7 +13,7 @@ from armwright.cell.model import Cell
 from armwright.program.api import Compilation
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import CLOSING, OPENING
-from armwright.program.language_server.positions import Drift, drift
+from armwright.program.language_server.edit_map import EditMap, drift
 from armwright.program.language_server.symbol_index import Extents, Occurrence, extents_of, occurrences
 from armwright.program.semantics.symbols import Scope
 from armwright.program.syntax import tree
@@ -146,10 +146,10 @@ class View:
         drift: what has changed between the two.
     """
 
-    def __init__(self, text: str, analysis: Analysis, change: Drift | None = None) -> None:
+    def __init__(self, text: str, analysis: Analysis, change: EditMap | None = None) -> None:
         """Take up what has changed; where that is not told, compare the texts."""
         self.text, self.analysis = text, analysis
-        self.drift: Drift = drift(analysis.text, text) if change is None else change
+        self.drift: EditMap = drift(analysis.text, text) if change is None else change
 
     @property
     def fresh(self) -> bool:

@@ -8,8 +8,8 @@ import attrs
 from armwright.program.diagnostics.fixes import apart
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
+from armwright.program.language.text_edits import Edit
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.positions import Edit
 
 # A longer text is not repeated in a title.
 _LONGEST_SHOWN = 30

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind, Type
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language_server.analysis import Before, View
 from armwright.program.language_server.expected import Wanted, wanted
@@ -79,8 +79,13 @@ _GOES_ON = {
     "VISIONS": "VISIONS (${1:frame})",
     "SYSTEM": "SYSTEM (${1:ARM_1})",
 }
-_SORTS = {Kind.SCALAR: Sort.VARIABLE, Kind.TRANS: Sort.VARIABLE, Kind.FRAME: Sort.FRAME, Kind.EVENT: Sort.EVENT}
-_TYPES = frozenset((*Kind, "ARRAY"))
+_SORTS = {
+    VariableKind.SCALAR: Sort.VARIABLE,
+    VariableKind.TRANS: Sort.VARIABLE,
+    VariableKind.FRAME: Sort.FRAME,
+    VariableKind.EVENT: Sort.EVENT,
+}
+_TYPES = frozenset((*VariableKind, "ARRAY"))
 
 
 def completions(view: View, offset: int) -> list[Completion]:
@@ -157,9 +162,9 @@ class _Maker:
             text = f"{name}[${{1:1}}]" if kind.sizes else name
             yield self._one(name, _SORTS[kind.kind], text, f"{kind} {where}".rstrip(), self._place(key, kind))
 
-    def _place(self, key: str, kind: Type) -> str:
+    def _place(self, key: str, kind: VariableType) -> str:
         frames = self._analysis.frames
-        if kind != Type(Kind.FRAME) or frames is None or key not in frames or self._scope.is_local(key):
+        if kind != VariableType(VariableKind.FRAME) or frames is None or key not in frames or self._scope.is_local(key):
             return ""
         return f"hangs on {frames.parent(key)} in the cell"
 

@@ -11,10 +11,11 @@ from typing import Any
 
 import attrs
 
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language_server.analyse import Settings, analyse
 from armwright.program.language_server.analysis import Analysis, View
 from armwright.program.language_server.cell_lookup import Cells
-from armwright.program.language_server.positions import NO_DRIFT, Ruler
+from armwright.program.language_server.edit_map import NO_DRIFT
 from armwright.program.language_server.semantic_tokens import Stretch, line_stretches
 
 # How long nothing has to be typed before a program is looked at as a whole, short and long ones [s].
@@ -73,7 +74,7 @@ class Office:
     def __init__(
         self,
         encoding: str,
-        said: Callable[[Analysis, Ruler, str], Sequence[Any]],
+        said: Callable[[Analysis, PositionCodec, str], Sequence[Any]],
         found_out: "Callable[[Document, Known], None]",
         failed: Callable[[Exception], None],
     ) -> None:
@@ -87,7 +88,7 @@ class Office:
         self.worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="analysis")
         self._idle: asyncio.TimerHandle | None = None
 
-    def look(self, name: str, uri: str, ruler: Ruler, folder: Path | None) -> Known:
+    def look(self, name: str, uri: str, ruler: PositionCodec, folder: Path | None) -> Known:
         """Find out all there is to know of a text."""
         begin = time.perf_counter()
         # All that is made here stays: to look through it for what can go costs as much as making it.
@@ -138,7 +139,7 @@ class Document:
         """Take up a text; nothing is known of it yet."""
         self.uri, self.version = uri, version
         self._office, self._path = office, path
-        self.ruler = Ruler(text, office.encoding)
+        self.ruler = PositionCodec(text, office.encoding)
         # Changes of the text, of settings or of cell files so far, and how many of them are known.
         self._changes, self._seen = 1, 0
         self._known: Known | None = None
@@ -220,7 +221,7 @@ class Document:
         except Exception as error:  # noqa: BLE001 - a conversation goes on, whatever happens in it
             office.failed(error)
             if self._known is None:
-                self._known = office.look(self.name, self.uri, Ruler("", office.encoding), None)
+                self._known = office.look(self.name, self.uri, PositionCodec("", office.encoding), None)
                 self._drift = NO_DRIFT.then(0, 0, len(self.text))
         if old and old[0] is not self._known:
             office.worker.submit(_let_go, old)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind
+from armwright.program.language.kinds import VariableKind
 from armwright.program.language.units import DECLARABLE
 from armwright.program.language.words import SENSORS, VOCABULARIES, Standard
 from armwright.program.language_server.analysis import Before
@@ -43,7 +43,7 @@ class Wanted:
     """
 
     words: tuple[str, ...] = ()
-    kinds: frozenset[Kind] = frozenset()
+    kinds: frozenset[VariableKind] = frozenset()
     arms: bool = False
     devices: bool = False
     procedures: bool = False
@@ -54,17 +54,26 @@ class Wanted:
 
 _NOTHING = Wanted()
 _ARM = Wanted(arms=True)
-_FRAME = Wanted(kinds=frozenset((Kind.FRAME,)))
-_MOBILE = Wanted(kinds=frozenset((Kind.FRAME,)), arms=True)
-_EVENT = Wanted(kinds=frozenset((Kind.EVENT,)))
-_SCALAR = Wanted(kinds=frozenset((Kind.SCALAR,)), functions=_MEASURES)
-_COUNTER = Wanted(kinds=frozenset((Kind.SCALAR,)))
-_TRANS = Wanted(kinds=frozenset((Kind.TRANS,)), functions=_STEPS)
-_PLACE = Wanted(kinds=frozenset((Kind.FRAME,)), arms=True)
-_STEP = Wanted(kinds=frozenset((Kind.TRANS, Kind.FRAME)), arms=True, functions=_STEPS)
-_ANYTHING = Wanted(kinds=frozenset((Kind.SCALAR, Kind.TRANS, Kind.FRAME)), arms=True, functions=tuple(FUNCTIONS))
-_CONDITION = Wanted(words=("NOT",), kinds=frozenset((Kind.SCALAR,)), functions=_MEASURES)
-_OF_KIND = {Kind.SCALAR: _SCALAR, Kind.TRANS: _STEP, Kind.FRAME: _PLACE, Kind.EVENT: _EVENT}
+_FRAME = Wanted(kinds=frozenset((VariableKind.FRAME,)))
+_MOBILE = Wanted(kinds=frozenset((VariableKind.FRAME,)), arms=True)
+_EVENT = Wanted(kinds=frozenset((VariableKind.EVENT,)))
+_SCALAR = Wanted(kinds=frozenset((VariableKind.SCALAR,)), functions=_MEASURES)
+_COUNTER = Wanted(kinds=frozenset((VariableKind.SCALAR,)))
+_TRANS = Wanted(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
+_PLACE = Wanted(kinds=frozenset((VariableKind.FRAME,)), arms=True)
+_STEP = Wanted(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
+_ANYTHING = Wanted(
+    kinds=frozenset((VariableKind.SCALAR, VariableKind.TRANS, VariableKind.FRAME)),
+    arms=True,
+    functions=tuple(FUNCTIONS),
+)
+_CONDITION = Wanted(words=("NOT",), kinds=frozenset((VariableKind.SCALAR,)), functions=_MEASURES)
+_OF_KIND = {
+    VariableKind.SCALAR: _SCALAR,
+    VariableKind.TRANS: _STEP,
+    VariableKind.FRAME: _PLACE,
+    VariableKind.EVENT: _EVENT,
+}
 _JOINTS = ("AND", "OR")
 
 # What stands behind a word of a statement, and which words may follow that.
@@ -97,7 +106,7 @@ _AFTER: Mapping[tuple[str, str], tuple[Wanted, tuple[str, ...]]] = {
 # What stands in the parentheses behind a word.
 _INSIDE: Mapping[str, Wanted] = {
     "VIA": _PLACE,
-    "LOCK": Wanted(kinds=frozenset(Kind)),
+    "LOCK": Wanted(kinds=frozenset(VariableKind)),
     "PRINT": _ANYTHING,
     "VISIONS": _FRAME,
     "SYSTEM": _ARM,
@@ -153,9 +162,9 @@ def _known(words: Sequence[str], std: Standard) -> tuple[str, ...]:
 
 def _behind_sign(asked: Wanted, last: Token) -> Wanted:
     """Return what is wanted as the second part of an operation: behind `*` a step."""
-    if last.key == "*" and Kind.FRAME in asked.kinds:
+    if last.key == "*" and VariableKind.FRAME in asked.kinds:
         return _STEP
-    return _TRANS if last.key == "*" and Kind.TRANS in asked.kinds else asked
+    return _TRANS if last.key == "*" and VariableKind.TRANS in asked.kinds else asked
 
 
 # ---- where the statement starts ------------------------------------------------------------------------------------
@@ -227,7 +236,7 @@ def _start(before: Before, std: Standard) -> Wanted:
         return Wanted(words=("BEGIN", "PRIORITY", "COEND"), starts=True)
     if opened != "RECOVER":
         words = tuple(word for word in words if word != "RETRY")
-    return Wanted(words=words, kinds=frozenset(Kind) - {Kind.EVENT}, procedures=True, starts=True)
+    return Wanted(words=words, kinds=frozenset(VariableKind) - {VariableKind.EVENT}, procedures=True, starts=True)
 
 
 def _opened(tokens: Sequence[Token]) -> str:

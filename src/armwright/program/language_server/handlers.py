@@ -7,13 +7,14 @@ from lsprotocol import types as lsp
 from armwright.errors import ArmwrightError
 from armwright.program.formatter.partial import formatted_around
 from armwright.program.language.source import Source, Span
+from armwright.program.language.text_edits import Edit
 from armwright.program.language_server import lsp_types
 from armwright.program.language_server.code_actions import all_fixes, quickfixes
 from armwright.program.language_server.completions import completions
+from armwright.program.language_server.edit_map import drift
 from armwright.program.language_server.hover import hover
 from armwright.program.language_server.inlay_hints import hints
 from armwright.program.language_server.outline import folds, outline
-from armwright.program.language_server.positions import Edit, drift
 from armwright.program.language_server.rename import nameable, rename
 from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS, Stretch, difference, encoded, patched
 from armwright.program.language_server.server import RloServer, refusal

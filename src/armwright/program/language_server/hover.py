@@ -4,8 +4,8 @@ import attrs
 
 from armwright.arrays import Array
 from armwright.cell.model import base_name
-from armwright.program.bytecode.instructions import Kind, Type
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language.units import UNITS, UnitSystem, convert, dimension
 from armwright.program.language_server.analysis import Analysis
@@ -140,7 +140,7 @@ def _variable(analysis: Analysis, one: Occurrence, text: str) -> tuple[str, list
         lines.append("imported")
     elif one.key in PREDECLARED:
         lines.append("predeclared")
-    if one.owner is None and one.type == Type(Kind.FRAME):
+    if one.owner is None and one.type == VariableType(VariableKind.FRAME):
         lines += _frame(analysis, one.key)
     return code, lines
 
@@ -208,6 +208,6 @@ def _of_number(token: Token, units: UnitSystem) -> Hover | None:
     unit = token.text[len(token.key) :].upper()
     if unit not in UNITS or token.damaged:
         return None
-    value = convert(tree.Number(token.span, token.text, float(token.key), unit), units)
+    value = convert(float(token.key), unit, units)
     own = {"length": units.length.lower(), "angle": units.angle.lower(), "time": "s", "force": "N"}[dimension(unit)]
     return Hover(token.span, f"{token.text} = {value:.12g} {own}", (f"a {dimension(unit)} in the unit of the program",))

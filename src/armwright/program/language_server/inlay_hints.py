@@ -7,7 +7,7 @@ import attrs
 
 from armwright.program.bytecode.codegen import form_of
 from armwright.program.bytecode.instructions import stages_text
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.syntax import tree

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import attrs
 
-from armwright.program.bytecode.instructions import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
+from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
 
 
 @attrs.frozen

@@ -5,13 +5,14 @@ from collections.abc import Iterable, Sequence
 from lsprotocol import types as lsp
 
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
+from armwright.program.language.text_edits import Edit
 from armwright.program.language_server.analysis import Analysis, View
 from armwright.program.language_server.completions import Completion, Sort
 from armwright.program.language_server.hover import Hover
 from armwright.program.language_server.inlay_hints import Hint
 from armwright.program.language_server.outline import Entry, Fold, Part
-from armwright.program.language_server.positions import Edit, Ruler
 from armwright.program.language_server.signature_help import Signature
 
 _ITEMS = {
@@ -36,24 +37,24 @@ _SYMBOLS = {
 }
 
 
-def span_range(ruler: Ruler, span: Span) -> lsp.Range:
+def span_range(ruler: PositionCodec, span: Span) -> lsp.Range:
     """Return a stretch of text as lines and columns."""
     start, end = ruler.place(span.start), ruler.place(span.end)
     return lsp.Range(lsp.Position(*start), lsp.Position(*end))
 
 
-def offset_of(ruler: Ruler, position: lsp.Position) -> int:
+def offset_of(ruler: PositionCodec, position: lsp.Position) -> int:
     """Return the offset of a place."""
     return ruler.offset(position.line, position.character)
 
 
-def span_of(ruler: Ruler, asked: lsp.Range) -> Span:
+def span_of(ruler: PositionCodec, asked: lsp.Range) -> Span:
     """Return the stretch of text between two places."""
     start = offset_of(ruler, asked.start)
     return Span(start, max(start, offset_of(ruler, asked.end)))
 
 
-def text_edits(ruler: Ruler, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
+def text_edits(ruler: PositionCodec, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
     """Return changes of a text."""
     return [lsp.TextEdit(span_range(ruler, edit.span), edit.text) for edit in edits]
 
@@ -61,7 +62,7 @@ def text_edits(ruler: Ruler, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
 # ---- what is wrong -------------------------------------------------------------------------------------------------
 
 
-def diagnostics(analysis: Analysis, ruler: Ruler, uri: str, *, related: bool) -> list[lsp.Diagnostic]:
+def diagnostics(analysis: Analysis, ruler: PositionCodec, uri: str, *, related: bool) -> list[lsp.Diagnostic]:
     """Return what is wrong with a program.
 
     Args:
@@ -73,7 +74,7 @@ def diagnostics(analysis: Analysis, ruler: Ruler, uri: str, *, related: bool) ->
     return [_diagnostic(one, ruler, uri, related=related) for one in analysis.compiled.diagnostics]
 
 
-def _diagnostic(one: Diagnostic, ruler: Ruler, uri: str, *, related: bool) -> lsp.Diagnostic:
+def _diagnostic(one: Diagnostic, ruler: PositionCodec, uri: str, *, related: bool) -> lsp.Diagnostic:
     severity = lsp.DiagnosticSeverity.Error if one.is_error else lsp.DiagnosticSeverity.Warning
     if one.code.startswith("L"):
         severity = lsp.DiagnosticSeverity.Information
@@ -101,7 +102,7 @@ def message_of(one: Diagnostic) -> str:
 # ---- at a place ----------------------------------------------------------------------------------------------------
 
 
-def hover(found: Hover, ruler: Ruler, span: Span, *, markdown: bool) -> lsp.Hover:
+def hover(found: Hover, ruler: PositionCodec, span: Span, *, markdown: bool) -> lsp.Hover:
     """Return what there is to say about a stretch of text."""
     if markdown:
         code = f"```rlo\n{found.code}\n```"
@@ -113,7 +114,7 @@ def hover(found: Hover, ruler: Ruler, span: Span, *, markdown: bool) -> lsp.Hove
     return lsp.Hover(content, span_range(ruler, span))
 
 
-def completion(found: Sequence[Completion], ruler: Ruler, *, snippets: bool) -> lsp.CompletionList:
+def completion(found: Sequence[Completion], ruler: PositionCodec, *, snippets: bool) -> lsp.CompletionList:
     """Return what can be written; whole statements only for an editor that leads from gap to gap."""
     items = []
     for number, one in enumerate(found):
@@ -138,7 +139,7 @@ def completion(found: Sequence[Completion], ruler: Ruler, *, snippets: bool) -> 
 
 def signature(found: Signature, encoding: str) -> lsp.SignatureHelp:
     """Return what a call takes."""
-    ruler = Ruler(found.label, encoding)
+    ruler = PositionCodec(found.label, encoding)
     parameters = [
         lsp.ParameterInformation((ruler.width(0, start), ruler.width(0, end))) for start, end in found.parameters
     ]
@@ -154,7 +155,7 @@ def signature(found: Signature, encoding: str) -> lsp.SignatureHelp:
 # ---- of the whole --------------------------------------------------------------------------------------------------
 
 
-def inlay_hints(found: Iterable[Hint], view: View, ruler: Ruler) -> list[lsp.InlayHint]:
+def inlay_hints(found: Iterable[Hint], view: View, ruler: PositionCodec) -> list[lsp.InlayHint]:
     """Return words between the words of a program."""
     hints = []
     for one in found:
@@ -174,7 +175,7 @@ def inlay_hints(found: Iterable[Hint], view: View, ruler: Ruler) -> list[lsp.Inl
     return hints
 
 
-def symbols(entries: Iterable[Entry], view: View, ruler: Ruler) -> list[lsp.DocumentSymbol]:
+def symbols(entries: Iterable[Entry], view: View, ruler: PositionCodec) -> list[lsp.DocumentSymbol]:
     """Return what a program declares."""
     found = []
     for entry in entries:

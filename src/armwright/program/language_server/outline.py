@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source, Span
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.hover import signature
@@ -46,7 +46,7 @@ class Entry:
     inside: tuple["Entry", ...] = ()
 
 
-_PARTS = {Kind.FRAME: Part.FRAME, Kind.EVENT: Part.EVENT}
+_PARTS = {VariableKind.FRAME: Part.FRAME, VariableKind.EVENT: Part.EVENT}
 
 
 def outline(analysis: Analysis) -> tuple[Entry, ...]:
@@ -76,7 +76,7 @@ def outline(analysis: Analysis) -> tuple[Entry, ...]:
 
 
 def _variables(
-    declaration: tree.Declaration, types: Mapping[str, Type | None], *, parameter: bool = False
+    declaration: tree.Declaration, types: Mapping[str, VariableType | None], *, parameter: bool = False
 ) -> list[Entry]:
     found = []
     for name in declaration.names:

@@ -3,9 +3,9 @@
 import re
 
 from armwright.errors import InvalidValueError
+from armwright.program.language.text_edits import Edit
 from armwright.program.language.words import VOCABULARIES, is_later
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.positions import Edit
 from armwright.program.language_server.symbol_index import Occurrence, What
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.symbols import PREDECLARED

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
-from armwright.program.bytecode.instructions import Kind
+from armwright.program.language.kinds import VariableKind
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import UNITS
 from armwright.program.language.words import LATER_TYPES, TYPES
 from armwright.program.language_server.analysis import Analysis, View
-from armwright.program.language_server.positions import Drift, Ruler
+from armwright.program.language_server.edit_map import EditMap
 from armwright.program.language_server.symbol_index import Occurrence, What, occurrences
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import without_numbers
@@ -41,7 +42,7 @@ Stretch = tuple[int, int, int, int]
 
 def line_stretches(analysis: Analysis, encoding: str) -> list[list[Stretch]]:
     """Return the coloured stretches of each line of a program."""
-    ruler = Ruler(analysis.text, encoding)
+    ruler = PositionCodec(analysis.text, encoding)
     compiled = analysis.compiled
     lines: list[list[Stretch]] = [[] for _ in ruler.starts]
     _put(lines, ruler, compiled.tokens, analysis.occurrences, analysis)
@@ -61,7 +62,7 @@ def patched(view: View, known: Sequence[list[Stretch]], encoding: str) -> Sequen
     if view.fresh:
         return known
     change = _whole_line_ends(view)
-    old, new = Ruler(view.analysis.text, encoding), Ruler(view.text, encoding)
+    old, new = PositionCodec(view.analysis.text, encoding), PositionCodec(view.text, encoding)
     first, last = new.line_of(change.start), new.line_of(change.new_end)
     above, below = known[: old.line_of(change.start)], known[old.line_of(change.old_end) + 1 :]
     start, end = new.starts[first], new.line_end(last)
@@ -81,15 +82,15 @@ def patched(view: View, known: Sequence[list[Stretch]], encoding: str) -> Sequen
     return (*above, *lines, *below)
 
 
-def _whole_line_ends(view: View) -> Drift:
+def _whole_line_ends(view: View) -> EditMap:
     """Return what has changed, with the other half of a line end that the change begins or ends in."""
     change, text = view.drift, view.text
     halved = text[change.start - 1 : change.start] == "\r"
     more = text[change.new_end : change.new_end + 1] == "\n"
-    return Drift(change.start - halved, change.old_end + more, change.new_end + more)
+    return EditMap(change.start - halved, change.old_end + more, change.new_end + more)
 
 
-def _in_comment(view: View, change: Drift, old: Ruler) -> bool:
+def _in_comment(view: View, change: EditMap, old: PositionCodec) -> bool:
     """Whether the lines that have changed lie in one comment, which goes on above and below them."""
     start = old.starts[old.line_of(change.start)]
     end = old.line_end(old.line_of(change.old_end))
@@ -101,7 +102,7 @@ def _in_comment(view: View, change: Drift, old: Ruler) -> bool:
 class _Part:
     """A ruler for some lines of a text: offsets and lines count from their start."""
 
-    def __init__(self, whole: Ruler, start: int, line: int) -> None:
+    def __init__(self, whole: PositionCodec, start: int, line: int) -> None:
         self._whole, self._start, self._line = whole, start, line
 
     def place(self, offset: int) -> tuple[int, int]:
@@ -124,7 +125,7 @@ def _numbered(text: str) -> bool:
 
 def _put(
     lines: list[list[Stretch]],
-    ruler: "Ruler | _Part",
+    ruler: "PositionCodec | _Part",
     tokens: Sequence[Token],
     names: Sequence[Occurrence],
     analysis: Analysis,
@@ -172,7 +173,7 @@ def _named(one: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
     elif one.owner is None and one.key not in symbols.declared:
         bits |= _BIT["defaultLibrary"]
     if one.type is not None:
-        if one.type.kind is Kind.EVENT:
+        if one.type.kind is VariableKind.EVENT:
             word = "event" if word == "variable" else word
         else:
             bits |= _BIT[one.type.kind.value.lower()]
@@ -180,7 +181,7 @@ def _named(one: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
     return KINDS.index(word), bits
 
 
-def _put_comment(lines: list[list[Stretch]], ruler: "Ruler | _Part", comment: Span) -> None:
+def _put_comment(lines: list[list[Stretch]], ruler: "PositionCodec | _Part", comment: Span) -> None:
     """Add a comment to each of its lines."""
     start = comment.start
     for line in range(ruler.line_of(comment.start), ruler.line_of(comment.end) + 1):

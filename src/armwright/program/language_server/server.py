@@ -14,13 +14,13 @@ from pygls.protocol import LanguageServerProtocol, lsp_method
 from pygls.uris import to_fs_path
 
 from armwright.errors import InvalidValueError
+from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.words import Standard
 from armwright.program.language_server import lsp_types
 from armwright.program.language_server.analyse import Settings
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.documents import Changed, Document, Known, Office
 from armwright.program.language_server.message_limits import Incoming
-from armwright.program.language_server.positions import Ruler
 from armwright.version import __version__
 
 SECTION = "armwright"
@@ -110,7 +110,7 @@ class RloServer(LanguageServer):
         """Take note that an answer was given of an earlier text: the editor shall ask again."""
         self._guessed = True
 
-    def _said(self, analysis: Analysis, ruler: Ruler, uri: str) -> list[lsp.Diagnostic]:
+    def _said(self, analysis: Analysis, ruler: PositionCodec, uri: str) -> list[lsp.Diagnostic]:
         related = bool(self.can("text_document", "publish_diagnostics", "related_information"))
         return lsp_types.diagnostics(analysis, ruler, uri, related=related)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import attrs
 
-from armwright.program.bytecode.instructions import Type
+from armwright.program.language.kinds import VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
@@ -55,7 +55,7 @@ class Occurrence:
     key: str
     what: What
     owner: str | None = None
-    type: Type | None = None
+    type: VariableType | None = None
     declares: bool = False
     writes: bool = False
 

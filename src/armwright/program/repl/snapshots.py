@@ -8,8 +8,9 @@ import attrs
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
-from armwright.program.bytecode.instructions import Code, Kind, Op, Type
+from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.language.diagnostic import Diagnostic
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.vm.interpreter import advance, due, warnings
@@ -63,7 +64,7 @@ def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
     other.limits = attrs.evolve(limits, time=machine.now + limits.time)
     other.idle = 0
     for name, kind in code.types.items():
-        if kind == Type(Kind.FRAME):
+        if kind == VariableType(VariableKind.FRAME):
             other.tree = other.tree.declare(name)
     return other
 

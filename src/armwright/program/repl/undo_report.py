@@ -3,7 +3,7 @@
 import numpy as np
 
 from armwright.cell.frames import WORLD
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.language.names import is_arm
 from armwright.program.vm.machine import Machine
 
 # Effects that say nothing of their own in a trace.

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from armwright.program.bytecode.instructions import Type
+from armwright.program.language.kinds import VariableType
 from armwright.program.semantics.expression_types import OF_KIND, Sort, bare, called, is_what
 from armwright.program.semantics.quantities import measure
 from armwright.program.semantics.scopes import Names
 from armwright.program.syntax import tree
 
 
-def single(names: Names, name: tree.Name, kind: Type) -> Sort | None:
+def single(names: Names, name: tree.Name, kind: VariableType) -> Sort | None:
     """Return the sort of a variable named without an index; say once when it is an array."""
     if not kind.sizes:
         return OF_KIND[kind.kind]

@@ -2,8 +2,8 @@
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind, Type
 from armwright.program.language.diagnostic import Fix, Label
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.language.words import ABSENT, ELSEWHERE
 from armwright.program.semantics import type_check
@@ -56,7 +56,7 @@ class Calls:
                 _look(names, argument)
                 continue
             _fits(names, argument, procedure, parameter, kind)
-            if kind == Type(Kind.FRAME) and isinstance(argument, tree.Name | tree.ArmName):
+            if kind == VariableType(VariableKind.FRAME) and isinstance(argument, tree.Name | tree.ArmName):
                 self._passed.append(_Passed(caller, argument, procedure, parameter))
 
     def changes(self, node: tree.Expression, inside: Procedure | None, span: Span) -> None:
@@ -107,7 +107,7 @@ def _look(names: Names, argument: tree.Expression) -> None:
         type_check.sort(names, argument)
 
 
-def _fits(names: Names, argument: tree.Expression, procedure: Procedure, parameter: str, kind: Type) -> None:
+def _fits(names: Names, argument: tree.Expression, procedure: Procedure, parameter: str, kind: VariableType) -> None:
     what = f"parameter `{_text(procedure, parameter)}` of `{procedure.node.name.text}` is "
     if not kind.sizes:
         takes = OF_KIND[kind.kind]
@@ -166,7 +166,7 @@ def _unknown(names: Names, node: tree.Call) -> None:
         if not kind.sizes and node.arguments:
             # No other statement begins with a variable.
             help_ = f"to give it a value write `{name.text} = ...`"
-            numbers = (1,) if kind.kind is Kind.SCALAR else (1, _NUMBERS_OF_A_PLACE)
+            numbers = (1,) if kind.kind is VariableKind.SCALAR else (1, _NUMBERS_OF_A_PLACE)
             fixes = (Fix(Span(name.span.end, name.span.end), " ="),) if len(node.arguments) in numbers else ()
     elif name.key in FUNCTIONS:
         message, label = f"`{name.key}` is a function and no statement", "its value goes nowhere"

@@ -2,7 +2,7 @@
 
 import enum
 
-from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.syntax import tree
 
 # A longer expression is not repeated in a message; its place is marked anyway.
@@ -35,7 +35,7 @@ class Sort(enum.Enum):
         return self.value.split(" ", 1)[1]
 
 
-OF_KIND = {kind: Sort[kind.name] for kind in Kind}
+OF_KIND = {kind: Sort[kind.name] for kind in VariableKind}
 # What each kind of variable, parameter or operand takes.
 FITTING = {sort: frozenset({sort}) for sort in Sort} | {
     Sort.FRAME: frozenset({Sort.FRAME, Sort.MATRIX}),
@@ -50,9 +50,9 @@ def is_what(node: tree.Expression, sort: Sort) -> str:
     return "a number" if isinstance(node, tree.Number) else sort.value
 
 
-def a_type(kind: Type) -> str:
+def a_type(kind: VariableType) -> str:
     """Return a type with its article, such as ``an ARRAY [2,3] OF FRAME``."""
-    return f"{'an' if kind.sizes or kind.kind is Kind.EVENT else 'a'} {kind}"
+    return f"{'an' if kind.sizes or kind.kind is VariableKind.EVENT else 'a'} {kind}"
 
 
 def bare(words: str) -> str:

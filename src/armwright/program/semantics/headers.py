@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 
 from armwright.errors import ArmwrightError
-from armwright.program.bytecode.instructions import Kind, Type
 from armwright.program.language.diagnostic import Label, Severity
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import DECLARABLE, UNITS, UnitSystem, dimension
 from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import STATION, WORLD, ReadImport
@@ -64,7 +64,7 @@ def _variables(names: Names, table: Table, declaration: tree.Declaration) -> Non
 
 def _is_frame(written: tree.TypeName) -> bool:
     """Whether a type is, or may have been meant as, a single FRAME."""
-    return written.key in (Kind.FRAME, None) and not written.sizes
+    return written.key in (VariableKind.FRAME, None) and not written.sizes
 
 
 def _twice(names: Names, name: tree.Name, first: tree.Name) -> None:
@@ -77,7 +77,7 @@ def _twice(names: Names, name: tree.Name, first: tree.Name) -> None:
     )
 
 
-def _type(names: Names, written: tree.TypeName) -> Type | None:
+def _type(names: Names, written: tree.TypeName) -> VariableType | None:
     """Return what a declaration declares; None where something was wrong with it."""
     sizes = [_size(names, number) for number in written.sizes]
     if written.key is None or None in sizes:
@@ -95,7 +95,7 @@ def _type(names: Names, written: tree.TypeName) -> Type | None:
             f"more than {MOST_ELEMENTS}",
         )
         return None
-    return Type(Kind(written.key), whole)
+    return VariableType(VariableKind(written.key), whole)
 
 
 def _size(names: Names, number: tree.Number) -> int | None:
@@ -188,7 +188,7 @@ def _import(names: Names, header: tree.Import, read_import: ReadImport | None) -
             text = f"frame `{frame}` comes from two imports"
             names.found.say("E228", text, path.span, "it comes from here too")
         names.imported.add(frame)
-        names.main.types[frame] = Type(Kind.FRAME)
+        names.main.types[frame] = VariableType(VariableKind.FRAME)
 
 
 # ---- procedures ----------------------------------------------------------------------------------------------------

@@ -1,8 +1,7 @@
 """Names, types and clauses of one MOVE."""
 
-from armwright.program.bytecode.instructions import HIGHEST_SPEED, LOWEST_SPEED
 from armwright.program.language.diagnostic import Label
-from armwright.program.language.units import Dimension
+from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
 from armwright.program.language.words import Standard
 from armwright.program.semantics.expression_types import Sort, written
 from armwright.program.semantics.quantities import in_range, measure

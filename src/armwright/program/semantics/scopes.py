@@ -4,8 +4,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 
 from armwright.errors import closest
-from armwright.program.bytecode.instructions import Type
 from armwright.program.language.diagnostic import Findings, Label, Severity
+from armwright.program.language.kinds import VariableType
 from armwright.program.language.units import UnitSystem
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import Imported, KnownCell
@@ -19,7 +19,7 @@ _MOST_COMPARISONS = 20_000
 class Table:
     """The names that belong together: those of the program, or those of one procedure."""
 
-    def __init__(self, types: dict[str, Type | None]) -> None:
+    def __init__(self, types: dict[str, VariableType | None]) -> None:
         """Start with names that nobody has to declare."""
         self.types = types
         self.declared: dict[str, tree.Name] = {}
@@ -91,7 +91,7 @@ class Names:
 
     # ---- looking up ------------------------------------------------------------------------------------------------
 
-    def type(self, name: tree.Name) -> Type | None:
+    def type(self, name: tree.Name) -> VariableType | None:
         """Return what a name stands for; say once when it is not declared. None where that is unknown."""
         key = name.key
         table = self._table(key)
@@ -104,7 +104,7 @@ class Names:
             table.poisoned.add(key)
         return None if key in table.poisoned else table.types[key]
 
-    def peek(self, key: str) -> Type | None:
+    def peek(self, key: str) -> VariableType | None:
         """Return what a name stands for, without asking anything of it."""
         return self._table(key).types.get(key)
 

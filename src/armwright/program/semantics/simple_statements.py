@@ -1,7 +1,7 @@
 """Names and types of single statements: values, frames, tools, sensors, events, counting, output."""
 
-from armwright.program.bytecode.instructions import Kind, Type
 from armwright.program.language.diagnostic import Label
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.words import Standard
 from armwright.program.semantics import events
 from armwright.program.semantics.cell_symbols import WORLD
@@ -160,7 +160,7 @@ def arm(names: Names, node: tree.Mobile | None, who: str) -> None:
         found = sort(names, node)
         if found is None:
             return
-        kind = Type(Kind[found.name])
+        kind = VariableType(VariableKind[found.name])
     is_one = "is no arm" if kind is None else f"is {a_type(kind)}"
     names.found.say(
         "E201",
@@ -216,7 +216,7 @@ def count(names: Names, node: tree.For) -> None:
         names.use(variable.names)
     else:
         kind = names.type(variable)
-        if kind is not None and kind != Type(Kind.SCALAR):
+        if kind is not None and kind != VariableType(VariableKind.SCALAR):
             names.poison(variable.key)
             names.found.say(
                 "E229",

@@ -4,13 +4,14 @@ from collections.abc import Mapping
 
 import attrs
 
-from armwright.program.bytecode.instructions import Kind, Type
+from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.units import UnitSystem
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import STATION, WORLD
 from armwright.program.syntax import tree
 
-PREDECLARED: Mapping[str, Type] = {WORLD: Type(Kind.FRAME), STATION: Type(Kind.FRAME)}
+FRAME = VariableType(VariableKind.FRAME)
+PREDECLARED: Mapping[str, VariableType] = {WORLD: FRAME, STATION: FRAME}
 
 
 @attrs.frozen(kw_only=True)
@@ -27,7 +28,7 @@ class ProcedureSymbols:
 
     node: tree.Procedure
     parameters: tuple[str, ...]
-    types: Mapping[str, Type | None]
+    types: Mapping[str, VariableType | None]
     declared: Mapping[str, tree.Name]
     poisoned: frozenset[str] = frozenset()
 
@@ -46,7 +47,7 @@ class Symbols:
         std: the language.
     """
 
-    types: Mapping[str, Type | None]
+    types: Mapping[str, VariableType | None]
     declared: Mapping[str, tree.Name]
     procedures: Mapping[str, ProcedureSymbols] = attrs.field(factory=dict)
     poisoned: frozenset[str] = frozenset()
@@ -79,7 +80,7 @@ class Scope:
         """Whether a name is a parameter or own variable of the procedure."""
         return self.procedure is not None and key in self.procedure.types
 
-    def type(self, key: str) -> Type | None:
+    def type(self, key: str) -> VariableType | None:
         """Return what a name stands for; None where it is unknown or was reported as wrong."""
         local = self.procedure
         return local.types[key] if local is not None and key in local.types else self.symbols.types.get(key)
@@ -99,4 +100,4 @@ class Scope:
         """Return the canonical name of a single FRAME or an arm; None for anything else or what is unknown."""
         if isinstance(node, tree.ArmName):
             return node.key
-        return node.key if isinstance(node, tree.Name) and self.type(node.key) == Type(Kind.FRAME) else None
+        return node.key if isinstance(node, tree.Name) and self.type(node.key) == FRAME else None

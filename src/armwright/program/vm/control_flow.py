@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping, Sequence
 
-from armwright.program.bytecode.instructions import Instruction, Kind, Op, Place
+from armwright.program.bytecode.instructions import Instruction, JumpTarget, Op
+from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
 from armwright.program.vm.contact import contact_of, note_contact, stop
 from armwright.program.vm.machine import Machine, RunError
@@ -21,7 +22,7 @@ _LONGEST_PAUSE = 1e6
 
 def _place(step: Instruction, at: int) -> int:
     place = step.operands[at]
-    assert isinstance(place, Place)  # noqa: S101 - the translator lands them
+    assert isinstance(place, JumpTarget)  # noqa: S101 - the translator lands them
     return place.index
 
 
@@ -62,13 +63,13 @@ def _call(run: Machine, process: Process, step: Instruction) -> None:
         kept = f"{key}'{run.activations}"
         if key in procedure.parameters:
             operand = step.operands[1 + procedure.parameters.index(key)]
-            by_value = not kind.sizes and kind.kind in (Kind.SCALAR, Kind.TRANS)
+            by_value = not kind.sizes and kind.kind in (VariableKind.SCALAR, VariableKind.TRANS)
             if not by_value and run.names_variable(process, operand):
                 bindings[key] = run.name(process, operand)
                 continue
             if not by_value:
                 run.grow(run.tree.place(kept, run.pose(process, operand, step)), kept, step.span)
-            elif kind.kind is Kind.SCALAR:
+            elif kind.kind is VariableKind.SCALAR:
                 run.values[kept] = run.number(process, operand, step)
             else:
                 run.values[kept] = run.pose(process, operand, step)
@@ -102,7 +103,7 @@ def _leave(run: Machine, process: Process, span: Span) -> None:
         kind = run.types.pop(kept)
         elements = [name for name in run.tree if name.startswith(f"{kept}[")] if kind.sizes else []
         for name in (kept, *elements):
-            if kind.kind is Kind.FRAME and name in run.tree:
+            if kind.kind is VariableKind.FRAME and name in run.tree:
                 run.grow(run.tree.without(name), name, span)
                 run.written.pop(name, None)
                 for hand in run.hands.values():

@@ -13,9 +13,10 @@ from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell, base_name
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
-from armwright.program.bytecode.instructions import Code, Instruction, Kind, Operand, Type
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.bytecode.instructions import Code, Instruction, Operand
 from armwright.program.language.diagnostic import Diagnostic, Label
+from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.vm.process import Activation, Element, Pending, Process, Start, Value
 from armwright.program.vm.recording import (
@@ -97,10 +98,10 @@ class Machine:
         """Stand in front of the first instruction."""
         self.code, self.cell, self.hardware = code, cell, hardware
         self.limits = limits or Limits()
-        self.types: dict[str, Type] = dict(code.types)
+        self.types: dict[str, VariableType] = dict(code.types)
         self.tree = cell.tree()
         for name, kind in code.types.items():
-            if kind == Type(Kind.FRAME):
+            if kind == VariableType(VariableKind.FRAME):
                 self.tree = self.tree.declare(name)
         self.constants = [from_noap(value) if isinstance(value, tuple) else float(value) for value in code.constants]
         self.values: dict[str, float | Array] = {}
@@ -157,12 +158,12 @@ class Machine:
             return False
         return not operand.startswith("%") or isinstance(process.now.passing[operand], Element)
 
-    def type_of(self, name: str) -> Type:
+    def type_of(self, name: str) -> VariableType:
         """Return what a kept name holds; of an element, what the element holds."""
         base, bracket, _ = name.partition("[")
         if is_arm(name) or base not in self.types:
-            return Type(Kind.FRAME)
-        return Type(self.types[base].kind) if bracket else self.types[base]
+            return VariableType(VariableKind.FRAME)
+        return VariableType(self.types[base].kind) if bracket else self.types[base]
 
     def read(self, process: Process, operand: Operand, step: Instruction) -> Value:
         """Return the value of an operand.
@@ -180,7 +181,7 @@ class Machine:
 
     def held(self, name: str, step: Instruction, process: Process) -> Value:
         """Return what a kept name holds."""
-        if self.type_of(name).kind is Kind.FRAME:
+        if self.type_of(name).kind is VariableKind.FRAME:
             self.look(process, name)
             if not self.has_place(name):
                 text = f"frame `{self.spelled(name)}` is used before it has a value"
@@ -211,7 +212,7 @@ class Machine:
             process.now.wrote[operand] = step.span
             return
         name = self.name(process, operand)
-        if self.type_of(name).kind is not Kind.FRAME:
+        if self.type_of(name).kind is not VariableKind.FRAME:
             assert not isinstance(value, Element)  # noqa: S101 - elements are read before they are written
             self.values[name] = value
             return

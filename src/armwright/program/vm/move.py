@@ -13,15 +13,9 @@ from armwright.errors import IncapableArmError
 from armwright.kinematics.forward import forward
 from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
 from armwright.motion.trajectory import hold, slowed_together, whole_ticks
-from armwright.program.bytecode.instructions import (
-    Instruction,
-    StagePlan,
-    Trajectory,
-    stages_of,
-    stages_text,
-)
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.bytecode.instructions import Instruction, MotionKind, StagePlan, stages_of, stages_text
 from armwright.program.language.diagnostic import Label
+from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language.words import Standard
 from armwright.program.vm.contact import comes_down, contact_of, look_out, note_contact, send, stop
@@ -211,7 +205,7 @@ def _plan(run: Machine, process: Process, asked: Asked, arm: str, moved: str) ->
             kind=one.kind.value,
             poses=np.stack([X_BW @ _pose(run, process, asked.goals[label]) @ X_MH for label in one.frames]),
             blend=asked.blend,
-            corner=cell.corner_room if one.kind is Trajectory.SPLINE and run.code.standard is Standard.RLO_2 else None,
+            corner=cell.corner_room if one.kind is MotionKind.SPLINE and run.code.standard is Standard.RLO_2 else None,
         )
         for one in plans
     ]

@@ -2,17 +2,9 @@
 
 from typing import NamedTuple
 
-from armwright.program.bytecode.instructions import (
-    HIGHEST_SPEED,
-    LOWEST_SPEED,
-    NORMAL_SPEED,
-    Form,
-    Instruction,
-    Op,
-    Operand,
-    Place,
-)
+from armwright.program.bytecode.instructions import Form, Instruction, JumpTarget, Op, Operand
 from armwright.program.language.source import Span
+from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, NORMAL_SPEED
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Guard, Process
 
@@ -121,8 +113,8 @@ def _quantity(run: Machine, process: Process, part: Instruction) -> float:
 
 def _guard(run: Machine, part: Instruction) -> Guard:
     condition, truth, action = part.operands
-    assert isinstance(condition, Place)  # noqa: S101 - the translator lands them
-    assert isinstance(action, Place)  # noqa: S101
+    assert isinstance(condition, JumpTarget)  # noqa: S101 - the translator lands them
+    assert isinstance(action, JumpTarget)  # noqa: S101
     at, looks = condition.index, False
     while (step := run.code.instructions[at]).op is not Op.RET:
         looks = looks or step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV)

@@ -6,9 +6,9 @@ import numpy as np
 
 from armwright.cell.frames import WORLD
 from armwright.cell.hardware import DeviceError
-from armwright.program.bytecode.instructions import Constant, Instruction, Op, Place, Text
-from armwright.program.flow_analysis.facts import is_arm
+from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op, Text
 from armwright.program.language.diagnostic import Label
+from armwright.program.language.names import is_arm
 from armwright.program.vm.contact import look_out, note_contact, pushed_otherwise
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.operators import IN_UNITS, PLAIN, ValueFault
@@ -226,7 +226,7 @@ def work_out(run: Machine, process: Process, steps: Sequence[Instruction], at: i
         if step.op is Op.JZ:
             # AND and OR jump forwards; nothing else in an expression jumps.
             target = step.operands[1]
-            assert isinstance(target, Place)  # noqa: S101 - the translator lands them
+            assert isinstance(target, JumpTarget)  # noqa: S101 - the translator lands them
             at = at if run.read(process, step.operands[0], step) else target.index
         else:
             HANDLERS[step.op](run, process, step)

@@ -1,14 +1,11 @@
-"""Places in a text as editors count them, changes of it, and where a place was before the text changed."""
+"""Positions in a text as editors count them: lines and columns, in bytes, halves of words or characters."""
 
 import re
 from bisect import bisect_right
-from collections.abc import Callable
 from functools import cached_property
 from itertools import takewhile
 
 import attrs
-
-from armwright.program.language.source import Span
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
 # What a character takes where editors count bytes or halves of words; in UTF-32 each takes one.
@@ -16,7 +13,7 @@ UTF_8, UTF_16, UTF_32 = "utf-8", "utf-16", "utf-32"
 
 
 @attrs.frozen(slots=False)
-class Ruler:
+class PositionCodec:
     """Converts between offsets into a text and lines and columns, both from 0.
 
     Attributes:
@@ -37,10 +34,10 @@ class Ruler:
         """Whether every character takes one column."""
         return self.encoding == UTF_32 or self.text.isascii()
 
-    def changed(self, start: int, end: int, new: str) -> "Ruler":
+    def changed(self, start: int, end: int, new: str) -> "PositionCodec":
         """Return the ruler of the text with ``new`` in the place of a stretch of it: lines far from that are known."""
         text = self.text[:start] + new + self.text[end:]
-        ruler = Ruler(text, self.encoding)
+        ruler = PositionCodec(text, self.encoding)
         # The two halves of a line end may come together, or apart, at the edges of the change.
         first = max(0, self.line_of(start) - 1)
         last = min(self.line_of(end) + 2, len(self.starts))
@@ -97,99 +94,3 @@ def columns(text: str, encoding: str) -> int:
         return len(text) + sum(character > "\uffff" for character in text)
     # Half of a character that takes two places in UTF-16 is no text, but may be sent all the same.
     return len(text.encode("utf-8", "surrogatepass")) if encoding == UTF_8 else len(text)
-
-
-@attrs.frozen
-class Edit:
-    """A change: ``text`` comes where ``span`` was."""
-
-    span: Span
-    text: str
-
-
-def edited(text: str, edits: tuple[Edit, ...]) -> str:
-    """Return a text with edits made, all counted in the text as given; of two that overlap the first is made."""
-    pieces, done = [], 0
-    for edit in sorted(edits, key=lambda one: (one.span.start, one.span.end)):
-        if edit.span.start >= done:
-            pieces += [text[done : edit.span.start], edit.text]
-            done = edit.span.end
-    return "".join((*pieces, text[done:]))
-
-
-@attrs.frozen
-class Drift:
-    """How two versions of a text differ: what is in front of ``start`` and behind the ends is the same.
-
-    Attributes:
-        start: where they begin to differ.
-        old_end: where that ends in the old text.
-        new_end: where it ends in the new one.
-    """
-
-    start: int
-    old_end: int
-    new_end: int
-
-    def then(self, start: int, end: int, length: int) -> "Drift":
-        """Return how the old text differs from the new one when that is changed once more.
-
-        Args:
-            start: where the new text is changed.
-            end: up to where.
-            length: of what comes there.
-        """
-        if self.none:
-            return Drift(start, end, start + length)
-        old_end = self.old_end + max(0, end - self.new_end)
-        new_end = max(end, self.new_end) - end + start + length
-        return Drift(min(self.start, start), old_end, new_end)
-
-    @property
-    def none(self) -> bool:
-        """Whether nothing has changed."""
-        return self.start == self.old_end == self.new_end
-
-    def old(self, offset: int) -> int | None:
-        """Return where a place of the new text was; None where it was not there."""
-        return _moved(offset, self.start, self.new_end, self.old_end)
-
-    def new(self, offset: int) -> int | None:
-        """Return where a place of the old text is now; None where it is gone."""
-        return _moved(offset, self.start, self.old_end, self.new_end)
-
-    def new_span(self, span: Span) -> Span | None:
-        """Return where a stretch of the old text is now; None where some of its ends is gone."""
-        start, end = self.new(span.start), self.new(span.end)
-        return None if start is None or end is None or end < start else Span(start, end)
-
-
-def _moved(offset: int, start: int, end: int, other_end: int) -> int | None:
-    if offset >= end:
-        return offset - end + other_end
-    return offset if offset <= start else None
-
-
-NO_DRIFT = Drift(0, 0, 0)
-
-
-def drift(old: str, new: str) -> Drift:
-    """Compare two versions of a text."""
-    if old == new:
-        return NO_DRIFT
-    limit = min(len(old), len(new))
-    start = _same(lambda n: old[:n] == new[:n], limit)
-    behind = _same(lambda n: old[len(old) - n :] == new[len(new) - n :], limit - start)
-    return Drift(start, len(old) - behind, len(new) - behind)
-
-
-def _same(equal: Callable[[int], bool], limit: int) -> int:
-    """Return how many characters are the same, by halving."""
-    low, high = 0, limit
-    while low < high:
-        middle = (low + high + 1) // 2
-        if equal(middle):
-            low = middle
-        else:
-            high = middle - 1
-    return low

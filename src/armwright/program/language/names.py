@@ -1,0 +1,11 @@
+"""What canonical names tell by their form."""
+
+
+def is_arm(name: str) -> bool:
+    """Whether a canonical name is that of an arm; no other name has its form."""
+    return name.startswith("ARM_") and name[4:].isdecimal()
+
+
+def is_any(name: str) -> bool:
+    """Whether a name stands for some element of an array, nobody knows which."""
+    return name.endswith("[]")
