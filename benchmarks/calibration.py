@@ -17,9 +17,9 @@ from scipy.optimize import least_squares
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Flags
-from armwright.calibration.fitting import calibrate
+from armwright.calibration.cross_validation import cross_validate
+from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.measurements import Measurements, read_measurements
-from armwright.calibration.validation import cross_validated
 from armwright.spatial.poses import pose
 
 FOLDER = Path(os.environ.get("ARMWRIGHT_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -64,7 +64,7 @@ def theirs(arm: Arm, data: Measurements) -> float:
 def ours(arm: Arm, data: Measurements) -> float:
     """Calibrate by armwright on the same points."""
     fit = some(data)
-    found = calibrate(arm, data.q[fit], data.points[fit])
+    found = calibrate_points(arm, data.q[fit], data.points[fit])
     return float(np.linalg.norm(found.predict(data.q[~fit]) - data.points[~fit], axis=1).mean())
 
 
@@ -83,7 +83,7 @@ def main() -> None:
         progress(name)
         data = read_measurements(FOLDER / FILES[name], arm, units=("mm", "deg"))
         start = time.perf_counter()
-        folds = cross_validated(arm, data.readings, folds=FOLDS).distance.mean()
+        folds = cross_validate(arm, data.readings, folds=FOLDS).distance.mean()
         taken = time.perf_counter() - start
         errors: dict[str, float] = {}
         mine, other = in_turn(

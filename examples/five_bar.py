@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from armwright.clearance.equations import Rubbing
-from armwright.clearance.estimating.static import rest_offsets
+from armwright.clearance.equations import FrictionModel
+from armwright.clearance.estimation.static import rest_offsets
 from armwright.clearance.paths import named_path
-from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 
@@ -24,7 +24,7 @@ PLAY = np.array((0.328, 0.171, 0.483)) * 1e-3  # m
 POSES = np.array(((-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7), (0.0, -0.55)))  # m
 READINGS, READ_NOISE = 10, 10e-6  # m
 PATHS, TRACK_NOISE = ("y1", "y3", "y7"), 2e-6  # m
-SETTINGS = Settings(friction=Rubbing(velocity="centre"), threshold=1e-2, sample=1e-3)
+SETTINGS = Settings(friction=FrictionModel(velocity="centre"), threshold=1e-2, sample=1e-3)
 
 
 def rest_rows(rng: np.random.Generator) -> Iterator[str]:

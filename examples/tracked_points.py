@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from armwright.arm.load import load_arm
-from armwright.calibration.bending import springs
 from armwright.calibration.chain import chain_of
-from armwright.calibration.planning import plan_poses
+from armwright.calibration.experiment_design import plan_poses
+from armwright.calibration.joint_errors import compliances
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 
@@ -30,7 +30,7 @@ def rows() -> Iterator[str]:
     """Give the rows: poses to fit, some of them several times, and poses by chance to check with."""
     rng = np.random.default_rng(1984)
     arm = load_arm("puma560-seed")
-    chain = chain_of(arm, base=HALL, bends=springs(arm))
+    chain = chain_of(arm, base=HALL, bends=compliances(arm))
     errors = rng.standard_normal(len(chain.names)) * np.where(chain.is_length, LENGTH, ANGLE)
     for i, name in enumerate(chain.names):
         errors[i] = SAG.get(name, 0.0 if name.endswith(".sag") else errors[i])

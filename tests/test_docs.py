@@ -11,10 +11,10 @@ import pytest
 import armwright
 from armwright.arm.load import read_arm, read_load
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimating.measured import RestMeasured, read_measured
+from armwright.clearance.estimation.measured import RestMeasured, read_measured
 from armwright.clearance.ideal import closed, tip_of
-from armwright.clearance.preparing import assembled
 from armwright.clearance.reader import read_linkage
+from armwright.clearance.scenario import assembly_guess
 from armwright.dynamics.integrators import Adaptive
 from armwright.dynamics.simulation import JointState, Status
 from armwright.errors import FileFormatError
@@ -119,7 +119,7 @@ def test_linkage_of_the_page(tmp_path: Path) -> None:
 
     press = read_linkage(tmp_path / "press.toml")
 
-    guess = assembled(press)
+    guess = assembly_guess(press)
     q = closed(press, guess, drives=guess[list(press.driven)])
     # Crank and rod of 40 and 200 mm: 40 sin 60° + √(200² - (40 cos 60°)²) below, and the face 50 mm below that.
     height = -(0.04 * np.sin(np.pi / 3) + np.sqrt(0.2**2 - 0.02**2)) - 0.05

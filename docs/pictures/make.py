@@ -15,8 +15,8 @@ from armwright.calibration.measurements import read_measurements
 from armwright.clearance.ideal import point_of, tip_of
 from armwright.clearance.linkage import Place
 from armwright.clearance.paths import thesis_path
-from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import Simulation as Rattling
 from armwright.clearance.simulation import simulate as simulate_play
 from armwright.dynamics.integrators import Adaptive

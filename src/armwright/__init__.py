@@ -21,23 +21,23 @@ if TYPE_CHECKING:
     from armwright.accuracy.compliance import static_compliance
     from armwright.accuracy.corner import corner_deviations
     from armwright.accuracy.distance import distance_accuracy, distance_repeatability
-    from armwright.accuracy.measured import Trace
-    from armwright.accuracy.measurements import read_measurements
+    from armwright.accuracy.measurement_file import read_measurements
     from armwright.accuracy.path import path_deviation, path_velocity
     from armwright.accuracy.pose import pose_accuracy, pose_repeatability
     from armwright.accuracy.settling import posing_time, settling
+    from armwright.accuracy.trace import Trace
     from armwright.accuracy.variation import exchangeability, multidirectional_variation, pose_drift
     from armwright.accuracy.weaving import weaving_deviation
     from armwright.arm.load import arm_names, load_arm
     from armwright.arm.model import Arm
     from armwright.arm.urdf.reader import load_urdf
-    from armwright.calibration.beyond import calibrate_beyond
-    from armwright.calibration.compensating import compensated
-    from armwright.calibration.correcting import corrected_arm, place_covariance
-    from armwright.calibration.fitting import calibrate, calibrate_to
-    from armwright.calibration.planning import plan_poses
-    from armwright.clearance.correcting import correct_nodes, correct_path
-    from armwright.clearance.estimating.static import estimate_at_rest
+    from armwright.calibration.compensation import inverse_calibrated
+    from armwright.calibration.correction import corrected_arm, position_covariance
+    from armwright.calibration.experiment_design import plan_poses
+    from armwright.calibration.fitting import calibrate, calibrate_points
+    from armwright.calibration.nongeometric import calibrate_nongeometric
+    from armwright.clearance.correction import correct_nodes, correct_path
+    from armwright.clearance.estimation.static import estimate_at_rest
     from armwright.clearance.reader import load_linkage
     from armwright.dynamics.compiled import compile_arm
     from armwright.dynamics.forward_dynamics import forward_dynamics
@@ -79,7 +79,7 @@ _HOME = {
     "ArmwrightError": "errors",
     "CacheWarning": "errors",
     "GravityWarning": "errors",
-    "Trace": "accuracy.measured",
+    "Trace": "accuracy.trace",
     "Trajectory": "motion.trajectory",
     "UnitWarning": "errors",
     "arm_names": "arm.load",
@@ -87,18 +87,17 @@ _HOME = {
     "blend_timing": "motion.blends",
     "blended": "motion.blends",
     "calibrate": "calibration.fitting",
-    "calibrate_beyond": "calibration.beyond",
-    "calibrate_to": "calibration.fitting",
+    "calibrate_nongeometric": "calibration.nongeometric",
+    "calibrate_points": "calibration.fitting",
     "cartesian_move": "motion.moves",
-    "compensated": "calibration.compensating",
     "compile_arm": "dynamics.compiled",
     "continuity": "motion.continuity",
     "coriolis_matrix": "dynamics.lagrange_euler",
     "coriolis_tensor": "dynamics.lagrange_euler",
     "corner_deviations": "accuracy.corner",
-    "correct_nodes": "clearance.correcting",
-    "correct_path": "clearance.correcting",
-    "corrected_arm": "calibration.correcting",
+    "correct_nodes": "clearance.correction",
+    "correct_path": "clearance.correction",
+    "corrected_arm": "calibration.correction",
     "cubic": "motion.cubic",
     "cubic_through": "motion.cubic",
     "damped_rates": "kinematics.damping",
@@ -106,7 +105,7 @@ _HOME = {
     "distance_accuracy": "accuracy.distance",
     "distance_repeatability": "accuracy.distance",
     "effort_peaks": "motion.efforts",
-    "estimate_at_rest": "clearance.estimating.static",
+    "estimate_at_rest": "clearance.estimation.static",
     "exchangeability": "accuracy.variation",
     "forward": "kinematics.forward",
     "forward_dynamics": "dynamics.forward_dynamics",
@@ -114,6 +113,7 @@ _HOME = {
     "images": "kinematics.inverse.turns",
     "inverse": "kinematics.inverse.closed_form",
     "inverse_branches": "kinematics.inverse.closed_form",
+    "inverse_calibrated": "calibration.compensation",
     "inverse_dynamics": "dynamics.newton_euler",
     "jacobian": "kinematics.jacobian",
     "join": "motion.trajectory",
@@ -131,8 +131,8 @@ _HOME = {
     "path_deviation": "accuracy.path",
     "path_velocity": "accuracy.path",
     "payload": "dynamics.payload",
-    "place_covariance": "calibration.correcting",
-    "plan_poses": "calibration.planning",
+    "plan_poses": "calibration.experiment_design",
+    "position_covariance": "calibration.correction",
     "point_to_point": "motion.quintic",
     "pose_accuracy": "accuracy.pose",
     "pose_derivative_matrices": "dynamics.lagrange_euler",
@@ -140,7 +140,7 @@ _HOME = {
     "pose_repeatability": "accuracy.pose",
     "posing_time": "accuracy.settling",
     "quintic": "motion.quintic",
-    "read_measurements": "accuracy.measurements",
+    "read_measurements": "accuracy.measurement_file",
     "replace_goal": "motion.online",
     "retarget": "motion.online",
     "settling": "accuracy.settling",
@@ -179,10 +179,9 @@ __all__ = [
     "blend_timing",
     "blended",
     "calibrate",
-    "calibrate_beyond",
-    "calibrate_to",
+    "calibrate_nongeometric",
+    "calibrate_points",
     "cartesian_move",
-    "compensated",
     "compile_arm",
     "continuity",
     "coriolis_matrix",
@@ -206,6 +205,7 @@ __all__ = [
     "images",
     "inverse",
     "inverse_branches",
+    "inverse_calibrated",
     "inverse_dynamics",
     "jacobian",
     "join",
@@ -223,7 +223,6 @@ __all__ = [
     "path_deviation",
     "path_velocity",
     "payload",
-    "place_covariance",
     "plan_poses",
     "point_to_point",
     "pose_accuracy",
@@ -231,6 +230,7 @@ __all__ = [
     "pose_drift",
     "pose_repeatability",
     "posing_time",
+    "position_covariance",
     "quintic",
     "read_measurements",
     "replace_goal",

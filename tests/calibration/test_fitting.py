@@ -14,8 +14,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.calibration import fitting
 from armwright.calibration.chain import Chain, chain_of
-from armwright.calibration.fitting import Calibration, calibrate
-from armwright.calibration.starting import registered
+from armwright.calibration.fitting import Calibration, calibrate_points
+from armwright.calibration.initial_guess import register
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, UnknownNameError
 from armwright.spatial.rotations import angle_between
 from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
@@ -44,9 +44,9 @@ def trial(seed: int) -> Trial:
     chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
     q = postures(rng, arm, POINTS)
     none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
-    expected = calibrate(arm, q, seen(chain, q, none, noise, rng), base=np.eye(4)).identified.kept
+    expected = calibrate_points(arm, q, seen(chain, q, none, noise, rng), base=np.eye(4)).identified.kept
     true[list(expected)] = random_errors(rng, chain)[list(expected)]
-    found = calibrate(arm, q, seen(chain, q, true, noise, rng), base=np.eye(4))
+    found = calibrate_points(arm, q, seen(chain, q, true, noise, rng), base=np.eye(4))
     return Trial(chain, true, noise, found, expected)
 
 
@@ -101,7 +101,7 @@ def test_intervals_cover(trials: list[Trial]) -> None:
 def test_intervals_by_student(ur5: Arm, rng: np.random.Generator) -> None:
     """With few numbers to spare an interval is wider than the normal distribution has it, by Student's t."""
     q, points, _ = measured(ur5, rng, 3e-5, m=11)
-    found = calibrate(ur5, q, points)
+    found = calibrate_points(ur5, q, points)
 
     lower, upper = found.intervals(0.9).T
 
@@ -130,7 +130,7 @@ def test_corrected_arms_are_right_elsewhere() -> None:
         arm = random_arm(rng, 3 + seed % 5, slides=seed % 3 == 0)
         chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
         errors, q, elsewhere = random_errors(rng, chain), postures(rng, arm, POINTS), postures(rng, arm, 50)
-        found = calibrate(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
+        found = calibrate_points(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
 
         missed = found.predict(elsewhere) - chain.reach(elsewhere, errors).position
         kept = list(found.identified.kept)
@@ -156,7 +156,7 @@ def test_nearly_dependent_errors(seed: int) -> None:
     chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
     errors, q, elsewhere = random_errors(rng, chain), postures(rng, arm, POINTS), postures(rng, arm, 50)
 
-    found = calibrate(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
+    found = calibrate_points(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
 
     assert np.abs(found.errors).max() < 0.05
     assert found.noise.length == pytest.approx(noise, rel=0.25)
@@ -168,7 +168,7 @@ def test_no_noise(ur5: Arm, rng: np.random.Generator) -> None:
     """From points without noise, an arm is found to rounding."""
     q, points, _ = measured(ur5, rng, 0.0)
 
-    found = calibrate(ur5, q, points, base=np.eye(4))
+    found = calibrate_points(ur5, q, points, base=np.eye(4))
 
     assert found.before.distance.mean() > 1e-3
     assert found.after.distance.max() < EXACT
@@ -183,8 +183,8 @@ def test_outliers(ur5: Arm, rng: np.random.Generator) -> None:
     wrong = [3, 14, 25, 36, 47]
     points[wrong] += rng.uniform(0.01, 0.03, (5, 3)) * rng.choice([-1, 1], (5, 3))
 
-    robust = calibrate(ur5, q, points, base=np.eye(4))
-    plain = calibrate(ur5, q, points, base=np.eye(4), robust=False)
+    robust = calibrate_points(ur5, q, points, base=np.eye(4))
+    plain = calibrate_points(ur5, q, points, base=np.eye(4), robust=False)
 
     miss = [float(np.linalg.norm(one.predict(q) - real, axis=1).mean()) for one in (robust, plain)]
     assert list(robust.outliers) == wrong
@@ -203,7 +203,7 @@ def test_many_outliers(seed: int) -> None:
     points = seen(chain, q, errors, 5e-5, rng)
     points[:20] += rng.uniform(0.005, 0.02, (20, 3)) * rng.choice([-1, 1], (20, 3))
 
-    found = calibrate(arm, q, points, base=np.eye(4))
+    found = calibrate_points(arm, q, points, base=np.eye(4))
 
     assert found.outliers == tuple(range(20))
     assert np.sqrt(np.mean((found.predict(elsewhere) - chain.reach(elsewhere, errors).position) ** 2)) < 2 * 5e-5
@@ -220,11 +220,11 @@ def test_outliers_do_not_count() -> None:
         arm = random_arm(rng, 3 + seed % 5)
         chain, q = chain_of(arm), postures(rng, arm, POINTS)
         none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
-        told = list(calibrate(arm, q, seen(chain, q, none, 5e-5, rng), base=np.eye(4)).identified.kept)
+        told = list(calibrate_points(arm, q, seen(chain, q, none, 5e-5, rng), base=np.eye(4)).identified.kept)
         true[told] = random_errors(rng, chain)[told]
         points = seen(chain, q, true, 5e-5, rng)
         points[:16] += rng.uniform(0.005, 0.03, (16, 3)) * rng.choice([-1, 1], (16, 3))
-        found = calibrate(arm, q, points, base=np.eye(4))
+        found = calibrate_points(arm, q, points, base=np.eye(4))
         assert found.freedom == 3 * (POINTS - 16) - len(found.names)
         noises.append(found.noise.length / 5e-5)
         if list(found.identified.kept) == told:
@@ -239,8 +239,8 @@ def test_no_outliers(ur5: Arm, rng: np.random.Generator) -> None:
     """Points with nothing but noise have no outliers, and both fits find the same but for a part of the noise."""
     q, points, _ = measured(ur5, rng, 5e-5, m=100)
 
-    robust = calibrate(ur5, q, points, base=np.eye(4))
-    plain = calibrate(ur5, q, points, base=np.eye(4), robust=False)
+    robust = calibrate_points(ur5, q, points, base=np.eye(4))
+    plain = calibrate_points(ur5, q, points, base=np.eye(4), robust=False)
 
     assert robust.outliers == ()
     np.testing.assert_allclose(robust.predict(q), plain.predict(q), atol=5e-5)
@@ -255,8 +255,8 @@ def test_any_measuring_frame(robust: bool, ur5: Arm, rng: np.random.Generator) -
     q, points, _ = measured(ur5, rng, 3e-5)
     X = random_pose(rng, 5.0)
 
-    here = calibrate(ur5, q, points, robust=robust)
-    there = calibrate(ur5, q, points @ X[:3, :3].T + X[:3, 3], robust=robust)
+    here = calibrate_points(ur5, q, points, robust=robust)
+    there = calibrate_points(ur5, q, points @ X[:3, :3].T + X[:3, 3], robust=robust)
 
     assert here.names == there.names
     np.testing.assert_allclose(here.after.distance, there.after.distance, atol=EXACT)
@@ -268,18 +268,18 @@ def test_registered(ur5: Arm, rng: np.random.Generator) -> None:
     q = postures(rng, ur5, 10)
     points = chain.reach(q).position @ X[:3, :3].T + X[:3, 3]
 
-    base = registered(chain, q, points)
+    base = register(chain, q, points)
 
     np.testing.assert_allclose(base[:3, 3], X[:3, 3], atol=EXACT)
     assert angle_between(base[:3, :3], X[:3, :3]) < EXACT
-    assert np.linalg.det(registered(chain, q, points * (1, 1, -1))[:3, :3]) == pytest.approx(1.0)
+    assert np.linalg.det(register(chain, q, points * (1, 1, -1))[:3, :3]) == pytest.approx(1.0)
 
 
 def test_only(ur5: Arm, rng: np.random.Generator) -> None:
     """Only the errors that are asked for are fitted; a part such as base means all of it."""
     q, points, _ = measured(ur5, rng, 3e-5)
 
-    found = calibrate(ur5, q, points, base=np.eye(4), only=["base", "joint3.a"])
+    found = calibrate_points(ur5, q, points, base=np.eye(4), only=["base", "joint3.a"])
 
     assert found.names == ("base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz", "joint3.a")
     assert all(found.errors[i] == 0.0 for i in range(len(found.errors)) if i not in found.identified.kept)
@@ -290,8 +290,8 @@ def test_one_kind_of_all_joints(ur5: Arm, rng: np.random.Generator) -> None:
     """A kind of error means that of all joints: only lengths of links, or all but the turns about y."""
     q, points, _ = measured(ur5, rng, 3e-5)
 
-    lengths = calibrate(ur5, q, points, base=np.eye(4), only=["base", "a", "d"])
-    without = calibrate(ur5, q, points, base=np.eye(4), without=["beta", "joint2.a"])
+    lengths = calibrate_points(ur5, q, points, base=np.eye(4), only=["base", "a", "d"])
+    without = calibrate_points(ur5, q, points, base=np.eye(4), without=["beta", "joint2.a"])
 
     assert {name.partition(".")[2] for name in lengths.names if name.startswith("joint")} == {"a", "d"}
     assert not [name for name in without.names if name.endswith("beta") or name == "joint2.a"]
@@ -305,9 +305,9 @@ def test_without_what_there_is_not(rng: np.random.Generator) -> None:
     q = postures(rng, none, 40)
     points = seen(chain_of(none), q, np.zeros(36), 3e-5, rng)
 
-    assert calibrate(none, q, points, without=["beta"]).names
+    assert calibrate_points(none, q, points, without=["beta"]).names
     with pytest.raises(UnknownNameError, match=r"no error 'thata'\. Did you mean 'theta'\?"):
-        calibrate(none, q, points, without=["thata"])
+        calibrate_points(none, q, points, without=["thata"])
 
 
 def test_only_what_there_is_not(ur5: Arm, rng: np.random.Generator) -> None:
@@ -315,7 +315,7 @@ def test_only_what_there_is_not(ur5: Arm, rng: np.random.Generator) -> None:
     q, points, _ = measured(ur5, rng, 3e-5)
 
     with pytest.raises(UnknownNameError, match=r"no error 'joint3\.aplha'\. Did you mean 'joint3\.alpha'\?"):
-        calibrate(ur5, q, points, only=["joint3.aplha"])
+        calibrate_points(ur5, q, points, only=["joint3.aplha"])
 
 
 def test_progress(ur5: Arm, rng: np.random.Generator) -> None:
@@ -323,7 +323,7 @@ def test_progress(ur5: Arm, rng: np.random.Generator) -> None:
     q, points, _ = measured(ur5, rng, 3e-5)
     said: list[str] = []
 
-    found = calibrate(ur5, q, points, progress=said.append)
+    found = calibrate_points(ur5, q, points, progress=said.append)
 
     assert said[-1] == f"fitting {len(found.names)} errors to 60 readings"
 
@@ -334,7 +334,7 @@ def test_joint_that_never_moved(ur5: Arm, rng: np.random.Generator) -> None:
     q, errors = postures(rng, ur5, 80), random_errors(rng, chain)
     q[:, 3] = 0.7
 
-    found = calibrate(ur5, q[:60], seen(chain, q[:60], errors, 3e-5, rng), base=np.eye(4))
+    found = calibrate_points(ur5, q[:60], seen(chain, q[:60], errors, 3e-5, rng), base=np.eye(4))
 
     missed = np.linalg.norm(found.predict(q[60:]) - chain.reach(q[60:], errors).position, axis=1)
     assert missed.max() < 5 * 3e-5
@@ -352,7 +352,7 @@ def test_other_units(factor: float, words: str, ur5: Arm, rng: np.random.Generat
     q, points, _ = measured(ur5, rng, 3e-5)
 
     with pytest.raises(ContradictionError, match=rf"as far as ur5 reaches in these postures: are they .*{words}"):
-        calibrate(ur5, q, points * factor)
+        calibrate_points(ur5, q, points * factor)
 
 
 def test_degrees_for_radians(ur5: Arm, rng: np.random.Generator) -> None:
@@ -360,7 +360,7 @@ def test_degrees_for_radians(ur5: Arm, rng: np.random.Generator) -> None:
     q, points, _ = measured(ur5, rng, 3e-5)
 
     with pytest.raises(ContradictionError, match="are these its joints, in this order and these units"):
-        calibrate(ur5, np.degrees(q), points)
+        calibrate_points(ur5, np.degrees(q), points)
 
 
 def test_another_arm(ur5: Arm, rng: np.random.Generator) -> None:
@@ -368,7 +368,7 @@ def test_another_arm(ur5: Arm, rng: np.random.Generator) -> None:
     q, points, _ = measured(ur5, rng, 3e-5)
 
     with pytest.raises(ContradictionError, match=r"mm from where puma560 would have its tool, wherever it stands"):
-        calibrate(load_arm("puma560"), q, points)
+        calibrate_points(load_arm("puma560"), q, points)
 
 
 @pytest.mark.parametrize("m", [1, 2, 5, 8])
@@ -377,15 +377,15 @@ def test_too_few(m: int, ur5: Arm, rng: np.random.Generator) -> None:
     q, points, _ = measured(ur5, rng, 3e-5, m=m)
 
     with pytest.raises(InvalidValueError, match=rf"{3 * m} numbers for {3 * m} errors; measure more"):
-        calibrate(ur5, q, points, base=np.eye(4))
+        calibrate_points(ur5, q, points, base=np.eye(4))
 
 
 def test_shapes(ur5: Arm) -> None:
     """As many points as postures, each of three coordinates, and as many joints as the arm has."""
     with pytest.raises(ShapeError, match=r"points: expected \(5, 3\) points or \(5, 4, 4\) poses .* got \(4, 3\)"):
-        calibrate(ur5, np.zeros((5, 6)), np.zeros((4, 3)))
+        calibrate_points(ur5, np.zeros((5, 6)), np.zeros((4, 3)))
     with pytest.raises(ShapeError, match="expected readings of 6 joints, as ur5 has, got 7"):
-        calibrate(ur5, np.zeros((5, 7)), np.zeros((5, 3)))
+        calibrate_points(ur5, np.zeros((5, 7)), np.zeros((5, 3)))
 
 
 @pytest.mark.parametrize(
@@ -400,7 +400,7 @@ def test_no_base(base: Array, words: str, ur5: Arm, rng: np.random.Generator) ->
     q, points, _ = measured(ur5, rng, 3e-5)
 
     with pytest.raises(ValueError, match=words):
-        calibrate(ur5, q, points, base=base)
+        calibrate_points(ur5, q, points, base=base)
 
 
 def test_not_numbers(ur5: Arm) -> None:
@@ -409,7 +409,7 @@ def test_not_numbers(ur5: Arm) -> None:
     points[2, 1] = np.nan
 
     with pytest.raises(InvalidValueError, match=r"points: every number must be finite, got nan at \(2, 1\)"):
-        calibrate(ur5, np.zeros((5, 6)), points)
+        calibrate_points(ur5, np.zeros((5, 6)), points)
 
 
 def test_round_that_leaves_less_is_kept(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
@@ -425,7 +425,7 @@ def test_round_that_leaves_less_is_kept(monkeypatch: pytest.MonkeyPatch, rng: np
         return found if next(rounds) == 0 else found + 0.005
 
     monkeypatch.setattr(fitting, "_fitted", worse)
-    found = calibrate(arm, q, points, robust=False)
+    found = calibrate_points(arm, q, points, robust=False)
 
     assert next(rounds) > 2
     assert found.after.distance.mean() < 1e-4

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from armwright.calibration.cross_validation import distinct_configurations, random_folds
 from armwright.calibration.iso9283 import accuracy, repeatability
 from armwright.calibration.readings import readings
-from armwright.calibration.validation import dealt, postures
 from armwright.errors import TooFewError
 
 
@@ -33,7 +33,7 @@ def test_repeated() -> None:
 
     assert found is not None
     assert words is not None
-    assert found.postures == 1
+    assert found.configurations == 1
     assert found.cycles == 3
     distances = np.array([1e-3, 1e-3, 0.0])
     assert pytest.approx(distances.mean() + 3 * distances.std(ddof=1)) == found.RP
@@ -49,16 +49,16 @@ def test_one_posture() -> None:
 def test_one_posture_cannot_be_held_out() -> None:
     """Of one posture, however often measured, nothing is left to hold out."""
     with pytest.raises(TooFewError, match="folds: 30 readings of one posture leave none to hold out"):
-        dealt(np.ones((30, 6)), 5, 0)
+        random_folds(np.ones((30, 6)), 5, 0)
 
 
 def test_repeats_are_held_out_together() -> None:
     """What was measured again is in the fold of the first time: it would tell the answer."""
     q = np.repeat(np.arange(10.0), 3)[:, None]
 
-    folds = dealt(q, 5, 0)
+    folds = random_folds(q, 5, 0)
 
-    np.testing.assert_array_equal(postures(q), np.repeat(np.arange(10), 3))
+    np.testing.assert_array_equal(distinct_configurations(q), np.repeat(np.arange(10), 3))
     for away in folds:
         assert away.reshape(10, 3).all(axis=1).sum() == 2
         assert away.sum() == 6
@@ -69,5 +69,5 @@ def test_encoders_never_say_the_same() -> None:
     rng = np.random.default_rng(0)
     q = np.repeat(rng.uniform(-2, 2, (8, 6)), 4, axis=0) + 1e-6 * rng.standard_normal((32, 6))
 
-    np.testing.assert_array_equal(postures(q), np.repeat(np.arange(8), 4))
-    np.testing.assert_array_equal(postures(rng.uniform(-2, 2, (5, 6))), np.arange(5))
+    np.testing.assert_array_equal(distinct_configurations(q), np.repeat(np.arange(8), 4))
+    np.testing.assert_array_equal(distinct_configurations(rng.uniform(-2, 2, (5, 6))), np.arange(5))

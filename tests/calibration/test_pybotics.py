@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.calibration.chain import chain_of
-from armwright.calibration.fitting import calibrate
+from armwright.calibration.fitting import calibrate_points
 from armwright.kinematics.forward import forward
 from armwright.spatial.poses import pose
 from calibration.simulated import postures, random_errors, seen
@@ -77,7 +77,7 @@ def test_the_same_fit(pybotics: Any, rng: np.random.Generator) -> None:
     errors[[i for i, name in enumerate(chain.names) if name.startswith("base")]] = 0.0
     q, elsewhere = postures(rng, arm, 60), postures(rng, arm, 40)
     points = seen(chain, q, errors, NOISE, rng)
-    ours = calibrate(
+    ours = calibrate_points(
         arm, q, points, base=np.eye(4), robust=False, only=["joint1", "joint2", "joint3", "joint4", "tool"]
     )
 

@@ -8,12 +8,12 @@ from scipy.stats import t as student
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.calibration.beyond import calibrate_beyond
-from armwright.calibration.chain import Bend, Chain, chain_of
-from armwright.calibration.fitting import Calibration, calibrate, calibrate_to
-from armwright.calibration.model import Model, Plane
-from armwright.calibration.readings import Readings, readings, refuse_not_fitted, together
-from armwright.calibration.validation import cross_validated
+from armwright.calibration.chain import Chain, JointErrorModel, chain_of
+from armwright.calibration.cross_validation import cross_validate
+from armwright.calibration.fitting import Calibration, calibrate, calibrate_points
+from armwright.calibration.measurement_model import MeasurementModel, Plane
+from armwright.calibration.nongeometric import calibrate_nongeometric
+from armwright.calibration.readings import Readings, concatenate, readings, refuse_not_fitted
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError
 from armwright.spatial.rotations import rotation_from_quaternion, rotation_from_vector
 from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
@@ -76,11 +76,11 @@ def test_derivatives(rng: np.random.Generator) -> None:
     """Equations of all kinds of readings have the derivatives that differences have."""
     arm = random_arm(rng, 5, slides=True)
     bends = (
-        Bend("joint1.sin", 0, lambda q: np.sin(q[:, 0])),
-        Bend("joint3.sag", 2, lambda q: np.cos(q[:, 1] + q[:, 2])),
+        JointErrorModel("joint1.sin", 0, lambda q: np.sin(q[:, 0])),
+        JointErrorModel("joint3.sag", 2, lambda q: np.cos(q[:, 1] + q[:, 2])),
     )
     chain = chain_of(arm, base=random_pose(rng, 1.0), hand=rotation_from_vector([0.1, 0.2, 0.3]), bends=bends)
-    model = Model(
+    model = MeasurementModel(
         chain=chain,
         frames=(np.eye(4), random_pose(rng, 1.0)),
         planes=(Plane(rng.standard_normal(3), rotation_from_vector(rng.standard_normal(3))),),
@@ -92,7 +92,7 @@ def test_derivatives(rng: np.random.Generator) -> None:
     q = postures(rng, arm, 6)
     X = np.stack([random_pose(rng, 1.0) for _ in q])
     X[:, :3, :3] = rotation_from_vector(0.3 * rng.standard_normal((6, 3))) @ chain.reach(q).rotation
-    given = together(
+    given = concatenate(
         readings(q, X, frame=list("ababab")),
         readings(q, plane=["table"] * 6),
         readings(q, distances=rng.random(6), anchor=["wire"] * 6),
@@ -109,8 +109,8 @@ def test_poses_tell_the_tool_frame(truth: Truth) -> None:
     """Poses tell how the tool is turned, which points do not; their two noises are found."""
     q = truth.postures(60)
 
-    found = calibrate(truth.arm, q, truth.poses(q))
-    points = calibrate(truth.arm, q, truth.points(q))
+    found = calibrate_points(truth.arm, q, truth.poses(q))
+    points = calibrate_points(truth.arm, q, truth.points(q))
 
     assert {"tool.rx", "tool.ry", "tool.rz"} <= set(found.names)
     assert not {"tool.rx", "tool.ry", "tool.rz"} & set(points.names)
@@ -126,11 +126,11 @@ def test_fewer_poses_than_points(truth: Truth) -> None:
     """Six poses give 36 numbers, more than the errors of a six-joint arm; six points do not."""
     q = truth.postures(6)
 
-    found = calibrate(truth.arm, q, truth.poses(q))
+    found = calibrate_points(truth.arm, q, truth.poses(q))
 
     assert len(found.names) >= 27
     with pytest.raises(InvalidValueError, match="measure more"):
-        calibrate(truth.arm, q, truth.points(q))
+        calibrate_points(truth.arm, q, truth.points(q))
 
 
 def test_intervals_of_few_poses() -> None:
@@ -143,7 +143,7 @@ def test_intervals_of_few_poses() -> None:
     for seed in range(12):
         truth = Truth(np.random.default_rng(seed))
         q, elsewhere = truth.postures(8), truth.postures(30)
-        found = calibrate(truth.arm, q, truth.poses(q))
+        found = calibrate_points(truth.arm, q, truth.poses(q))
         off = found.predict(elsewhere) - truth.points(elsewhere, 0.0)
         deviation = np.sqrt(np.diagonal(found.uncertainty(elsewhere), axis1=1, axis2=2))
         within.append(np.abs(off) < student.ppf(0.95, found.freedom) * deviation)
@@ -159,7 +159,7 @@ def test_poses_of_another_frame_of_the_hand(truth: Truth) -> None:
     X = truth.poses(q)
     X[:, :3, :3] = X[:, :3, :3] @ rotation_from_vector([2.0, -1.0, 0.4])
 
-    found = calibrate(truth.arm, q, X)
+    found = calibrate_points(truth.arm, q, X)
 
     assert found.noise.turn == pytest.approx(TURN, rel=0.2)
     assert truth.missed(found).mean() < NOISE
@@ -171,7 +171,7 @@ def test_one_pose_that_is_turned(truth: Truth) -> None:
     X = truth.poses(q)
     X[7, :3, :3] = X[7, :3, :3] @ rotation_from_vector([0.0, 0.05, 0.0])
 
-    found = calibrate(truth.arm, q, X)
+    found = calibrate_points(truth.arm, q, X)
 
     assert found.outliers == (7,)
     assert truth.missed(found).mean() < NOISE
@@ -183,7 +183,7 @@ def test_poses_that_are_turned_over(truth: Truth) -> None:
     X = truth.poses(q)
     X[:6, :3, :3] = X[:6, :3, :3] @ rotation_from_vector([np.pi, 0.0, 0.0])
 
-    found = calibrate(truth.arm, q, X)
+    found = calibrate_points(truth.arm, q, X)
 
     assert found.outliers == (0, 1, 2, 3, 4, 5)
     np.testing.assert_allclose(found.after.turn[:6], np.pi, atol=10 * TURN)
@@ -195,7 +195,7 @@ def test_derivatives_of_large_turns(angle: float, rng: np.random.Generator) -> N
     """Turns that are far off have the derivatives that differences have, too."""
     arm = random_arm(rng, 4)
     chain = chain_of(arm)
-    model = Model(chain=chain, frames=(np.eye(4), random_pose(rng, 1.0)), frame_names=("a", "b"))
+    model = MeasurementModel(chain=chain, frames=(np.eye(4), random_pose(rng, 1.0)), frame_names=("a", "b"))
     q = postures(rng, arm, 4)
     X, axes = np.tile(np.eye(4), (4, 1, 1)), rng.standard_normal((4, 3))
     axes *= angle / np.linalg.norm(axes, axis=1)[:, None]
@@ -219,7 +219,7 @@ def test_a_board_set_up_three_times(truth: Truth) -> None:
         which = frame == name
         points[which] = (points[which] - X[:3, 3]) @ X[:3, :3]
 
-    found = calibrate_to(truth.arm, readings(q, points, frame=frame))
+    found = calibrate(truth.arm, readings(q, points, frame=frame))
 
     assert {f"frame.{name}.{six}" for name in ("roll", "pitch") for six in ("x", "rz")} <= set(found.names)
     assert found.noise.length == pytest.approx(NOISE, rel=0.2)
@@ -234,7 +234,7 @@ def test_touched_planes(truth: Truth) -> None:
     planes = [(random_pose(truth.rng, 0.4), name) for name in ("floor", "wall", "door")]
     parts = [readings(_on(truth, X, 100), plane=[name] * 100) for X, name in planes]
 
-    found = calibrate_to(truth.arm, together(*parts))
+    found = calibrate(truth.arm, concatenate(*parts))
 
     assert not [name for name in found.names if name.startswith("base")]
     assert {"plane.floor.z", "plane.wall.rx", "plane.door.ry"} <= set(found.names)
@@ -242,7 +242,7 @@ def test_touched_planes(truth: Truth) -> None:
     held = {one.name for one in found.held}
     assert held >= {"base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"}
     q = truth.postures(100)
-    lengths = [one.name for one in found.held if one.name in calibrate(truth.arm, q, truth.points(q)).names]
+    lengths = [one.name for one in found.held if one.name in calibrate_points(truth.arm, q, truth.points(q)).names]
     assert [name for name in lengths if not name.startswith("base")] == ["joint5.d"]
 
 
@@ -275,7 +275,7 @@ def test_distances_from_anchors(truth: Truth) -> None:
         for name, end in zip("abc", ends, strict=True)
     ]
 
-    found = calibrate_to(truth.arm, together(*parts))
+    found = calibrate(truth.arm, concatenate(*parts))
 
     assert not [name for name in found.names if name.startswith("base")]
     assert found.noise.length == pytest.approx(NOISE, rel=0.2)
@@ -287,7 +287,7 @@ def test_distances_between_postures(truth: Truth) -> None:
     q, other = truth.postures(150), truth.postures(150)
     apart = np.linalg.norm(truth.points(q, 0.0) - truth.points(other, 0.0), axis=1)
 
-    found = calibrate_to(truth.arm, readings(q, distances=apart + NOISE * truth.rng.standard_normal(150), other=other))
+    found = calibrate(truth.arm, readings(q, distances=apart + NOISE * truth.rng.standard_normal(150), other=other))
 
     assert not [name for name in found.names if name.startswith("base")]
     assert truth.missed(found, rigid=True).mean() < 3 * NOISE
@@ -299,8 +299,8 @@ def test_points_with_distances(truth: Truth) -> None:
     away = np.linalg.norm(truth.points(more, 0.0), axis=1) + NOISE * truth.rng.standard_normal(100)
     points = readings(q, truth.points(q))
 
-    alone = calibrate_to(truth.arm, points, without=("joint6.theta",))
-    both = calibrate_to(truth.arm, together(points, readings(more, distances=away, anchor=["wire"] * 100)))
+    alone = calibrate(truth.arm, points, without=("joint6.theta",))
+    both = calibrate(truth.arm, concatenate(points, readings(more, distances=away, anchor=["wire"] * 100)))
 
     assert truth.missed(both).mean() < truth.missed(alone).mean()
 
@@ -309,7 +309,7 @@ def test_no_noise(truth: Truth) -> None:
     """From poses without noise an arm is found to rounding."""
     q = truth.postures(30)
 
-    found = calibrate(truth.arm, q, truth.poses(q, 0.0, 0.0))
+    found = calibrate_points(truth.arm, q, truth.poses(q, 0.0, 0.0))
 
     assert truth.missed(found).max() < EXACT
 
@@ -323,7 +323,7 @@ def test_a_frame_on_a_line(truth: Truth) -> None:
     given = readings(q, truth.points(q), frame=["one"] * 40 + ["other"] * 2)
 
     with pytest.raises(TooFewError, match="frame other: 2 points do not tell where it stands; measure 3 or more"):
-        calibrate_to(truth.arm, given)
+        calibrate(truth.arm, given)
 
 
 @pytest.mark.parametrize("what", ["plane", "anchor"])
@@ -333,7 +333,7 @@ def test_few_touches(what: str, truth: Truth) -> None:
     more = readings(q[:3], plane=["a"] * 3) if what == "plane" else readings(q[:3], distances=[1] * 3, anchor=["a"] * 3)
 
     with pytest.raises(TooFewError, match=f"{what} a: 3 .* only tell where it is; measure 4 or more"):
-        calibrate_to(truth.arm, together(readings(q, truth.points(q)), more))
+        calibrate(truth.arm, concatenate(readings(q, truth.points(q)), more))
 
 
 def test_ways_in_millimetres(truth: Truth) -> None:
@@ -342,7 +342,7 @@ def test_ways_in_millimetres(truth: Truth) -> None:
     apart = 1e3 * np.linalg.norm(truth.points(q) - truth.points(other), axis=1)
 
     with pytest.raises(ContradictionError, match=r"distances are .* are they millimetres read as metres"):
-        calibrate_to(truth.arm, readings(q, distances=apart, other=other))
+        calibrate(truth.arm, readings(q, distances=apart, other=other))
 
 
 def test_what_does_not_fit(truth: Truth) -> None:
@@ -358,7 +358,7 @@ def test_what_does_not_fit(truth: Truth) -> None:
     with pytest.raises(ShapeError, match=r"other: expected \(4, 6\) for as many q, got \(3, 6\)"):
         readings(q, distances=[1.0] * 4, other=q[:3])
     with pytest.raises(ShapeError, match=r"readings of arms with \[3, 6\] joints are not of one arm"):
-        together(readings(q, plane=["a"] * 4), readings(q[:, :3], plane=["a"] * 4))
+        concatenate(readings(q, plane=["a"] * 4), readings(q[:, :3], plane=["a"] * 4))
 
 
 @pytest.mark.parametrize("how", ["never turned", "x, y, z, w for w, x, y, z"])
@@ -374,7 +374,7 @@ def test_turns_told_another_way(how: str, truth: Truth) -> None:
     with pytest.raises(
         ContradictionError, match=r"half of the poses are turned \d+ degrees .* are these its turns, in"
     ):
-        calibrate(truth.arm, q, X)
+        calibrate_points(truth.arm, q, X)
 
 
 @pytest.mark.parametrize("by", [(2.0, 2.0, 2.0), (1.0, 1.0, -1.0)])
@@ -391,14 +391,14 @@ def test_no_poses(by: tuple[float, ...], truth: Truth) -> None:
 def test_nothing_told(truth: Truth) -> None:
     """Postures all over the room do not touch one plane; that nothing is told is said, and soon."""
     with pytest.raises(ContradictionError, match=r"misses its readings by, .* mm, hides every error"):
-        calibrate_to(load_arm("puma560"), readings(truth.postures(40), plane=["table"] * 40))
+        calibrate(load_arm("puma560"), readings(truth.postures(40), plane=["table"] * 40))
 
 
 def test_nothing_fitted(truth: Truth) -> None:
     """An arm of which nothing may be fitted that its readings tell stays as it is."""
     q = truth.postures(40)
 
-    found = calibrate(truth.arm, q, truth.points(q), only=["tool.rx"])
+    found = calibrate_points(truth.arm, q, truth.points(q), only=["tool.rx"])
 
     assert found.names == ()
     assert not found.errors.any()
@@ -407,7 +407,7 @@ def test_nothing_fitted(truth: Truth) -> None:
 def test_nothing_to_hold_against(truth: Truth) -> None:
     """Points in a frame of which all are held out, or a plane that is touched at the check alone, say nothing."""
     q = truth.postures(44)
-    given = together(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
+    given = concatenate(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
 
     with pytest.raises(InvalidValueError, match=r"plane table: no reading that is fitted .* so that the 4 others"):
         refuse_not_fitted(given.take(np.arange(40)), given.take(np.arange(40, 44)))
@@ -417,9 +417,9 @@ def test_nothing_to_hold_against(truth: Truth) -> None:
 def test_too_few_to_hold_out(truth: Truth) -> None:
     """Where a fit without the part that is held out cannot be, the text says that it is of that part."""
     q = truth.postures(44)
-    given = together(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
+    given = concatenate(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
 
-    for held_out in (cross_validated, calibrate_beyond):
+    for held_out in (cross_validate, calibrate_nongeometric):
         with pytest.raises(InvalidValueError, match=r"with part \d of 5 held out: plane table"):
             held_out(truth.arm, given)
 

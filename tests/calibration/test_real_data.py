@@ -13,7 +13,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
-from armwright.calibration.fitting import calibrate
+from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.measurements import Measurements, read_measurements
 from armwright.kinematics.forward import forward
 from armwright.spatial.poses import pose
@@ -61,7 +61,7 @@ def held_out(arm: Arm, measured: Measurements) -> Array:
     for fold in range(FOLDS):
         out = order[fold::FOLDS]
         rest = np.setdiff1d(order, out)
-        found = calibrate(arm, measured.q[rest], measured.points[rest], base=np.eye(4))
+        found = calibrate_points(arm, measured.q[rest], measured.points[rest], base=np.eye(4))
         missed[out] = np.linalg.norm(found.predict(measured.q[out]) - measured.points[out], axis=1)
     return missed
 
@@ -86,7 +86,7 @@ def test_ur5_errors() -> None:
     arm = ur5()
     measured = read("3D_UR5_uncalibrated_grid_cleaned.csv", arm)
 
-    found = calibrate(arm, measured.q, measured.points, base=np.eye(4))
+    found = calibrate_points(arm, measured.q, measured.points, base=np.eye(4))
 
     lengths = found.chain.is_length[list(found.identified.kept)]
     assert len(found.names) == 25

@@ -4,13 +4,13 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike
-from armwright.clearance.equations import Rubbing
+from armwright.clearance.equations import FrictionModel
 from armwright.clearance.paths import Path
 from armwright.clearance.settings import Settings
 
 # Clearances of J2, J3 and J4 [m].
 ARM_A, ARM_B = np.array((0.328, 0.171, 0.483)) * 1e-3, np.array((0.460, 0.480, 0.460)) * 1e-3
-CENTRE = Settings(friction=Rubbing(velocity="centre"), threshold=1e-2)
+CENTRE = Settings(friction=FrictionModel(velocity="centre"), threshold=1e-2)
 PATHS = ("y1", "y3", "y7")
 # Where these paths start [m].
 STARTS = np.array(((-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7)))

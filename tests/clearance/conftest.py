@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimating.kriging import Surrogate, learn
+from armwright.clearance.estimation.kriging import Surrogate, learn
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.sweeping import FeatureSweep, feature_vector

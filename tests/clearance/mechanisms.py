@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armwright.arrays import Array
-from armwright.clearance.equations import Contact, Rubbing, State, Touch, rates
+from armwright.clearance.equations import Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.linkage import Body, Drive, Guide, Linkage, Material, Pin, Place, Play
 from armwright.clearance.paths import Path
-from armwright.clearance.preparing import Task, prepare
+from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation
 
@@ -74,7 +74,7 @@ def still(duration: float, *drives: float) -> Path:
     return Path(name="still", knots=np.array([0.0, duration]), pieces=pieces, of="drives")
 
 
-def thrown(linkage: Linkage, settings: Settings, duration: float, speeds: ArrayLike) -> Task:
+def thrown(linkage: Linkage, settings: Settings, duration: float, speeds: ArrayLike) -> Scenario:
     """A linkage that starts with given speeds where it stood still."""
     task = prepare(linkage, still(duration, *([0.0] * len(linkage.drives))), settings)
     qd = np.zeros_like(task.ideal.qd)
@@ -82,7 +82,7 @@ def thrown(linkage: Linkage, settings: Settings, duration: float, speeds: ArrayL
     return attrs.evolve(task, ideal=attrs.evolve(task.ideal, qd=qd))
 
 
-def left_alone(task: Task) -> Task:
+def left_alone(task: Scenario) -> Scenario:
     """The same with drives that give nothing."""
     return attrs.evolve(task, table=np.zeros_like(task.table))
 
@@ -93,9 +93,9 @@ def energies(found: Simulation) -> Array:
     c = np.broadcast_to(found.clearances[..., None, :], (*found.q.shape[:-1], len(linkage.pins)))
     K = contact_stiffness(linkage, c)
     contacts = [Contact(c[..., i], K[..., i], 0.0, 0.0, settings.threshold) for i in range(len(linkage.pins))]
-    touches = [Touch(np.zeros(found.q.shape[:-1]), 1.0) for _ in linkage.pins]
+    touches = [ContactMemory(np.zeros(found.q.shape[:-1]), 1.0) for _ in linkage.pins]
     state = State(axes(found.q), axes(found.qd), touches)
-    return np.asarray(sum(rates(linkage, Rubbing(), state, [0.0] * len(linkage.drives), contacts).energy))
+    return np.asarray(sum(rates(linkage, FrictionModel(), state, [0.0] * len(linkage.drives), contacts).energy))
 
 
 def imbalance(found: Simulation) -> Array:

@@ -10,10 +10,10 @@ import pytest
 
 from armwright.clearance.equations import (
     Contact,
+    ContactMemory,
+    FrictionModel,
     Rates,
-    Rubbing,
     State,
-    Touch,
     drive_weights,
     free_forces,
     mass_matrix,
@@ -55,14 +55,14 @@ def found(
     qd: np.ndarray,
     drives: Any = None,
     *,
-    rubbing: Rubbing | None = None,
+    rubbing: FrictionModel | None = None,
     friction: float = 0.1,
     bend: float = 0.0,
 ) -> Rates:
     contacts = [Contact(pin.clearance, 7e10, 0.15, friction, 1e-3) for pin in linkage.pins]
-    touches = [Touch(1.0, 0.3, bend) for _ in linkage.pins]
+    touches = [ContactMemory(1.0, 0.3, bend) for _ in linkage.pins]
     efforts = [0.0] * len(linkage.drives) if drives is None else list(drives)
-    return rates(linkage, rubbing or Rubbing(), State(list(q), list(qd), touches), efforts, contacts)
+    return rates(linkage, rubbing or FrictionModel(), State(list(q), list(qd), touches), efforts, contacts)
 
 
 def full(linkage: Linkage, q: np.ndarray) -> np.ndarray:
@@ -124,11 +124,11 @@ class TestBesidePinocchio:
 class TestWhatMotionKeeps:
     """Laws that hold in every configuration, whatever touches."""
 
-    LAWS = (Rubbing(), Rubbing(velocity="centre"), Rubbing(law="tanh"), Rubbing(law="lugre"))
+    LAWS = (FrictionModel(), FrictionModel(velocity="centre"), FrictionModel(law="tanh"), FrictionModel(law="lugre"))
 
     @pytest.mark.parametrize("rubbing", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
     @pytest.mark.parametrize("seed", range(4))
-    def test_energy(self, seed: int, rubbing: Rubbing) -> None:
+    def test_energy(self, seed: int, rubbing: FrictionModel) -> None:
         """Kinetic, potential and stored energy grow by what drives give and contacts do not take, watt by watt."""
         rng = np.random.default_rng(seed)
         linkage = tree(rng)
@@ -153,7 +153,7 @@ class TestWhatMotionKeeps:
             assert now.powers[2] > 0
 
     @pytest.mark.parametrize("rubbing", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
-    def test_momentum_of_free_bodies(self, rng: np.random.Generator, rubbing: Rubbing) -> None:
+    def test_momentum_of_free_bodies(self, rng: np.random.Generator, rubbing: FrictionModel) -> None:
         """Two free bodies in a pin with play keep their momentum and their angular momentum, whatever rubs."""
         linkage = pair(rng)
         q, qd = pressed(linkage, rng)

@@ -6,8 +6,8 @@ import pytest
 
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import thesis_path
-from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import simulate
 from clearance.arms import beginning

@@ -7,7 +7,7 @@ from armwright.arrays import Array
 from armwright.clearance.features import UNITS, Features, features, features_of, spectrum
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
-from armwright.clearance.preparing import prepare
+from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import simulate
 from armwright.errors import InvalidValueError
 from clearance.arms import ARM_A, CENTRE

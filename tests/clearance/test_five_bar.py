@@ -32,9 +32,9 @@ from armwright.clearance.five_bar_workspace import (
 )
 from armwright.clearance.linkage import Body, Drive, Guide, Linkage, Pin, Place, Play
 from armwright.clearance.paths import thesis_path
-from armwright.clearance.placement import Pair
-from armwright.clearance.preparing import prepare
+from armwright.clearance.placement import Vec2
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import prepare
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 
 # Sums of a few lengths near 1, and angles of them [m, rad].
@@ -183,8 +183,8 @@ def test_batches_keep_their_axes(bar: FiveBar) -> None:
 
 def test_law_takes_floats_and_arrays() -> None:
     """The law of an arm gives the same for a float as for an array of one."""
-    one = arm_angles(Pair(0.05, -0.7), 0.3, 0.65, 1.0)
-    many = arm_angles(Pair(np.array([0.05]), np.array([-0.7])), 0.3, 0.65, 1.0)
+    one = arm_angles(Vec2(0.05, -0.7), 0.3, 0.65, 1.0)
+    many = arm_angles(Vec2(np.array([0.05]), np.array([-0.7])), 0.3, 0.65, 1.0)
 
     assert (one.crank, one.rod) == pytest.approx((many.crank[0], many.rod[0]), abs=1e-15)
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from armwright.clearance.contact import Bristles
-from armwright.clearance.equations import Rubbing
+from armwright.clearance.equations import FrictionModel
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.preparing import Task
+from armwright.clearance.scenario import Scenario
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
 from clearance.mechanisms import GRAVITY, block, imbalance, thrown
@@ -28,7 +28,7 @@ def floor(**options: float) -> Linkage:
     return block(gravity=GRAVITY, clearance=FLAT, **options)
 
 
-def laid(linkage: Linkage, settings: Settings, duration: float, speed: float = 0.0) -> Task:
+def laid(linkage: Linkage, settings: Settings, duration: float, speed: float = 0.0) -> Scenario:
     """The block below the middle of the hole, as deep in the floor as its weight presses it."""
     task = thrown(linkage, attrs.evolve(settings, start="centred"), duration, (speed, 0.0))
     K = float(contact_stiffness(linkage, np.array([FLAT]))[0])
@@ -87,7 +87,7 @@ def test_slope() -> None:
 def test_brushes_hold() -> None:
     """On brushes it creeps by -(g/σ0) ln(1 - F / N g) while they bend, and then lies still."""
     tangent, frictions = 0.02, np.array((0.1, 0.2))
-    settings = Settings(friction=Rubbing(law="lugre"), sample=1e-3)
+    settings = Settings(friction=FrictionModel(law="lugre"), sample=1e-3)
     found = simulate(laid(slope(tangent), settings, 0.1), frictions=frictions)
 
     held = Bristles.static_ratio * frictions

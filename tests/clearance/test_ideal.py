@@ -22,8 +22,8 @@ from armwright.clearance.ideal import (
 from armwright.clearance.linkage import Body, Drive, Linkage, Pin, Place, Play
 from armwright.clearance.paths import Path, hermite, thesis_path, turning
 from armwright.clearance.placement import Placement
-from armwright.clearance.preparing import assembled, prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import assembly_guess, prepare
 from armwright.clearance.settings import Settings
 from armwright.errors import InvalidValueError, ShapeError
 from clearance.mechanisms import axes
@@ -190,7 +190,7 @@ class TestFiveBar:
 
     def test_start(self, linkage: Linkage) -> None:
         """At (-150, -700) mm its links stand at -1.252325, 0.369776, -0.756151 and 0.711901 rad, elbows out."""
-        q = closed(linkage, assembled(linkage), tip=[-0.15, -0.7])
+        q = closed(linkage, assembly_guess(linkage), tip=[-0.15, -0.7])
 
         np.testing.assert_allclose(q[[0, 3, 6, 7]], (-1.252325, 0.369776, -0.756151, 0.711901), rtol=0, atol=PRINTED)
 
@@ -203,7 +203,7 @@ class TestFiveBar:
 
     def test_shift_of_the_tip(self, linkage: Linkage) -> None:
         """At (-180, -600) mm play shifts the tip by 0.65, 0.62 and -0.87 of it in x, -0.82, -0.77, -0.31 in y."""
-        q = closed(linkage, assembled(linkage), tip=[-0.18, -0.6])
+        q = closed(linkage, assembly_guess(linkage), tip=[-0.18, -0.6])
         still = np.zeros_like(q)
         _, reactions = balance(linkage, q, still, still)
 
@@ -215,7 +215,7 @@ class TestFiveBar:
 
     def test_shift_is_the_slope_of_the_closure(self, linkage: Linkage) -> None:
         """Opening one pin by a micrometre shifts the tip as the sensitivity says, in every direction."""
-        q = closed(linkage, assembled(linkage), tip=[0.1, -0.55])
+        q = closed(linkage, assembly_guess(linkage), tip=[0.1, -0.55])
         slope, small = sensitivity(linkage, q), 1e-6
         for pin, axis in np.ndindex(3, 2):
             gaps = np.zeros((2, 3, 2))
@@ -256,7 +256,7 @@ def test_drives_give_the_energy(name: str, path: Path) -> None:
 def test_many_as_one(name: str, rng: np.random.Generator) -> None:
     """A batch of configurations gives what each of them gives alone, to rounding."""
     linkage = load_linkage(name)
-    guess = assembled(linkage)
+    guess = assembly_guess(linkage)
     start = closed(linkage, guess, drives=guess[list(linkage.driven)])
     drives = start[list(linkage.driven)] + rng.uniform(-0.1, 0.1, (2, 3, len(linkage.drives)))
     speeds, pulls = rng.uniform(-1, 1, (2, *drives.shape))
@@ -274,7 +274,7 @@ def test_many_as_one(name: str, rng: np.random.Generator) -> None:
 def test_tip_or_drives_lead_alike() -> None:
     """Led by its tip or by its drives the five-bar moves alike and needs the same torques."""
     linkage = load_linkage("five-bar")
-    q = closed(linkage, assembled(linkage), tip=[0.05, -0.62])
+    q = closed(linkage, assembly_guess(linkage), tip=[0.05, -0.62])
 
     by_tip = ideal_motion(linkage, q, [0.7, -0.4], [3.0, 20.0], by_tip=True)
     driven = list(linkage.driven)
@@ -297,7 +297,7 @@ def test_speeds_and_accelerations_are_slopes() -> None:
 def test_rocker_of_a_crank_rocker() -> None:
     """When crank and coupler lie in one line the rocker stands still: at √(OC² + …) from the law of cosines."""
     linkage = load_linkage("four-bar")
-    guess = assembled(linkage)
+    guess = assembly_guess(linkage)
 
     def rocker_speed(crank: float) -> float:
         q = closed(linkage, guess, drives=[crank])
@@ -322,7 +322,7 @@ class TestRefused:
         """A place two metres away cannot be reached by arms of a metre."""
         linkage = load_linkage("five-bar")
         with pytest.raises(InvalidValueError, match=r"five-bar: the path cannot be followed.*out of reach"):
-            closed(linkage, assembled(linkage), tip=[0.0, -2.0])
+            closed(linkage, assembly_guess(linkage), tip=[0.0, -2.0])
 
     def test_path_that_leaves(self) -> None:
         """Of a path that leaves the reach halfway the message says where it is lost."""
@@ -346,19 +346,19 @@ class TestRefused:
         linkage = load_linkage("five-bar")
         for goals in ({}, {"tip": [0.0, -0.6], "drives": [0.0, 0.0]}):
             with pytest.raises(ShapeError, match="expected either where the tip is to be, or the driven coordinates"):
-                closed(linkage, assembled(linkage), **goals)
+                closed(linkage, assembly_guess(linkage), **goals)
 
     def test_wrong_number_of_drives(self) -> None:
         """The five-bar has two drives."""
         linkage = load_linkage("five-bar")
         with pytest.raises(ShapeError, match=r"expected 2 numbers on the last axis, got shape \(3,\)"):
-            closed(linkage, assembled(linkage), drives=[0.0, 0.0, 0.0])
+            closed(linkage, assembly_guess(linkage), drives=[0.0, 0.0, 0.0])
 
     def test_too_few_drives(self) -> None:
         """With one motor the five-bar's two freedoms are not determined."""
         linkage = load_linkage("five-bar")
         lame = attrs.evolve(linkage, drives=linkage.drives[:1])
-        q = closed(linkage, assembled(linkage), tip=[0.0, -0.6])
+        q = closed(linkage, assembly_guess(linkage), tip=[0.0, -0.6])
         with pytest.raises(InvalidValueError, match="one drive for each freedom, got 1 drives for 2 freedoms"):
             balance(lame, q, np.zeros(8), np.zeros(8))
         with pytest.raises(InvalidValueError, match="it has 2 freedoms, and its drives tell 1; expected as many"):
@@ -368,7 +368,7 @@ class TestRefused:
         """A slider-crank cannot lead its tip through the plane."""
         linkage = load_linkage("slider-crank")
         with pytest.raises(InvalidValueError, match="it has 1 freedom, and a place of the tip tells 2"):
-            closed(linkage, assembled(linkage), tip=[0.17, 0.0])
+            closed(linkage, assembly_guess(linkage), tip=[0.17, 0.0])
 
     def test_singular(self) -> None:
         """A parallelogram that lies flat can go on in two ways."""

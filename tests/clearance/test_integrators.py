@@ -8,8 +8,8 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 from armwright.clearance.paths import straight
-from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from clearance.arms import beginning

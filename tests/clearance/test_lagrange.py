@@ -7,8 +7,8 @@ from scipy.interpolate import CubicSpline
 
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import thesis_path
-from armwright.clearance.preparing import Task, prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
 from clearance.arms import beginning
@@ -27,7 +27,7 @@ def five_bar() -> Linkage:
     return attrs.evolve(linkage, material=attrs.evolve(linkage.material, restitution=1.0))
 
 
-def beside(task: Task, found: Simulation, wall: Wall) -> np.ndarray:
+def beside(task: Scenario, found: Simulation, wall: Wall) -> np.ndarray:
     """The same motion on the other road, in the coordinates of the linkage."""
     ideal = task.ideal
     torques = CubicSpline(np.arange(len(ideal.efforts)) * task.h, ideal.efforts)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armwright.clearance.linkage import Linkage, Place
-from armwright.clearance.placement import Pair, Placement, Point
+from armwright.clearance.placement import Placement, Point, Vec2
 from armwright.clearance.reader import load_linkage
 from clearance.trees import tree
 
@@ -117,7 +117,7 @@ def test_ground_stands_still() -> None:
 
 def test_pairs() -> None:
     """Vectors of the plane add, and turn to the left."""
-    a, b = Pair(1.0, 2.0), Pair(-3.0, 0.5)
+    a, b = Vec2(1.0, 2.0), Vec2(-3.0, 0.5)
 
     assert a.plus(b) == (-2.0, 2.5)
     assert a.minus(b) == (4.0, 1.5)

@@ -6,7 +6,7 @@ import pytest
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path
 from armwright.clearance.predictability import APART, perturbed, with_outlook
-from armwright.clearance.preparing import prepare
+from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
 from samples import Sample

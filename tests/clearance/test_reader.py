@@ -9,8 +9,8 @@ import pytest
 
 from armwright.clearance.ideal import closed
 from armwright.clearance.linkage import Guide, Linkage, Pin
-from armwright.clearance.preparing import assembled
 from armwright.clearance.reader import linkage_names, load_linkage, read_linkage
+from armwright.clearance.scenario import assembly_guess
 from armwright.errors import FileFormatError, InvalidValueError, UnknownNameError
 
 SLIDER = Path(__file__).parents[2] / "src" / "armwright" / "clearance" / "catalogue" / "slider-crank.toml"
@@ -36,7 +36,7 @@ def test_catalogue() -> None:
 def test_catalogue_can_be_put_together(name: str) -> None:
     """Every linkage of the catalogue closes within a quarter turn of its assembly, and has a drive per freedom."""
     linkage = load_linkage(name)
-    guess = assembled(linkage)
+    guess = assembly_guess(linkage)
 
     q = closed(linkage, guess, drives=guess[list(linkage.driven)])
 
@@ -152,4 +152,4 @@ def test_free_body_that_nothing_holds() -> None:
     linkage = load_linkage("five-bar")
     adrift = attrs.evolve(linkage, pins=linkage.pins[:1], joints=linkage.joints)
     with pytest.raises(InvalidValueError, match="five-bar: no pin joins link3 to the rest"):
-        assembled(adrift)
+        assembly_guess(adrift)

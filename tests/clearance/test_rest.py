@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.equations import Contact, Rubbing, State, Touch, potential_energy, rates
+from armwright.clearance.equations import Contact, ContactMemory, FrictionModel, State, potential_energy, rates
 from armwright.clearance.ideal import closed, tip_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.placement import Placement
-from armwright.clearance.preparing import assembled
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.rest import at_rest
+from armwright.clearance.scenario import assembly_guess
 from armwright.clearance.settings import contact_stiffness
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -30,7 +30,7 @@ def linkage() -> Linkage:
 
 
 def ideal(linkage: Linkage, tip: tuple[float, float]) -> Array:
-    return closed(linkage, assembled(linkage), tip=tip)
+    return closed(linkage, assembly_guess(linkage), tip=tip)
 
 
 @pytest.mark.parametrize(
@@ -67,8 +67,8 @@ def test_nothing_moves(linkage: Linkage, clearances: Array) -> None:
 
     held = attrs.evolve(linkage, drives=[attrs.evolve(drive, kind="motion") for drive in linkage.drives])
     contacts = [Contact(*row, 0.15, 0.0, 1e-3) for row in np.stack([clearances, K], axis=-1)]
-    state = State(list(rest.q), [0.0] * 8, [Touch(1.0, 1e-3)] * 3)
-    now = rates(held, Rubbing(), state, [0.0, 0.0], contacts)
+    state = State(list(rest.q), [0.0] * 8, [ContactMemory(1.0, 1e-3)] * 3)
+    now = rates(held, FrictionModel(), state, [0.0, 0.0], contacts)
 
     np.testing.assert_allclose([pin.normal for pin in now.pins], rest.forces, rtol=1e-7)
     lightest = 0.0282
@@ -114,7 +114,7 @@ def test_no_play(linkage: Linkage) -> None:
 
 def test_leading_axes(linkage: Linkage, rng: np.random.Generator) -> None:
     """Many clearances at many places make a table of offsets, each as it is alone."""
-    q = closed(linkage, assembled(linkage), tip=[[-0.1, -0.6], [0.1, -0.5]])
+    q = closed(linkage, assembly_guess(linkage), tip=[[-0.1, -0.6], [0.1, -0.5]])
     c = rng.uniform(1e-4, 5e-4, (4, 1, 3))
 
     rest = at_rest(linkage, q, c)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from armwright.clearance import simulation
-from armwright.clearance.correcting import correct_nodes, tip_at
-from armwright.clearance.estimating.measured import PathsMeasured, RestMeasured, read_measured
-from armwright.clearance.estimating.static import estimate_at_rest, rest_matrix
+from armwright.clearance.correction import correct_nodes, tip_at
+from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured, read_measured
+from armwright.clearance.estimation.static import estimate_at_rest, rest_matrix
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import sensitivity
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import PickAndPlace, thesis_path
-from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
 from armwright.clearance.sweeping import FeatureSweep, is_sweep_of

@@ -6,10 +6,10 @@ import attrs
 import numpy as np
 import pytest
 
-from armwright.clearance.equations import Rubbing
+from armwright.clearance.equations import FrictionModel
 from armwright.clearance.paths import turning
-from armwright.clearance.preparing import prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings, check_step, contact_stiffness
 from armwright.clearance.simulation import Status, simulate
 from armwright.errors import InvalidValueError, UnknownNameError
@@ -22,8 +22,8 @@ from clearance.mechanisms import GRAVITY, block, thrown
         ({"integrator": "rk5"}, r"no integrator 'rk5'. Did you mean 'rk4'\?"),
         ({"control": "torque"}, "no control 'torque'"),
         ({"impact": "hunt"}, "no law of impact 'hunt'"),
-        ({"friction": Rubbing(law="coulomb")}, "no law of friction 'coulomb'"),  # type: ignore[arg-type]
-        ({"friction": Rubbing(velocity="center")}, r"no sliding speed 'center'. Did you mean 'centre'\?"),  # type: ignore[arg-type]
+        ({"friction": FrictionModel(law="coulomb")}, "no law of friction 'coulomb'"),  # type: ignore[arg-type]
+        ({"friction": FrictionModel(velocity="center")}, r"no sliding speed 'center'. Did you mean 'centre'\?"),  # type: ignore[arg-type]
         ({"start": "rests"}, r"no start 'rests'. Did you mean 'rest'\?"),
     ],
 )

@@ -8,11 +8,11 @@ import pytest
 
 from armwright.clearance import simulation
 from armwright.clearance.contact import stiffness
-from armwright.clearance.equations import Rubbing
+from armwright.clearance.equations import FrictionModel
 from armwright.clearance.linkage import Linkage, Place
 from armwright.clearance.paths import thesis_path, turning
-from armwright.clearance.preparing import Task, prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import InvalidValueError, ShapeError
@@ -30,18 +30,18 @@ def five_bar() -> Linkage:
 
 
 @pytest.fixture(scope="module")
-def y1(five_bar: Linkage) -> Task:
+def y1(five_bar: Linkage) -> Scenario:
     return prepare(five_bar, thesis_path("y1"), Settings(sample=1e-3))
 
 
 @pytest.fixture(scope="module")
-def smooth(y1: Task) -> Simulation:
+def smooth(y1: Scenario) -> Simulation:
     """Without friction, with 1 mm down to 50 µm of play."""
     return simulate(y1, np.array((1e-3, 5e-4, 2e-4, 1e-4, 5e-5))[:, None] * np.ones(3), frictions=0.0)
 
 
 @pytest.fixture(scope="module")
-def many(y1: Task) -> Simulation:
+def many(y1: Scenario) -> Simulation:
     """Forty runs, with clearances and frictions by chance."""
     rng = np.random.default_rng(5)
     return simulate(y1, rng.uniform(1e-4, 5e-4, (40, 3)), frictions=rng.uniform(0.0, 0.2, 40), threads=2)
@@ -67,7 +67,7 @@ class TestFiveBar:
         np.testing.assert_allclose(smooth.distance[:, 0] / play, 1.9, rtol=3e-3)
 
     @pytest.mark.parametrize("friction", [0.0, 0.05])
-    def test_ledger(self, y1: Task, friction: float) -> None:
+    def test_ledger(self, y1: Scenario, friction: float) -> None:
         """What the motors give is in the arm, or lost in impacts and friction, at every moment."""
         found = simulate(y1, frictions=friction)
 
@@ -79,7 +79,7 @@ class TestFiveBar:
     @pytest.mark.parametrize(("path", "thesis"), [("y1", 0.5504), ("y3", 0.5439), ("y7", 0.5187)])
     def test_intercepts_of_arm_a(self, five_bar: Linkage, path: str, thesis: float) -> None:
         """With friction of the centres' speed arm A's straight parts begin within 3 % of where the thesis' do."""
-        settings = Settings(friction=Rubbing(velocity="centre"), threshold=1e-2)
+        settings = Settings(friction=FrictionModel(velocity="centre"), threshold=1e-2)
         found = simulate(prepare(five_bar, thesis_path(path), settings), np.array((0.328, 0.171, 0.483)) * 1e-3)
 
         part = (found.time > 0.07 - 1e-9) & (found.time < 0.12 + 1e-9)
@@ -161,23 +161,23 @@ class TestManyAtOnce:
     """Runs side by side."""
 
     @pytest.mark.parametrize("number", [0, 7, 15, 16, 39])
-    def test_alone(self, y1: Task, many: Simulation, number: int) -> None:
+    def test_alone(self, y1: Scenario, many: Simulation, number: int) -> None:
         """A run has the same bits alone as among forty."""
         alone = simulate(y1, many.clearances[number], frictions=many.frictions[number])
 
         assert_same(alone, many, number)
 
-    def test_threads(self, y1: Task, many: Simulation) -> None:
+    def test_threads(self, y1: Scenario, many: Simulation) -> None:
         """One core gives the same bits as two."""
         assert_same(simulate(y1, many.clearances, frictions=many.frictions, threads=1), many)
 
-    def test_order(self, y1: Task, many: Simulation) -> None:
+    def test_order(self, y1: Scenario, many: Simulation) -> None:
         """In any order they are the same."""
         back = simulate(y1, many.clearances[::-1], frictions=many.frictions[::-1])
 
         assert_same(back, many, slice(None, None, -1))
 
-    def test_leading_axes(self, y1: Task, many: Simulation) -> None:
+    def test_leading_axes(self, y1: Scenario, many: Simulation) -> None:
         """Clearances and frictions make a table of runs."""
         found = simulate(y1, many.clearances[:2, None], frictions=[many.frictions[0], 0.3, 0.0])
 
@@ -185,7 +185,7 @@ class TestManyAtOnce:
         assert found.impacts.shape == (2, 3, 3)
         np.testing.assert_array_equal(found.q[0, 0], many.q[0])
 
-    def test_diverging_run_leaves_its_neighbours(self, y1: Task, many: Simulation) -> None:
+    def test_diverging_run_leaves_its_neighbours(self, y1: Scenario, many: Simulation) -> None:
         """A run whose friction no step can follow is a row that says so; those beside it do not know."""
         frictions = many.frictions[:5].copy()
         frictions[2] = 1e9
@@ -195,7 +195,7 @@ class TestManyAtOnce:
         for i in (0, 1, 3, 4):
             np.testing.assert_array_equal(found.q[i], many.q[i])
 
-    def test_none(self, y1: Task) -> None:
+    def test_none(self, y1: Scenario) -> None:
         """No clearances, no runs."""
         assert simulate(y1, np.zeros((0, 3)) + 1e-4).tip.shape == (0, 251, 2)
 
@@ -253,22 +253,22 @@ class TestRefused:
     """What is said before anything runs."""
 
     @pytest.mark.parametrize("clearance", [0.0, -1e-4, np.nan])
-    def test_no_clearance(self, y1: Task, clearance: float) -> None:
+    def test_no_clearance(self, y1: Scenario, clearance: float) -> None:
         """Contact needs play."""
         with pytest.raises(InvalidValueError, match="clearances"):
             simulate(y1, [5e-4, clearance, 5e-4])
 
-    def test_clearances_per_pin(self, y1: Task) -> None:
+    def test_clearances_per_pin(self, y1: Scenario) -> None:
         """There is one for each pin; the message names the pins."""
         with pytest.raises(ShapeError, match=r"expected 3 on the last axis \(J2, J3, J4\), got shape \(2,\)"):
             simulate(y1, [5e-4, 5e-4])
 
-    def test_axes_that_do_not_fit(self, y1: Task) -> None:
+    def test_axes_that_do_not_fit(self, y1: Scenario) -> None:
         """Four clearances and three frictions make no table."""
         with pytest.raises(ShapeError, match=r"leading axes must fit together, got \(4,\) and \(3,\)"):
             simulate(y1, np.full((4, 3), 5e-4), frictions=np.zeros(3))
 
-    def test_negative_friction(self, y1: Task) -> None:
+    def test_negative_friction(self, y1: Scenario) -> None:
         """Friction does not push."""
         with pytest.raises(InvalidValueError, match=r"frictions: expected none below 0, got -0\.1"):
             simulate(y1, frictions=-0.1)

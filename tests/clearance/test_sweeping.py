@@ -13,7 +13,7 @@ from armwright.clearance.features import Features, features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.clearance.predictability import APART, perturbed
-from armwright.clearance.preparing import prepare
+from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import simulate
 from armwright.clearance.sweeping import FeatureSweep, feature_vector, is_chance
 from armwright.errors import InvalidValueError, UnknownNameError

@@ -143,10 +143,10 @@ def test_coupled_joints_are_doubtful(tmp_path: Path) -> None:
     assert "coupled to another (q3 = a2 q2 + q3" in data.stderr
     assert (tmp_path / "out" / "errors.json").exists()
     told = json.loads(data.stdout)
-    assert told["notes"][0] == f"DOUBTFUL: {told['doubts'][0]}"
+    assert told["notes"][0] == f"DOUBTFUL: {told['contradictions'][0]}"
     assert (told["exit_status"], told["error"]["class"]) == (3, "DoubtfulError")
     assert told["error"]["message"] == data.stderr.removeprefix("armwright: ").rstrip("\n")
-    assert "joint 2 is elsewhere than in the" in told["doubts"][0]
+    assert "joint 2 is elsewhere than in the" in told["contradictions"][0]
 
 
 def test_coupled_joints_are_refused(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimating.measured import RestMeasured, read_measured
+from armwright.clearance.estimation.measured import RestMeasured, read_measured
 from armwright.clearance.reader import read_linkage
 from armwright.cli.app import app
 from armwright.cli.programs import translate_file

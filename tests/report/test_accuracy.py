@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.accuracy.assess import Assessment, assess
-from armwright.accuracy.measurements import read_measurements
+from armwright.accuracy.measurement_file import read_measurements
 from armwright.report.accuracy_figures import drawings
 from armwright.report.accuracy_page import accuracy_page, notes_of, shown_measure
 

@@ -13,8 +13,8 @@ from armwright.clearance.five_bar import FiveBar
 from armwright.clearance.ideal import tip_of
 from armwright.clearance.linkage import Pin, Place
 from armwright.clearance.paths import thesis_path, turning
-from armwright.clearance.preparing import Task, prepare
 from armwright.clearance.reader import load_linkage
+from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import ShapeError
@@ -31,12 +31,12 @@ MEGABYTE = 1e6
 
 
 @pytest.fixture(scope="module")
-def task() -> Task:
+def task() -> Scenario:
     return prepare(load_linkage("five-bar"), thesis_path("y1"))
 
 
 @pytest.fixture(scope="module")
-def simulation(task: Task) -> Simulation:
+def simulation(task: Scenario) -> Simulation:
     return simulate(task)
 
 
@@ -146,7 +146,7 @@ def test_books_that_do_not_close(simulation: Simulation) -> None:
     assert "1e-05 s" in said[0]
 
 
-def test_many_runs_are_refused(task: Task) -> None:
+def test_many_runs_are_refused(task: Scenario) -> None:
     """A report is of one run: of several one is to be taken out."""
     both = simulate(task, [[5e-4] * 3, [4e-4] * 3])
     with pytest.raises(ShapeError, match=r"expected one run, got \(2,\)"):
@@ -179,7 +179,7 @@ def test_round_numbers(x: float, round_one: float) -> None:
     assert round_number(x) == round_one
 
 
-def test_workspace(task: Task, run: Run, cranked: dict[str, Run]) -> None:
+def test_workspace(task: Scenario, run: Run, cranked: dict[str, Run]) -> None:
     """The workspace of a five-bar is drawn in the mode in which it stands, of no other linkage at all."""
     assert run.simulation.task is task
     drawn = workspace_of(task)

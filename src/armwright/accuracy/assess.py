@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 import attrs
 import numpy as np
 
+from armwright.accuracy.characteristics import Measure, Result, measures_of
 from armwright.accuracy.compliance import StaticCompliance, static_compliance
 from armwright.accuracy.corner import corner_deviations
 from armwright.accuracy.distance import distance_accuracy, distance_repeatability
-from armwright.accuracy.measurements import AnyTest, Cloud, PathTest, PoseTest
-from armwright.accuracy.measures import Measure, Result, measures_of
+from armwright.accuracy.measurement_file import AnyTest, Cloud, PathTest, PoseTest
 from armwright.accuracy.path import path_deviation, path_velocity
 from armwright.accuracy.pose import pose_accuracy, pose_repeatability
 from armwright.accuracy.settling import posing_time, settling

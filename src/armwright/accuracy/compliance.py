@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import LOADS, checked_cycles, checked_parts
-from armwright.accuracy.measured import frozen_array, place_of, places_of
+from armwright.accuracy.trace import frozen_array, place_of, places_of
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats
 from armwright.errors import InvalidValueError, ShapeError
 

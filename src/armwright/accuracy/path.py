@@ -7,8 +7,8 @@ import numpy as np
 
 from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
 from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.measured import Trace, frozen_array, one_size
 from armwright.accuracy.planes import ENDS, Legs, legs_of, middles, passages
+from armwright.accuracy.trace import Trace, frozen_array, one_size
 from armwright.arrays import Array, by_fields, number
 from armwright.errors import InvalidValueError, ShapeError
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.accuracy.measured import Trace, frozen_array, turned
+from armwright.accuracy.trace import Trace, frozen_array, turned
 from armwright.arrays import Array, by_fields
 from armwright.errors import InvalidValueError
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
 from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.measured import angles_of, frozen_array, place_of, places_of
+from armwright.accuracy.trace import angles_of, frozen_array, place_of, places_of
 from armwright.arrays import Array, ArrayLike, by_fields, floats
 from armwright.errors import ShapeError
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import attrs
 
 from armwright.accuracy.cycles import ASKED, Kind
-from armwright.accuracy.measured import ANGLES
+from armwright.accuracy.trace import ANGLES
 from armwright.errors import FileFormatError, closest, shown
 from armwright.files.columns import Columns
 from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, NOTE, Cells, number_in_cell, of_one_width, read_rows

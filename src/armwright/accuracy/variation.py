@@ -8,8 +8,8 @@ import numpy as np
 
 from armwright.accuracy.angles import mean_angles, wrapped
 from armwright.accuracy.cycles import DIRECTIONS, ROBOTS, Kind, checked_cycles, checked_parts
-from armwright.accuracy.measured import angles_of, frozen_array, one_size, place_of, places_of
 from armwright.accuracy.pose import from_commanded, repeatability
+from armwright.accuracy.trace import angles_of, frozen_array, one_size, place_of, places_of
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats
 from armwright.errors import InvalidValueError, ShapeError
 

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import checked_cycles
-from armwright.accuracy.measured import Trace, frozen_array, one_size
+from armwright.accuracy.trace import Trace, frozen_array, one_size
 from armwright.arrays import Array, by_fields, number
 from armwright.errors import InvalidValueError
 

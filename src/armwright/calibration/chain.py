@@ -44,7 +44,7 @@ class Element(NamedTuple):
     joint: int | None = None
 
 
-class Bend(NamedTuple):
+class JointErrorModel(NamedTuple):
     """Something that moves a joint away from where its encoder has it, by a law of the posture.
 
     Attributes:
@@ -58,7 +58,7 @@ class Bend(NamedTuple):
     law: Callable[[Array], Array]
 
 
-class Reached(NamedTuple):
+class ToolPoses(NamedTuple):
     """Where tools are, and how that depends on the errors.
 
     Attributes:
@@ -90,7 +90,7 @@ class Chain:
     elements: tuple[Element, ...]
     base: Array
     hand: Array
-    bends: tuple[Bend, ...] = ()
+    bends: tuple[JointErrorModel, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -104,7 +104,7 @@ class Chain:
         slides = [not self.arm.joints[bend.joint].revolute for bend in self.bends]
         return np.array([*shifts, *slides], dtype=np.bool_)
 
-    def reach(self, q: ArrayLike, errors: ArrayLike | None = None) -> Reached:
+    def reach(self, q: ArrayLike, errors: ArrayLike | None = None) -> ToolPoses:
         """Return where the tool is, and the derivatives.
 
         Args:
@@ -149,10 +149,12 @@ class Chain:
         for i, (bend, part) in enumerate(zip(self.bends, parts, strict=True), first):
             levers[i] = levers[moving[bend.joint]] * part[:, None]
             turns[i] = turns[moving[bend.joint]] * part[:, None]
-        return Reached(p, R, np.moveaxis(levers, 0, -1), np.moveaxis(turns, 0, -1))
+        return ToolPoses(p, R, np.moveaxis(levers, 0, -1), np.moveaxis(turns, 0, -1))
 
 
-def chain_of(arm: Arm, *, base: Array | None = None, hand: Array | None = None, bends: tuple[Bend, ...] = ()) -> Chain:
+def chain_of(
+    arm: Arm, *, base: Array | None = None, hand: Array | None = None, bends: tuple[JointErrorModel, ...] = ()
+) -> Chain:
     """Return an arm with all errors that its geometry can have: base, links, tool.
 
     Args:

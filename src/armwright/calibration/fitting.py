@@ -18,20 +18,20 @@ from scipy.stats import t as student
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
-from armwright.calibration.chain import Bend, Chain
-from armwright.calibration.identifying import (
-    KNOWN_ANGLE,
-    KNOWN_LENGTH,
-    Held,
-    Identified,
-    identify,
-    is_enough,
-    preferred,
+from armwright.calibration.chain import Chain, JointErrorModel
+from armwright.calibration.identifiability import (
+    MAX_STANDARD_ERROR_ANGLE,
+    MAX_STANDARD_ERROR_LENGTH,
+    FixedParameter,
+    Identifiability,
+    is_overdetermined,
+    preferred_parameters,
+    select_identifiable,
 )
-from armwright.calibration.model import Model, Off
-from armwright.calibration.noise import TYPICAL, Noise, estimated, remaining, trust, weights
+from armwright.calibration.initial_guess import initial_guess
+from armwright.calibration.measurement_model import MeasurementModel, PoseError
+from armwright.calibration.noise import TYPICAL, Noise, length_scales, median_noise, noise_and_outliers, robust_weights
 from armwright.calibration.readings import Readings, readings
-from armwright.calibration.starting import started
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError, UnknownNameError
 
 _ROUNDS, _WEIGHINGS = 8, 30
@@ -47,7 +47,7 @@ _STEPS = 100
 # What is off by more than this is not believed unless the readings say so clearly [m], [rad]. It binds what they
 # hardly tell: two such errors can otherwise run away together. What is told to a tenth of it is moved by a hundredth
 # of its deviation at most.
-BELIEVED_LENGTH, BELIEVED_ANGLE = 0.02, 0.05
+PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE = 0.02, 0.05
 # Bends of joints are a twentieth of that: gears run true to an arc minute or a few.
 _BENDS = 0.05
 # What may be wrong where an arm and its readings do not belong together.
@@ -73,12 +73,12 @@ class Calibration:
         outliers: numbers of readings that are off by more than they should be; they do not count.
     """
 
-    model: Model
-    identified: Identified
+    model: MeasurementModel
+    identified: Identifiability
     errors: Array
     covariance: Array
-    before: Off
-    after: Off
+    before: PoseError
+    after: PoseError
     noise: Noise
     freedom: int
     outliers: tuple[int, ...]
@@ -109,7 +109,7 @@ class Calibration:
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
     @property
-    def held(self) -> tuple[Held, ...]:
+    def held(self) -> tuple[FixedParameter, ...]:
         """The errors that are not fitted, and why."""
         return self.identified.held
 
@@ -136,7 +136,7 @@ class Calibration:
         return np.asarray(J @ self.covariance[np.ix_(rows, rows)] @ J.swapaxes(1, 2), dtype=np.float64)
 
 
-def calibrate(
+def calibrate_points(
     arm: Arm,
     q: ArrayLike,
     points: ArrayLike,
@@ -153,11 +153,11 @@ def calibrate(
         arm: as it is said to be, with n joints.
         q: (m, n) joint positions [rad] or [m].
         points: (m, 3) where the tool was [m], or (m, 4, 4) how it stood.
-        base: see ``calibrate_to``.
-        only: see ``calibrate_to``.
-        without: see ``calibrate_to``.
-        robust: see ``calibrate_to``.
-        progress: see ``calibrate_to``.
+        base: see ``calibrate``.
+        only: see ``calibrate``.
+        without: see ``calibrate``.
+        robust: see ``calibrate``.
+        progress: see ``calibrate``.
 
     Raises:
         ShapeError: joint positions and points are not as many.
@@ -166,15 +166,15 @@ def calibrate(
         UnknownNameError: ``only`` or ``without`` names what there is not.
     """
     seen = readings(q, points)
-    return calibrate_to(arm, seen, base=base, only=only, without=without, robust=robust, progress=progress)
+    return calibrate(arm, seen, base=base, only=only, without=without, robust=robust, progress=progress)
 
 
-def calibrate_to(
+def calibrate(
     arm: Arm,
     seen: Readings,
     *,
     base: Array | None = None,
-    bends: tuple[Bend, ...] = (),
+    bends: tuple[JointErrorModel, ...] = (),
     only: Sequence[str] | None = None,
     without: Sequence[str] = (),
     robust: bool = True,
@@ -201,7 +201,7 @@ def calibrate_to(
     """
     if seen.q.shape[1] != arm.n:
         raise ShapeError(f"expected readings of {arm.n} joints, as {arm.name} has, got {seen.q.shape[1]}")
-    model = started(arm, seen, base=base, bends=bends)
+    model = initial_guess(arm, seen, base=base, bends=bends)
     found, errors, noise = _rounds(model, seen, _chosen(model, only, without), robust=robust, progress=progress)
     kept = list(found.kept)
     if robust and kept:
@@ -213,7 +213,7 @@ def calibrate_to(
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _chosen(model: Model, only: Sequence[str] | None, without: Sequence[str]) -> tuple[list[int], set[int]]:
+def _chosen(model: MeasurementModel, only: Sequence[str] | None, without: Sequence[str]) -> tuple[list[int], set[int]]:
     """Return the order in which errors are taken, and those that may be."""
     names = model.names
 
@@ -229,40 +229,42 @@ def _chosen(model: Model, only: Sequence[str] | None, without: Sequence[str]) ->
     # What there is not need not be left out.
     parts = {part for name in names for part in (name, *name.split("."))}
     allowed -= set[int]().union(*(named(one) for one in without if one in parts or one != "beta"))
-    return [*sorted(around), *preferred(names)], allowed
+    return [*sorted(around), *preferred_parameters(names)], allowed
 
 
-def _no_more(found: Identified, before: Identified) -> Identified:
+def _no_more(found: Identifiability, before: Identifiability) -> Identifiability:
     """Return what was fitted before; what else seems to be told is held."""
     why = "so few readings leave nothing over to tell it from noise"
-    more = (Held(found.names[i], why, ()) for i in found.kept if i not in before.kept)
+    more = (FixedParameter(found.names[i], why, ()) for i in found.kept if i not in before.kept)
     return attrs.evolve(before, held=(*found.held, *more))
 
 
 def _rounds(
-    model: Model,
+    model: MeasurementModel,
     seen: Readings,
     chosen: tuple[list[int], set[int]],
     *,
     robust: bool,
     progress: Callable[[str], None] | None,
-) -> tuple[Identified, Array, Noise]:
+) -> tuple[Identifiability, Array, Noise]:
     """Return what can be fitted, the errors, and the noise, which depend on one another."""
     first, allowed = chosen
-    known = np.where(model.is_length, KNOWN_LENGTH, KNOWN_ANGLE) * _parts(model)
+    known = np.where(model.is_length, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE) * _parts(model)
     errors, kept = np.zeros(len(model.names)), tuple[int, ...]()
-    tried: list[tuple[Identified, Array, Noise]] = []
+    tried: list[tuple[Identifiability, Array, Noise]] = []
     # Before anything is fitted, what is left says nothing of the noise.
-    start = remaining(model.rows(seen), 0)
+    start = median_noise(model.rows(seen), 0)
     noise = before = Noise(*map(min, start, TYPICAL))
     for _ in range(_ROUNDS):
         rows = model.rows(seen, errors)
-        J = rows.by * weights(rows, noise)[:, None]
+        J = rows.by * length_scales(rows, noise)[:, None]
         # What is fitted already comes first: of two that are nearly one, one would displace the other and run away.
         order = list(dict.fromkeys([*kept, *first]))
-        identified = partial(identify, model.names, J, model.is_length, noise.length, first=order, known=known)
+        identified = partial(
+            select_identifiable, model.names, J, model.is_length, noise.length, first=order, known=known
+        )
         found = identified(allowed=allowed)
-        if kept and not is_enough(len(rows.off), len(found.kept)):
+        if kept and not is_overdetermined(len(rows.off), len(found.kept)):
             # What so few readings leave is next to nothing, and seems to tell what it does not: noise.
             found = _no_more(found, identified(allowed=set(kept)))
         if found.kept == kept and all(now > _SETTLED * then for now, then in zip(noise, before, strict=True)):
@@ -274,12 +276,12 @@ def _rounds(
                 f"that it may have: are these its readings? If so, {CHECK}"
             )
         kept, before = found.kept, noise
-        if not is_enough(len(rows.off), len(kept)):
+        if not is_overdetermined(len(rows.off), len(kept)):
             raise TooFewError(f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more")
         if progress is not None:
             progress(f"fitting {len(kept)} errors to {len(seen)} readings")
         errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)
-        noise = remaining(model.rows(seen, errors), len(kept))
+        noise = median_noise(model.rows(seen, errors), len(kept))
         tried.append((found, errors, noise))
     # What is left hides errors, and what is not fitted is left: rounds may lead away, and the last is not the best.
     best = min(tried, key=lambda one: one[2].length)
@@ -287,14 +289,21 @@ def _rounds(
 
 
 def _fitted(
-    model: Model, seen: Readings, kept: list[int], start: Array, noise: Noise, *, robust: bool, strict: bool = False
+    model: MeasurementModel,
+    seen: Readings,
+    kept: list[int],
+    start: Array,
+    noise: Noise,
+    *,
+    robust: bool,
+    strict: bool = False,
 ) -> Array:
     """Return (k,) errors of which those that are kept fit the readings best; if strict, without outliers."""
     errors = start.copy()
     errors[[i for i in range(len(errors)) if i not in kept]] = 0.0
     belief = noise.length * np.diag(1 / _believed(model)[kept])
     rows = model.rows(seen, errors)
-    scale = weighed = weights(rows, noise)
+    scale = weighed = length_scales(rows, noise)
 
     def missing(x: Array) -> Array:
         errors[kept] = x
@@ -306,7 +315,7 @@ def _fitted(
 
     for _ in range(_WEIGHINGS):
         if robust:
-            weighed = scale * trust(model.rows(seen, errors), noise, strict=strict)
+            weighed = scale * robust_weights(model.rows(seen, errors), noise, strict=strict)
         found = least_squares(
             missing,
             errors[kept].copy(),
@@ -318,27 +327,29 @@ def _fitted(
             max_nfev=_STEPS,
         )
         errors[kept] = found.x
-        settled = scale * trust(model.rows(seen, errors), noise, strict=strict) if robust else weighed
+        settled = scale * robust_weights(model.rows(seen, errors), noise, strict=strict) if robust else weighed
         if np.all(np.abs(settled - weighed) <= _WEIGHED * scale):
             break
     return errors
 
 
-def _believed(model: Model) -> Array:
+def _believed(model: MeasurementModel) -> Array:
     """Return (k,) how far errors may be off without a question [m], [rad]."""
-    return np.where(model.is_length, BELIEVED_LENGTH, BELIEVED_ANGLE) * _parts(model)
+    return np.where(model.is_length, PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE) * _parts(model)
 
 
-def _parts(model: Model) -> Array:
+def _parts(model: MeasurementModel) -> Array:
     """Return (k,) how large errors may be as a part of those of the geometry."""
     bends = {bend.name for bend in model.chain.bends}
     return np.array([_BENDS if name in bends else 1.0 for name in model.names])
 
 
-def _told(model: Model, found: Identified, seen: Readings, errors: Array, *, robust: bool) -> Calibration:
+def _told(
+    model: MeasurementModel, found: Identifiability, seen: Readings, errors: Array, *, robust: bool
+) -> Calibration:
     kept = list(found.kept)
     rows = model.rows(seen, errors)
-    noise, outlying, freedom = estimated(rows, len(seen), len(kept), robust=robust)
+    noise, outlying, freedom = noise_and_outliers(rows, len(seen), len(kept), robust=robust)
     deviation = np.where(rows.turning, noise.turn, noise.length)
     believed = _believed(model)[kept]
     counted = ~outlying[rows.of]

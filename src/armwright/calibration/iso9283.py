@@ -15,8 +15,8 @@ import numpy as np
 from armwright.accuracy.distance import distance_accuracy
 from armwright.accuracy.pose import pose_accuracy, pose_repeatability
 from armwright.arrays import Array
+from armwright.calibration.cross_validation import distinct_configurations
 from armwright.calibration.readings import Readings
-from armwright.calibration.validation import postures
 
 
 class Accuracy(NamedTuple):
@@ -42,14 +42,14 @@ class Repeatability(NamedTuple):
         RP: mean pose repeatability over the postures that were measured more than once [m].
         RP_largest: the largest [m].
         floor: root mean square distance of an attained pose from the mean of its posture [m].
-        postures: how many were measured more than once.
+        configurations: how many were measured more than once.
         cycles: how often at least.
     """
 
     RP: float
     RP_largest: float
     floor: float
-    postures: int
+    configurations: int
     cycles: int
 
 
@@ -88,7 +88,7 @@ def repeatability(seen: Readings) -> Repeatability | None:
         RP=float(radii.mean()),
         RP_largest=float(radii.max()),
         floor=float(np.sqrt(square / freedom)),
-        postures=len(clouds),
+        configurations=len(clouds),
         cycles=min(map(len, clouds)),
     )
 
@@ -96,5 +96,5 @@ def repeatability(seen: Readings) -> Repeatability | None:
 def _groups(seen: Readings) -> list[Array]:
     """Return by posture the rows that tell a point in the measuring frame."""
     rows = np.flatnonzero(seen.with_point & (seen.frame == 0))
-    posture = postures(seen.q[rows]) if len(rows) else np.zeros(0, dtype=np.intp)
+    posture = distinct_configurations(seen.q[rows]) if len(rows) else np.zeros(0, dtype=np.intp)
     return [rows[posture == i] for i in range(int(posture.max(initial=-1)) + 1)]

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from armwright.arrays import Array, Flags
-from armwright.calibration.model import Rows
+from armwright.calibration.measurement_model import Residuals
 from armwright.calibration.readings import Numbers
 
 # Readings that are off by more than this part of all are by their noise count less: three deviations of one number.
@@ -39,12 +39,12 @@ TYPICAL, LEAST = Noise(1e-4, 5e-4), Noise(1e-9, 1e-9)
 _FEW = 30
 
 
-def weights(rows: Rows, noise: Noise) -> Array:
+def length_scales(rows: Residuals, noise: Noise) -> Array:
     """Return (r,) what makes lengths of all numbers, by which they are weighed against one another [1], [m/rad]."""
     return np.where(rows.turning, noise.length / noise.turn, 1.0)
 
 
-def trust(rows: Rows, noise: Noise, *, strict: bool) -> Array:
+def robust_weights(rows: Residuals, noise: Noise, *, strict: bool) -> Array:
     """Return (r,) by how much readings that are off count less: the root of the weight that soft L1 gives them.
 
     If strict, outliers do not count.
@@ -56,7 +56,7 @@ def trust(rows: Rows, noise: Noise, *, strict: bool) -> Array:
     return np.asarray(root[rows.of], dtype=np.float64)
 
 
-def remaining(rows: Rows, fitted: int) -> Noise:
+def median_noise(rows: Residuals, fitted: int) -> Noise:
     """Return the noise as half of the readings say, whatever the others are.
 
     Args:
@@ -66,7 +66,7 @@ def remaining(rows: Rows, fitted: int) -> Noise:
     return _noise(rows, np.ones(len(rows.off), dtype=np.bool_), len(rows.off) - fitted, _spread)
 
 
-def estimated(rows: Rows, readings: int, fitted: int, *, robust: bool) -> tuple[Noise, Flags, int]:
+def noise_and_outliers(rows: Residuals, readings: int, fitted: int, *, robust: bool) -> tuple[Noise, Flags, int]:
     """Return the noise, which of so many readings are outliers, and how many numbers there are to spare.
 
     Args:
@@ -91,11 +91,11 @@ def estimated(rows: Rows, readings: int, fitted: int, *, robust: bool) -> tuple[
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _deviation(rows: Rows, noise: Noise) -> Array:
+def _deviation(rows: Residuals, noise: Noise) -> Array:
     return np.where(rows.turning, noise.turn, noise.length)
 
 
-def _noise(rows: Rows, counted: Flags, freedom: int, spread: Callable[[Numbers, Array], float]) -> Noise:
+def _noise(rows: Residuals, counted: Flags, freedom: int, spread: Callable[[Numbers, Array], float]) -> Noise:
     """Return the noise of lengths and turns by the same rule; with few numbers to spare, of both together."""
     if freedom < _FEW:
         common = spread(rows.of[counted], (rows.off / _deviation(rows, TYPICAL))[counted])

@@ -149,7 +149,7 @@ def readings(
     )
 
 
-def together(*parts: Readings) -> Readings:
+def concatenate(*parts: Readings) -> Readings:
     """Return the readings of several parts as one. Frames, planes and anchors of one name are the same.
 
     Raises:

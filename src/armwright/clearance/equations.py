@@ -20,7 +20,7 @@ from armwright.clearance.contact import (
     smooth_slip,
 )
 from armwright.clearance.linkage import Guide, Linkage, Pin, Play
-from armwright.clearance.placement import Pair, Placement
+from armwright.clearance.placement import Placement, Vec2
 from armwright.tracing.scalar import Scalar, select, sqrt
 
 SlipSpeed: TypeAlias = Literal["surface", "centre"]
@@ -36,7 +36,7 @@ _SLIP: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {"linear": linear_slip
 
 
 @attrs.frozen(kw_only=True)
-class Rubbing:
+class FrictionModel:
     """How friction is worked out.
 
     Attributes:
@@ -66,7 +66,7 @@ class Contact(NamedTuple):
     threshold: Scalar
 
 
-class Touch(NamedTuple):
+class ContactMemory(NamedTuple):
     """What is kept of a contact from step to step.
 
     Attributes:
@@ -91,10 +91,10 @@ class State(NamedTuple):
 
     q: Sequence[Scalar]
     qd: Sequence[Scalar]
-    touches: Sequence[Touch]
+    touches: Sequence[ContactMemory]
 
 
-class Pressed(NamedTuple):
+class PinContact(NamedTuple):
     """One pin in one configuration.
 
     Attributes:
@@ -110,12 +110,12 @@ class Pressed(NamedTuple):
         stored: energy of the indentation [J].
     """
 
-    gap: Pair
+    gap: Vec2
     depth: Scalar
     rate: Scalar
     normal: Scalar
     sliding: Scalar
-    touch: Touch
+    touch: ContactMemory
     bending: Scalar
     pushes: dict[int, Scalar]
     losses: tuple[Scalar, Scalar]
@@ -137,13 +137,13 @@ class Rates(NamedTuple):
     qdd: list[Scalar]
     efforts: list[Scalar]
     powers: list[Scalar]
-    pins: list[Pressed]
-    tip: Pair
+    pins: list[PinContact]
+    tip: Vec2
     energy: list[Scalar]
 
 
 def rates(
-    linkage: Linkage, rubbing: Rubbing, state: State, drives: Sequence[Scalar], contacts: Sequence[Contact]
+    linkage: Linkage, rubbing: FrictionModel, state: State, drives: Sequence[Scalar], contacts: Sequence[Contact]
 ) -> Rates:
     """Return what a linkage with play does.
 
@@ -181,14 +181,14 @@ def free_forces(placement: Placement) -> list[Scalar]:
     """Return the generalised forces of gravity, loads and speeds, without drives and contacts."""
     linkage = placement.linkage
     force: list[Scalar] = [0.0] * len(linkage.coordinates)
-    gravity = Pair(*map(float, linkage.gravity))
+    gravity = Vec2(*map(float, linkage.gravity))
     for body in linkage.bodies:
         centre = placement.centre(body)
         push = gravity.minus(centre.bias).times(body.mass)
         for i, partial in centre.partials.items():
             force[i] += partial.dot(push)
     for load in linkage.loads:
-        push = Pair(*map(float, load.force))
+        push = Vec2(*map(float, load.force))
         for i, partial in placement.point(load.at).partials.items():
             force[i] += partial.dot(push)
     return force
@@ -222,11 +222,11 @@ def kinetic_energy(placement: Placement) -> Scalar:
 def potential_energy(placement: Placement) -> Scalar:
     """Return the energy of gravity and of the constant loads [J]."""
     linkage, energy = placement.linkage, 0.0
-    gravity = Pair(*map(float, linkage.gravity))
+    gravity = Vec2(*map(float, linkage.gravity))
     for body in linkage.bodies:
         energy = energy - body.mass * gravity.dot(placement.centre(body).at)
     for load in linkage.loads:
-        energy = energy - Pair(*map(float, load.force)).dot(placement.point(load.at).at)
+        energy = energy - Vec2(*map(float, load.force)).dot(placement.point(load.at).at)
     return energy
 
 
@@ -317,7 +317,9 @@ def solve(
 # ---- contacts ------------------------------------------------------------------------------------------------------
 
 
-def _pressed(placement: Placement, rubbing: Rubbing, pin: Play, contact: Contact, touch: Touch) -> Pressed:
+def _pressed(
+    placement: Placement, rubbing: FrictionModel, pin: Play, contact: Contact, touch: ContactMemory
+) -> PinContact:
     """Return what is going on in a pin.
 
     Both bodies are pushed at one point, on the wall of the bearing, so that no couple is left over.
@@ -354,13 +356,13 @@ def _pressed(placement: Placement, rubbing: Rubbing, pin: Play, contact: Contact
     touching = depth > 0.0
     pressed = select(touching, depth, 0.0)
     spring = elastic_force(pressed, contact.stiffness)
-    return Pressed(
+    return PinContact(
         gap=gap,
         depth=depth,
         rate=rate,
         normal=normal,
         sliding=surface_slip,
-        touch=Touch(select(touching, 1.0, 0.0), speed),
+        touch=ContactMemory(select(touching, 1.0, 0.0), speed),
         bending=bending,
         pushes=pushes,
         losses=((normal - spring) * rate, rub * surface_slip),

@@ -17,7 +17,7 @@ import numpy as np
 from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats
 from armwright.clearance.five_bar_parts import parts_of
 from armwright.clearance.linkage import Linkage, not_negative
-from armwright.clearance.placement import Pair
+from armwright.clearance.placement import Vec2
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.tracing.scalar import Scalar, atan2, cos, sin, sqrt
 
@@ -112,12 +112,12 @@ class ArmAngles(NamedTuple):
     rod: Scalar
 
 
-def direction(angle: Scalar) -> Pair:
+def direction(angle: Scalar) -> Vec2:
     """Return u = (sin θ, -cos θ), along which a link points."""
-    return Pair(sin(angle), -cos(angle))
+    return Vec2(sin(angle), -cos(angle))
 
 
-def arm_angles(reach: Pair, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngles:
+def arm_angles(reach: Vec2, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngles:
     """Return the angles at which an arm of two links spans from its motor to a place.
 
     Args:
@@ -134,7 +134,7 @@ def arm_angles(reach: Pair, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngl
     return ArmAngles(atan2(elbow.x, -elbow.y), atan2(rest.x, -rest.y))
 
 
-def joined_at(elbows: tuple[Pair, Pair], rods: tuple[Scalar, Scalar], sign: Scalar) -> Pair:
+def joined_at(elbows: tuple[Vec2, Vec2], rods: tuple[Scalar, Scalar], sign: Scalar) -> Vec2:
     """Return where two rods meet.
 
     Args:
@@ -149,7 +149,7 @@ def joined_at(elbows: tuple[Pair, Pair], rods: tuple[Scalar, Scalar], sign: Scal
     return elbows[0].plus(base.times(along)).plus(base.turned().times(across))
 
 
-def arm_rates(angles: ArmAngles, crank: Scalar, rod: Scalar, target: Pair) -> ArmAngles:
+def arm_rates(angles: ArmAngles, crank: Scalar, rod: Scalar, target: Vec2) -> ArmAngles:
     """Return the rates ω of an arm for which crank ω1 u1' + rod ω2 u2' is a target, with u' = (cos θ, sin θ).
 
     Args:
@@ -166,7 +166,7 @@ def arm_rates(angles: ArmAngles, crank: Scalar, rod: Scalar, target: Pair) -> Ar
     return ArmAngles(rod_way.dot(target) / (crank * turn), -crank_way.dot(target) / (rod * turn))
 
 
-def centripetal(angles: ArmAngles, rates: ArmAngles, crank: Scalar, rod: Scalar) -> Pair:
+def centripetal(angles: ArmAngles, rates: ArmAngles, crank: Scalar, rod: Scalar) -> Vec2:
     """Return the acceleration that the tip of an arm has at constant rates [m/s²]; arguments as of ``arm_rates``."""
     parts = (direction(angles.crank).times(crank * rates.crank * rates.crank),
              direction(angles.rod).times(rod * rates.rod * rates.rod))  # fmt: skip
@@ -309,9 +309,9 @@ def _angles(value: ArrayLike) -> Array:
     return array
 
 
-def _pair(places: Array) -> Pair:
+def _pair(places: Array) -> Vec2:
     """Return (..., 2) numbers as a pair of arrays: also a single place, so that one law fits all."""
-    return Pair(np.asarray(places[..., 0]), np.asarray(places[..., 1]))
+    return Vec2(np.asarray(places[..., 0]), np.asarray(places[..., 1]))
 
 
 def _arms(bar: FiveBar, links: Array) -> list[tuple[ArmAngles, float, float]]:

@@ -9,8 +9,8 @@ from typing import Literal, TypeAlias
 
 import attrs
 
-from armwright.clearance import crossing
-from armwright.clearance.equations import WORKS, Contact, Rubbing, State, Touch, rates
+from armwright.clearance import event_location
+from armwright.clearance.equations import WORKS, Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.linkage import Linkage
 from armwright.tracing.emit import LANES, head, stretch
 from armwright.tracing.scalar import Scalar
@@ -126,11 +126,11 @@ class Layout:
         linkage: what moves.
         rubbing: how friction is worked out.
         control: what the drives do.
-        located: whether it is found where in a step a journal comes to its wall; see ``crossing``.
+        located: whether it is found where in a step a journal comes to its wall; see ``event_location``.
     """
 
     linkage: Linkage
-    rubbing: Rubbing
+    rubbing: FrictionModel
     control: Control
     located: bool = False
 
@@ -180,7 +180,7 @@ class Layout:
         contacts = [Contact(*(next(rest) for _ in Contact._fields)) for _ in range(self.pins)]
         gains = [next(rest) for _ in range(self.gains)]
         columns = [next(rest) for _ in range(self.columns)]
-        touches = [Touch(touching, speed, bend) for (touching, speed), bend in zip(kept, bends, strict=True)]
+        touches = [ContactMemory(touching, speed, bend) for (touching, speed), bend in zip(kept, bends, strict=True)]
         return State(q, qd, touches), self._drives(q, qd, gains, columns), contacts
 
     def _drives(
@@ -213,12 +213,12 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
     loop = f"for k in range({LANES}):\n" + textwrap.indent(body.lines, " " * 4)
     parts = {"functions": "", "arrays": "", "again": "", "body": textwrap.indent(loop, " " * 16)}
     if layout.located:
-        part = crossing.RK4 if integrator == "rk4" else crossing.SEMI_IMPLICIT
+        part = event_location.RK4 if integrator == "rk4" else event_location.SEMI_IMPLICIT
         lines = {"body": textwrap.indent(body.lines, " " * 8), "advance": _filled(part, sizes)}
         parts = {
-            "functions": _filled(crossing.FUNCTIONS, {**sizes, **lines}),
-            "arrays": _filled(crossing.ARRAYS, sizes),
-            "again": _filled(crossing.AGAIN, sizes),
+            "functions": _filled(event_location.FUNCTIONS, {**sizes, **lines}),
+            "arrays": _filled(event_location.ARRAYS, sizes),
+            "again": _filled(event_location.AGAIN, sizes),
             "body": " " * 16 + "rates(x, y)",
         }
     return _SOURCE.format(

@@ -13,34 +13,34 @@ from armwright.clearance.linkage import GROUND, Body, Guide, Linkage, Pin, Place
 from armwright.tracing.scalar import Scalar, cos, sin
 
 
-class Pair(NamedTuple):
+class Vec2(NamedTuple):
     """A vector in the plane."""
 
     x: Scalar
     y: Scalar
 
-    def plus(self, other: "Pair") -> "Pair":
+    def plus(self, other: "Vec2") -> "Vec2":
         """Return the sum."""
-        return Pair(self.x + other.x, self.y + other.y)
+        return Vec2(self.x + other.x, self.y + other.y)
 
-    def minus(self, other: "Pair") -> "Pair":
+    def minus(self, other: "Vec2") -> "Vec2":
         """Return the difference."""
-        return Pair(self.x - other.x, self.y - other.y)
+        return Vec2(self.x - other.x, self.y - other.y)
 
-    def times(self, factor: Scalar) -> "Pair":
+    def times(self, factor: Scalar) -> "Vec2":
         """Return a multiple."""
-        return Pair(factor * self.x, factor * self.y)
+        return Vec2(factor * self.x, factor * self.y)
 
-    def dot(self, other: "Pair") -> Scalar:
+    def dot(self, other: "Vec2") -> Scalar:
         """Return the scalar product."""
         return self.x * other.x + self.y * other.y
 
-    def turned(self) -> "Pair":
+    def turned(self) -> "Vec2":
         """Return it turned by a right angle, counter-clockwise."""
-        return Pair(-self.y, self.x)
+        return Vec2(-self.y, self.x)
 
 
-NOWHERE = Pair(0.0, 0.0)
+NOWHERE = Vec2(0.0, 0.0)
 
 
 class Point(NamedTuple):
@@ -53,10 +53,10 @@ class Point(NamedTuple):
         bias: its acceleration while no speed changes.
     """
 
-    at: Pair
-    partials: dict[int, Pair]
-    velocity: Pair
-    bias: Pair
+    at: Vec2
+    partials: dict[int, Vec2]
+    velocity: Vec2
+    bias: Vec2
 
 
 class Frame(NamedTuple):
@@ -69,7 +69,7 @@ class Frame(NamedTuple):
         origin: the point from which its own points are measured.
     """
 
-    axis: Pair
+    axis: Vec2
     turns: dict[int, float]
     spin: Scalar
     origin: Point
@@ -78,11 +78,11 @@ class Frame(NamedTuple):
         """Return a point of the body, given in its own axes."""
         return self.shifted(self.origin, self.arm(along, across))
 
-    def arm(self, along: float, across: float) -> Pair:
+    def arm(self, along: float, across: float) -> Vec2:
         """Return a vector of the body in the axes of the ground."""
         return self.axis.times(along).plus(self.axis.turned().times(across))
 
-    def shifted(self, point: Point, arm: Pair) -> Point:
+    def shifted(self, point: Point, arm: Vec2) -> Point:
         """Return the point of the body that lies by ``arm`` beside another of its points."""
         across = arm.turned()
         partials = dict(point.partials)
@@ -108,7 +108,7 @@ class Placement:
         """
         self.linkage, self.q = linkage, q
         still = Point(NOWHERE, {}, NOWHERE, NOWHERE)
-        self.frames = {GROUND: Frame(Pair(1.0, 0.0), {}, 0.0, still)}
+        self.frames = {GROUND: Frame(Vec2(1.0, 0.0), {}, 0.0, still)}
         self._points: dict[Place, Point] = {}
         number = 0
         for body in linkage.bodies:
@@ -123,9 +123,9 @@ class Placement:
             else:
                 frame = self._turning(number + 2, q, qd)
                 at = Point(
-                    Pair(q[number], q[number + 1]),
-                    {number: Pair(1.0, 0.0), number + 1: Pair(0.0, 1.0)},
-                    Pair(qd[number], qd[number + 1]),
+                    Vec2(q[number], q[number + 1]),
+                    {number: Vec2(1.0, 0.0), number + 1: Vec2(0.0, 1.0)},
+                    Vec2(qd[number], qd[number + 1]),
                     NOWHERE,
                 )
                 number += 3
@@ -146,7 +146,7 @@ class Placement:
 
     def _turning(self, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Frame:
         zero = self.linkage.zero
-        axis = _turned(Pair(cos(q[number]), sin(q[number])), zero)
+        axis = _turned(Vec2(cos(q[number]), sin(q[number])), zero)
         return Frame(axis, {number: 1.0}, qd[number], Point(NOWHERE, {}, NOWHERE, NOWHERE))
 
     def _sliding(self, guide: Guide, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> tuple[Frame, Point]:
@@ -161,5 +161,5 @@ class Placement:
         return frame, at._replace(velocity=velocity, bias=bias)
 
 
-def _turned(axis: Pair, angle: float) -> Pair:
+def _turned(axis: Vec2, angle: float) -> Vec2:
     return axis.times(exact(math.cos(angle))).plus(axis.turned().times(exact(math.sin(angle))))

@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.clearance.preparing import Task, prepare
+from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError
 
@@ -56,7 +56,7 @@ def perturbed(clearances: Array, count: int = TWINS) -> Array:
 
 
 def with_outlook(
-    task: Task, clearances: Array, *, friction: float | None = None, threads: int | None = None
+    task: Scenario, clearances: Array, *, friction: float | None = None, threads: int | None = None
 ) -> tuple[Simulation, Outlook]:
     """Return a run, its bits as ``simulate`` has them alone, and until when it is a prediction.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.clearance.contact import FRICTION_LAWS, IMPACT_LAWS, ImpactLaw, deepest, stiffness
-from armwright.clearance.equations import SLIP_SPEEDS, Rubbing
+from armwright.clearance.equations import SLIP_SPEEDS, FrictionModel
 from armwright.clearance.kernel import CONTROLS, INTEGRATORS, Control, Integrator
 from armwright.clearance.linkage import Linkage, not_negative
 from armwright.errors import InvalidValueError, one_of
@@ -45,7 +45,7 @@ class Settings:
     control: Control = "effort"
     gains: tuple[float, float] = (200.0, 10.0)
     impact: ImpactLaw = "lankarani-nikravesh"
-    friction: Rubbing = attrs.field(factory=Rubbing)
+    friction: FrictionModel = attrs.field(factory=FrictionModel)
     threshold: float = 1e-3
     start: Start = "rest"
     sample: float = 1e-4

@@ -14,12 +14,12 @@ import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.contact import damping
-from armwright.clearance.equations import WORKS, Rubbing
+from armwright.clearance.equations import WORKS, FrictionModel
 from armwright.clearance.ideal import gaps_of, tip_of
 from armwright.clearance.kernel import Control, Integrator, Layout, emit_simulation
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.preparing import Task
 from armwright.clearance.rest import at_rest
+from armwright.clearance.scenario import Scenario
 from armwright.clearance.settings import check_step, contact_stiffness
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled
@@ -57,7 +57,7 @@ class Simulation:
         status: (...) how each run ended.
     """
 
-    task: Task
+    task: Scenario
     clearances: Array
     frictions: Array
     time: Array
@@ -97,7 +97,11 @@ class Record(NamedTuple):
 
 
 def simulate(
-    task: Task, clearances: ArrayLike | None = None, *, frictions: ArrayLike | None = None, threads: int | None = None
+    task: Scenario,
+    clearances: ArrayLike | None = None,
+    *,
+    frictions: ArrayLike | None = None,
+    threads: int | None = None,
 ) -> Simulation:
     """Let a linkage with play do what one without would need for its path.
 
@@ -118,7 +122,7 @@ def simulate(
     check_step(linkage, settings, K)
     layout = Layout(linkage=linkage, rubbing=settings.friction, control=settings.control, located=settings.located)
     start = np.zeros((*lead, layout.states))
-    start[..., : layout.n] = started(task, c, K)
+    start[..., : layout.n] = initial_coordinates(task, c, K)
     start[..., layout.n : 2 * layout.n] = task.ideal.qd[0]
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
@@ -127,7 +131,7 @@ def simulate(
     return _told(task, layout, c, mu, record)
 
 
-def started(task: Task, clearances: Array, K: Array) -> Array:
+def initial_coordinates(task: Scenario, clearances: Array, K: Array) -> Array:
     """Return (..., n) the coordinates from which runs start.
 
     Args:
@@ -161,7 +165,7 @@ def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: Array
     return np.broadcast_to(c, (*lead, len(own))), np.broadcast_to(mu, lead)
 
 
-def _run(task: Task, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
+def _run(task: Scenario, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
     """Run the compiled simulation, blocks of lanes on several cores."""
     runs, pins, rows = len(start), layout.pins, len(task.table)
     marks = task.marks[: rows + 1]
@@ -211,13 +215,13 @@ class _Shape:
 
 
 @cache
-def _compiled(shape: _Shape, rubbing: Rubbing, control: Control, located: bool, integrator: Integrator) -> Any:  # noqa: FBT001 - a part of the key
+def _compiled(shape: _Shape, rubbing: FrictionModel, control: Control, located: bool, integrator: Integrator) -> Any:  # noqa: FBT001 - a part of the key
     layout = Layout(linkage=shape.linkage, rubbing=rubbing, control=control, located=located)
     source = emit_simulation(layout, integrator)
     return compiled(source, "simulate", f"the simulation of {shape.linkage.name}")
 
 
-def _told(task: Task, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
+def _told(task: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
     """Return a record in the terms of the linkage."""
     n, lead, linkage = layout.n, mu.shape, task.linkage
     samples = record.samples.reshape(*lead, *record.samples.shape[1:])

@@ -16,7 +16,7 @@ from armwright.clearance.features import UNITS, features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path
 from armwright.clearance.predictability import APART, TWINS, perturbed, together_until
-from armwright.clearance.preparing import Task, prepare
+from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
 from armwright.errors import InvalidValueError, one_of
@@ -124,7 +124,7 @@ class FeatureSweep:
         return {}
 
     @cached_property
-    def tasks(self) -> tuple[Task, ...]:
+    def tasks(self) -> tuple[Scenario, ...]:
         """The paths made ready, when they are first needed."""
         return tuple(prepare(self.linkage, thesis_path(path), self.settings_of) for path in self.paths)
 
@@ -190,7 +190,7 @@ def is_sweep_of(settings: Mapping[str, Any], linkage: Linkage) -> bool:
     return both[0] == both[1]
 
 
-def _seen(task: Task, clearances: Array, frictions: Array | None) -> _Seen:
+def _seen(task: Scenario, clearances: Array, frictions: Array | None) -> _Seen:
     """Simulate (m, p) clearances [m] and keep what a sweep tells of them."""
     # One core: the sweep has the others.
     run = simulate(task, clearances, frictions=frictions, threads=1)

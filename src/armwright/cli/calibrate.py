@@ -70,7 +70,8 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None:
         title = f"{model.name}, {measured.name}"
         write_results(output, calibrated_files(found, title=title, command=command_line()))
-    doubtful = DoubtfulError(f"the readings contradict the arm: {'; '.join(found.doubts)}") if found.doubts else None
+    against = found.contradictions
+    doubtful = DoubtfulError(f"the readings contradict the arm: {'; '.join(against)}") if against else None
     if as_json:
         print_json({**outcome(doubtful), **as_data(found)})
     elif not quiet:

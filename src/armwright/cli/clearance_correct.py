@@ -13,7 +13,7 @@ from armwright.cli.results import warn_of_stray, write_results
 
 if TYPE_CHECKING:
     from armwright.arrays import Array
-    from armwright.clearance.correcting import Correction
+    from armwright.clearance.correction import Correction
     from armwright.clearance.linkage import Linkage
     from armwright.clearance.simulation import Simulation
 
@@ -56,11 +56,11 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     import numpy as np
 
-    from armwright.clearance.correcting import correct_nodes, correct_path
+    from armwright.clearance.correction import correct_nodes, correct_path
     from armwright.clearance.paths import PICK_AND_PLACE, PickAndPlace, named_path
     from armwright.clearance.predictability import with_outlook
-    from armwright.clearance.preparing import prepare
     from armwright.clearance.reader import load_linkage
+    from armwright.clearance.scenario import prepare
     from armwright.clearance.simulation import simulate
 
     model = with_clearances(load_linkage(linkage), clearance or [])
@@ -127,7 +127,7 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
 
     import numpy as np
 
-    from armwright.clearance.estimating.misfit import refuse_contradiction
+    from armwright.clearance.estimation.misfit import refuse_contradiction
     from armwright.errors import FileFormatError, TooFewError
     from armwright.files.reading import read_text
 

@@ -12,9 +12,9 @@ from armwright.cli.printing import plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
 
 if TYPE_CHECKING:
-    from armwright.clearance.estimating.measured import PathsMeasured, RestMeasured
-    from armwright.clearance.estimating.on_paths import Learnt
-    from armwright.clearance.estimating.static import Estimate
+    from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured
+    from armwright.clearance.estimation.on_paths import Learnt
+    from armwright.clearance.estimation.static import Estimate
     from armwright.clearance.linkage import Linkage
 
 # What of an error curve is compared.
@@ -47,7 +47,7 @@ def estimate(
 
     **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
     """
-    from armwright.clearance.estimating.measured import RestMeasured, read_measured
+    from armwright.clearance.estimation.measured import RestMeasured, read_measured
     from armwright.clearance.reader import load_linkage
     from armwright.cli.results import warn_of_stray
 
@@ -62,8 +62,8 @@ def estimate(
 
 
 def _at_rest(model: "Linkage", measured: "RestMeasured", noise: float | None) -> dict[str, Any]:
-    from armwright.clearance.estimating.blind import faults
-    from armwright.clearance.estimating.misfit import widening
+    from armwright.clearance.estimation.blind import faults
+    from armwright.clearance.estimation.misfit import widening
     from armwright.errors import InvalidValueError
 
     if noise is not None and not 0 < noise < math.inf:
@@ -141,8 +141,8 @@ def _told_of_friction(friction: float, clearance: float) -> Iterator[str]:
 
 
 def _on_paths(model: "Linkage", measured: "PathsMeasured", folder: Path | None, noise: float | None) -> dict[str, Any]:
-    from armwright.clearance.estimating.on_paths import learnt_from
-    from armwright.clearance.estimating.posterior import posterior
+    from armwright.clearance.estimation.on_paths import learnt_from
+    from armwright.clearance.estimation.posterior import posterior
     from armwright.errors import InvalidValueError
 
     if folder is None:

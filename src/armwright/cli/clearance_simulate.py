@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
     from armwright.clearance.paths import Path as TipPath
     from armwright.clearance.predictability import Outlook
-    from armwright.clearance.preparing import Task
+    from armwright.clearance.scenario import Scenario
     from armwright.clearance.settings import Settings
     from armwright.clearance.simulation import Simulation
     from armwright.report.rattling import Run
@@ -170,10 +170,10 @@ def _simulated(
     import numpy as np
 
     from armwright.clearance.predictability import with_outlook
-    from armwright.clearance.preparing import prepare
+    from armwright.clearance.scenario import prepare
 
     with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
-        task: Task = prepare(model, way, settings)
+        task: Scenario = prepare(model, way, settings)
         return with_outlook(task, np.array(list(model.clearances.values())), friction=friction)
 
 

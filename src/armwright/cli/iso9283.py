@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from armwright.accuracy.assess import Assessment
-    from armwright.accuracy.measures import Measure
+    from armwright.accuracy.characteristics import Measure
 
 
 def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -83,7 +83,7 @@ def _assessed(
 ) -> "Assessment":
     """Read the files and work out all measures."""
     from armwright.accuracy.assess import assess
-    from armwright.accuracy.measurements import read_measurements
+    from armwright.accuracy.measurement_file import read_measurements
     from armwright.cli.results import warn_of_stray
 
     for name, value, valid in (

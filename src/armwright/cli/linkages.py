@@ -63,8 +63,8 @@ def settings_of(velocity: str, threshold_mm_s: float, *, law: str = "linear", **
         law: of friction.
         others: settings by their names, SI.
     """
-    from armwright.clearance.equations import Rubbing
+    from armwright.clearance.equations import FrictionModel
     from armwright.clearance.settings import Settings
 
-    rubbing = Rubbing(law=law, velocity=velocity)  # type: ignore[arg-type]
+    rubbing = FrictionModel(law=law, velocity=velocity)  # type: ignore[arg-type]
     return Settings(threshold=threshold_mm_s * 1e-3, friction=rubbing, **others)

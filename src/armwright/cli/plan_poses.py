@@ -13,7 +13,7 @@ from armwright.cli.printing import plain_console, print_json, print_table, table
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
-    from armwright.calibration.planning import Plan
+    from armwright.calibration.experiment_design import MeasurementPlan
 
 
 def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -47,8 +47,8 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright plan-poses puma560 -n 30 -o out/poses.csv`
     """
     from armwright.arm.load import load_arm
+    from armwright.calibration.experiment_design import plan_poses as planned
     from armwright.calibration.measurements import read_measurements
-    from armwright.calibration.planning import plan_poses as planned
     from armwright.cli.results import warn_of_stray
     from armwright.files.output import write_file
 
@@ -67,7 +67,7 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
             print(f"poses: {output}")
 
 
-def _as_data(plan: "Plan") -> dict[str, Any]:
+def _as_data(plan: "MeasurementPlan") -> dict[str, Any]:
     return {
         "q": plan.q.tolist(),
         "tells": list(plan.names),
@@ -86,13 +86,13 @@ def _columns(model: "Arm") -> list[tuple[str, float]]:
     ]
 
 
-def _csv(model: "Arm", plan: "Plan") -> str:
+def _csv(model: "Arm", plan: "MeasurementPlan") -> str:
     columns = _columns(model)
     rows = [",".join(f"{x * scale:z.4f}" for x, (_, scale) in zip(q, columns, strict=True)) for q in plan.q]
     return "\n".join([",".join(name for name, _ in columns), *rows]) + "\n"
 
 
-def _print(model: "Arm", plan: "Plan") -> None:
+def _print(model: "Arm", plan: "MeasurementPlan") -> None:
     console = plain_console()
     console.print(f"{len(plan.q)} poses of {model.name} tell {len(plan.names)} errors:")
     console.print(", ".join(plan.names))

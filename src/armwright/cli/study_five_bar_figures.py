@@ -6,7 +6,7 @@ from armwright.arrays import Array
 from armwright.clearance.features import WINDOW, spectrum
 from armwright.clearance.ideal import tip_of
 from armwright.clearance.paths import Path, PickAndPlace, named_path
-from armwright.clearance.preparing import prepare
+from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.report.clearance_figures import lines_of_spectrum, marked_curves, paths, surface
 from armwright.report.figures import curves

@@ -8,7 +8,7 @@ import numpy as np
 from armwright.accuracy.assess import Assessment
 from armwright.accuracy.compliance import StaticCompliance
 from armwright.accuracy.corner import CornerDeviation
-from armwright.accuracy.measurements import PathTest, PoseTest
+from armwright.accuracy.measurement_file import PathTest, PoseTest
 from armwright.accuracy.path import PathDeviation, PathVelocity
 from armwright.accuracy.pose import PoseRepeatability
 from armwright.accuracy.settling import PosingTime, Settling, attained_place

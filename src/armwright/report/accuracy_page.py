@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armwright.accuracy.assess import Assessment
-from armwright.accuracy.measures import Measure
+from armwright.accuracy.characteristics import Measure
 from armwright.report.figures import Drawing
 from armwright.report.plain_page import Table, plain_page
 

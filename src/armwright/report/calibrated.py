@@ -9,16 +9,16 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.calibration.bending import largest_efforts
-from armwright.calibration.beyond import Beyond, calibrate_beyond
 from armwright.calibration.chain import chain_of
-from armwright.calibration.doubts import doubts, refuse_noise
-from armwright.calibration.fitting import Calibration, calibrate_to
+from armwright.calibration.contradictions import contradictions, refuse_noise
+from armwright.calibration.cross_validation import HeldOut, cross_validate
+from armwright.calibration.fitting import Calibration, calibrate
 from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
+from armwright.calibration.joint_errors import largest_gravity_efforts
+from armwright.calibration.measurement_model import PoseError
 from armwright.calibration.measurements import Measurements
-from armwright.calibration.model import Off
+from armwright.calibration.nongeometric import NongeometricCalibration, calibrate_nongeometric
 from armwright.calibration.readings import refuse_not_fitted
-from armwright.calibration.validation import HeldOut, cross_validated
 from armwright.errors import ContradictionError, InvalidValueError
 from armwright.spatial.euler import to_rpy
 
@@ -61,11 +61,11 @@ class Calibrated:
     held_out: HeldOut
     held_out_region: HeldOut | None
     held_out_table: HeldOut
-    checked: Off
+    checked: PoseError
     accuracy: dict[str, Accuracy] | None
     repeatability: Repeatability | None
-    beyond: Beyond | None
-    doubts: tuple[str, ...]
+    beyond: NongeometricCalibration | None
+    contradictions: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -92,7 +92,7 @@ def calibrated(
         progress: told what is being done.
 
     Raises:
-        InvalidValueError: see ``calibrate_to`` and ``cross_validated``; readings to check with are told in a frame, of
+        InvalidValueError: see ``calibrate`` and ``cross_validate``; readings to check with are told in a frame, of
             a plane or from an anchor that none is fitted of.
         ShapeError: the readings are of an arm with another number of joints.
     """
@@ -107,21 +107,23 @@ def calibrated(
     fit = ~measurements.check
     seen = measurements.readings.take(fit)
     refuse_not_fitted(seen, measurements.readings.take(~fit))
-    full = calibrate_to(arm, seen, progress=progress)
-    table = full if not any(name.endswith(_TILTS) for name in full.names) else calibrate_to(arm, seen, without=_TILTS)
-    tried = calibrate_beyond(arm, seen, folds=folds, seed=seed, unseen=True, progress=progress) if beyond else None
+    full = calibrate(arm, seen, progress=progress)
+    table = full if not any(name.endswith(_TILTS) for name in full.names) else calibrate(arm, seen, without=_TILTS)
+    tried = (
+        calibrate_nongeometric(arm, seen, folds=folds, seed=seed, unseen=True, progress=progress) if beyond else None
+    )
     told("holding points out: all errors")
-    held_out = tried.geometry if tried else cross_validated(arm, seen, folds=folds, seed=seed)
+    held_out = tried.geometry if tried else cross_validate(arm, seen, folds=folds, seed=seed)
     told("holding regions out")
     try:
-        held_out_region = cross_validated(arm, seen, folds=folds, regions=True)
+        held_out_region = cross_validate(arm, seen, folds=folds, regions=True)
     except (ContradictionError, InvalidValueError):
         # A frame, a plane or an anchor lies in one region, or too few readings are left.
         held_out_region = None
     held_out_table = held_out
     if any(name.endswith(_TILTS) for name in full.chain.names):
         told("holding points out: for the arm file")
-        held_out_table = cross_validated(arm, seen, folds=folds, seed=seed, without=_TILTS)
+        held_out_table = cross_validate(arm, seen, folds=folds, seed=seed, without=_TILTS)
     own = seen.with_point & (seen.frame == 0)
     places = {
         "as said": chain_of(arm).reach(seen.q).position,
@@ -134,7 +136,7 @@ def calibrated(
         del places["as said"]
     if tried and tried.unseen:
         places["beyond geometry, held out"] = tried.unseen.places
-    doubtful = tuple(doubts(full, seen, noise))
+    doubtful = tuple(contradictions(full, seen, noise))
     words = {name: accuracy(seen, place) for name, place in places.items()}
     return Calibrated(
         arm=arm,
@@ -149,7 +151,7 @@ def calibrated(
         accuracy={name: one for name, one in words.items() if one is not None} or None,
         repeatability=repeatability(seen),
         beyond=tried,
-        doubts=doubtful,
+        contradictions=doubtful,
         notes=(
             *(f"DOUBTFUL: {one}" for one in doubtful),
             *_notes(full, measurements),
@@ -192,7 +194,7 @@ def _which_to_believe(held_out: HeldOut, region: HeldOut | None) -> Iterator[str
     )
 
 
-def _of_the_choice(tried: Beyond | None) -> Iterator[str]:
+def _of_the_choice(tried: NongeometricCalibration | None) -> Iterator[str]:
     """Say of which points the figures beyond geometry are."""
     if tried is None:
         return
@@ -221,7 +223,7 @@ def distances(found: Calibrated) -> dict[str, Array]:
         "arm file, held out": found.held_out_table.distance,
         "beyond geometry, held out": found.beyond.unseen.distance if found.beyond and found.beyond.unseen else none,
         "calibrated, kept to check": found.checked.distance,
-        "beyond geometry, kept to check": found.beyond.missed(kept).distance if found.beyond else none,
+        "beyond geometry, kept to check": found.beyond.pose_errors(kept).distance if found.beyond else none,
     }
     return {name: x for name, x in kinds.items() if len(x)}
 
@@ -246,11 +248,11 @@ def shown_errors(calibration: Calibration) -> Iterator[tuple[str, str, str, str]
         yield name, f"{value * scale:+z.4f}", f"{deviation * scale:.4f}", unit
 
 
-def shown_bends(beyond: Beyond) -> Iterator[tuple[str, str, str, str]]:
+def shown_bends(beyond: NongeometricCalibration) -> Iterator[tuple[str, str, str, str]]:
     """Give the bends of joints that were kept as people read them: name, value, deviation, what it means."""
     found = beyond.calibration
     bends = {bend.name: bend for bend in found.chain.bends}
-    largest = largest_efforts(found.chain.arm)
+    largest = largest_gravity_efforts(found.chain.arm)
     for name, value, deviation in zip(found.names, found.values, found.deviations, strict=True):
         if name not in bends:
             continue
@@ -282,7 +284,7 @@ def as_data(found: Calibrated) -> dict[str, Any]:
             **{name: one._asdict() for name, one in (found.accuracy or {}).items()},
             "repeatability": found.repeatability._asdict() if found.repeatability else None,
         },
-        "doubts": list(found.doubts),
+        "contradictions": list(found.contradictions),
         "notes": list(found.notes),
     }
     if found.beyond:

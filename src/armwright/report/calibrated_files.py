@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armwright.arm.write import toml_text
-from armwright.calibration.correcting import corrected_arm, corrected_tables, corrected_urdf
+from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf
 from armwright.report.calibrated import Calibrated, as_data, distances, shown_bends, shown_errors, turns
 from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
 from armwright.report.plain_page import Table, plain_page
@@ -122,7 +122,7 @@ def _repeated(found: Calibrated) -> str:
     if one is None:
         return "each posture once; RP needs several"
     return (
-        f"RP {one.RP * 1e3:.4f} mm, largest {one.RP_largest * 1e3:.4f}, of {one.postures} postures measured "
+        f"RP {one.RP * 1e3:.4f} mm, largest {one.RP_largest * 1e3:.4f}, of {one.configurations} postures measured "
         f"{one.cycles} times or more (of 30)"
     )
 

@@ -10,7 +10,7 @@ from armwright.clearance.five_bar import MODES, FiveBar, Mode, elbows, inverse, 
 from armwright.clearance.five_bar_parts import configuration
 from armwright.clearance.five_bar_workspace import Workspace, singular_curves, singularity, transmission, workspace
 from armwright.clearance.ideal import tip_of
-from armwright.clearance.preparing import Task
+from armwright.clearance.scenario import Scenario
 from armwright.errors import InvalidValueError, one_of
 from armwright.report.figures import Drawing, empty_figure, svg_text
 
@@ -62,7 +62,7 @@ def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = 
     return Drawing("workspace", caption, svg_text(figure))
 
 
-def workspace_of(task: Task) -> Drawing | None:
+def workspace_of(task: Scenario) -> Drawing | None:
     """Return the workspace of the five-bar that does a task, with its path; None where it is no five-bar."""
     try:
         bar = FiveBar.of(task.linkage)

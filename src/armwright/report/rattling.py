@@ -9,8 +9,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.clearance.contact import damping, restitution_of
+from armwright.clearance.energy_balance import EnergyBalance, energy_balance
 from armwright.clearance.features import spectrum
-from armwright.clearance.ledger import Ledger, ledger
 from armwright.clearance.predictability import APART, FINER, Outlook
 from armwright.clearance.simulation import Simulation, Status
 from armwright.errors import ShapeError
@@ -39,7 +39,7 @@ class Run:
     simulation: Simulation
     rows: int
     outlook: Outlook | None
-    energy: Ledger
+    energy: EnergyBalance
     gaps: Array
     depths: Array
 
@@ -53,7 +53,7 @@ class Run:
         if simulation.error.ndim != 2:
             raise ShapeError(f"expected one run, got {simulation.error.shape[:-2]} of them: take one out")
         with np.errstate(invalid="ignore", over="ignore"):
-            energy, gaps, depths = ledger(simulation), simulation.gaps, simulation.depths
+            energy, gaps, depths = energy_balance(simulation), simulation.gaps, simulation.depths
             told = [simulation.q, simulation.qd, simulation.forces, energy.imbalance[:, None]]
         # Forces and energies become infinite before places do.
         sound = np.isfinite(np.concatenate(told, axis=-1)).all(axis=-1)
@@ -255,7 +255,7 @@ def samples_csv(run: Run) -> Iterator[str]:
         columns[f"{pin.name}.gap_x_m"], columns[f"{pin.name}.gap_y_m"] = run.gaps[rows, i].T
         columns[f"{pin.name}.depth_m"] = run.depths[rows, i]
         columns[f"{pin.name}.force_N"] = simulation.forces[rows, i]
-    for field in attrs.fields(Ledger):
+    for field in attrs.fields(EnergyBalance):
         columns[f"{field.name}_J"] = getattr(run.energy, field.name)[rows]
     yield ",".join(map(text_cell, columns)) + "\n"
     line = ",".join(["%.10g"] * len(columns)) + "\n"

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares, minimize
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.calibration.chain import Chain, chain_of
-from armwright.calibration.fitting import Calibration, calibrate
+from armwright.calibration.fitting import Calibration, calibrate_points
 
 NOISE = 0.3e-3  # of the cameras, per coordinate [m]
 # Places to verify at, mean errors there before and after, as the thesis prints them [mm].
@@ -156,7 +156,7 @@ def full_fit(attitudes: tuple[str, ...]) -> Calibration:
     """Return a calibration with all errors that boards in these attitudes tell."""
     data = [touched(one) for one in attitudes]
     q, points = (np.concatenate([getattr(one, key) for one in data]) for key in ("q", "points"))
-    return calibrate(chain().arm, q, points, base=np.eye(4))
+    return calibrate_points(chain().arm, q, points, base=np.eye(4))
 
 
 def verified(errors: Array) -> tuple[float, ...]:

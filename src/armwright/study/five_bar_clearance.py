@@ -18,17 +18,17 @@ import numpy as np
 
 from armwright.accuracy.pose import pose_repeatability
 from armwright.arrays import Array
-from armwright.clearance.correcting import Correction, correct_nodes, misses
-from armwright.clearance.equations import Rubbing
-from armwright.clearance.estimating.kriging import Surrogate, check_extra, learn, solve_features
-from armwright.clearance.estimating.static import estimate_at_rest, rest_offsets
+from armwright.clearance.correction import Correction, correct_nodes, misses
+from armwright.clearance.equations import FrictionModel
+from armwright.clearance.estimation.kriging import Surrogate, check_extra, learn, solve_features
+from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
 from armwright.clearance.features import Features, features
 from armwright.clearance.ideal import closed, tip_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, named_path
-from armwright.clearance.preparing import Task, assembled, prepare
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.rest import at_rest
+from armwright.clearance.scenario import Scenario, assembly_guess, prepare
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.clearance.sweeping import FeatureSweep, feature_vector
@@ -41,7 +41,7 @@ ARMS: Mapping[str, tuple[float, float, float]] = {
 PATHS = ("y1", "y3", "y7")
 LEVELS = tuple(round(0.1e-3 + 0.05e-3 * i, 9) for i in range(9))
 FEATURES = ("slope", "intercept", "amp_dc")
-SETTINGS = Settings(friction=Rubbing(velocity="centre"), threshold=1e-2)
+SETTINGS = Settings(friction=FrictionModel(velocity="centre"), threshold=1e-2)
 SURFACE = Settings()
 # Where arms rest to be measured: the starts of the three paths [m].
 POSES = ((-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7))
@@ -273,7 +273,7 @@ def target_errors(path: Path, clearances: tuple[float, ...] | Array) -> tuple[fl
 
 
 @lru_cache(maxsize=8)
-def _ready(path: Path) -> Task:
+def _ready(path: Path) -> Scenario:
     """Return a path made ready; several arms follow the same."""
     return prepare(arm(), path, SETTINGS)
 
@@ -281,7 +281,7 @@ def _ready(path: Path) -> Task:
 def _cycles(clearances: Array, rng: np.random.Generator) -> Array:
     """Return (30, 2) places at which an arm comes to rest at the first target [m]."""
     linkage = arm()
-    ideal = closed(linkage, assembled(linkage), tip=PickAndPlace().nodes[0])
+    ideal = closed(linkage, assembly_guess(linkage), tip=PickAndPlace().nodes[0])
     rest = at_rest(linkage, ideal, clearances, contact_stiffness(linkage, clearances))
     cone = np.arctan(linkage.material.friction)
     turn = cone * rng.uniform(-1.0, 1.0, (CYCLES, len(clearances)))

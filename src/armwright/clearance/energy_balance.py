@@ -1,0 +1,55 @@
+"""The energy ledger of a linkage with play: what the drives gave, what is stored, what was lost."""
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.clearance.equations import kinetic_energy, potential_energy
+from armwright.clearance.placement import Placement
+from armwright.clearance.settings import contact_stiffness
+from armwright.clearance.simulation import Simulation
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class EnergyBalance:
+    """Where the energy of a run is at each sample; the leading axes are those of the runs.
+
+    Attributes:
+        driven: (..., s) what the drives have given [J].
+        kinetic: (..., s) of all bodies [J].
+        potential: (..., s) of gravity and loads, from the start [J].
+        stored: (..., s) in the walls of the bearings [J].
+        impact_loss: (..., s) what impacts have taken [J].
+        friction_loss: (..., s) what friction has taken [J].
+    """
+
+    driven: Array
+    kinetic: Array
+    potential: Array
+    stored: Array
+    impact_loss: Array
+    friction_loss: Array
+
+    @property
+    def imbalance(self) -> Array:
+        """(..., s) what the books do not explain: the error of the integration [J]."""
+        energy = self.kinetic + self.potential + self.stored
+        return np.asarray(energy - energy[..., :1] - self.driven + self.impact_loss + self.friction_loss)
+
+
+def energy_balance(simulation: Simulation) -> EnergyBalance:
+    """Return the energy ledger of a simulation."""
+    linkage = simulation.task.linkage
+    q, qd = ([x[..., i] for i in range(x.shape[-1])] for x in (simulation.q, simulation.qd))
+    placement = Placement(linkage, q, qd)
+    K = contact_stiffness(linkage, simulation.clearances)
+    depths = np.maximum(simulation.depths, 0.0)
+    potential = np.asarray(potential_energy(placement))
+    return EnergyBalance(
+        driven=simulation.works["driven"],
+        kinetic=np.asarray(kinetic_energy(placement)),
+        potential=potential - potential[..., :1],
+        stored=np.asarray((0.4 * K[..., None, :] * depths**2.5).sum(axis=-1)),
+        impact_loss=simulation.works["impact loss"],
+        friction_loss=simulation.works["friction loss"],
+    )

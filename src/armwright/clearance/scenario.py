@@ -1,0 +1,205 @@
+"""Making a path ready to be simulated many times: what the linkage without play does, and what its drives give."""
+
+import math
+
+import attrs
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arrays import Array, ArrayLike, floats
+from armwright.clearance.ideal import IdealMotion, closed, ideal_motion
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.paths import ROUNDING, Path
+from armwright.clearance.placement import Placement
+from armwright.clearance.settings import Settings
+from armwright.errors import InvalidValueError, ShapeError
+
+# So many places of a path are solved one after the other; all between them at once, from there.
+_COARSE = 60
+# A path that takes less time is none, and nothing could be worked out on it [s].
+_SHORTEST = 1e-9
+# A coordinate that changes by more between two moments has jumped [rad, m].
+_JUMP = 0.05
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class Scenario:
+    """A path made ready for many runs.
+
+    Attributes:
+        linkage: what is to move.
+        path: for its tip or its drives.
+        settings: how.
+        steps: how many there are.
+        h: how long each is [s].
+        stride: how many of them lie between two samples; the last sample is at the end.
+        table: (rows, 3, columns) what the drives are told at the start, the middle and the end of each row. A row is a
+            step, or a part of one: a step in which the acceleration jumps is made in parts that meet at the jump, since
+            no rule of integration keeps its order across one.
+        lengths: (rows,) how long each is [s].
+        marks: (rows + 1,) the number of the step that begins with each row, and the end; -1 within a step.
+        ideal: the motion without play at the start of each step and at the end of the last.
+    """
+
+    linkage: Linkage
+    path: Path
+    settings: Settings
+    steps: int
+    h: float
+    stride: int
+    table: Array
+    lengths: Array
+    marks: npt.NDArray[np.int64]
+    ideal: IdealMotion
+
+
+def prepare(
+    linkage: Linkage, path: Path, settings: Settings | None = None, *, guess: ArrayLike | None = None
+) -> Scenario:
+    """Work out what the drives have to do for a path without play.
+
+    Args:
+        linkage: what is to move.
+        path: for its tip or its drives.
+        settings: how it will be simulated.
+        guess: (n,) coordinates near those at the start, which choose the assembly; that of the linkage when left out.
+
+    Raises:
+        InvalidValueError: the path cannot be followed, or takes too many steps.
+        ShapeError: it has not as many axes as there are drives.
+    """
+    settings = settings or Settings()
+    if not _SHORTEST <= path.duration < math.inf:
+        raise InvalidValueError(f"path {path.name}: expected a duration from {_SHORTEST:g} s, got {path.duration:g} s")
+    axes = 2 if path.of == "tip" else len(linkage.drives)
+    if path.pieces.shape[1] != axes:
+        raise ShapeError(f"path {path.name}: expected {axes} axes for the {path.of}, got {path.pieces.shape[1]}")
+    steps = settings.steps(path.duration)
+    stride = min(steps, max(1, round(settings.sample * steps / path.duration)))
+    # A few more, where that is needed for the last sample to be at the end.
+    steps = -(-steps // stride) * stride
+    after, before = path.halves(steps)
+    by_tip = path.of == "tip"
+    q = closed_along(
+        linkage, after.at, assembly_guess(linkage) if guess is None else floats(guess, "guess"), by_tip=by_tip
+    )
+    ideal = ideal_motion(linkage, q, after.velocity, after.acceleration, by_tip=by_tip)
+    told = _told(linkage, settings, ideal)
+    table = np.stack([told[:-1:2], told[1::2], told[2::2]], axis=1)
+    # A step that ends where the acceleration jumps is told what held before the jump.
+    jumps = np.flatnonzero(np.any(after.acceleration != before.acceleration, axis=-1))
+    jumps = jumps[(jumps > 0) & (jumps % 2 == 0)]
+    if len(jumps):
+        came = ideal_motion(linkage, q[jumps], before.velocity[jumps], before.acceleration[jumps], by_tip=by_tip)
+        table[jumps // 2 - 1, 2] = _told(linkage, settings, came)
+    table, lengths, marks = _parted(linkage, path, settings, q[::2], table)
+    return Scenario(
+        linkage=linkage,
+        path=path,
+        settings=settings,
+        steps=steps,
+        h=path.duration / steps,
+        stride=stride,
+        table=np.ascontiguousarray(table),
+        lengths=lengths,
+        marks=marks,
+        ideal=IdealMotion(**{one.name: getattr(ideal, one.name)[::2] for one in attrs.fields(IdealMotion)}),
+    )
+
+
+def assembly_guess(linkage: Linkage) -> Array:
+    """Return coordinates near those of the linkage put together as its ``assembly`` says.
+
+    Free bodies are put where the first pin wants them that joins them to one that has its place.
+    """
+    coordinates = linkage.coordinates
+    numbers = {coordinate: i for i, coordinate in enumerate(coordinates)}
+    q = np.array(
+        [linkage.assembly.get(one.body, 0.0) if one.kind in ("angle", "slide") else 0.0 for one in coordinates]
+    )
+    free = [body.name for body in linkage.bodies if linkage.joint(body.name) is None]
+    waiting = list(free)
+    while waiting:
+        placement = Placement(linkage, list(q), [0.0] * len(q))
+        for pin in linkage.pins:
+            ends = [pin.bearing, pin.journal]
+            loose = next((place for place in ends if place.body in waiting), None)
+            other = next((place for place in ends if place.body not in waiting), None)
+            if loose is not None and other is not None:
+                shift = placement.point(other).at.minus(placement.point(loose).at)
+                for kind, by in zip(("x", "y"), shift, strict=True):
+                    q[next(i for one, i in numbers.items() if one.body == loose.body and one.kind == kind)] += by
+                waiting.remove(loose.body)
+                break
+        else:
+            raise InvalidValueError(f"{linkage.name}: no pin joins {', '.join(waiting)} to the rest")
+    return q
+
+
+def closed_along(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bool) -> Array:
+    """Return (s, n) closed coordinates along a path (s, 2) of the tip, or (s, d) of the drives, without a jump.
+
+    Raises:
+        InvalidValueError: the path leaves what can be reached, or passes a singular configuration.
+    """
+
+    def at(start: Array, goal: Array) -> Array:
+        return closed(linkage, start, tip=goal) if by_tip else closed(linkage, start, drives=goal)
+
+    picks = np.unique(np.linspace(0, len(goals) - 1, min(_COARSE, len(goals))).astype(int))
+    coarse = [at(guess, goals[0])]
+    for pick in picks[1:]:
+        # The way that was taken last goes on, and its end is put right.
+        ahead = 2 * coarse[-1] - coarse[-2] if len(coarse) > 1 else coarse[-1]
+        coarse.append(at(ahead, goals[pick]))
+    known = np.array(coarse)
+    if len(picks) == 1:
+        return known
+    between = [np.interp(np.arange(len(goals)), picks, known[:, i]) for i in range(known.shape[1])]
+    q = at(np.stack(between, axis=-1), goals)
+    jumps = np.abs(np.diff(q, axis=0)).max(axis=-1)
+    # From one moment to the next a body goes hardly farther than on its way on average; to another assembly it jumps.
+    if jumps.max() > _JUMP + 50 * jumps.mean():
+        raise InvalidValueError(
+            f"{linkage.name}: at moment {int(jumps.argmax())} of {len(goals)} the path comes to a singular "
+            f"configuration, where the linkage goes over to another assembly"
+        )
+    return q
+
+
+def _parted(
+    linkage: Linkage, path: Path, settings: Settings, q: Array, table: Array
+) -> tuple[Array, Array, npt.NDArray[np.int64]]:
+    """Return a table whose steps are parted where the acceleration jumps within one, and what else tells its rows."""
+    steps = len(table)
+    h = path.duration / steps
+    grid = np.linspace(0.0, path.duration, steps + 1)
+    knots = np.array([knot for knot in path.knots[1:-1] if np.abs(grid - knot).min() > ROUNDING * h])
+    ends = np.union1d(grid, knots)
+    marks = np.full(len(ends), -1)
+    marks[np.searchsorted(ends, grid)] = np.arange(steps + 1)
+    lengths = np.where((marks[:-1] >= 0) & (marks[1:] >= 0), h, np.diff(ends))
+    number = np.maximum.accumulate(marks)[:-1]
+    parts = np.flatnonzero((marks[:-1] < 0) | (marks[1:] < 0))
+    rows = table[number]
+    if len(parts):
+        times = ends[parts, None] + lengths[parts, None] * (0.0, 0.5, 1.0)
+        piece = np.searchsorted(path.knots, times[:, 1], side="right") - 1
+        moment = path.at(times, np.broadcast_to(piece[:, None], times.shape))
+        by_tip = path.of == "tip"
+        near = np.broadcast_to(q[number[parts], None], (*times.shape, q.shape[1]))
+        there = closed(linkage, near, **{"tip" if by_tip else "drives": moment.at})
+        ideal = ideal_motion(linkage, there, moment.velocity, moment.acceleration, by_tip=by_tip)
+        rows[parts] = _told(linkage, settings, ideal)
+    return rows, lengths, marks
+
+
+def _told(linkage: Linkage, settings: Settings, ideal: IdealMotion) -> Array:
+    """Return what the drives are told: efforts, or accelerations where their motion is given; and goals."""
+    driven = list(linkage.driven)
+    given = np.array([drive.kind == "motion" for drive in linkage.drives])
+    told = np.where(given, ideal.qdd[..., driven], ideal.efforts)
+    if settings.control == "effort":
+        return told
+    parts = np.stack([told, ideal.q[..., driven], ideal.qd[..., driven]], axis=-1)
+    return parts.reshape(*parts.shape[:-2], -1)

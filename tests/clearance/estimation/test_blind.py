@@ -1,0 +1,107 @@
+"""Which wrong models a resting tip contradicts: those that are said to be seen are refused, the others are not."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from armwright.arrays import Array
+from armwright.clearance.estimation.blind import POWER, faults, wrong_offsets
+from armwright.clearance.estimation.measured import RestMeasured
+from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
+from armwright.clearance.linkage import Linkage
+from armwright.errors import ContradictionError
+from clearance.arms import ARM_A, STARTS
+from clearance.conftest import RANGE
+from cli_calls import armwright
+from samples import Sample
+
+REST = Path(__file__).parents[3] / "examples" / "five_bar_rest.csv"
+# Up to here a fault is small enough that its shift of the tip is proportional to it.
+SMALL = {"1": 0.5, "m": 2e-3, "rad": 5e-3}
+NOISE = 1e-6
+
+
+def is_refused(linkage: Linkage, poses: Array, offsets: Array, noise: float) -> bool:
+    """Whether readings with this noise contradict the model."""
+    names = tuple(f"P{i}" for i in range(len(poses)))
+    try:
+        RestMeasured(names=names, poses=poses, offsets=offsets, readings=(1,) * len(poses), noise=None).estimate(
+            linkage, noise
+        )
+    except ContradictionError:
+        return True
+    return False
+
+
+@pytest.mark.share(0.014)
+def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -> None:
+    """Readings of an arm whose model is wrong by what is told are refused nine times of ten, and hardly by a fifth."""
+    count, refused, little = 0, 0, 0
+    for rng in sample.cases(300):
+        c, k = rng.uniform(*RANGE, 3), int(rng.integers(4, 9))
+        poses = np.column_stack([rng.uniform(-0.18, 0.18, k), rng.uniform(-0.7, -0.45, k)])
+        found = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, c), NOISE)
+        seen = [one for one in faults(five_bar, poses, found) if one.seen < SMALL[one.unit]]
+        # Load and masses, lengths, zeros: none is left out because others are more.
+        kind = rng.choice(sorted({one.unit for one in seen}))
+        one = rng.choice(np.array([i for i, fault in enumerate(seen) if fault.unit == kind]))
+        noise = rng.normal(0.0, NOISE, poses.shape)
+        offsets = [wrong_offsets(five_bar, poses, c, seen[one].name, part * seen[one].seen) for part in (1.0, 0.2)]
+        count += 1
+        refused += is_refused(five_bar, poses, offsets[0] + noise, NOISE)
+        little += is_refused(five_bar, poses, offsets[1] + noise, NOISE)
+    sample.record("wrong models at rest of the size told as seen that are not refused", count, count - refused)
+
+    # Once in a million samples by chance; a fifth is refused in less than one of a hundred.
+    assert binom.cdf(refused, count, POWER) > 1e-6
+    assert binom.sf(refused - 1, count, POWER) > 1e-6
+    assert binom.sf(little - 1, count, 0.01) > 1e-6
+
+
+def test_shifts_of_clearances(five_bar: Linkage) -> None:
+    """A model that is wrong by a little shifts the clearances by what is told."""
+    found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
+    usual = {"1": 0.05, "m": 5e-5, "rad": 2e-4}
+
+    for one in faults(five_bar, STARTS, found):
+        by = usual[one.unit]
+        offsets = wrong_offsets(five_bar, STARTS, ARM_A, one.name, by)
+        shifted = estimate_at_rest(five_bar, STARTS, offsets, NOISE).values - ARM_A
+        np.testing.assert_allclose(shifted, by * one.shifts, rtol=0.1, atol=2e-7, err_msg=one.name)
+
+
+def test_play_and_length_look_alike(five_bar: Linkage) -> None:
+    """A rod that is longer than in the model looks like play in its pin: it is hardly seen, and shifts J2 as much."""
+    found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
+    by_name = {one.name: one for one in faults(five_bar, STARTS, found)}
+
+    rod, crank = by_name["length of link2"], by_name["length of link1"]
+    assert 0.9 < abs(rod.shifts[0]) < 1.3
+    assert crank.seen < 0.1 * rod.seen
+    # The cranks are held: their masses press on no pin with play.
+    assert not {"mass of link1", "mass of link4"} & set(by_name)
+
+
+def test_nothing_contradicts(five_bar: Linkage) -> None:
+    """Without numbers to spare, or without a known noise, no wrong model is ever seen."""
+    for poses, known in ((STARTS[:2], True), (STARTS, False)):
+        found = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A), NOISE)
+        told = faults(five_bar, poses, found, noise_is_known=known)
+        assert all(np.isinf(one.seen) for one in told) == (not known or found.spare < 1)
+
+
+def test_told_by_the_command() -> None:
+    """An estimate at rest says what its readings would contradict, as a table and as data."""
+    text = armwright("clearance", "estimate", "five-bar", REST, columns=120).stdout
+    told = json.loads(armwright("clearance", "estimate", "five-bar", REST, "--json").stdout)["wrong_models"]
+
+    lines = {line.split("  ")[0].strip(): line for line in text.splitlines()}
+    assert "beyond 100 %" in lines["load at link3:J3"]
+    assert "0.1 mm" in lines["length of link2"]
+    assert "Smaller errors pass for clearance: they shift the estimates in proportion" in " ".join(text.split())
+    by_name = {one["what"]: one for one in told}
+    assert by_name["load at link3:J3"]["unit"] == "1"
+    assert set(by_name["zero of link1"]["shifts"]) == {"J2", "J3", "J4"}

@@ -1,0 +1,276 @@
+"""Features learnt from simulations: a known function comes back, and clearances come of features."""
+
+import builtins
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armwright.arrays import Array
+from armwright.clearance.estimation.kriging import MOST_POINTS, Surrogate, learn, solve_features
+from armwright.errors import InvalidValueError, MissingExtraError, ShapeError
+from armwright.sweep.designs import sobol
+from clearance.arms import ARM_A, ARM_B, PATHS, accuracy
+from clearance.conftest import RANGE, Swept
+
+pytest.importorskip("sklearn")
+
+# Mean accuracy that is asked for where nothing is measured with noise [%].
+WITHOUT_NOISE = 99.5
+NAMES = ("a", "b")
+# Parameters of other sizes, as a clearance and a coefficient of friction are.
+BOUNDS = {"a": (1e-4, 5e-4), "b": (0.0, 0.2)}
+
+
+def smooth(points: Array) -> Array:
+    """Two functions of two parameters that bend a little, never the same twice."""
+    u, v = ((points - [1e-4, 0.0]) / [4e-4, 0.2]).T
+    return np.stack([u + 0.3 * np.sin(2 * u) + 0.2 * v**2, 3 + v + 0.2 * np.exp(-u * v)], axis=-1)
+
+
+def design(runs: int) -> Array:
+    return sobol(BOUNDS, runs, 3).points
+
+
+@pytest.fixture(scope="module")
+def known() -> Surrogate:
+    points = design(64)
+    return learn(NAMES, points, ("f", "g"), smooth(points), ranges=[BOUNDS[name] for name in NAMES])
+
+
+def test_smooth_function(known: Surrogate, rng: np.random.Generator) -> None:
+    """Of 64 points a smooth function comes back to three digits and more between them, with a deviation as small."""
+    points = rng.uniform(*np.array(list(BOUNDS.values())).T, (200, 2))
+
+    mean, deviation = known.predict(points)
+
+    np.testing.assert_allclose(mean, smooth(points), rtol=0, atol=5e-4)
+    assert deviation.max() < 1e-3
+
+
+def test_slope_of_a_surface(known: Surrogate) -> None:
+    """The slopes of what was learnt are those of the function, with parameters from 0 to 1."""
+    u, v = 0.3, 0.6
+    by_hand = [
+        (1 + 0.6 * np.cos(2 * u), 0.4 * v),
+        (-0.2 * v * np.exp(-u * v), 1 - 0.2 * u * np.exp(-u * v)),
+    ]
+
+    found = [process.slope(np.array([u, v])) for process in known.processes]
+
+    np.testing.assert_allclose(found, by_hand, rtol=0, atol=2e-3)
+
+
+def test_noise_is_told_from_the_surface(rng: np.random.Generator) -> None:
+    """Of values that chance shakes by 0.05 the surface is smooth, and the deviation is what chance adds."""
+    points = design(256)
+    shaken = smooth(points) + rng.normal(0.0, 0.05, (256, 2))
+
+    found = learn(NAMES, points, ("f", "g"), shaken)
+    mean, deviation = found.predict(np.array([[3e-4, 0.1]]))
+
+    np.testing.assert_allclose(deviation, 0.05, rtol=0.2)
+    np.testing.assert_allclose(mean, smooth(np.array([[3e-4, 0.1]])), rtol=0, atol=0.03)
+
+
+def test_what_surfaces_miss_together(rng: np.random.Generator) -> None:
+    """Where one number comes out too large by chance as another comes out too small, a surrogate knows it."""
+    points = design(64)
+    chance = 0.02 * rng.standard_normal(len(points))
+    values = smooth(points) + np.stack([chance, -chance], axis=-1)
+
+    found = learn(NAMES, points, ("f", "g"), values)
+
+    assert found.correlation[0, 1] < -0.8
+    np.testing.assert_allclose(np.diag(found.correlation), 1.0)
+    assert found.chosen(("g",)).correlation.shape == (1, 1)
+
+
+def test_spread_of_single_runs_is_that_of_neighbours() -> None:
+    """Where runs that nobody can tell apart differ, a single one is known no better; far from there it is."""
+    points = design(256)
+    late = points[:, 0] > 3e-4
+    spreads = np.where(late, 0.1, 0.0)[:, None] * [1.0, 0.0]
+
+    found = learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads)
+    _, deviation = found.predict(np.array([[1e-4, 0.1], [5e-4, 0.1]]))
+
+    np.testing.assert_allclose(deviation[1], (0.1, 0.0), rtol=0.05, atol=1e-3)
+    assert deviation[0].max() < 0.02
+    assert found.chosen(("g",)).predict(points)[1].max() < 1e-3
+    with pytest.raises(ShapeError, match=r"spreads: expected \(256, 2\), as the values, got \(256, 1\)"):
+        learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads[:, :1])
+
+
+def test_inverse(known: Surrogate, rng: np.random.Generator) -> None:
+    """Features of a known function tell the parameters that they are of."""
+    true = rng.uniform(*np.array(list(BOUNDS.values())).T, (20, 2))
+
+    found = np.array([solve_features(known, one) for one in smooth(true)])
+
+    np.testing.assert_allclose((found - true) / [4e-4, 0.2], 0.0, rtol=0, atol=1e-3)
+
+
+def test_weights(known: Surrogate) -> None:
+    """Where the features contradict one another, the one that is known better wins."""
+    true = np.array([[2e-4, 0.05]])
+    half = known.chosen(["f", "f", "g"])
+    seen = smooth(true)[0][[0, 0, 1]] + [0.0, 0.1, 0.0]
+
+    first = solve_features(half, seen, [1e-4, 1.0, 1e-4])
+    second = solve_features(half, seen, [1.0, 1e-4, 1e-4])
+
+    np.testing.assert_allclose(half.predict(first[None])[0][0, 0], seen[0], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(half.predict(second[None])[0][0, 1], seen[1], rtol=0, atol=1e-3)
+
+
+def test_many_points() -> None:
+    """Of more points than are needed some are taken, the same for the same seed, spread over all."""
+    points = design(512)
+    found = learn(NAMES, points, ("f",), smooth(points)[:, :1], seed=4)
+    again = learn(NAMES, points, ("f",), smooth(points)[:, :1], seed=4)
+
+    assert len(found.processes[0].x) == MOST_POINTS
+    np.testing.assert_array_equal(found.processes[0].weights, again.processes[0].weights)
+    np.testing.assert_allclose(found.predict(points)[0], smooth(points)[:, :1], rtol=0, atol=5e-4)
+
+
+def test_failed_runs_are_left_out(known: Surrogate) -> None:
+    """Rows that came to nothing teach nothing, and disturb nothing."""
+    points = design(64)
+    values = smooth(points)
+    more = np.vstack([points, [[2e-4, 0.1], [3e-4, 0.15]]])
+
+    found = learn(
+        NAMES, more, ("f", "g"), np.vstack([values, [[np.nan, 1.0], [np.nan, np.nan]]]), ranges=list(BOUNDS.values())
+    )
+
+    np.testing.assert_array_equal(found.processes[0].weights, known.processes[0].weights)
+
+
+def test_progress() -> None:
+    """Each feature is told before it is learnt."""
+    points, told = design(16), []
+
+    learn(NAMES, points, ("f", "g"), smooth(points), progress=told.append)
+
+    assert told == ["f", "g"]
+
+
+class TestFiveBar:
+    """128 five-bars on the thesis' three paths."""
+
+    def test_surfaces(self, swept: Swept, rng: np.random.Generator) -> None:
+        """Arms that were not learnt from have the features that the surfaces say: R² ≥ 0.9994, 0.99 of amplitudes.
+
+        What impacts do to the amplitude is chance, and the surface says so: nine of ten lie within its 90 %.
+        """
+        held = rng.uniform(*RANGE, (48, 3))
+        seen = swept.seen(held)
+
+        mean, deviation = swept.surrogate.predict(held)
+
+        part = ((mean - seen) ** 2).sum(axis=0) / ((seen - seen.mean(axis=0)) ** 2).sum(axis=0)
+        for name, one in zip(swept.surrogate.features, 1 - part, strict=True):
+            assert one > (0.99 if "amp" in name else 0.9994), name
+        amplitudes = [i for i, name in enumerate(swept.surrogate.features) if "amp" in name]
+        inside = np.abs(mean - seen)[:, amplitudes] < 1.645 * deviation[:, amplitudes]
+        assert 0.8 < inside.mean() < 0.97
+
+    @pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
+    def test_all_features(self, swept: Swept, clearances: Array) -> None:
+        """All features of the error curves together tell arms A and B to 99.99 % without noise."""
+        found = solve_features(swept.surrogate, swept.seen(clearances)[0])
+
+        assert accuracy(found, clearances) > 99.99 > WITHOUT_NOISE
+
+    def test_held_out(self, swept: Swept, rng: np.random.Generator) -> None:
+        """Forty arms that nothing was learnt from are told to 99.99 % on average, the worst to 99.9 %."""
+        true = rng.uniform(*RANGE, (40, 3))
+
+        found = [solve_features(swept.surrogate, one) for one in swept.seen(true)]
+
+        right = accuracy(found, true)
+        assert right.mean() > 99.99
+        assert right.min() > 99.9 > WITHOUT_NOISE
+
+    def test_more_features_tell_more(self, swept: Swept, rng: np.random.Generator) -> None:
+        """The thesis' way, one feature of three paths, tells less than its three features together, and these 99 %."""
+        true = rng.uniform(*RANGE, (20, 3))
+        seen = swept.seen(true)
+        names = swept.surrogate.features
+
+        def right(chosen: Callable[[str], bool]) -> float:
+            some = [i for i, name in enumerate(names) if chosen(name)]
+            part = swept.surrogate.chosen([names[i] for i in some])
+            return float(np.median(accuracy([solve_features(part, one) for one in seen[:, some]], true)))
+
+        amplitude, nine = right(lambda name: "amp_dc" in name), right(lambda name: "offset" not in name)
+        assert amplitude < 97
+        assert nine > 99
+
+    def test_offsets_agree_with_rest(self, swept: Swept) -> None:
+        """The offset that a sweep finds at the start of a path is that of the resting tip: no second law."""
+        from armwright.clearance.estimation.static import rest_offsets
+        from clearance.arms import STARTS
+
+        rested = rest_offsets(swept.task.linkage, STARTS, swept.points)
+
+        for k, path in enumerate(PATHS):
+            found = np.stack([swept.values[f"{path}_offset_{axis}"] for axis in "xy"], axis=-1)
+            np.testing.assert_allclose(found, rested[:, k], rtol=0, atol=1e-12)
+
+
+def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where scikit-learn is not installed it is said how to get it."""
+    real = builtins.__import__
+
+    def without(name: str, *more: Any, **named: Any) -> Any:
+        if name.startswith("sklearn"):
+            raise ImportError(name)
+        return real(name, *more, **named)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    points = design(16)
+    with pytest.raises(
+        MissingExtraError, match=r'needs scikit-learn; install it by: pip install "armwright\[clearance\]"'
+    ):
+        learn(NAMES, points, ("f", "g"), smooth(points))
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "said"),
+    [
+        ({"values": np.zeros((16, 3))}, ShapeError, r"expected \(m, 2\) points and \(m, 2\) values, got \(16, 2\) and"),
+        ({"points": design(8), "values": smooth(design(8))}, InvalidValueError, "expected 12 or more that ended well"),
+        ({"values": np.full((16, 2), np.nan)}, InvalidValueError, "12 or more that ended well, got 0"),
+        ({"points": design(16) * [1, 0]}, InvalidValueError, "parameter b does not vary: it is 0 in every run"),
+        ({"ranges": [(1e-4, 5e-4)]}, ShapeError, r"ranges: expected shape \(2, 2\), got \(1, 2\)"),
+        ({"ranges": [(1e-4, 3e-4), (0.0, 0.2)]}, InvalidValueError, "ranges: a point lies outside"),
+    ],
+)
+def test_bad_tables(change: dict[str, Any], error: type[Exception], said: str) -> None:
+    """Tables that do not fit, too few runs, and parameters that do not vary are told."""
+    points = design(16)
+    with pytest.raises(error, match=said):
+        learn(**{"parameters": NAMES, "points": points, "features": ("f", "g"), "values": smooth(points), **change})
+
+
+def test_features_that_do_not_fit(known: Surrogate) -> None:
+    """There is one number for each feature."""
+    with pytest.raises(ShapeError, match=r"seen: expected 2 features, got shape \(3,\)"):
+        solve_features(known, [0.0, 0.0, 0.0])
+
+
+def test_feature_of_chance_alone_teaches_nothing(rng: np.random.Generator) -> None:
+    """A feature that impacts leave to chance is noise of its whole spread, not a surface through the runs."""
+    x = rng.random((96, 3))
+    values = np.column_stack([x @ [1.0, 0.5, 0.2], rng.standard_normal(96)])
+
+    found = learn("pqr", x, ("smooth", "chance"), values, ranges=[(0, 1)] * 3)
+
+    new = rng.random((200, 3))
+    mean, deviation = found.predict(new)
+    assert np.abs(mean[:, 0] - new @ [1.0, 0.5, 0.2]).max() < 1e-2
+    assert np.median(deviation[:, 1]) > 0.7 * values[:, 1].std()

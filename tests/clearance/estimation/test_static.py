@@ -1,0 +1,243 @@
+"""Clearances from resting tips: exact without noise, as sure as they say with it, and better at better poses."""
+
+import attrs
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from armwright.arrays import Array
+from armwright.clearance.estimation import static
+from armwright.clearance.estimation.static import Estimate, best_poses, estimate_at_rest, rest_matrix, rest_offsets
+from armwright.clearance.linkage import Linkage
+from armwright.clearance.paths import TEST_PATHS
+from armwright.errors import InvalidValueError, ShapeError, TooFewError
+from clearance.arms import ARM_A, ARM_B, STARTS, accuracy
+
+# Mean of 50 readings with 10 µm each, and the measure that the thesis' way is held against [m, %].
+DWELL_NOISE = 10e-6 / np.sqrt(50)
+WITHOUT_NOISE, WITH_NOISE = 99.5, 99.0
+# Singular values are told to three digits.
+PRINTED = 0.006
+ALL_STARTS = np.array([start for start, _ in TEST_PATHS.values()])
+
+
+def triples(rng: np.random.Generator, count: int) -> Array:
+    """Clearances that nothing was fitted to, from 0.1 to 0.5 mm."""
+    return rng.uniform(0.1e-3, 0.5e-3, (count, 3))
+
+
+@pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
+def test_without_noise(five_bar: Linkage, clearances: Array) -> None:
+    """Where the tip rests at three poses tells the clearances of arms A and B to the last digit."""
+    found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, clearances))
+
+    assert accuracy(found.values, clearances) > WITHOUT_NOISE
+    np.testing.assert_allclose(found.values, clearances, rtol=1e-9)
+    assert found.residual < 1e-12
+    assert found.names == ("J2", "J3", "J4")
+
+
+def test_held_out(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """A hundred other arms are told just as well, each of them; the linear map alone misses by 0.3 % on average."""
+    true = triples(rng, 100)
+    offsets = rest_offsets(five_bar, STARTS, true)
+
+    found = estimate_at_rest(five_bar, STARTS, offsets)
+    linear = offsets.reshape(100, -1) @ np.linalg.pinv(rest_matrix(five_bar, STARTS).reshape(-1, 3)).T
+
+    assert accuracy(found.values, true).min() > WITHOUT_NOISE
+    np.testing.assert_allclose(found.values, true, rtol=1e-7)
+    assert WITHOUT_NOISE < accuracy(linear, true).mean() < 99.99
+
+
+@pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
+def test_with_noise(five_bar: Linkage, clearances: Array, rng: np.random.Generator) -> None:
+    """With 10 µm of noise and 50 readings at each pose the clearances are right to 99 % on average."""
+    offsets = rest_offsets(five_bar, STARTS, clearances)
+    noise = rng.normal(0.0, DWELL_NOISE, (300, *offsets.shape))
+
+    found = estimate_at_rest(five_bar, STARTS, offsets + noise, DWELL_NOISE)
+
+    assert accuracy(found.values, clearances).mean() > WITH_NOISE
+    # The standard deviation of one that is taken of 300 draws is 4 %.
+    np.testing.assert_allclose(found.values.std(axis=0), np.sqrt(np.diag(found.covariance)), rtol=0.16)
+
+
+def test_intervals_cover(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """Intervals of 90 % hold the truth in 85 to 95 of a hundred cases, for each clearance."""
+    true = triples(rng, 1000)
+    offsets = rest_offsets(five_bar, STARTS, true)
+
+    found = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, DWELL_NOISE, offsets.shape), DWELL_NOISE)
+
+    low, high = np.moveaxis(found.interval(0.9), -1, 0)
+    held = ((low <= true) & (true <= high)).sum(axis=0)
+    # By chance a thousand honest intervals hold more or fewer once in half a million.
+    assert binom.sf(949, 1000, 0.9) + binom.cdf(850, 1000, 0.9) < 2e-6
+    assert np.all((held >= 850) & (held <= 950))
+    assert accuracy(found.values, true).mean() > WITH_NOISE
+
+
+def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """Six numbers for three clearances: what is left of the noise is the root of a half, on average."""
+    offsets = rest_offsets(five_bar, STARTS, triples(rng, 400))
+
+    found = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 1e-6, offsets.shape))
+
+    assert np.sqrt(np.mean(found.residual**2)) == pytest.approx(1e-6 * np.sqrt(0.5), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("poses", "singular"),
+    [(STARTS, (2.46, 1.51, 0.42)), (STARTS[:1], (1.58, 0.87)), (ALL_STARTS, (6.52, 4.29, 1.32))],
+    ids=["y1, y3 and y7", "y1", "all paths"],
+)
+def test_singular_values(five_bar: Linkage, poses: Array, singular: tuple[float, ...]) -> None:
+    """Three poses tell the worst mixture of clearances with 0.42, one pose not at all, 24 poses with 1.32."""
+    found = np.linalg.svd(rest_matrix(five_bar, poses).reshape(-1, 3), compute_uv=False)
+
+    np.testing.assert_allclose(found, singular, rtol=0, atol=PRINTED)
+
+
+def test_deviations_of_the_spec(five_bar: Linkage) -> None:
+    """A noise of 1 µm at three poses is 1.46, 1.96 and 0.60 µm in the clearances, of 24 poses 0.46, 0.63 and 0.22."""
+    few = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), 1e-6)
+    many = estimate_at_rest(five_bar, ALL_STARTS, rest_offsets(five_bar, ALL_STARTS, ARM_A), 1e-6)
+
+    np.testing.assert_allclose(few.deviations * 1e6, (1.46, 1.96, 0.60), rtol=0, atol=PRINTED)
+    np.testing.assert_allclose(many.deviations * 1e6, (0.46, 0.63, 0.22), rtol=0, atol=PRINTED)
+    np.testing.assert_allclose(few.singular_values, (2.46, 1.51, 0.42), rtol=0, atol=PRINTED)
+    np.testing.assert_allclose(np.diag(few.correlation), 1.0)
+    # J2 and J3 shift the tip alike, so that one is taken for the other.
+    assert few.correlation[0, 1] < -0.5
+
+
+def test_map_at_the_first_goal(five_bar: Linkage) -> None:
+    """At (-180, -600) mm a millimetre in J4 shifts the tip by 0.872 mm to the left and 0.313 mm down."""
+    found = rest_matrix(five_bar, [(-0.18, -0.6)])[0]
+
+    # The spec's numbers are those of arm A, where the tip hangs half a millimetre lower.
+    np.testing.assert_allclose(found, [[0.6545, 0.6187, -0.8721], [-0.8197, -0.7748, -0.3134]], rtol=0, atol=1e-3)
+
+
+def test_map_is_the_derivative(five_bar: Linkage) -> None:
+    """The map is what small clearances shift the resting tip by, pin by pin, where the walls do not give."""
+    stiff = attrs.evolve(five_bar, material=attrs.evolve(five_bar.material, young=1e18))
+    steps = np.full(3, 1e-5) + 1e-6 * np.vstack([np.zeros(3), np.eye(3)])
+
+    own, *more = rest_offsets(stiff, STARTS, steps)
+
+    columns = [(one - own) / 1e-6 for one in more]
+    # At 10 µm of play what is not linear is a few parts in a hundred thousand.
+    np.testing.assert_allclose(np.stack(columns, axis=-1), rest_matrix(five_bar, STARTS), rtol=0, atol=1e-4)
+
+
+def test_best_poses(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """Four poses that are chosen tell all clearances together better than any of a hundred random fours."""
+    x, y = np.meshgrid(np.linspace(-0.18, 0.18, 7), np.linspace(-0.7, -0.45, 6))
+    places = np.stack([x.ravel(), y.ravel()], axis=-1)
+    B = rest_matrix(five_bar, places)
+
+    def told(numbers: list[int]) -> float:
+        return float(np.linalg.slogdet(np.einsum("kai,kaj->ij", B[numbers], B[numbers]))[1])
+
+    best = best_poses(five_bar, places, 4)
+    random = [told(rng.choice(len(places), 4, replace=False).tolist()) for _ in range(100)]
+
+    assert len(set(best)) == 4
+    assert told(best) > max(random)
+    offsets = rest_offsets(five_bar, places[best], ARM_A)
+    assert estimate_at_rest(five_bar, places[best], offsets).deviations.max() < 1.8e-6
+
+
+def test_all_poses_can_be_taken(five_bar: Linkage) -> None:
+    """Asked for as many poses as there are, all come, each once."""
+    assert sorted(best_poses(five_bar, STARTS, 3)) == [0, 1, 2]
+
+
+def test_told_or_not(five_bar: Linkage) -> None:
+    """Poses 10 µm apart tell no clearance with a noise of 1 µm; good ones tell all three."""
+    near = STARTS[:1] + np.array([(0.0, 0.0), (1e-5, 0.0), (0.0, 1e-5)])
+
+    def found(poses: Array) -> Estimate:
+        return estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A), 1e-6)
+
+    assert found(STARTS).identifiable(0.4e-3) == (True, True, True)
+    assert found(near).identifiable(0.4e-3)[:2] == (False, False)
+
+
+def test_too_few_poses(five_bar: Linkage) -> None:
+    """One pose has two numbers for three clearances, and the same pose twice has no more."""
+    for poses in (STARTS[:1], STARTS[[0, 0]]):
+        with pytest.raises(TooFewError, match=f"{len(poses)} poses do not tell 3 clearances from one another"):
+            estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A))
+
+
+def test_bad_input(five_bar: Linkage) -> None:
+    """Shapes that do not fit, noise of nothing, poses out of reach, and impossible probabilities are told."""
+    offsets = rest_offsets(five_bar, STARTS, ARM_A)
+    with pytest.raises(
+        ShapeError, match=r"expected \(k, 2\) poses and as many offsets, got shapes \(3, 2\) and \(2, 2"
+    ):
+        estimate_at_rest(five_bar, STARTS, offsets[:2])
+    with pytest.raises(InvalidValueError, match="noise: expected a standard deviation above 0, got 0"):
+        estimate_at_rest(five_bar, STARTS, offsets, 0.0)
+    with pytest.raises(InvalidValueError, match="the loops do not close"):
+        rest_offsets(five_bar, [(0.0, -2.0)], ARM_A)
+    with pytest.raises(InvalidValueError, match="count: expected 1 to 3 poses, got 4"):
+        best_poses(five_bar, STARTS, 4)
+    with pytest.raises(InvalidValueError, match="level: expected a probability between 0 and 1, got 90"):
+        estimate_at_rest(five_bar, STARTS, offsets).interval(90)
+
+
+def test_pins_without_play(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """Noise about a pin without play makes no negative clearance."""
+    offsets = rest_offsets(five_bar, STARTS, (0.3e-3, 1e-7, 0.3e-3))
+
+    found = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 2e-6, (50, *offsets.shape)))
+
+    assert found.values.min() > 0
+    assert np.abs(found.values[:, 2] - 0.3e-3).max() < 10e-6
+
+
+def test_a_pose_weighs_as_often_as_it_was_read(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """The mean of several readings counts as they do one by one: the same clearances, as well known."""
+    counts = np.array([1, 2, 5, 3])[: len(STARTS)]
+    offsets = rest_offsets(five_bar, STARTS, ARM_A) + rng.normal(0.0, 1e-5, STARTS.shape)
+    again = (np.repeat(one, counts, axis=0) for one in (STARTS, offsets))
+
+    mean = estimate_at_rest(five_bar, STARTS, offsets, 1e-5, counts)
+    single = estimate_at_rest(five_bar, *again, 1e-5)
+
+    np.testing.assert_allclose(mean.values, single.values, rtol=1e-9)
+    np.testing.assert_allclose(mean.covariance, single.covariance, rtol=1e-9)
+    assert float(mean.square) == pytest.approx(float(single.square), rel=1e-6)
+    with pytest.raises(InvalidValueError, match="readings: expected at least 1 of each pose, got 0"):
+        estimate_at_rest(five_bar, STARTS, offsets, 1e-5, 0)
+
+
+def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many rounds an estimate takes, the loops of each pose are closed one after the other only once."""
+    offsets = rest_offsets(five_bar, STARTS, ARM_A)
+    closings = []
+    posed = static.posed
+    monkeypatch.setattr(static, "posed", lambda *given: (closings.append(given), posed(*given))[1])
+
+    estimate_at_rest(five_bar, STARTS, offsets)
+
+    assert len(closings) == 1
+
+
+def test_nothing_is_told_from_none(five_bar: Linkage, rng: np.random.Generator) -> None:
+    """No interval reaches below nothing, and a clearance less than its deviation is told to be none, not identified."""
+    true = np.array((0.328e-3, 0.171e-3, 0.0))
+    exact = rest_offsets(five_bar, STARTS, np.maximum(true, 1e-9))
+    told = []
+    for _ in range(40):
+        found = estimate_at_rest(five_bar, STARTS, exact + rng.normal(scale=2e-6, size=exact.shape), noise=2e-6)
+        low = found.interval()[2, 0]
+        assert low >= 0
+        told.append(found.identifiable(1e-3)[2])
+        assert told[-1] == (found.values[2] > max(found.deviations[2], 2e-7))
+
+    assert 2 <= sum(told) <= 20
