@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 # Loaded when they are asked for: the command line needs some words of the language for its --help, and no compiler.
 _HOMES = {
-    "Compilation": "compiler",
-    "compile": "compiler",
-    "KnownCell": "meaning.known",
-    "known_cell": "meaning.known",
-    "Source": "text.source",
+    "Compilation": "api",
+    "compile": "api",
+    "KnownCell": "semantics.cell_symbols",
+    "known_cell": "semantics.cell_symbols",
+    "Source": "language.source",
 }
 
 __all__ = ["Compilation", "KnownCell", "Source", "compile", "known_cell"]

@@ -1,10 +1,10 @@
-"""Parsing statements that hold others: blocks, choices, loops, branches side by side, locks, recovery."""
+"""Parsing what decides what is done next: blocks, choices, loops, calls, branches side by side, events, recovery."""
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
-from armwright.program.syntax.expressions import expression, listed, mobile, number, reserved_as_name, variable
+from armwright.program.syntax.expressions import expression, listed, mobile, number, reserved_as_name, values, variable
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.operands import equals
 from armwright.program.syntax.statement_list import (
@@ -19,6 +19,7 @@ from armwright.program.syntax.statement_list import (
 from armwright.program.syntax.token_stream import LostError, Tokens, TooDeepError, shown
 
 _CONDITION = "a condition"
+_EVENT = "the name of an EVENT"
 _OPERANDS = (TokenKind.NAME, TokenKind.NUMBER, TokenKind.ARM)
 _DOWNWARDS = "DOWNTO"
 _ELSE_IF = ("ELSEIF", "ELSIF", "ELIF")
@@ -352,3 +353,51 @@ def try_(tokens: Tokens) -> tree.Try:
     elif tokens.sees("END") and tokens.ahead().key != ".":
         tokens.take()
     return tree.Try(tokens.since(start), body, recovery)
+
+
+# "RETRY"
+def retry(tokens: Tokens) -> tree.Retry:
+    """Read one RETRY."""
+    return tree.Retry(tokens.take().span)
+
+
+# "SIGNAL" lvalue
+def signal(tokens: Tokens) -> tree.Signal:
+    """Read one SIGNAL."""
+    start = tokens.take()
+    event = variable(tokens, _EVENT, "after SIGNAL")
+    return tree.Signal(tokens.since(start), event)
+
+
+# "WAIT" lvalue
+def wait(tokens: Tokens) -> tree.Wait:
+    """Read one WAIT."""
+    start = tokens.take()
+    if tokens.now.kind is TokenKind.NUMBER:
+        text = tokens.now.text
+        helps = (f"to let {text} seconds pass, write `PAUSE {text}`",)
+        tokens.lost(f"expected {_EVENT} after WAIT", f"found `{text}`", helps=helps)
+    event = variable(tokens, _EVENT, "after WAIT")
+    return tree.Wait(tokens.since(start), event)
+
+
+# "PAUSE" expr
+def pause(tokens: Tokens) -> tree.Pause:
+    """Read one PAUSE."""
+    start = tokens.take()
+    duration = expression(tokens, "a number of seconds", "after PAUSE")
+    return tree.Pause(tokens.since(start), duration)
+
+
+# "HALT"
+def halt(tokens: Tokens) -> tree.Halt:
+    """Read one HALT."""
+    return tree.Halt(tokens.take().span)
+
+
+# name "(" [ expr { "," expr } ] ")"
+def call(tokens: Tokens) -> tree.Call:
+    """Read the call of a procedure."""
+    token = tokens.take()
+    arguments = values(tokens, "a value", f"after {token.text}", empty=True)
+    return tree.Call(tokens.since(token), tree.Name(token.span, token.text, token.key), arguments)

@@ -1,4 +1,4 @@
-"""Parsing what stands for a value: in RLO-83 names, arms, numbers, matrices; in RLO-2 any expression."""
+"""Parsing what stands for a value: in RLO-83 names, arms and numbers; in RLO-2 any expression."""
 
 # ruff: noqa: ERA001 - each rule of the grammar stands above its function
 
@@ -11,7 +11,6 @@ from armwright.program.syntax import expressions, rlo83, tree
 from armwright.program.syntax.lexer import TokenKind
 from armwright.program.syntax.token_stream import Tokens, shown
 
-_SET_WANTS = "a number or twelve numbers in `( )`"
 # What may stand behind a name, so that a reserved word in front of it was meant as one.
 _BEHIND_A_NAME = (",", ";", ")", ":", "=", "TO", "FROM", "AT", "WITH", "VIA")
 
@@ -90,29 +89,6 @@ def check_length(tokens: Tokens, name: tree.Name) -> None:
         )
 
 
-# init   = name "=" ( matrix | signed ) ;                      (* RLO-83 *)
-# assign = lvalue "=" expr ;                                   (* RLO-2 *)
-def assign(tokens: Tokens) -> tree.Assign:
-    """Read ``name = value``."""
-    token = tokens.now
-    target: tree.Mobile
-    if tokens.later:
-        target = expressions.mobile(tokens, "a name", "here")
-        if tokens.now.key == "=":
-            tokens.take()
-        else:
-            written = tokens.source.slice(tokens.since(token))
-            equals(tokens, f"`{written}`", written)
-        value = expressions.expression(tokens, "a value", "")
-        return tree.Assign(tokens.since(token), target, value)
-    tokens.take()
-    make = tree.ArmName if token.kind is TokenKind.ARM else tree.Name
-    target = make(token.span, token.text, token.key)
-    equals(tokens, f"`{token.text}`", token.text)
-    found = _value(tokens)
-    return tree.Assign(tokens.since(token), target, found)
-
-
 def equals(tokens: Tokens, what: str, written: str) -> None:
     """Read ``=``, or say that it is missing before a value and go on."""
     if tokens.accept("="):
@@ -139,60 +115,6 @@ def equals(tokens: Tokens, what: str, written: str) -> None:
         )
 
 
-def _value(tokens: Tokens) -> tree.Matrix | tree.Number | tree.Poison:
-    start = tokens.at
-    token = tokens.now
-    if tokens.sees("("):
-        found = len(tokens.found)
-        matrix = _matrix(tokens)
-        if matrix is not None and len(matrix.items) > 1 and not tokens.sees(*rlo83.OPERATORS):
-            return matrix
-        # Not a list of numbers but an expression that begins with a parenthesis.
-        del tokens.found[found:]
-        tokens.back(start)
-        return rlo83.expression(tokens, _SET_WANTS)
-    if token.kind is TokenKind.NUMBER or tokens.sees("-", "+"):
-        number = _signed_or_none(tokens)
-        if number is not None and not tokens.sees(*rlo83.OPERATORS):
-            return number
-        tokens.back(start)
-        return rlo83.expression(tokens, _SET_WANTS)
-    if token.kind in (TokenKind.NAME, TokenKind.ARM, TokenKind.STRING):
-        return rlo83.expression(tokens, _SET_WANTS)
-    return tokens.lost("expected a value after `=`", f"found {shown(token)}")
-
-
-# matrix = "(" signed "," signed ... 12 in all ... ")" ;
-def _matrix(tokens: Tokens) -> tree.Matrix | None:
-    """Read numbers in parentheses; None where something else is among them."""
-    start = tokens.take()
-    numbers: list[tree.Number] = []
-    while True:
-        number = _signed_or_none(tokens)
-        if number is None:
-            if numbers and tokens.sees(")") and tokens.before.key == ",":
-                tokens.found.say("E111", "expected a number after `,`", tokens.now.span, "found `)`")
-                numbers.append(tree.Number(tokens.gap(), "", math.nan))
-                break
-            if tokens.done or tokens.sees(";", "END", ")", ","):
-                tokens.lost("expected a number", f"found {shown(tokens.now)}")
-            return None
-        numbers.append(number)
-        if tokens.accept(","):
-            continue
-        if tokens.now.kind is TokenKind.NUMBER and not tokens.before.damaged:
-            gap = tokens.gap()
-            tokens.found.say(
-                "E112", "missing `,` between two numbers", gap, "expected `,` here", fixes=(Fix(gap, ","),)
-            )
-            continue
-        break
-    if tokens.now.kind in (TokenKind.NAME, TokenKind.ARM, TokenKind.STRING) or tokens.sees(*rlo83.OPERATORS, "(", "["):
-        return None
-    tokens.expect(")", "after the last number")
-    return tree.Matrix(tokens.since(start), tuple(numbers))
-
-
 # signed = [ "-" ] number ;
 def signed(tokens: Tokens) -> tree.Number:
     """Read a number with its sign.
@@ -200,13 +122,14 @@ def signed(tokens: Tokens) -> tree.Number:
     Raises:
         LostError: there is none.
     """
-    number = _signed_or_none(tokens)
+    number = signed_or_none(tokens)
     if number is None:
         tokens.lost("expected a number", f"found {shown(tokens.now)}")
     return number
 
 
-def _signed_or_none(tokens: Tokens) -> tree.Number | None:
+def signed_or_none(tokens: Tokens) -> tree.Number | None:
+    """Read a number with its sign; None where there is none."""
     start = tokens.now
     sign = start.key if tokens.sees("-", "+") else ""
     token = tokens.ahead() if sign else start

@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
-from armwright.program.syntax import control_flow, simple_statements, tree
+from armwright.program.syntax import control_flow, devices, frames, output, tree
 from armwright.program.syntax.headers import head, late
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.move import move
@@ -21,32 +21,34 @@ from armwright.program.syntax.token_stream import Rule, Tokens
 
 # statement = init | affix | unfix | open | grasp | operate | read | move ;
 _RULES_83: Mapping[str, Rule] = {
-    "AFFIX": simple_statements.affix,
-    "UNFIX": simple_statements.unfix,
-    "OPEN": simple_statements.open_hand,
-    "GRASP": simple_statements.grasp,
-    "OPERATE": simple_statements.operate,
-    "READ": simple_statements.read,
+    "=": frames.assign,
+    "AFFIX": frames.affix,
+    "UNFIX": frames.unfix,
+    "OPEN": devices.open_hand,
+    "GRASP": devices.grasp,
+    "OPERATE": devices.operate,
+    "READ": devices.read,
     "MOVE": move,
     "VAR": late,  # reported: it belongs in front of BEGIN
 }
 # statement = assign | affix | ... | move | block | "IF" ... | "WHILE" ... | "REPEAT" ... | ... | name "(" ... ")" ;
 _RULES_2: Mapping[str, Rule] = {
     **_RULES_83,
+    "(": control_flow.call,
     "BEGIN": control_flow.block,
     "IF": control_flow.if_,
     "WHILE": control_flow.while_,
     "REPEAT": control_flow.repeat,
     "FOR": control_flow.for_,
     "COBEGIN": control_flow.cobegin,
-    "SIGNAL": simple_statements.signal,
-    "WAIT": simple_statements.wait,
-    "PAUSE": simple_statements.pause,
+    "SIGNAL": control_flow.signal,
+    "WAIT": control_flow.wait,
+    "PAUSE": control_flow.pause,
     "LOCK": control_flow.lock,
     "TRY": control_flow.try_,
-    "RETRY": simple_statements.retry,
-    "HALT": simple_statements.halt,
-    "PRINT": simple_statements.printing,
+    "RETRY": control_flow.retry,
+    "HALT": control_flow.halt,
+    "PRINT": output.printing,
     "IMPORT": late,
     "UNITS": late,
     "PROCEDURE": late,

@@ -9,8 +9,6 @@ from armwright.program.language.source import Span
 from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, LATER_STATEMENTS, OPENING
 from armwright.program.syntax import rlo83, tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.operands import assign
-from armwright.program.syntax.simple_statements import call
 from armwright.program.syntax.token_stream import DEEPEST, LostError, Tokens, TooDeepError, shown
 
 _Read = TypeVar("_Read")
@@ -138,7 +136,7 @@ def statement(tokens: Tokens) -> tree.Statement:
         return found
     after = tokens.ahead()
     if token.kind is _ARM and after.key in ASSIGNING:
-        return assign(tokens)
+        return tokens.rules["="](tokens)
     if token.kind is _NAME:
         return _named(tokens, after)
     if not tokens.later and rlo83.starts_statement(tokens):
@@ -150,9 +148,9 @@ def _named(tokens: Tokens, after: Token) -> tree.Statement:
     """Read a statement that begins with a name."""
     token = tokens.now
     if after.key in ASSIGNING or (tokens.later and after.key == "["):
-        return assign(tokens)
+        return tokens.rules["="](tokens)
     if tokens.later and after.key == "(" and tokens.ahead(2).kind is not TokenKind.STRING:
-        return call(tokens)
+        return tokens.rules["("](tokens)
     known = token.key in tokens.declared or token.key in tokens.procedures
     if not tokens.later and token.key in LATER_STATEMENTS and not known:
         return rlo83.statement(tokens)
@@ -162,7 +160,7 @@ def _named(tokens: Tokens, after: Token) -> tree.Statement:
     number = tokens.ahead(2) if after.key in ("(", "-") else after
     valued = number.kind is _NUMBER or (number.key == "-" and number is not after)
     if valued and not elsewhere and not (near and tokens.later):
-        return assign(tokens)
+        return tokens.rules["="](tokens)
     if not tokens.later and rlo83.starts_statement(tokens):
         return rlo83.statement(tokens)
     if number.kind is TokenKind.STRING and number is not after:
@@ -177,7 +175,8 @@ def _reserved(tokens: Tokens) -> tree.Statement:
     tokens.refuse_reserved()
     token = tokens.now
     tokens.replace_by_name()
-    found = assign(tokens)
+    found = tokens.rules["="](tokens)
+    assert isinstance(found, tree.Assign)  # noqa: S101 - that is what the rule reads
     return tree.Assign(found.span, tree.Poison(token.span, frozenset((token.key,))), found.value)
 
 

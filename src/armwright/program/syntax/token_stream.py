@@ -32,7 +32,7 @@ class Tokens:
         source: the text.
         later: whether the program is in RLO-2.
         words: those of its language.
-        rules: how to read each statement, by the word that starts it.
+        rules: how to read each statement, by the word that starts it, or the sign behind the name that does.
         found: what is wrong.
         at: how many tokens have been read.
         now: the token to be read next.

@@ -1,5 +1,38 @@
 """The syntax tree: what a program says, and where it says it."""
 
+from armwright.program.syntax.tree.control_flow import (
+    Block,
+    Branch,
+    Call,
+    Cobegin,
+    For,
+    Halt,
+    If,
+    Lock,
+    Pause,
+    Repeat,
+    Retry,
+    Signal,
+    Try,
+    Wait,
+    While,
+)
+from armwright.program.syntax.tree.devices import Grasp, Open, Operate, ReadSystem, ReadVisions
+from armwright.program.syntax.tree.frames import Affix, Assign, Unfix
+from armwright.program.syntax.tree.move import (
+    Approach,
+    Blend,
+    Clause,
+    Departure,
+    Directly,
+    Duration,
+    Move,
+    On,
+    Speed,
+    Straightly,
+    Via,
+)
+from armwright.program.syntax.tree.output import Print
 from armwright.program.syntax.tree.program import (
     Declaration,
     Header,
@@ -9,44 +42,7 @@ from armwright.program.syntax.tree.program import (
     TypeName,
     Units,
 )
-from armwright.program.syntax.tree.statements import (
-    Affix,
-    Approach,
-    Assign,
-    Blend,
-    Block,
-    Branch,
-    Call,
-    Clause,
-    Cobegin,
-    Departure,
-    Directly,
-    Duration,
-    For,
-    Grasp,
-    Halt,
-    If,
-    Lock,
-    Move,
-    On,
-    Open,
-    Operate,
-    Pause,
-    Print,
-    ReadSystem,
-    ReadVisions,
-    Repeat,
-    Retry,
-    Signal,
-    Speed,
-    Statement,
-    Straightly,
-    Try,
-    Unfix,
-    Via,
-    Wait,
-    While,
-)
+from armwright.program.syntax.tree.statements import Statement
 from armwright.program.syntax.tree.traversal import (
     dump,
     walk,

@@ -5,7 +5,8 @@ from typing import TypeAlias
 import attrs
 
 from armwright.program.language.source import Span
-from armwright.program.syntax.tree.statements import Block, Statement
+from armwright.program.syntax.tree.control_flow import Block
+from armwright.program.syntax.tree.statements import Statement
 from armwright.program.syntax.tree.values import Name, Number, String
 
 

@@ -1,55 +1,17 @@
-"""Parsing statements that hold no others, but for MOVE."""
+"""Parsing statements about hands, devices and sensors: OPEN, GRASP, OPERATE and READ."""
 
 from armwright.errors import closest
 from armwright.program.language.source import Span
 from armwright.program.language.words import SENSORS
 from armwright.program.syntax import rlo83, tree
-from armwright.program.syntax.expressions import expression, listed, values, variable
+from armwright.program.syntax.expressions import expression, listed
 from armwright.program.syntax.expressions import mobile as element
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.operands import check_length, mobile, operand, parenthesised, value
+from armwright.program.syntax.operands import check_length, mobile, operand, parenthesised
 from armwright.program.syntax.token_stream import Tokens
 
 _FRAME = "the name of a FRAME"
-_EVENT = "the name of an EVENT"
 _ARM = "an arm such as ARM_1"
-
-
-# affix = "AFFIX" name "TO" mobile [ "AT" name ] ;                                              (* RLO-83 *)
-# affix = "AFFIX" mobile "TO" mobile [ "AT" expr ] [ "RIGIDLY" | "NONRIGIDLY" ] ;               (* RLO-2 *)
-def affix(tokens: Tokens) -> tree.Affix:
-    """Read one AFFIX."""
-    start = tokens.take()
-    child = mobile(tokens, _FRAME, "after AFFIX")
-    tokens.expect("TO", "after the frame that follows")
-    parent = mobile(tokens, "the name of a FRAME or an arm", "after TO")
-    link = tokens.since(start)
-    at = None
-    if tokens.accept("AT"):
-        at = value(tokens, "a TRANS" if tokens.later else "the name of a TRANS", "after AT")
-    rigid = tokens.accept("RIGIDLY", "NONRIGIDLY")
-    if not tokens.later:
-        rlo83.trailing(
-            tokens, "AFFIX ...", "in RLO-83 a frame follows its parent, never the other way", "RIGIDLY", "NONRIGIDLY"
-        )
-    return tree.Affix(tokens.since(start), link, child, parent, at, rigid is not None and rigid.key == "RIGIDLY")
-
-
-# unfix = "UNFIX" name "FROM" mobile ;                                                          (* RLO-83 *)
-# unfix = "UNFIX" lvalue [ "FROM" mobile ] ;                                                    (* RLO-2 *)
-def unfix(tokens: Tokens) -> tree.Unfix:
-    """Read one UNFIX."""
-    start = tokens.take()
-    child = mobile(tokens, _FRAME, "after UNFIX")
-    if tokens.done or tokens.now.key in (";", *tokens.words.closing):
-        if not tokens.later:
-            rlo83.report(tokens, "UNFIX without FROM", tokens.gap(), "RLO-83 names the frame it hangs on: `FROM ...`")
-        return tree.Unfix(tokens.since(start), child, None)
-    if tokens.later and tokens.now.key != "FROM" and (tokens.now.kind is TokenKind.KEYWORD or not tokens.same_line()):
-        return tree.Unfix(tokens.since(start), child, None)
-    tokens.expect("FROM", "after the frame to cut")
-    parent = mobile(tokens, "the name of a FRAME or an arm", "after FROM")
-    return tree.Unfix(tokens.since(start), child, parent)
 
 
 # open = "OPEN" arm [ "TO" expr ] ;
@@ -148,68 +110,3 @@ def _seen(tokens: Tokens) -> tuple[tree.Mobile, ...]:
 
 def _operands(tokens: Tokens, wants: str, where: str) -> tuple[tree.Mobile, ...]:
     return listed(tokens, element, wants, where) if tokens.later else parenthesised(tokens, wants, where)
-
-
-# "SIGNAL" lvalue
-def signal(tokens: Tokens) -> tree.Signal:
-    """Read one SIGNAL."""
-    start = tokens.take()
-    event = variable(tokens, _EVENT, "after SIGNAL")
-    return tree.Signal(tokens.since(start), event)
-
-
-# "WAIT" lvalue
-def wait(tokens: Tokens) -> tree.Wait:
-    """Read one WAIT."""
-    start = tokens.take()
-    if tokens.now.kind is TokenKind.NUMBER:
-        text = tokens.now.text
-        helps = (f"to let {text} seconds pass, write `PAUSE {text}`",)
-        tokens.lost(f"expected {_EVENT} after WAIT", f"found `{text}`", helps=helps)
-    event = variable(tokens, _EVENT, "after WAIT")
-    return tree.Wait(tokens.since(start), event)
-
-
-# "PAUSE" expr
-def pause(tokens: Tokens) -> tree.Pause:
-    """Read one PAUSE."""
-    start = tokens.take()
-    duration = expression(tokens, "a number of seconds", "after PAUSE")
-    return tree.Pause(tokens.since(start), duration)
-
-
-# "HALT"
-def halt(tokens: Tokens) -> tree.Halt:
-    """Read one HALT."""
-    return tree.Halt(tokens.take().span)
-
-
-# "RETRY"
-def retry(tokens: Tokens) -> tree.Retry:
-    """Read one RETRY."""
-    return tree.Retry(tokens.take().span)
-
-
-# "PRINT" "(" ( expr | string ) { "," ( expr | string ) } ")"
-def printing(tokens: Tokens) -> tree.Print:
-    """Read one PRINT."""
-    start = tokens.take()
-    items = listed(tokens, _printed, "a value or a text", "after PRINT")
-    return tree.Print(tokens.since(start), items)
-
-
-def _printed(tokens: Tokens, wants: str, where: str) -> tree.Expression | tree.String:
-    token = tokens.now
-    if token.kind is not TokenKind.STRING:
-        return expression(tokens, wants, where)
-    tokens.take()
-    tokens.height = 1
-    return tree.String(token.span, token.text[1:-1])
-
-
-# name "(" [ expr { "," expr } ] ")"
-def call(tokens: Tokens) -> tree.Call:
-    """Read the call of a procedure."""
-    token = tokens.take()
-    arguments = values(tokens, "a value", f"after {token.text}", empty=True)
-    return tree.Call(tokens.since(token), tree.Name(token.span, token.text, token.key), arguments)
