@@ -7,7 +7,7 @@ import pytest
 from armwright.cell.simulator import Simulator
 from armwright.program import Compilation, KnownCell, Source, known_cell
 from armwright.program import compile as translate
-from armwright.program.bytecode.codegen import translate as code_of
+from armwright.program.bytecode.codegen import generate as code_of
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis.analysis import _Follower
 from armwright.program.language.diagnostic import Diagnostic

@@ -9,7 +9,7 @@ import attrs
 
 from armwright.errors import ArmwrightError, InvalidValueError
 from armwright.files.limits import beyond, limit
-from armwright.program.bytecode.codegen import translate
+from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis
 from armwright.program.flow_analysis.analysis import Flow
@@ -144,7 +144,7 @@ def _compile(
         course, odd_course = analysis.check(program, symbols, spelling, cell, strict=strict, source=source)
         found += odd_course
         if not any(one.is_error for one in found):
-            code = attrs.evolve(translate(source, program, symbols, course, spelling), standard=std)
+            code = attrs.evolve(generate(source, program, symbols, course, spelling), standard=std)
     return Compilation(
         source=source,
         standard=std,

@@ -80,7 +80,7 @@ class Emitter:
         """
         match node:
             case tree.Number() | tree.Name() | tree.ArmName():
-                operand = convert(node.value, node.unit, self.units) if isinstance(node, tree.Number) else node.key
+                operand = self.number(node) if isinstance(node, tree.Number) else node.key
                 if into is None:
                     return operand
                 self.emit(Op.COPY, into, operand, span=node.span)
@@ -98,6 +98,10 @@ class Emitter:
             case _:
                 return self._operation(node, into)
         return _given(into)
+
+    def number(self, node: tree.Number) -> float:
+        """Return what a number counts in the units of the program."""
+        return float(convert(node.value, node.unit, self.units))
 
     def _operation(self, node: tree.Expression, into: str | None) -> Operand:
         match node:
@@ -147,11 +151,7 @@ class Emitter:
         if all(isinstance(item, tree.Number) for item in node.items):
             numbers = pose_literals.constant(node)
             metres = self.units.metres
-            shift = [
-                convert(item.value, item.unit, self.units) * metres
-                for item in node.items[9:]
-                if isinstance(item, tree.Number)
-            ]
+            shift = [self.number(item) * metres for item in node.items[9:] if isinstance(item, tree.Number)]
             self.emit(Op.LOADM, to, self.constant((*numbers[:9], *shift)), span=node.span)
         else:
             self.emit(Op.MATX, to, *(self.value(item) for item in node.items), span=node.span)

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import attrs
 
-from armwright.program.bytecode.codegen import form_of
 from armwright.program.bytecode.instructions import stages_text
+from armwright.program.bytecode.move import form_of
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
 from armwright.program.language_server.analysis import Analysis

@@ -12,7 +12,7 @@ import attrs
 
 from armwright.cell.model import Cell
 from armwright.errors import ExitStatus
-from armwright.program.bytecode.codegen import translate
+from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis
 from armwright.program.flow_analysis.analysis import Flow
@@ -129,7 +129,7 @@ class _Checked:
         """Return the code of some statements, with all procedures."""
         end = _end(self.source)
         program = tree.Program(end, self.heading.headers, statements, end)
-        return translate(self.source, program, self.symbols, self.flow, self.spelling)
+        return generate(self.source, program, self.symbols, self.flow, self.spelling)
 
     def state(self, machine: Machine, statements: tuple[tree.Statement, ...], text: str) -> State:
         """Return the state that a part of the input leads to."""

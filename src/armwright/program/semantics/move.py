@@ -1,12 +1,15 @@
 """Names, types and clauses of one MOVE."""
 
+from collections.abc import Mapping
+
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
 from armwright.program.language.words import Standard
+from armwright.program.semantics.context import Check, Context
 from armwright.program.semantics.expression_types import Sort, written
 from armwright.program.semantics.quantities import in_range, measure
 from armwright.program.semantics.scopes import Names
-from armwright.program.semantics.type_check import need, quantity
+from armwright.program.semantics.type_check import condition, need, quantity
 from armwright.program.syntax import tree
 
 _WORDS: dict[type, str] = {
@@ -36,12 +39,13 @@ _NOT_ASKED: dict[type, str] = {
 SPEED_NOTE = "100 is the normal speed and 120 the largest the arm allows"
 
 
-def check(names: Names, move: tree.Move) -> None:
-    """Check one MOVE, but for conditions and actions of ON."""
-    need(names, move.moved, Sort.FRAME, "E215", "MOVE moves an arm or a FRAME")
-    _place(names, move.goal, "E211", "a MOVE must go to a FRAME", move)
-    _combination(names, move.clauses)
-    for clause in move.clauses:
+def move(context: Context, node: tree.Move) -> None:
+    """Check one MOVE."""
+    names = context.names
+    need(names, node.moved, Sort.FRAME, "E215", "MOVE moves an arm or a FRAME")
+    _place(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
+    _combination(names, node.clauses)
+    for clause in node.clauses:
         match clause:
             case tree.Via(points=points):
                 for point in points:
@@ -54,6 +58,9 @@ def check(names: Names, move: tree.Move) -> None:
                 _speed(names, value)
             case tree.Blend() | tree.Duration():
                 _amount(names, clause)
+            case tree.On(condition=wanted, action=action):
+                condition(names, wanted, "ON")
+                context.check_concurrent(action)
             case _:
                 pass
 
@@ -164,3 +171,6 @@ def _times(names: Names, first: dict[type, tree.Clause]) -> None:
             notes=("each of them settles how long the motion takes",),
             helps=("remove one of the two",),
         )
+
+
+CHECKS: Mapping[type, Check] = {tree.Move: move}

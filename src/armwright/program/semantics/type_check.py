@@ -5,10 +5,12 @@ from collections.abc import Callable
 
 import attrs
 
+from armwright.program.language.diagnostic import Label
 from armwright.program.language.units import Dimension
 from armwright.program.language.words import Standard
 from armwright.program.semantics import array_elements, builtins, operators
 from armwright.program.semantics.builtins import FUNCTIONS
+from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import (
     FITTING,
     Sort,
@@ -32,6 +34,23 @@ def sort(names: Names, node: tree.Expression) -> Sort | None:
         node: any expression.
     """
     return _SORTS[type(node)](names, node)
+
+
+def declared(names: Names, node: tree.Expression) -> tuple[Label, ...]:
+    """Return where a variable is declared."""
+    if isinstance(node, tree.Index):
+        node = node.name
+    return tuple(label for key in plain_keys(node) for label in names.where_declared(key))
+
+
+def is_world(node: tree.Expression) -> bool:
+    """Whether this is the root of all frames."""
+    return isinstance(node, tree.Name) and node.key == WORLD
+
+
+def refuse_world(names: Names, node: tree.Expression) -> None:
+    """Say that the root of all frames cannot be given a value."""
+    names.found.say("E218", f"{called(node)} cannot be given a value", node.span, "the root of all frames")
 
 
 def need(

@@ -1,0 +1,58 @@
+"""What the generators of all statements share: the instructions so far, and what is known of the statements."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import attrs
+
+from armwright.program.bytecode.emitter import Emitter
+from armwright.program.bytecode.instructions import Operand
+from armwright.program.flow_analysis.analysis import Flow
+from armwright.program.language.names import is_arm
+from armwright.program.syntax import tree
+
+Generate: TypeAlias = Callable[["Context", Any], None]
+
+
+@attrs.define
+class Context:
+    """Where the code of statements is generated.
+
+    Attributes:
+        generators: of each kind of statement.
+        out: the instructions so far.
+        flow: the arms of the statements.
+        spelling: how the program writes its names.
+        in_action: whether the statements are the action of an ON, whose HALT ends the MOVE and not the program.
+    """
+
+    generators: Mapping[type, Generate]
+    out: Emitter
+    flow: Flow
+    spelling: Mapping[str, str]
+    in_action: bool = False
+
+    def generate(self, *statements: tree.Statement) -> None:
+        """Generate the code of statements, one after the other."""
+        for statement in statements:
+            # A block is no statement of its own.
+            if not isinstance(statement, tree.Block):
+                self.out.begin()
+            self.generators[type(statement)](self, statement)
+
+    def generate_with(self, *statements: tree.Statement, in_action: bool) -> None:
+        """Generate the code of statements as those of an action, or as others."""
+        outside, self.in_action = self.in_action, in_action
+        self.generate(*statements)
+        self.in_action = outside
+
+    def operand(self, node: tree.Mobile) -> Operand:
+        """Generate the code of what is named, and return where it is."""
+        assert not isinstance(node, tree.Poison)  # noqa: S101 - a checked program has none
+        return self.out.value(node)
+
+    def text(self, node: tree.Expression) -> str:
+        """Return an expression as the program writes it."""
+        if isinstance(node, tree.Name | tree.ArmName):
+            return node.key if is_arm(node.key) else self.spelling.get(node.key, node.key)
+        return self.out.text(node)

@@ -1,0 +1,154 @@
+"""Code of control flow: choices, loops, processes, events, locks, recovery, calls."""
+
+from collections.abc import Mapping
+
+from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.emitter import LATER
+from armwright.program.bytecode.instructions import Op
+from armwright.program.syntax import tree
+
+
+def block(context: Context, node: tree.Block) -> None:
+    """Generate the statements of a block."""
+    context.generate(*node.statements)
+
+
+def if_(context: Context, node: tree.If) -> None:
+    """Generate an IF with the ELSE IFs behind it."""
+    out = context.out
+    chain, otherwise = node.chain
+    ends: list[int] = []
+    for choice in chain:
+        if choice is not node:
+            out.begin()
+        to_next = out.emit(Op.JZ, out.value(choice.condition), LATER, span=choice.head)
+        context.generate(choice.then)
+        if choice.otherwise is not None:
+            ends.append(out.emit(Op.JMP, LATER, span=choice.head))
+        out.land(to_next)
+    if otherwise is not None:
+        context.generate(otherwise)
+    for end in reversed(ends):
+        out.land(end)
+
+
+def while_(context: Context, node: tree.While) -> None:
+    """Generate a loop that is tested at its top."""
+    out, top = context.out, context.out.here
+    over = out.emit(Op.JZ, out.value(node.condition), LATER, span=node.head)
+    context.generate(node.body)
+    out.emit(Op.JMP, top, span=node.head)
+    out.land(over)
+
+
+def repeat(context: Context, node: tree.Repeat) -> None:
+    """Generate a loop that is tested at its end."""
+    out, top = context.out, context.out.here
+    context.generate(*node.body)
+    out.begin()
+    out.emit(Op.JZ, out.value(node.condition), top, span=node.tail)
+
+
+def for_(context: Context, node: tree.For) -> None:
+    """Generate a loop that counts; its bounds may be variables that it changes, and count as they were."""
+    out, head = context.out, node.head
+    count = out.passing()
+    bounds = [out.passing() for _ in range(3)]
+    for bound, value in zip(bounds, (node.first, node.last, node.step), strict=True):
+        if value is None:
+            out.emit(Op.COPY, bound, 1.0, span=head)
+        else:
+            out.value(value, bound)
+    out.emit(Op.COPY, count, 0.0, span=head)
+    out.begin()
+    top = out.here
+    over = out.emit(Op.FOR, context.operand(node.variable), count, *bounds, LATER, span=head)
+    context.generate(node.body)
+    out.emit(Op.JMP, top, span=head)
+    out.land(over)
+
+
+def cobegin(context: Context, node: tree.Cobegin) -> None:
+    """Generate branches; HALT in one ends the program, also where the branch is part of an action."""
+    out = context.out
+    forks = []
+    for branch in node.branches:
+        priority = () if branch.priority is None else (branch.priority.value,)
+        forks.append(out.emit(Op.FORK, LATER, *priority, span=branch.head))
+    join = out.emit(Op.JOIN, span=node.span)
+    over = out.emit(Op.JMP, LATER, span=out.instructions[join].span)
+    for branch, fork in zip(node.branches, forks, strict=True):
+        out.land(fork)
+        context.generate_with(*branch.body.statements, in_action=False)
+        out.begin()
+        out.emit(Op.QUIT, span=branch.body.end)
+    out.land(over)
+
+
+def signal(context: Context, node: tree.Signal) -> None:
+    """Generate one SIGNAL."""
+    context.out.emit(Op.SIG, context.operand(node.event), span=node.span)
+
+
+def wait(context: Context, node: tree.Wait) -> None:
+    """Generate one WAIT."""
+    context.out.emit(Op.WAIT, context.operand(node.event), span=node.span)
+
+
+def pause(context: Context, node: tree.Pause) -> None:
+    """Generate one PAUSE."""
+    context.out.emit(Op.PAUSE, context.out.value(node.duration), span=node.span)
+
+
+def lock(context: Context, node: tree.Lock) -> None:
+    """Generate a body between LOCK and UNLK of the same variables."""
+    locked = [context.operand(target) for target in node.targets]
+    context.out.emit(Op.LOCK, *locked, span=node.head)
+    context.generate(node.body)
+    context.out.emit(Op.UNLK, *locked, span=node.head)
+
+
+def try_(context: Context, node: tree.Try) -> None:
+    """Generate both parts of a TRY."""
+    out = context.out
+    attempt = out.emit(Op.TRY, LATER, span=node.span)
+    context.generate(*node.body)
+    succeeded = out.emit(Op.ENDT, LATER, span=node.span)
+    out.land(attempt)
+    context.generate(*node.recovery)
+    out.emit(Op.ENDR, span=node.span)
+    out.land(succeeded)
+
+
+def retry(context: Context, node: tree.Retry) -> None:
+    """Generate one RETRY."""
+    context.out.emit(Op.RETRY, span=node.span)
+
+
+def halt(context: Context, node: tree.Halt) -> None:
+    """Generate one HALT: of the MOVE in an action, else of the program."""
+    context.out.emit(Op.MVHLT if context.in_action else Op.HALT, span=node.span)
+
+
+def call(context: Context, node: tree.Call) -> None:
+    """Generate the arguments of a call, then the call."""
+    values = [context.out.value(argument) for argument in node.arguments]
+    context.out.emit(Op.CALL, node.name.key, *values, span=node.span)
+
+
+GENERATORS: Mapping[type, Generate] = {
+    tree.Block: block,
+    tree.If: if_,
+    tree.While: while_,
+    tree.Repeat: repeat,
+    tree.For: for_,
+    tree.Cobegin: cobegin,
+    tree.Signal: signal,
+    tree.Wait: wait,
+    tree.Pause: pause,
+    tree.Lock: lock,
+    tree.Try: try_,
+    tree.Retry: retry,
+    tree.Halt: halt,
+    tree.Call: call,
+}

@@ -1,0 +1,38 @@
+"""Code of AFFIX, UNFIX and assignments."""
+
+from collections.abc import Mapping
+
+from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.instructions import (
+    Op,
+)
+from armwright.program.syntax import tree
+
+
+def assign(context: Context, node: tree.Assign) -> None:
+    """Generate the value, and let the last instruction stand for the whole statement."""
+    out, to = context.out, str(context.operand(node.target))
+    if isinstance(node.value, tree.Number):
+        out.emit(Op.LOADS, to, out.constant(out.number(node.value)), span=node.span)
+        return
+    out.value(node.value, to)
+    last = out.instructions[-1]
+    out.instructions[-1] = type(last)(op=last.op, operands=last.operands, span=node.span, begins=last.begins)
+
+
+def affix(context: Context, node: tree.Affix) -> None:
+    """Generate one AFFIX."""
+    operands = [context.operand(node.child), context.operand(node.parent)]
+    if node.at is not None:
+        operands.append(context.out.value(node.at))
+    rigid = ("RIGIDLY",) if node.rigid else ()
+    context.out.emit(Op.AFFIX if node.at is None else Op.AFFAT, *operands, *rigid, span=node.span)
+
+
+def unfix(context: Context, node: tree.Unfix) -> None:
+    """Generate one UNFIX."""
+    above = () if node.parent is None else (context.operand(node.parent),)
+    context.out.emit(Op.UNFIX, context.operand(node.child), *above, span=node.span)
+
+
+GENERATORS: Mapping[type, Generate] = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}

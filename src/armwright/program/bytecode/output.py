@@ -1,0 +1,19 @@
+"""Code of PRINT."""
+
+from collections.abc import Mapping
+
+from armwright.program.bytecode.context import Context, Generate
+from armwright.program.bytecode.instructions import (
+    Op,
+    Text,
+)
+from armwright.program.syntax import tree
+
+
+def print_(context: Context, node: tree.Print) -> None:
+    """Generate one PRINT."""
+    items = [Text(item.value) if isinstance(item, tree.String) else context.out.value(item) for item in node.items]
+    context.out.emit(Op.PRINT, *items, span=node.span)
+
+
+GENERATORS: Mapping[type, Generate] = {tree.Print: print_}

@@ -1,0 +1,51 @@
+"""What the checks of all statements share: the names of the program, its calls, and where a statement stands."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
+
+import attrs
+
+from armwright.program.language.source import Span
+from armwright.program.semantics.calls import Calls
+from armwright.program.semantics.scopes import Names, Procedure
+from armwright.program.syntax import tree
+
+Check: TypeAlias = Callable[["Context", Any], None]
+
+
+@attrs.define
+class Context:
+    """Where statements are checked.
+
+    Attributes:
+        checks: of each kind of statement.
+        names: of the program, and what is wrong so far.
+        calls: of procedures.
+        procedure: in which the statements stand; None for the main program.
+        recovering: whether they stand in a RECOVER part, whose TRY can be started again.
+    """
+
+    checks: Mapping[type, Check]
+    names: Names
+    calls: Calls
+    procedure: Procedure | None = None
+    recovering: bool = False
+
+    def check(self, *statements: tree.Statement) -> None:
+        """Check statements, one after the other."""
+        for statement in statements:
+            self.checks[type(statement)](self, statement)
+
+    def check_concurrent(self, statement: tree.Statement) -> None:
+        """Check what runs beside the statements around it: it cannot start their TRY again."""
+        self.check_with(statement, recovering=False)
+
+    def check_with(self, *statements: tree.Statement, recovering: bool) -> None:
+        """Check statements as those of a RECOVER part, or as others."""
+        outside, self.recovering = self.recovering, recovering
+        self.check(*statements)
+        self.recovering = outside
+
+    def changes(self, node: tree.Expression, span: Span) -> None:
+        """Note that a statement changes a variable, which may be a parameter."""
+        self.calls.changes(node, self.procedure, span)

@@ -1,0 +1,160 @@
+"""Control flow: choices, loops, processes, events, locks, recovery, calls."""
+
+from collections.abc import Mapping
+
+from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.expression_types import (
+    Sort,
+    a_type,
+)
+from armwright.program.semantics.quantities import in_range, measure
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.type_check import condition, need, quantity, sort
+from armwright.program.syntax import tree
+
+
+def block(context: Context, node: tree.Block) -> None:
+    """Check the statements of a block."""
+    context.check(*node.statements)
+
+
+def if_(context: Context, node: tree.If) -> None:
+    """Check conditions and statements of IF and the ELSE IFs behind it."""
+    chain, otherwise = node.chain
+    for choice in chain:
+        condition(context.names, choice.condition, "IF")
+        context.check(choice.then)
+    if otherwise is not None:
+        context.check(otherwise)
+
+
+def while_(context: Context, node: tree.While) -> None:
+    """Check condition and body of WHILE."""
+    condition(context.names, node.condition, "WHILE")
+    context.check(node.body)
+
+
+def repeat(context: Context, node: tree.Repeat) -> None:
+    """Check body and condition of REPEAT."""
+    context.check(*node.body)
+    condition(context.names, node.condition, "UNTIL")
+
+
+def for_(context: Context, node: tree.For) -> None:
+    """Check variable, bounds, step and body of a FOR."""
+    names, variable = context.names, node.variable
+    if isinstance(variable, tree.Poison):
+        names.use(variable.names)
+    else:
+        kind = names.type(variable)
+        if kind is not None and kind != VariableType(VariableKind.SCALAR):
+            names.poison(variable.key)
+            names.found.say(
+                "E229",
+                f"FOR counts with a SCALAR, but `{variable.text}` is {a_type(kind)}",
+                variable.span,
+                str(kind),
+                secondary=names.where_declared(variable.key),
+            )
+    for bound in (node.first, node.last, node.step):
+        if bound is not None:
+            need(names, bound, Sort.SCALAR, "E229", "FOR counts in numbers")
+    if isinstance(node.step, tree.Number) and node.step.value == 0:
+        text = "a FOR with STEP 0 would never end"
+        names.found.say("E229", text, node.step.span, "goes nowhere", helps=("leave STEP out to count by 1",))
+    context.check(node.body)
+
+
+def cobegin(context: Context, node: tree.Cobegin) -> None:
+    """Check priorities and bodies of branches."""
+    for branch in node.branches:
+        if branch.priority is not None:
+            measure(context.names, branch.priority, None, "a priority has no unit")
+        context.check_concurrent(branch.body)
+
+
+def signal(context: Context, node: tree.Signal) -> None:
+    """Check the event of a SIGNAL."""
+    _event(context.names, node.event, "SIGNAL")
+
+
+def wait(context: Context, node: tree.Wait) -> None:
+    """Check the event of a WAIT."""
+    _event(context.names, node.event, "WAIT")
+
+
+def _event(names: Names, node: tree.Variable, who: str) -> None:
+    """Check what SIGNAL or WAIT is about."""
+    need(
+        names,
+        node,
+        Sort.EVENT,
+        "E223",
+        f"{who} needs an EVENT",
+        helps=lambda _: "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`",
+    )
+
+
+def pause(context: Context, node: tree.Pause) -> None:
+    """Check the time of a PAUSE."""
+    if quantity(context.names, node.duration, "time", "PAUSE needs a time"):
+        in_range(context.names, node.duration, "a pause", zero=True)
+
+
+def lock(context: Context, node: tree.Lock) -> None:
+    """Check what is locked, which may be of any kind, and a whole array too; then the body."""
+    for target in node.targets:
+        if isinstance(target, tree.Name):
+            context.names.type(target)
+        else:
+            sort(context.names, target)
+    context.check(node.body)
+
+
+def try_(context: Context, node: tree.Try) -> None:
+    """Check both parts. An error in a RECOVER part goes outward: a TRY inside of it has a RECOVER of its own."""
+    context.check_with(*node.body, recovering=False)
+    context.check_with(*node.recovery, recovering=True)
+
+
+def retry(context: Context, node: tree.Retry) -> None:
+    """Check that a RETRY stands in a RECOVER part."""
+    if not context.recovering:
+        context.names.found.say(
+            "E225",
+            "RETRY stands outside of RECOVER",
+            node.span,
+            "retry what?",
+            notes=("RETRY runs the TRY part again to whose RECOVER it belongs",),
+            helps=("write `TRY ... RECOVER ... RETRY END`",),
+        )
+
+
+def call(context: Context, node: tree.Call) -> None:
+    """Check procedure and arguments of a call."""
+    context.calls.check(node, context.procedure)
+
+
+def mention(context: Context, node: tree.Poison) -> None:
+    """Use the names of what could not be read."""
+    context.names.mention(node.names)
+
+
+CHECKS: Mapping[type, Check] = {
+    tree.Block: block,
+    tree.If: if_,
+    tree.While: while_,
+    tree.Repeat: repeat,
+    tree.For: for_,
+    tree.Cobegin: cobegin,
+    tree.Signal: signal,
+    tree.Wait: wait,
+    tree.Pause: pause,
+    tree.Lock: lock,
+    tree.Try: try_,
+    tree.Retry: retry,
+    tree.Halt: lambda *_: None,
+    tree.Call: call,
+    tree.Poison: mention,
+}

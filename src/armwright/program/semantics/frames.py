@@ -1,0 +1,134 @@
+"""AFFIX, UNFIX and assignments: what gives variables their values and frames their parents."""
+
+from collections.abc import Mapping
+
+from armwright.program.language.words import Standard
+from armwright.program.semantics import events
+from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.expression_types import (
+    FITTING,
+    Sort,
+    bare,
+    called,
+    is_what,
+    plain_keys,
+    written,
+)
+from armwright.program.semantics.scopes import Names
+from armwright.program.semantics.type_check import declared, is_world, need, refuse_world, sort
+from armwright.program.syntax import tree
+
+_TAKES = {Sort.SCALAR: "a number", Sort.FRAME: "a place", Sort.TRANS: "a step"}
+
+
+def assign(context: Context, node: tree.Assign) -> None:
+    """Check that a variable can be given a value, and gets one of its kind."""
+    context.changes(node.target, node.span)
+    names, target = context.names, node.target
+    given = sort(names, node.value)
+    if isinstance(target, tree.ArmName):
+        help_ = f"move it, or write `READ SYSTEM ({target.key})`"
+        names.found.say(
+            "E218", f"`{target.text}` is an arm and cannot be given a value", target.span, "an arm", helps=(help_,)
+        )
+    elif is_world(target):
+        refuse_world(names, target)
+    else:
+        takes = sort(names, target)
+        if takes is Sort.EVENT:
+            events.refuse(names, target, "given a value")
+        elif takes is not given and takes is not None and given is not None and given not in FITTING[takes]:
+            _misfit(names, node, takes, given)
+
+
+def _misfit(names: Names, node: tree.Assign, takes: Sort, given: Sort) -> None:
+    target, value = node.target, node.value
+    if given is Sort.EVENT:
+        events.refuse(names, value, "a value")
+        return
+    if not names.first("E217", *plain_keys(target)):
+        return
+    if names.std is Standard.RLO_83:
+        what = "one number" if takes is Sort.SCALAR else "twelve numbers in `( )`"
+        message, label = "", "a matrix" if given is Sort.MATRIX else "one number"
+    else:
+        what, is_one = _TAKES[takes], is_what(value, given)
+        message, label = f", but {called(value)} is {is_one}", bare(is_one)
+    help_ = _advice(target, value, takes, given) if message else ""
+    names.found.say(
+        "E217",
+        f"{called(target)} is {takes.value} and takes {what}{message}",
+        value.span,
+        label,
+        secondary=declared(names, target),
+        helps=(help_,) if help_ else (),
+    )
+
+
+def _advice(target: tree.Expression, value: tree.Expression, takes: Sort, given: Sort) -> str:
+    match takes, given:
+        case _, Sort.INVERSE:
+            return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
+        case Sort.SCALAR, Sort.CONDITION:
+            return f"write `IF {written(value)} THEN {written(target)} = 1 ELSE {written(target)} = 0`"
+        case Sort.FRAME, Sort.TRANS:
+            return f"for the place at this step from WORLD write `WORLD * {written(value)}`"
+        case Sort.TRANS, Sort.FRAME:
+            return f"for the step from WORLD to this place write `INV(WORLD) * {written(value)}`"
+        case ((Sort.FRAME | Sort.TRANS), Sort.SCALAR):
+            return "write twelve numbers in `( )`, or make a step from numbers by XYZ, ROTX, ROTY and ROTZ"
+        case _:
+            return ""
+
+
+def affix(context: Context, node: tree.Affix) -> None:
+    """Check child, parent and step of one AFFIX."""
+    names = context.names
+    context.changes(node.child, node.link)
+    if node.rigid:
+        context.changes(node.parent, node.link)
+    whence = written(node.parent)
+    swap = isinstance(node.child, tree.ArmName) and isinstance(node.parent, tree.Name | tree.Index)
+    helps = (f"did you mean `AFFIX {whence} TO {written(node.child)}`?",) if swap else ()
+    _child(names, node.child, "AFFIX hangs", "affixed to a frame", helps)
+    need(names, node.parent, Sort.FRAME, "E215", "AFFIX ... TO needs a FRAME or an arm")
+    if node.at is None:
+        return
+    where, is_arm = written(node.at), isinstance(node.at, tree.ArmName)
+
+    def advice(found: Sort) -> str:
+        is_place = found is Sort.FRAME and not (is_arm and names.std is Standard.RLO_83)
+        return f"for the step from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
+
+    need(
+        names,
+        node.at,
+        Sort.TRANS,
+        "E210",
+        "AT needs a TRANS",
+        notes=("a FRAME is a place in the cell; a TRANS is the step from one frame to another",),
+        helps=advice,
+    )
+
+
+def unfix(context: Context, node: tree.Unfix) -> None:
+    """Check child and parent of one UNFIX."""
+    context.changes(node.child, node.span)
+    _child(context.names, node.child, "UNFIX cuts", "unfixed")
+    if node.parent is not None:
+        need(context.names, node.parent, Sort.FRAME, "E215", "FROM needs a FRAME or an arm")
+
+
+def _child(names: Names, node: tree.Mobile, verb: str, done: str, helps: tuple[str, ...] = ()) -> None:
+    """Check the frame that AFFIX hangs or UNFIX cuts."""
+    if isinstance(node, tree.ArmName):
+        text = f"an arm cannot be {done}"
+        names.found.say("E308", text, node.span, "an arm hangs on its own base", helps=helps)
+    elif is_world(node):
+        text = f"{called(node)} cannot be {done.partition(' ')[0]}"
+        names.found.say("E309", text, node.span, "the root of all frames")
+    else:
+        need(names, node, Sort.FRAME, "E215", f"{verb} a FRAME")
+
+
+CHECKS: Mapping[type, Check] = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}

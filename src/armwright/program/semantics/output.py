@@ -1,0 +1,21 @@
+"""PRINT."""
+
+from collections.abc import Mapping
+
+from armwright.program.semantics import events
+from armwright.program.semantics.context import Check, Context
+from armwright.program.semantics.expression_types import (
+    Sort,
+)
+from armwright.program.semantics.type_check import sort
+from armwright.program.syntax import tree
+
+
+def print_(context: Context, node: tree.Print) -> None:
+    """Check what is printed: anything but an EVENT."""
+    for item in node.items:
+        if not isinstance(item, tree.String) and sort(context.names, item) is Sort.EVENT:
+            events.refuse(context.names, item, "printed")
+
+
+CHECKS: Mapping[type, Check] = {tree.Print: print_}
