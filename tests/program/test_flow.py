@@ -9,7 +9,7 @@ from armwright.program import Compilation, KnownCell, Source, known_cell
 from armwright.program import compile as translate
 from armwright.program.bytecode.codegen import generate as code_of
 from armwright.program.bytecode.instructions import Code
-from armwright.program.flow_analysis.analysis import _Follower
+from armwright.program.flow_analysis.context import Context
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.interpreter import Limits, Machine, RunError
 from armwright.program.vm.interpreter import run as run_on
@@ -188,14 +188,14 @@ def test_warning_of_one_call_alone() -> None:
 def steps(text: str, monkeypatch: pytest.MonkeyPatch) -> int:
     """Return how many statements were followed, each as often as it was."""
     count = 0
-    one = _Follower.one
+    follow = Context.follow_one
 
-    def counted(self: _Follower, statement: object) -> None:
+    def counted(self: Context, statement: object) -> None:
         nonlocal count
         count += 1
-        one(self, statement)  # type: ignore[arg-type]
+        follow(self, statement)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(_Follower, "one", counted)
+    monkeypatch.setattr(Context, "follow_one", counted)
     assert not [found for found in compiled(text).diagnostics if found.is_error]
     monkeypatch.undo()
     return count

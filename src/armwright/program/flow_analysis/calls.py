@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 from armwright.program.flow_analysis import plausibility
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
-from armwright.program.flow_analysis.frames import give
 from armwright.program.flow_analysis.lattice import EVERYTHING, Shaky
 from armwright.program.flow_analysis.state import LAST, Activation, Called, Course
 from armwright.program.language.kinds import VariableKind, VariableType
@@ -141,7 +140,7 @@ class Calling:
             course.table.has(own)
             course.table.links.put(own, None)
             return own
-        give(course, own, course.number(argument) if kind.kind is VariableKind.SCALAR else None, span)
+        course.give(own, course.number(argument) if kind.kind is VariableKind.SCALAR else None, span)
         return own
 
     def _leave(self, procedure: ProcedureSymbols, activation: Activation) -> None:

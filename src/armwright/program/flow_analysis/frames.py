@@ -1,6 +1,9 @@
-"""What gives frames their places and hangs them on one another in the course of a program."""
+"""AFFIX, UNFIX and assignments: what has a value, and what hangs on what."""
+
+from collections.abc import Mapping
 
 from armwright.program.flow_analysis import plausibility, poses
+from armwright.program.flow_analysis.context import Step, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.state import Course
 from armwright.program.language.diagnostic import Label, Severity
@@ -26,22 +29,13 @@ def assign(course: Course, node: tree.Assign) -> None:
         plausibility.placed(course, frame, node.value)
         return
     if (name := course.variable(target, VariableKind.SCALAR)) is not None:
-        give(course, name, course.number(node.value), node.span)
+        course.give(name, course.number(node.value), node.span)
     elif (name := course.variable(target, VariableKind.TRANS)) is not None:
         plausibility.lengths(course, node.value)
         step = poses.certain(course, node.value)
-        give(course, name, None, node.span)
+        course.give(name, None, node.span)
         if not is_any(name):
             course.steps.put(name, step)
-
-
-def give(course: Course, name: str, value: tuple[float, Span] | None, span: Span) -> None:
-    """Give a number or step a value; ``value`` is that of a number that is certain."""
-    if is_any(name):
-        course.facts.wipe(name)
-        return
-    course.table.has(name)
-    course.numbers.put(name, None if value is None else (value[0], span))
 
 
 def place(course: Course, frame: str, node: tree.Expression, span: Span) -> None:
@@ -198,3 +192,6 @@ def _not_affixed(course: Course, node: tree.Unfix, child: str) -> None:
         secondary=(where,) if where else (),
         helps=(instead,),
     )
+
+
+STEPS: Mapping[type, Step] = {tree.Assign: of_state(assign), tree.Affix: of_state(affix), tree.Unfix: of_state(unfix)}

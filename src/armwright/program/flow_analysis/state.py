@@ -187,6 +187,14 @@ class Course:
         name = self.variable(node, VariableKind.SCALAR)
         return None if name is None or is_any(name) else self.numbers[name]
 
+    def give(self, name: str, value: tuple[float, Span] | None, span: Span) -> None:
+        """Give a number or step a value; ``value`` is that of a number that is certain."""
+        if is_any(name):
+            self.facts.wipe(name)
+            return
+        self.table.has(name)
+        self.numbers.put(name, None if value is None else (value[0], span))
+
     def holds(self, node: tree.Expression) -> bool | None:
         """Return whether a condition holds; None where that is not certain."""
         return constants.holds(node, self._known)
