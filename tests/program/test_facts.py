@@ -2,12 +2,12 @@
 
 import pytest
 
-from armwright.program.flow_analysis.lattice import Book, Facts, Shaky, same
+from armwright.program.flow_analysis.lattice import Facts, FactTable, Uncertainty, same
 
 
-def book(facts: Facts) -> Book[int | None]:
+def book(facts: Facts) -> FactTable[int | None]:
     """Return a book of numbers, -1 where nobody knows."""
-    return Book(facts, default=None, unknown=-1, joined=lambda one, other: one if one == other else -1)
+    return FactTable(facts, default=None, unknown=-1, joined=lambda one, other: one if one == other else -1)
 
 
 def test_taken_back() -> None:
@@ -82,7 +82,7 @@ def test_shaky() -> None:
     """What others may change at any time stays unknown whatever is written."""
     facts = Facts()
     numbers = book(facts)
-    facts.shaky = (Shaky(names=frozenset({"A", "S[]"}), arms=True, excepted=frozenset({"ARM_1"})),)
+    facts.shaky = (Uncertainty(names=frozenset({"A", "S[]"}), arms=True, excepted=frozenset({"ARM_1"})),)
     for name in ("A", "B", "S[1]", "ARM_1", "ARM_10"):
         numbers.put(name, 1)
 

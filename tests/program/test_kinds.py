@@ -7,7 +7,7 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.semantics import check
-from armwright.program.semantics.expression_types import Sort, written
+from armwright.program.semantics.expression_types import ExpressionType, written
 from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.symbols import Symbols
 from armwright.program.semantics.type_check import sort
@@ -44,7 +44,7 @@ def expression(text: str) -> tree.Expression:
     return item
 
 
-def judged(text: str) -> tuple[Sort | None, list[Diagnostic]]:
+def judged(text: str) -> tuple[ExpressionType | None, list[Diagnostic]]:
     """Return what an expression is, and what is said of it."""
     names = Names(None)
     names.main.types.update(DECLARED)
@@ -59,34 +59,34 @@ def checked(text: str) -> tuple[Symbols, list[Diagnostic]]:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("1 + n * 2 / -n", Sort.SCALAR),
-        ("2mm", Sort.SCALAR),
-        ("DIST(f, ARM_1)", Sort.SCALAR),
-        ("FORCE(z)", Sort.SCALAR),
-        ("count[count[1]]", Sort.SCALAR),
-        ("n < 3", Sort.CONDITION),
-        ("NOT n = 1 AND (n > 2 OR n <> 4)", Sort.CONDITION),
-        ("ARM_1", Sort.FRAME),
-        ("WORLD", Sort.FRAME),
-        ("slot[2, n + 1]", Sort.FRAME),
-        ("f * t", Sort.FRAME),
-        ("ARM_1 * XYZ(0, 0, n) * ROTX(90)", Sort.FRAME),
-        (f"f * {UNIT}", Sort.FRAME),
-        ("t * u", Sort.TRANS),
-        (f"t * {UNIT}", Sort.TRANS),
-        ("INV(t)", Sort.TRANS),
-        ("INV(f) * g", Sort.TRANS),
-        ("INV(f) * g * t", Sort.TRANS),
-        (f"INV(f) * {UNIT}", Sort.TRANS),
-        ("INV(INV(f))", Sort.FRAME),
-        ("INV(f)", Sort.INVERSE),
-        (UNIT, Sort.MATRIX),
-        (f"{UNIT} * t", Sort.MATRIX),
-        (f"INV({UNIT} * {UNIT})", Sort.MATRIX),
-        ("e", Sort.EVENT),
+        ("1 + n * 2 / -n", ExpressionType.SCALAR),
+        ("2mm", ExpressionType.SCALAR),
+        ("DIST(f, ARM_1)", ExpressionType.SCALAR),
+        ("FORCE(z)", ExpressionType.SCALAR),
+        ("count[count[1]]", ExpressionType.SCALAR),
+        ("n < 3", ExpressionType.CONDITION),
+        ("NOT n = 1 AND (n > 2 OR n <> 4)", ExpressionType.CONDITION),
+        ("ARM_1", ExpressionType.FRAME),
+        ("WORLD", ExpressionType.FRAME),
+        ("slot[2, n + 1]", ExpressionType.FRAME),
+        ("f * t", ExpressionType.FRAME),
+        ("ARM_1 * XYZ(0, 0, n) * ROTX(90)", ExpressionType.FRAME),
+        (f"f * {UNIT}", ExpressionType.FRAME),
+        ("t * u", ExpressionType.TRANS),
+        (f"t * {UNIT}", ExpressionType.TRANS),
+        ("INV(t)", ExpressionType.TRANS),
+        ("INV(f) * g", ExpressionType.TRANS),
+        ("INV(f) * g * t", ExpressionType.TRANS),
+        (f"INV(f) * {UNIT}", ExpressionType.TRANS),
+        ("INV(INV(f))", ExpressionType.FRAME),
+        ("INV(f)", ExpressionType.INVERSE),
+        (UNIT, ExpressionType.MATRIX),
+        (f"{UNIT} * t", ExpressionType.MATRIX),
+        (f"INV({UNIT} * {UNIT})", ExpressionType.MATRIX),
+        ("e", ExpressionType.EVENT),
     ],
 )
-def test_kinds(text: str, expected: Sort) -> None:
+def test_kinds(text: str, expected: ExpressionType) -> None:
     """A place is moved by a step to a place, steps follow one another, and two places are a step apart."""
     assert judged(text) == (expected, [])
 

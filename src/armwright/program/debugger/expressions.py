@@ -14,7 +14,7 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.semantics import type_check
-from armwright.program.semantics.expression_types import FITTING, OF_KIND, Sort, is_what
+from armwright.program.semantics.expression_types import FITTING, OF_KIND, ExpressionType, is_what
 from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.syntax import tree
@@ -43,7 +43,7 @@ class Parsed:
 
     source: Source
     node: tree.Expression
-    sort: Sort | None
+    sort: ExpressionType | None
 
 
 def names_at(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
@@ -103,7 +103,7 @@ def compute(machine: Machine, process: Process, frame: Frame, parsed: Parsed) ->
     """
     try:
         here, asking, operand = _worked_out(machine, process, frame, parsed)
-        if parsed.sort is Sort.EVENT:
+        if parsed.sort is ExpressionType.EVENT:
             return float(here.events.get(here.name(asking, operand), 0))
         return here.read(asking, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
     except RunError as error:
@@ -151,7 +151,7 @@ def condition(text: str, types: Mapping[str, VariableType], code: Code) -> Parse
         ExpressionError: it is neither.
     """
     parsed = parse(text, types, code)
-    if parsed.sort not in (Sort.CONDITION, Sort.SCALAR):
+    if parsed.sort not in (ExpressionType.CONDITION, ExpressionType.SCALAR):
         raise ExpressionError(f"expected a condition, such as `n > 0`, but `{text}` is none")
     return parsed
 

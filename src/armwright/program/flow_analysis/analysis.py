@@ -10,7 +10,7 @@ import attrs
 
 from armwright.program.flow_analysis import concurrency, control_flow, data_races, devices, frames, move, output
 from armwright.program.flow_analysis.context import Context, Step
-from armwright.program.flow_analysis.state import Course
+from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.semantics.cell_symbols import KnownCell
@@ -61,10 +61,10 @@ def check(
     Returns:
         What the translator needs, and what is wrong.
     """
-    course = Course(program, symbols, spelling, cell, source=source, strict=strict)
-    context = Context(STEPS, course)
+    state = FlowState(program, symbols, spelling, cell, source=source, strict=strict)
+    context = Context(STEPS, state)
     context.follow(*program.statements)
-    course.over = False
+    state.over = False
     context.follow_uncalled()
-    found = [*course.found, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
-    return Flow(arms=course.arms, implied=course.implied), found
+    found = [*state.found, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
+    return Flow(arms=state.arms, implied=state.implied), found

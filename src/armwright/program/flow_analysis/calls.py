@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from armwright.program.flow_analysis import plausibility
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
-from armwright.program.flow_analysis.lattice import EVERYTHING, Shaky
-from armwright.program.flow_analysis.state import LAST, Activation, Called, Course
+from armwright.program.flow_analysis.lattice import EVERYTHING, Uncertainty
+from armwright.program.flow_analysis.state import LAST, Activation, Called, FlowState
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Span
 from armwright.program.semantics.symbols import ProcedureSymbols
@@ -19,14 +19,14 @@ _BY_VALUE = (VariableKind.SCALAR, VariableKind.TRANS)
 class Calling:
     """Follows calls, as far as that takes no end."""
 
-    def __init__(self, course: Course, follow: Callable[[tuple[tree.Statement, ...]], None]) -> None:
+    def __init__(self, state: FlowState, follow: Callable[[tuple[tree.Statement, ...]], None]) -> None:
         """Start outside of all procedures.
 
         Args:
-            course: the state.
+            state: the state.
             follow: follows the statements of a procedure.
         """
-        self._course, self._follow = course, follow
+        self._state, self._follow = state, follow
         self._count = 0
         self._left = _MOST_STATEMENTS
         # Procedures that are followed at each call, and those of which that is not so.
@@ -35,31 +35,31 @@ class Calling:
 
     def step(self) -> None:
         """Count one statement."""
-        if self._course.calls:
+        if self._state.calls:
             self._left -= 1
 
     def call(self, node: tree.Call, *, follow: bool) -> None:
         """Follow one call, or forget what it may change."""
-        course = self._course
-        procedure = course.symbols.procedures.get(node.name.key)
+        state = self._state
+        procedure = state.symbols.procedures.get(node.name.key)
         if procedure is None:
-            need(course, *(one for one in node.arguments if not isinstance(one, tree.Name)))
+            need(state, *(one for one in node.arguments if not isinstance(one, tree.Name)))
             return
         key = procedure.node.name.key
         self._needs(procedure, node)
-        plausibility.lengths(course, *node.arguments)
-        deep = len(course.calls) >= _DEEPEST or self._left <= 0 or any(one.name == key for one in course.calls)
+        plausibility.lengths(state, *node.arguments)
+        deep = len(state.calls) >= _DEEPEST or self._left <= 0 or any(one.name == key for one in state.calls)
         if deep or not follow or len(node.arguments) != len(procedure.parameters):
             self.pass_over(key)
-            writes = course.writing.called(node, course.now.scope)
+            writes = state.writing.called(node, state.now.scope)
             self._left -= len(writes.names)
-            course.forget(writes)
+            state.forget(writes)
             return
         self._seen.add(key)
         activation = self._activation(procedure, node)
-        with course.inside(activation, Called(key, node.name.text, node.span)):
+        with state.inside(activation, Called(key, node.name.text, node.span)):
             self._follow(procedure.node.body.statements)
-        if not course.over:
+        if not state.over:
             self._leave(procedure, activation)
 
     def pass_over(self, key: str) -> None:
@@ -68,20 +68,20 @@ class Calling:
 
     def others(self) -> None:
         """Follow what was not followed at each call once more, knowing nothing of what it is called with."""
-        course = self._course
+        state = self._state
         done: set[str] = set()
         while waiting := sorted(
-            key for key in course.symbols.procedures if key not in done and not self._is_followed(key)
+            key for key in state.symbols.procedures if key not in done and not self._is_followed(key)
         ):
             for key in waiting:
                 done.add(key)
-                self._follow_unknown(course.symbols.procedures[key])
+                self._follow_unknown(state.symbols.procedures[key])
 
     def _is_followed(self, key: str) -> bool:
         return key in self._seen and key not in self._passed_over
 
     def _follow_unknown(self, procedure: ProcedureSymbols) -> None:
-        course, facts = self._course, self._course.facts
+        state, facts = self._state, self._state.facts
         mark = facts.mark()
         facts.wipe(EVERYTHING)
         activation = self._activation(procedure, None)
@@ -89,28 +89,28 @@ class Calling:
             name for key in procedure.types if (name := activation.bindings[key]) and key not in procedure.parameters
         ]
         # Parameters may be the same frame as another, so that all but own variables may change at any time.
-        facts.shaky = (Shaky(everything=True, excepted=frozenset((LAST, *own)), places=True, aliases=True),)
-        with course.inside(activation):
+        facts.shaky = (Uncertainty(everything=True, excepted=frozenset((LAST, *own)), places=True, aliases=True),)
+        with state.inside(activation):
             self._follow(procedure.node.body.statements)
-        facts.shaky, course.over = (), False
+        facts.shaky, state.over = (), False
         facts.take_back(mark)
 
     # ---- parameters ------------------------------------------------------------------------------------------------
 
     def _needs(self, procedure: ProcedureSymbols, node: tree.Call) -> None:
         """Say which arguments need a value and have none: all but variables that are given themselves."""
-        course = self._course
+        state = self._state
         for parameter, argument in zip(procedure.parameters, node.arguments, strict=False):
             kind = procedure.types.get(parameter)
             by_value = kind is not None and not kind.sizes and kind.kind in _BY_VALUE
             if by_value or not isinstance(argument, tree.Name | tree.Index):
-                need(course, argument)
+                need(state, argument)
             else:
-                need_indices(course, argument)
+                need_indices(state, argument)
 
     def _activation(self, procedure: ProcedureSymbols, node: tree.Call | None) -> Activation:
         """Return where a procedure keeps its names; None as the call stands for one that is not known."""
-        course = self._course
+        state = self._state
         self._count += 1
         given = dict(zip(procedure.parameters, node.arguments, strict=True)) if node else {}
         bindings: dict[str, str | None] = {}
@@ -119,28 +119,28 @@ class Calling:
             argument = given.get(key)
             bindings[key] = own
             if key not in procedure.parameters:
-                course.table.lacks(own)
-                course.table.links.put(own, None)
+                state.table.lacks(own)
+                state.table.links.put(own, None)
             elif argument is None:
-                course.table.has(own)
+                state.table.has(own)
             else:
                 bindings[key] = self._bound(argument, kind, own, node.span if node else argument.span)
-        return Activation(scope=course.symbols.scope(procedure.node.name.key), bindings=bindings)
+        return Activation(scope=state.symbols.scope(procedure.node.name.key), bindings=bindings)
 
     def _bound(self, argument: tree.Expression, kind: VariableType | None, own: str, span: Span) -> str | None:
         """Return where a parameter is kept: where its argument is, or in a place of its own."""
-        course = self._course
+        state = self._state
         if kind is None:
             return None
         if kind.sizes or kind.kind is VariableKind.EVENT:
-            return course.bound(argument.key) if isinstance(argument, tree.Name) else None
+            return state.bound(argument.key) if isinstance(argument, tree.Name) else None
         if kind.kind is VariableKind.FRAME:
             if isinstance(argument, tree.Name | tree.Index | tree.ArmName | tree.Poison):
-                return course.frame(argument)
-            course.table.has(own)
-            course.table.links.put(own, None)
+                return state.frame(argument)
+            state.table.has(own)
+            state.table.links.put(own, None)
             return own
-        course.give(own, course.number(argument) if kind.kind is VariableKind.SCALAR else None, span)
+        state.give(own, state.number(argument) if kind.kind is VariableKind.SCALAR else None, span)
         return own
 
     def _leave(self, procedure: ProcedureSymbols, activation: Activation) -> None:
@@ -148,4 +148,4 @@ class Calling:
         for key, kind in procedure.types.items():
             kept = activation.bindings[key]
             if kept is not None and "'" in kept and kind is not None and kind.kind is VariableKind.FRAME:
-                self._course.table.drop(kept, array=bool(kind.sizes))
+                self._state.table.drop(kept, array=bool(kind.sizes))

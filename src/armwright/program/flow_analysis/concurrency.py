@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import attrs
 
 from armwright.program.flow_analysis.side_effects import every, parts, written_name
-from armwright.program.flow_analysis.state import Course, Use, Uses
+from armwright.program.flow_analysis.state import FlowState, Use, Uses
 from armwright.program.language.diagnostic import Diagnostic, Findings, Label, Severity
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Source
@@ -64,23 +64,23 @@ def _priorities(found: Findings, fork: tree.Cobegin, source: Source) -> None:
             )
 
 
-def shared_arms(course: Course, branches: Sequence[Uses]) -> None:
+def shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
     """Say which arms are used by more than one branch.
 
     Args:
-        course: for what is found.
+        state: for what is found.
         branches: what each branch of one COBEGIN uses.
     """
     seen: dict[str, Use] = {}
     used = {arm for branch in branches for arm in branch.arms}
     for branch in branches:
         for arm, use in branch.arms.items():
-            free = _other(course, used)
+            free = _other(state, used)
             first = seen.setdefault(arm, use)
             if first is use:
                 continue
             does = "moved" if first.moves and use.moves else "used"
-            course.say(
+            state.say(
                 "E503",
                 f"{arm} is {does} in two branches of one COBEGIN",
                 use.span,
@@ -91,9 +91,9 @@ def shared_arms(course: Course, branches: Sequence[Uses]) -> None:
             )
 
 
-def _other(course: Course, used: set[str]) -> str:
+def _other(state: FlowState, used: set[str]) -> str:
     """Return an arm that no branch uses."""
-    free = sorted(course.cell.arms - used) if course.cell else []
+    free = sorted(state.cell.arms - used) if state.cell else []
     return free[0] if free else next(arm for n in range(1, len(used) + 2) if (arm := f"ARM_{n}") not in used)
 
 

@@ -6,10 +6,10 @@ from typing import Any, TypeAlias, TypeVar
 import attrs
 
 from armwright.program.flow_analysis.calls import Calling
-from armwright.program.flow_analysis.facts import Parting
+from armwright.program.flow_analysis.facts import Divergence
 from armwright.program.flow_analysis.lattice import Outcome
-from armwright.program.flow_analysis.side_effects import Writes, every
-from armwright.program.flow_analysis.state import Course
+from armwright.program.flow_analysis.side_effects import SideEffects, every
+from armwright.program.flow_analysis.state import FlowState
 from armwright.program.syntax import tree
 
 Node = TypeVar("Node", bound=tree.Statement)
@@ -19,9 +19,9 @@ Step: TypeAlias = Callable[["Context", Any], None]
 _DEEPEST = 100
 
 
-def of_state(change: Callable[[Course, Node], None]) -> Callable[["Context", Node], None]:
+def of_state(change: Callable[[FlowState, Node], None]) -> Callable[["Context", Node], None]:
     """Return the analysis of a statement that holds no others: it changes nothing but the state."""
-    return lambda context, node: change(context.course, node)
+    return lambda context, node: change(context.state, node)
 
 
 @attrs.define
@@ -30,13 +30,13 @@ class Context:
 
     Attributes:
         steps: how each kind of statement is followed.
-        course: the state.
+        state: the state.
         loops: how many loops are followed, one inside the other.
         recovering: whether the statements stand in a RECOVER part.
     """
 
     steps: Mapping[type, Step]
-    course: Course
+    state: FlowState
     loops: int = 0
     recovering: bool = False
     _depth: int = 0
@@ -44,13 +44,13 @@ class Context:
 
     def __attrs_post_init__(self) -> None:
         """Let calls follow the statements of procedures."""
-        self._calling = Calling(self.course, lambda statements: self.follow(*statements))
+        self._calling = Calling(self.state, lambda statements: self.follow(*statements))
 
     def follow(self, *statements: tree.Statement) -> None:
         """Follow statements, one after the other, up to a HALT; those that stand too deep only make things unknown."""
         for statement in statements:
-            if self.course.over:
-                self.course.unreached(statement.span)
+            if self.state.over:
+                self.state.unreached(statement.span)
                 return
             self.follow_one(statement)
 
@@ -73,28 +73,28 @@ class Context:
         self._calling.others()
 
     def _pass_over(self, statement: tree.Statement) -> None:
-        self.course.forget(self.writes(statement))
+        self.state.forget(self.writes(statement))
         for inner in every((statement,)):
             if isinstance(inner, tree.Move | tree.Grasp):
-                self.course.record(inner, None)
+                self.state.record(inner, None)
             elif isinstance(inner, tree.Call):
                 self._calling.pass_over(inner.name.key)
 
-    def writes(self, *statements: tree.Statement) -> Writes:
+    def writes(self, *statements: tree.Statement) -> SideEffects:
         """Return what statements may change."""
-        return self.course.writing.all(statements, self.course.now.scope)
+        return self.state.writing.all(statements, self.state.now.scope)
 
     def path(self, *statements: tree.Statement, mark: int | None = None) -> Outcome | None:
         """Follow one path from here and come back to a mark, or to here; None where HALT ends it."""
-        course, facts = self.course, self.course.facts
+        state, facts = self.state, self.state.facts
         start = facts.mark() if mark is None else mark
         self.follow(*statements)
-        outcome = None if course.over else facts.outcome(start)
+        outcome = None if state.over else facts.outcome(start)
         facts.take_back(start)
-        course.over = False
+        state.over = False
         return outcome
 
-    def merge(self, *outcomes: Outcome | None, parting: Parting | None = None) -> None:
+    def merge(self, *outcomes: Outcome | None, parting: Divergence | None = None) -> None:
         """Go on where paths merge; not at all if none of them comes here.
 
         Args:
@@ -103,8 +103,8 @@ class Context:
         """
         arrived = [outcome for outcome in outcomes if outcome is not None]
         if arrived:
-            self.course.table.parting = parting
-            self.course.facts.join(arrived)
-            self.course.table.parting = None
+            self.state.table.parting = parting
+            self.state.facts.join(arrived)
+            self.state.table.parting = None
         else:
-            self.course.over = True
+            self.state.over = True

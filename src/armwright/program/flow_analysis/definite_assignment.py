@@ -1,7 +1,7 @@
 """What has no value where it needs one, certainly or on some of the ways that lead there."""
 
-from armwright.program.flow_analysis.facts import Parting
-from armwright.program.flow_analysis.state import Course
+from armwright.program.flow_analysis.facts import Divergence
+from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label, Severity
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
@@ -9,62 +9,62 @@ from armwright.program.semantics.expression_types import written
 from armwright.program.syntax import tree
 
 
-def need(course: Course, *nodes: tree.Expression | None) -> None:
+def need(state: FlowState, *nodes: tree.Expression | None) -> None:
     """Say of each name in expressions that has certainly no value, once, that it needs one."""
     waiting = [node for node in reversed(nodes) if node is not None]
     while waiting:
         node = waiting.pop()
         if isinstance(node, tree.Name):
-            _need_variable(course, node)
+            _need_variable(state, node)
         elif isinstance(node, tree.Matrix):
             waiting += [item for item in reversed(node.items) if not isinstance(item, tree.Number)]
         elif isinstance(node, tree.Binary):
             # AND and OR look at the right side only where it matters.
             waiting += [node.left] if node.operation in ("AND", "OR") else [node.right, node.left]
         elif isinstance(node, tree.Index):
-            need(course, *node.indices)
-            _need_variable(course, node)
+            need(state, *node.indices)
+            _need_variable(state, node)
         elif isinstance(node, tree.Function):
             waiting += reversed(node.arguments if node.name.key != "FORCE" else ())
         elif isinstance(node, tree.ArmName):
-            course.look_up(node.key, node.span)
+            state.look_up(node.key, node.span)
         elif isinstance(node, tree.Unary):
             waiting.append(node.operand)
 
 
-def need_indices(course: Course, *nodes: object) -> None:
+def need_indices(state: FlowState, *nodes: object) -> None:
     """Say what is needed to find the variables that are written or named."""
     for node in nodes:
         if isinstance(node, tree.Index):
-            need(course, *node.indices)
+            need(state, *node.indices)
 
 
-def _kind(course: Course, node: tree.Expression) -> VariableKind | None:
+def _kind(state: FlowState, node: tree.Expression) -> VariableKind | None:
     key = node.name.key if isinstance(node, tree.Index) else getattr(node, "key", "")
-    kind = course.now.scope.type(key)
+    kind = state.now.scope.type(key)
     return None if kind is None or kind.kind is VariableKind.EVENT else kind.kind
 
 
-def _need_variable(course: Course, node: tree.Name | tree.Index) -> None:
-    name = course.variable(node)
+def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
+    name = state.variable(node)
     if name is None or is_any(name) or is_arm(name):
         return
-    if course.table.valued[name]:
-        parting = course.table.is_sure(name)
-        if isinstance(parting, Parting) and course.conditions <= parting.depth:
-            _uncertain(course, node, name, parting)
+    if state.table.valued[name]:
+        parting = state.table.is_sure(name)
+        if isinstance(parting, Divergence) and state.conditions <= parting.depth:
+            _uncertain(state, node, name, parting)
         return
     head = node.name if isinstance(node, tree.Index) else node
-    scope, kind = course.now.scope, _kind(course, node)
-    kept = course.bound(head.key)
-    if kept is None or kind is None or scope.is_poisoned(head.key) or not course.settle(kept):
+    scope, kind = state.now.scope, _kind(state, node)
+    kept = state.bound(head.key)
+    if kept is None or kind is None or scope.is_poisoned(head.key) or not state.settle(kept):
         return
     declared = scope.declared(head.key)
     secondary = (Label(declared.span, "declared here"),) if declared else ()
     if kind is VariableKind.FRAME:
-        _no_place(course, node, secondary, from_cell=kept == head.key and head is node)
+        _no_place(state, node, secondary, from_cell=kept == head.key and head is node)
         return
-    course.say(
+    state.say(
         "E303",
         f"`{written(node)}` is used before it has a value",
         node.span,
@@ -74,15 +74,15 @@ def _need_variable(course: Course, node: tree.Name | tree.Index) -> None:
     )
 
 
-def _uncertain(course: Course, node: tree.Name | tree.Index, name: str, parting: Parting) -> None:
+def _uncertain(state: FlowState, node: tree.Name | tree.Index, name: str, parting: Divergence) -> None:
     """Warn of a variable that has a value on one way here and none on the other.
 
     Where the use depends on a condition too, nothing is said: that may be the one on which it has the value.
     """
-    open_cell = course.cell is None and _kind(course, node) is VariableKind.FRAME
-    if open_cell or not course.settle(name):
+    open_cell = state.cell is None and _kind(state, node) is VariableKind.FRAME
+    if open_cell or not state.settle(name):
         return
-    course.say(
+    state.say(
         "W207",
         f"`{written(node)}` may have no value here",
         node.span,
@@ -93,14 +93,14 @@ def _uncertain(course: Course, node: tree.Name | tree.Index, name: str, parting:
     )
 
 
-def _no_place(course: Course, node: tree.Name | tree.Index, secondary: tuple[Label, ...], *, from_cell: bool) -> None:
+def _no_place(state: FlowState, node: tree.Name | tree.Index, secondary: tuple[Label, ...], *, from_cell: bool) -> None:
     """Say that a frame has no value; a cell file may give one to the frames of the program, and to no others."""
-    certain = course.cell is not None or not from_cell
+    certain = state.cell is not None or not from_cell
     note = "a frame gets its value from `=`, AFFIX ... AT, READ VISIONS or an imported cell file"
     if not certain:
         note = "no cell was given; a cell file may give it one"
-    nothing_yet = course.table.is_empty
-    course.say(
+    nothing_yet = state.table.is_empty
+    state.say(
         "E304" if certain else "W204",
         f"frame `{written(node)}` is used before it has a value",
         node.span,

@@ -7,7 +7,7 @@ from armwright.program.flow_analysis.context import Step, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import place
-from armwright.program.flow_analysis.state import LAST, Course
+from armwright.program.flow_analysis.state import LAST, FlowState
 from armwright.program.language.diagnostic import Label, Severity
 from armwright.program.language.names import is_arm
 from armwright.program.language.words import Standard
@@ -18,47 +18,47 @@ from armwright.program.syntax import tree
 # ---- the hand ------------------------------------------------------------------------------------------------------
 
 
-def open_(course: Course, node: tree.Open) -> None:
+def open_(state: FlowState, node: tree.Open) -> None:
     """Open the fingers of an arm."""
-    need(course, node.width)
+    need(state, node.width)
     if isinstance(node.arm, tree.ArmName):
-        course.mention(node.arm)
-        course.use(node.arm.key, node.span.to(node.arm.span))
-        course.table.open(node.arm.key, node.span)
+        state.mention(node.arm)
+        state.use(node.arm.key, node.span.to(node.arm.span))
+        state.table.open(node.arm.key, node.span)
 
 
-def grasp(course: Course, node: tree.Grasp) -> None:
+def grasp(state: FlowState, node: tree.Grasp) -> None:
     """Close the fingers of an arm; say which when no arm is named."""
-    course.mention(node.arm)
-    arm = node.arm.key if isinstance(node.arm, tree.ArmName) else course.last[LAST]
+    state.mention(node.arm)
+    arm = node.arm.key if isinstance(node.arm, tree.ArmName) else state.last[LAST]
     if node.arm is not None and not isinstance(node.arm, tree.ArmName):
         return
     if arm is None:
-        help_ = f"write `GRASP {course.some_arm()}`"
-        if course.symbols.std is Standard.RLO_83:
-            help_ = f"name one before, as `OPEN {course.some_arm()}` does"
+        help_ = f"write `GRASP {state.some_arm()}`"
+        if state.symbols.std is Standard.RLO_83:
+            help_ = f"name one before, as `OPEN {state.some_arm()}` does"
         text = "GRASP does not say which arm, and none has been used yet"
-        course.say("E307", text, node.span, "which arm?", helps=(help_,))
+        state.say("E307", text, node.span, "which arm?", helps=(help_,))
         return
-    course.record(node, None if arm == UNKNOWN else arm)
+    state.record(node, None if arm == UNKNOWN else arm)
     if arm == UNKNOWN:
-        course.lose_arms(grasps=True)
+        state.lose_arms(grasps=True)
         return
-    course.use(arm, node.span)
-    _closed_on_arrival(course, arm)
-    course.table.close(arm, node.span)
+    state.use(arm, node.span)
+    _closed_on_arrival(state, arm)
+    state.table.close(arm, node.span)
 
 
-def _closed_on_arrival(course: Course, arm: str) -> None:
+def _closed_on_arrival(state: FlowState, arm: str) -> None:
     """Point at a hand that came to its object without room for it between the fingers."""
-    hand = course.table.hands[arm]
+    hand = state.table.hands[arm]
     opened_late = hand.arrived_open is None and hand.opened is not None
     never_opened = hand.arrived_open is False and hand.opened is None
     if hand.arrival is None or hand.at is None or not (opened_late or never_opened):
         return
-    course.say(
+    state.say(
         "L301",
-        f"{arm} {'may come' if opened_late else 'comes'} to `{course.name(hand.at)}` with closed fingers",
+        f"{arm} {'may come' if opened_late else 'comes'} to `{state.name(hand.at)}` with closed fingers",
         hand.arrival,
         "it arrives here",
         secondary=(Label(hand.opened, "they open only here"),) if hand.opened else (),
@@ -70,32 +70,32 @@ def _closed_on_arrival(course: Course, arm: str) -> None:
 # ---- tools and sensors ---------------------------------------------------------------------------------------------
 
 
-def read_system(course: Course, node: tree.ReadSystem) -> None:
+def read_system(state: FlowState, node: tree.ReadSystem) -> None:
     """Ask the sensors of an arm where it is."""
     if isinstance(node.arm, tree.ArmName):
-        course.mention(node.arm)
-        course.use(node.arm.key, node.span)
+        state.mention(node.arm)
+        state.use(node.arm.key, node.span)
         # They may find the arm elsewhere, and with it what hangs on it.
-        course.table.displace(node.arm.key, by=node.arm.key)
+        state.table.displace(node.arm.key, by=node.arm.key)
 
 
-def read_visions(course: Course, node: tree.ReadVisions) -> None:
+def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
     """Ask the camera for frames."""
     for target in node.targets:
         if isinstance(target, tree.Poison):
             for name in sorted(target.names):
                 if not is_arm(name):
-                    course.table.forget(name)
+                    state.table.forget(name)
             continue
-        need_indices(course, target)
-        frame = course.frame(target)
+        need_indices(state, target)
+        frame = state.frame(target)
         if frame is None or frame == WORLD:
             continue
-        visions = course.cell.visions if course.cell else None
+        visions = state.cell.visions if state.cell else None
         own = "'" in frame or "[" in frame
-        if visions is not None and not own and frame not in visions and course.settle(frame):
+        if visions is not None and not own and frame not in visions and state.settle(frame):
             near = closest(written(target), visions)
-            course.say(
+            state.say(
                 "W601",
                 f"the camera of the cell has no answer for `{written(target)}`",
                 target.span,
@@ -103,12 +103,12 @@ def read_visions(course: Course, node: tree.ReadVisions) -> None:
                 helps=(f"did you mean `{near}`?",) if near else (),
                 severity=Severity.WARNING,
             )
-        place(course, frame, target, node.span)
+        place(state, frame, target, node.span)
 
 
-def operate(course: Course, node: tree.Operate) -> None:
+def operate(state: FlowState, node: tree.Operate) -> None:
     """Switch a device on or off."""
-    device, devices = node.device, course.cell.devices if course.cell else None
+    device, devices = node.device, state.cell.devices if state.cell else None
     if not isinstance(device, tree.Name) or devices is None:
         return
     known = {name.upper() for name in devices}
@@ -116,7 +116,7 @@ def operate(course: Course, node: tree.Operate) -> None:
         return
     near = closest(device.text, known)
     listed = ", ".join(sorted(known)) or "none"
-    course.say(
+    state.say(
         "R602",
         f"the cell has no device `{device.text}`",
         device.span,

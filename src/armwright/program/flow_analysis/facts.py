@@ -36,7 +36,7 @@ class Assignment:
 
 
 @attrs.frozen
-class Parting:
+class Divergence:
     """What gives a variable its value on one way and not on the other.
 
     Attributes:
@@ -53,7 +53,7 @@ class Parting:
 
 
 @attrs.frozen
-class Hand:
+class GripperState:
     """What is known of one hand, but for what it holds.
 
     Attributes:
@@ -84,7 +84,7 @@ class Grip:
 
 
 ANY_LINK = Link(None)
-ANY_HAND = Hand(doubtful=True, at=UNKNOWN)
+ANY_HAND = GripperState(doubtful=True, at=UNKNOWN)
 ANY_GRIP = Grip(UNKNOWN)
 
 
@@ -97,11 +97,11 @@ def joined_links(one: Link | None, other: Link | None) -> Link | None:
     return one
 
 
-def joined_hands(one: Hand, other: Hand) -> Hand:
+def joined_hands(one: GripperState, other: GripperState) -> GripperState:
     """Return what holds of a hand where two ways meet."""
     if one == other:
         return one
-    return Hand(
+    return GripperState(
         open=same(one.open, other.open),
         doubtful=one.doubtful or other.doubtful or one.open != other.open,
         at=one.at if one.at == other.at else UNKNOWN,

@@ -12,15 +12,15 @@ from armwright.program.flow_analysis.facts import (
     HANDS,
     UNKNOWN,
     Assignment,
+    Divergence,
     Grip,
-    Hand,
+    GripperState,
     Link,
-    Parting,
     joined_grips,
     joined_hands,
     joined_links,
 )
-from armwright.program.flow_analysis.lattice import Book, Facts, either, same
+from armwright.program.flow_analysis.lattice import Facts, FactTable, either, same
 from armwright.program.flow_analysis.poses import HERE, Place, after, inverse
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
@@ -30,7 +30,7 @@ from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
 _LONGEST_WAY = 50
 
 
-class Hanging:
+class FrameState:
     """Frames and hands, as far as one can know."""
 
     def __init__(self, cell: KnownCell | None, facts: Facts, *, rigid: bool = False) -> None:
@@ -44,18 +44,22 @@ class Hanging:
         self._facts, self._rigid = facts, rigid
         self._children: dict[str, int] = {}
         self._count = self._carried = self._doubts = self._assignments = self._order = 0
-        self.links: Book[Link | None] = Book(
+        self.links: FactTable[Link | None] = FactTable(
             facts, default=None, unknown=ANY_LINK, joined=joined_links, watch=self._watch
         )
-        self.valued = Book(facts, default=False, unknown=True, joined=either)
+        self.valued = FactTable(facts, default=False, unknown=True, joined=either)
         # Of what may have a value, whether it has one on every way here, or where the ways have parted.
-        self.sure: Book[Parting | bool] = Book(facts, default=False, unknown=True, joined=self._joined_sure)
-        self.parting: Parting | None = None
+        self.sure: FactTable[Divergence | bool] = FactTable(
+            facts, default=False, unknown=True, joined=self._joined_sure
+        )
+        self.parting: Divergence | None = None
         # Where frames stand, seen from what they hang on.
-        self._steps: Book[Place | None] = Book(facts, default=None, unknown=None, joined=same)
-        self.assigned: Book[Assignment | None] = Book(facts, default=None, unknown=None, joined=same)
-        self.hands = Book(facts, default=Hand(), unknown=ANY_HAND, joined=joined_hands, group=HANDS)
-        self.grips: Book[Grip | None] = Book(facts, default=None, unknown=ANY_GRIP, joined=joined_grips, group=GRIPS)
+        self._steps: FactTable[Place | None] = FactTable(facts, default=None, unknown=None, joined=same)
+        self.assigned: FactTable[Assignment | None] = FactTable(facts, default=None, unknown=None, joined=same)
+        self.hands = FactTable(facts, default=GripperState(), unknown=ANY_HAND, joined=joined_hands, group=HANDS)
+        self.grips: FactTable[Grip | None] = FactTable(
+            facts, default=None, unknown=ANY_GRIP, joined=joined_grips, group=GRIPS
+        )
         frames = dict(cell.frames) if cell else {}
         for name in (WORLD, STATION, *frames):
             self.has(name)
@@ -140,7 +144,7 @@ class Hanging:
         there, here = self.where(child), self.where(parent)
         return None if there is None or here is None else after(inverse(here), there)
 
-    def is_sure(self, name: str) -> "Parting | bool":
+    def is_sure(self, name: str) -> "Divergence | bool":
         """Return whether what may have a value has one on every way here; if not, where the ways parted."""
         return self.sure[name]
 
@@ -308,10 +312,10 @@ class Hanging:
 
     # ---- inside ----------------------------------------------------------------------------------------------------
 
-    def _joined_sure(self, one: Parting | bool, other: Parting | bool) -> Parting | bool:  # noqa: FBT001 - two values
+    def _joined_sure(self, one: Divergence | bool, other: Divergence | bool) -> Divergence | bool:  # noqa: FBT001 - two values
         if one == other:
             return one
-        return next((each for each in (one, other) if isinstance(each, Parting)), self.parting or True)
+        return next((each for each in (one, other) if isinstance(each, Divergence)), self.parting or True)
 
     def _hold(self, arm: str, grip: Grip, frame: str | None) -> None:
         """Let a hand hold something else than before, or nothing, or nobody knows what."""

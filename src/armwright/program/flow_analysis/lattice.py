@@ -18,7 +18,7 @@ def base(name: str) -> str:
 
 
 @attrs.frozen(kw_only=True)
-class Shaky:
+class Uncertainty:
     """What others change at any time, so that nothing can be known of it.
 
     Attributes:
@@ -49,7 +49,7 @@ class Shaky:
 class Outcome:
     """How a way through a part of a program ended: what it changed, and which names it forgot when."""
 
-    changed: Mapping[tuple["Book[Any]", str], Any]
+    changed: Mapping[tuple["FactTable[Any]", str], Any]
     wipes: Mapping[str, int]
 
 
@@ -60,8 +60,8 @@ class Facts:
         """Start without facts."""
         self.tick = 0
         self.wipes: dict[str, int] = {}
-        self.shaky: tuple[Shaky, ...] = ()
-        self._changes: list[tuple[Book[Any] | None, str, Any]] = []
+        self.shaky: tuple[Uncertainty, ...] = ()
+        self._changes: list[tuple[FactTable[Any] | None, str, Any]] = []
 
     # ---- forgetting ------------------------------------------------------------------------------------------------
 
@@ -85,7 +85,7 @@ class Facts:
         """Return what to go back to later."""
         return len(self._changes)
 
-    def note(self, book: "Book[Any]", key: str, old: Any) -> None:
+    def note(self, book: "FactTable[Any]", key: str, old: Any) -> None:
         """Keep an entry of a book that is about to change."""
         self._changes.append((book, key, old))
 
@@ -112,7 +112,7 @@ class Facts:
             outcomes: of the ways; at least one.
             together: whether all of them were gone, side by side, and not one of them.
         """
-        joined: list[tuple[Book[Any], str, Any]] = []
+        joined: list[tuple[FactTable[Any], str, Any]] = []
         for book, key in dict.fromkeys(place for outcome in outcomes for place in outcome.changed):
             values = [
                 outcome.changed[book, key] if (book, key) in outcome.changed else book.under(key, outcome.wipes)
@@ -129,7 +129,7 @@ class Facts:
             book.put(key, value)
 
 
-class Book(Generic[V]):
+class FactTable(Generic[V]):
     """One kind of fact, by name."""
 
     def __init__(

@@ -7,7 +7,7 @@ from armwright.program.flow_analysis.context import Context, Step
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.facts import UNKNOWN
 from armwright.program.flow_analysis.frames import leaves
-from armwright.program.flow_analysis.state import Course
+from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label, Severity
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED
@@ -19,93 +19,93 @@ from armwright.program.syntax import tree
 
 def move(context: Context, node: tree.Move) -> None:
     """Follow a MOVE; what its actions do may happen or not, while the arm is on its way."""
-    course = context.course
-    arm = _begin(course, node)
+    state = context.state
+    arm = _begin(state, node)
     guards = [clause for clause in node.clauses if isinstance(clause, tree.On)]
     for guard in guards:
-        need(course, guard.condition)
+        need(state, guard.condition)
         writes = context.writes(guard.action)
-        if not course.first:
-            mark = course.facts.mark()
+        if not state.first:
+            mark = state.facts.mark()
             if arm is None:
-                course.lose_arms(grasps=False)
+                state.lose_arms(grasps=False)
             else:
-                course.table.arrive(arm, UNKNOWN, None)
-            with course.perhaps():
+                state.table.arrive(arm, UNKNOWN, None)
+            with state.perhaps():
                 context.follow(guard.action)
-            course.facts.take_back(mark)
-            course.over = False
+            state.facts.take_back(mark)
+            state.over = False
         says, advice = "it gets one in this action, which may not happen", "give it a value before the MOVE"
-        course.forget_undone(writes, course.parting(guard.head, says, advice))
+        state.forget_undone(writes, state.parting(guard.head, says, advice))
     halted = any(context.writes(guard.action).halts for guard in guards)
-    _end(course, node, arm, halted=halted)
+    _end(state, node, arm, halted=halted)
 
 
-def _begin(course: Course, node: tree.Move) -> str | None:
+def _begin(state: FlowState, node: tree.Move) -> str | None:
     """Look at what a MOVE needs to begin; return the arm, None where it is unknown."""
-    course.mention(node.moved)
-    need_indices(course, node.moved)
-    moved = course.frame(node.moved)
+    state.mention(node.moved)
+    need_indices(state, node.moved)
+    moved = state.frame(node.moved)
     implied = False
     if moved is not None and is_arm(moved):
         arm: str | None = moved
     else:
-        arm, implied = _carrier(course, node, moved)
-    course.record(node, arm, implied=implied)
-    need(course, *_places(node))
-    plausibility.lengths(course, *_places(node))
+        arm, implied = _carrier(state, node, moved)
+    state.record(node, arm, implied=implied)
+    need(state, *_places(node))
+    plausibility.lengths(state, *_places(node))
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
-            _speed(course, clause.value)
+            _speed(state, clause.value)
         elif isinstance(clause, tree.Blend | tree.Duration):
-            need(course, clause.value)
+            need(state, clause.value)
     if arm is None:
         return None
-    _left_hanging(course, node, arm)
-    course.use(arm, node.span.to(node.moved.span), moves=True, hung=_hung(course, moved, arm))
-    goal = course.frame(node.goal)
-    if goal is not None and not course.table.unknown(goal) and course.table.carrier(goal) == arm:
-        _relative(course, node, arm)
+    _left_hanging(state, node, arm)
+    state.use(arm, node.span.to(node.moved.span), moves=True, hung=_hung(state, moved, arm))
+    goal = state.frame(node.goal)
+    if goal is not None and not state.table.unknown(goal) and state.table.carrier(goal) == arm:
+        _relative(state, node, arm)
     return arm
 
 
-def _end(course: Course, node: tree.Move, arm: str | None, *, halted: bool) -> None:
+def _end(state: FlowState, node: tree.Move, arm: str | None, *, halted: bool) -> None:
     """Take note of where a MOVE has brought what.
 
     Args:
-        course: the state.
+        state: the state.
         node: the MOVE.
         arm: as ``_begin`` gave it.
         halted: whether an action may have ended the motion on the way.
     """
-    moved = course.frame(node.moved)
+    moved = state.frame(node.moved)
     if arm is None or moved is None:
-        if moved is None or course.table.unknown(moved) or course.table.holder(moved) == UNKNOWN:
+        if moved is None or state.table.unknown(moved) or state.table.holder(moved) == UNKNOWN:
             # An arm has moved, but nobody knows which: that is no reason to say that none has been used.
-            course.lose_arms(grasps=False)
+            state.lose_arms(grasps=False)
             if moved is not None:
-                course.table.forget(moved)
+                state.table.forget(moved)
         return
     at: str | None = moved
     if moved == arm:
-        goal = course.frame(node.goal)
+        goal = state.frame(node.goal)
         at = UNKNOWN if halted or (goal is not None and is_any(goal)) else goal
         if goal is None and not isinstance(node.goal, tree.Binary | tree.Matrix | tree.Function):
             # Something was reported of the goal, or it is given to a procedure in a way that is not followed.
             at = UNKNOWN
-    course.table.arrive(arm, at, node.span if moved == arm else None)
+    state.table.arrive(arm, at, node.span if moved == arm else None)
 
 
-def _left_hanging(course: Course, node: tree.Move, arm: str) -> None:
+def _left_hanging(state: FlowState, node: tree.Move, arm: str) -> None:
     """Warn of a frame that the fingers have let go, and that follows the arm all the same."""
-    left = course.table.hands[arm].left
+    left = state.table.hands[arm].left
     if left is None:
         return
     frame, opened = left
-    link, name = course.table.links[frame], course.name(frame)
+    link, name = state.table.links[frame], state.name(frame)
     if link is None or link.parent != arm:
         return
-    course.say(
+    state.say(
         "W209",
         f"`{name}` still hangs on {arm}, whose fingers have let it go",
         node.span,
@@ -116,68 +116,68 @@ def _left_hanging(course: Course, node: tree.Move, arm: str) -> None:
     )
 
 
-def _hung(course: Course, moved: str | None, arm: str) -> tuple[Label, ...]:
+def _hung(state: FlowState, moved: str | None, arm: str) -> tuple[Label, ...]:
     """Return where what is moved, or what it hangs on, was hung on its arm; nothing for the arm itself."""
     if moved is None or is_arm(moved):
         return ()
-    for name in (moved, *course.table.above(moved)):
-        link = course.table.links[name]
+    for name in (moved, *state.table.above(moved)):
+        link = state.table.links[name]
         if link is not None and link.parent == arm:
-            return (Label(link.span, f"{course.name(name)} was affixed to {arm} here"),) if link.span else ()
+            return (Label(link.span, f"{state.name(name)} was affixed to {arm} here"),) if link.span else ()
     return ()
 
 
-def _carrier(course: Course, node: tree.Move, moved: str | None) -> tuple[str | None, bool]:
+def _carrier(state: FlowState, node: tree.Move, moved: str | None) -> tuple[str | None, bool]:
     """Return the arm that carries what is moved; hang it on the arm that has grasped it, if nothing else does.
 
     Returns:
         The arm, None where it is unknown, and whether the frame hangs there only from now on.
     """
-    if moved is None or course.table.unknown(moved):
+    if moved is None or state.table.unknown(moved):
         return None, False
-    if (arm := course.table.carrier(moved)) is not None:
+    if (arm := state.table.carrier(moved)) is not None:
         return arm, False
-    holder = course.table.holder(moved)
+    holder = state.table.holder(moved)
     if holder == UNKNOWN:
         return None, False
     if holder is None:
-        _not_carried(course, node, moved)
+        _not_carried(state, node, moved)
     else:
-        _imply(course, node, moved, holder)
+        _imply(state, node, moved, holder)
     return holder, holder is not None
 
 
-def _imply(course: Course, node: tree.Move, moved: str, arm: str) -> None:
-    name, grip = course.name(moved), course.table.grips[arm]
-    course.say(
+def _imply(state: FlowState, node: tree.Move, moved: str, arm: str) -> None:
+    name, grip = state.name(moved), state.table.grips[arm]
+    state.say(
         "W201",
         f"`{name}` is moved, but no AFFIX hangs it on {arm}",
         node.span,
         f"`AFFIX {name} TO {arm}` is implied",
         secondary=(Label(grip.span, f"{arm} grasped it here"),) if grip and grip.span else (),
         helps=(f"write `AFFIX {name} TO {arm}` after GRASP",),
-        severity=Severity.ERROR if course.strict else Severity.WARNING,
+        severity=Severity.ERROR if state.strict else Severity.WARNING,
     )
-    leaves(course, moved, arm, node.span)
-    course.table.hang(moved, arm, node.span)
+    leaves(state, moved, arm, node.span)
+    state.table.hang(moved, arm, node.span)
 
 
-def _not_carried(course: Course, node: tree.Move, moved: str) -> None:
-    link, name = course.table.links[moved], course.name(moved)
-    course.say(
+def _not_carried(state: FlowState, node: tree.Move, moved: str) -> None:
+    link, name = state.table.links[moved], state.name(moved)
+    state.say(
         "E301",
         f"`{name}` cannot be moved: it is not affixed to an arm",
         node.moved.span,
-        f"hangs on {course.name(link.parent) if link and link.parent else WORLD}, not on an arm",
+        f"hangs on {state.name(link.parent) if link and link.parent else WORLD}, not on an arm",
         secondary=(Label(link.span, "affixed here"),) if link and link.span else (),
-        helps=(f"grasp it and write `AFFIX {name} TO {course.last_arm() or course.some_arm()}` first",)
+        helps=(f"grasp it and write `AFFIX {name} TO {state.last_arm() or state.some_arm()}` first",)
         if moved != WORLD
         else (),
     )
 
 
-def _relative(course: Course, node: tree.Move, arm: str) -> None:
-    course.say(
+def _relative(state: FlowState, node: tree.Move, arm: str) -> None:
+    state.say(
         "L302",
         f"`{written(node.goal)}` moves together with {arm}, which is to come to it",
         node.goal.span,
@@ -187,17 +187,17 @@ def _relative(course: Course, node: tree.Move, arm: str) -> None:
     )
 
 
-def _speed(course: Course, node: tree.Expression) -> None:
-    need(course, node)
-    known = course.number(node)
+def _speed(state: FlowState, node: tree.Expression) -> None:
+    need(state, node)
+    known = state.number(node)
     if isinstance(node, tree.Number) or known is None or not isinstance(node, tree.Name):
         return
     value, span = known
-    kept = course.bound(node.key)
-    if LOWEST_SPEED <= value <= HIGHEST_SPEED or kept is None or course.now.scope.is_poisoned(node.key):
+    kept = state.bound(node.key)
+    if LOWEST_SPEED <= value <= HIGHEST_SPEED or kept is None or state.now.scope.is_poisoned(node.key):
         return
-    if course.settle(kept):
-        course.say(
+    if state.settle(kept):
+        state.say(
             "E207",
             f"speed `{node.text}` = {value:.12g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
             node.span,

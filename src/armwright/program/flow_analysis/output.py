@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 from armwright.program.flow_analysis.context import Step, of_state
 from armwright.program.flow_analysis.definite_assignment import need
-from armwright.program.flow_analysis.state import Course
+from armwright.program.flow_analysis.state import FlowState
 from armwright.program.syntax import tree
 
 
-def print_(course: Course, node: tree.Print) -> None:
+def print_(state: FlowState, node: tree.Print) -> None:
     """Look at what one PRINT needs."""
-    need(course, *(item for item in node.items if not isinstance(item, tree.String)))
+    need(state, *(item for item in node.items if not isinstance(item, tree.String)))
 
 
 STEPS: Mapping[type, Step] = {tree.Print: of_state(print_)}

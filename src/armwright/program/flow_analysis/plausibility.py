@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from armwright.program.flow_analysis.facts import UNKNOWN
-from armwright.program.flow_analysis.state import Course
+from armwright.program.flow_analysis.state import FlowState
 from armwright.program.language.diagnostic import Label, Severity
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.units import convert
@@ -19,11 +19,11 @@ _NEAR, _LEAST, _MOST = 0.02, 0.05, 3.0
 _AWAY = 0.2
 
 
-def placed(course: Course, frame: str, value: tree.Expression) -> None:
+def placed(state: FlowState, frame: str, value: tree.Expression) -> None:
     """Warn of a frame that is given a place that cannot be meant, so near to WORLD."""
-    reach = course.cell.reach if course.cell else None
-    place = None if is_any(frame) else course.table.where(frame)
-    units = course.symbols.units
+    reach = state.cell.reach if state.cell else None
+    place = None if is_any(frame) else state.table.where(frame)
+    units = state.symbols.units
     if reach is None or place is None or units.length == "M":
         return
     away = math.hypot(*place[9:])
@@ -33,14 +33,14 @@ def placed(course: Course, frame: str, value: tree.Expression) -> None:
         if bare and broken and 0 < away < _NEAR * reach and _LEAST * reach < size < _MOST * reach:
             unit = _UNITS[units.length]
             advice = f"write the lengths in {unit}, or with their unit: `{numbers[0].text}m`"
-            _odd(course, f"`{course.name(frame)}` would be {_length(away)} from WORLD", numbers, reach, advice)
+            _odd(state, f"`{state.name(frame)}` would be {_length(away)} from WORLD", numbers, reach, advice)
             return
 
 
-def lengths(course: Course, *nodes: tree.Expression | None) -> None:
+def lengths(state: FlowState, *nodes: tree.Expression | None) -> None:
     """Warn of places and steps that lead out of every robot's world."""
-    reach = course.cell.reach if course.cell else None
-    units = course.symbols.units
+    reach = state.cell.reach if state.cell else None
+    units = state.symbols.units
     if reach is None:
         return
     for node in nodes:
@@ -51,7 +51,7 @@ def lengths(course: Course, *nodes: tree.Expression | None) -> None:
                 advice = f"write the lengths in {_UNITS[units.length]}"
                 if units.length == "M":
                     advice = "put `UNITS MM ;` in front of BEGIN if they are millimetres, or write them with their unit"
-                _odd(course, what.format(_length(away)), numbers, reach, advice)
+                _odd(state, what.format(_length(away)), numbers, reach, advice)
 
 
 def _typed(node: tree.Expression) -> Iterator[list[tree.Number]]:
@@ -73,9 +73,9 @@ def _typed(node: tree.Expression) -> Iterator[list[tree.Number]]:
             yield numbers
 
 
-def _odd(course: Course, what: str, numbers: list[tree.Number], reach: float, advice: str) -> None:
-    unit = _UNITS[course.symbols.units.length]
-    course.say(
+def _odd(state: FlowState, what: str, numbers: list[tree.Number], reach: float, advice: str) -> None:
+    unit = _UNITS[state.symbols.units.length]
+    state.say(
         "W208",
         f"{what}, in a cell whose arm reaches {_length(reach)}",
         numbers[0].span.to(numbers[-1].span),
@@ -90,9 +90,9 @@ def _length(metres: float) -> str:
     return f"{metres:.3g} m" if metres >= 1 else f"{metres * 1e3:.3g} mm"
 
 
-def grasped(course: Course, node: tree.Affix, child: str, arm: str) -> None:
+def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
     """Warn of a frame that is hung on a hand which has closed at quite another place."""
-    table = course.table
+    table = state.table
     if not is_arm(arm) or is_any(child) or table.grips[arm] is None:
         return
     at = table.hands[arm].at
@@ -104,8 +104,8 @@ def grasped(course: Course, node: tree.Affix, child: str, arm: str) -> None:
     away = math.dist(here[9:], there[9:])
     if away <= _AWAY:
         return
-    name, hand = course.name, table.hands[arm]
-    course.say(
+    name, hand = state.name, table.hands[arm]
+    state.say(
         "W210",
         f"`{name(child)}` is {_length(away)} away from the hand of {arm}",
         node.link,

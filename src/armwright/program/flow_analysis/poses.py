@@ -13,7 +13,7 @@ from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.syntax import tree
 
 if TYPE_CHECKING:
-    from armwright.program.flow_analysis.state import Course
+    from armwright.program.flow_analysis.state import FlowState
 
 Place: TypeAlias = tuple[float, ...]
 
@@ -36,53 +36,53 @@ def inverse(place: Place) -> Place:
     return (*turned, *back)
 
 
-def certain(course: "Course", node: tree.Expression) -> Place | None:
+def certain(state: "FlowState", node: tree.Expression) -> Place | None:
     """Return the place or step that an expression gives; None where that is not certain."""
     if isinstance(node, tree.Binary):
-        return _product(course, node)
+        return _product(state, node)
     if isinstance(node, tree.Matrix):
-        return _matrix(course, node)
+        return _matrix(state, node)
     if isinstance(node, tree.Function):
-        return _function(course, node)
+        return _function(state, node)
     if isinstance(node, tree.Name) and node.key == WORLD:
         return HERE
-    if (name := course.variable(node, VariableKind.FRAME)) is not None:
-        return course.table.where(name)
-    name = course.variable(node, VariableKind.TRANS)
-    return None if name is None else course.steps[name]
+    if (name := state.variable(node, VariableKind.FRAME)) is not None:
+        return state.table.where(name)
+    name = state.variable(node, VariableKind.TRANS)
+    return None if name is None else state.steps[name]
 
 
-def _product(course: "Course", node: tree.Binary) -> Place | None:
+def _product(state: "FlowState", node: tree.Binary) -> Place | None:
     first, operations = tree.chain(node)
-    found = certain(course, first)
+    found = certain(state, first)
     for one in operations:
-        step = certain(course, one.right) if one.operation == "*" else None
+        step = certain(state, one.right) if one.operation == "*" else None
         if found is None or step is None:
             return None
         found = after(found, step)
     return found
 
 
-def _matrix(course: "Course", node: tree.Matrix) -> Place | None:
+def _matrix(state: "FlowState", node: tree.Matrix) -> Place | None:
     if len(node.items) != _NUMBERS:
         return None
-    turn, shift = _amounts(course, node.items[:9]), _lengths(course, node.items[9:])
+    turn, shift = _amounts(state, node.items[:9]), _lengths(state, node.items[9:])
     return None if turn is None or shift is None else (*turn, *shift)
 
 
-def _function(course: "Course", node: tree.Function) -> Place | None:
+def _function(state: "FlowState", node: tree.Function) -> Place | None:
     key, arguments = node.name.key, node.arguments
     if key == "XYZ" and len(arguments) == 3:
-        shift = _lengths(course, arguments)
+        shift = _lengths(state, arguments)
         return None if shift is None else (*HERE[:9], *shift)
     if len(arguments) != 1:
         return None
     if key == "INV":
-        place = certain(course, arguments[0])
+        place = certain(state, arguments[0])
         return None if place is None else inverse(place)
     if key in ("ROTX", "ROTY", "ROTZ"):
-        angle = _amounts(course, arguments)
-        return None if angle is None else _turn("XYZ".index(key[-1]), angle[0] * course.symbols.units.radians)
+        angle = _amounts(state, arguments)
+        return None if angle is None else _turn("XYZ".index(key[-1]), angle[0] * state.symbols.units.radians)
     return None
 
 
@@ -95,19 +95,19 @@ def _turn(axis: int, angle: float) -> Place:
     return tuple(found)
 
 
-def _lengths(course: "Course", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
-    amounts = _amounts(course, nodes)
-    return None if amounts is None else tuple(one * course.symbols.units.metres for one in amounts)
+def _lengths(state: "FlowState", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
+    amounts = _amounts(state, nodes)
+    return None if amounts is None else tuple(one * state.symbols.units.metres for one in amounts)
 
 
-def _amounts(course: "Course", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
+def _amounts(state: "FlowState", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
     """Return numbers in the units of the program."""
     found = []
     for node in nodes:
         if isinstance(node, tree.Number):
-            number = None if math.isnan(node.value) else convert(node.value, node.unit, course.symbols.units)
+            number = None if math.isnan(node.value) else convert(node.value, node.unit, state.symbols.units)
         else:
-            known = course.number(node)
+            known = state.number(node)
             number = None if known is None else known[0]
         if number is None:
             return None

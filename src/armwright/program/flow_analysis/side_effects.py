@@ -21,7 +21,7 @@ _MOST_ROUNDS = 10
 
 
 @attrs.frozen(kw_only=True)
-class Writes:
+class SideEffects:
     """What may be changed.
 
     Attributes:
@@ -46,12 +46,12 @@ class Writes:
     halts: bool = False
     retries: bool = False
 
-    def __or__(self, other: "Writes") -> "Writes":
+    def __or__(self, other: "SideEffects") -> "SideEffects":
         """Return what either may change."""
         if self is NOTHING or other is NOTHING:
             return other if self is NOTHING else self
         return _limited(
-            Writes(
+            SideEffects(
                 placed=self.placed | other.placed,
                 hung=self.hung | other.hung,
                 moved=self.moved | other.moved,
@@ -70,11 +70,11 @@ class Writes:
         return self.placed | self.hung | self.moved | self.values | self.arms - {ANY_ARM}
 
 
-NOTHING = Writes()
-ANYTHING = Writes(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
+NOTHING = SideEffects()
+ANYTHING = SideEffects(arms=frozenset({ANY_ARM}), grasps=True, everything=True)
 
 
-def _limited(writes: Writes) -> Writes:
+def _limited(writes: SideEffects) -> SideEffects:
     if writes.everything or sum(map(len, (writes.placed, writes.hung, writes.moved, writes.values))) > _MOST:
         return attrs.evolve(ANYTHING, halts=writes.halts, retries=writes.retries)
     return writes
@@ -103,13 +103,13 @@ class Writing:
     def __init__(self, program: tree.Program, symbols: Symbols) -> None:
         """Look at the procedures."""
         self._symbols = symbols
-        self._known: dict[int, Writes] = {}
-        self._procedures: dict[str, Writes] = {}
+        self._known: dict[int, SideEffects] = {}
+        self._procedures: dict[str, SideEffects] = {}
         bodies = (program.statements, *(node.body.statements for node in program.procedures))
         self.rigid = any(isinstance(one, tree.Affix) and one.rigid for body in bodies for one in every(body))
         self._settle(program)
 
-    def of(self, statement: tree.Statement, scope: Scope) -> Writes:
+    def of(self, statement: tree.Statement, scope: Scope) -> SideEffects:
         """Return what a statement and all inside it may change."""
         found = self._known.get(id(statement))
         if found is None:
@@ -121,14 +121,14 @@ class Writing:
             self._known[id(statement)] = found
         return found
 
-    def all(self, statements: Iterable[tree.Statement], scope: Scope) -> Writes:
+    def all(self, statements: Iterable[tree.Statement], scope: Scope) -> SideEffects:
         """Return what several statements may change."""
         found = NOTHING
         for statement in statements:
             found |= self.of(statement, scope)
         return found
 
-    def called(self, call: tree.Call, scope: Scope) -> Writes:
+    def called(self, call: tree.Call, scope: Scope) -> SideEffects:
         """Return what a call may change."""
         procedure = self._symbols.procedures.get(call.name.key)
         if procedure is None:
@@ -164,7 +164,7 @@ class Writing:
                 return
         self._procedures.update(dict.fromkeys(news, ANYTHING))
 
-    def _own(self, statement: tree.Statement, scope: Scope) -> Writes:
+    def _own(self, statement: tree.Statement, scope: Scope) -> SideEffects:
         """Return what one statement may change by itself, without those inside it."""
         if isinstance(statement, tree.Call):
             return self.called(statement, scope)
@@ -172,43 +172,43 @@ class Writing:
         return NOTHING if own is None else own(scope, statement)
 
 
-def _assigned(scope: Scope, node: tree.Assign) -> Writes:
+def _assigned(scope: Scope, node: tree.Assign) -> SideEffects:
     names = _names(scope, node.target)
     head = node.target.name if isinstance(node.target, tree.Index) else node.target
     kind = scope.type(head.key) if isinstance(head, tree.Name) else None
     is_frame = kind is None or kind.kind is VariableKind.FRAME
-    return Writes(placed=names if is_frame else frozenset(), values=frozenset() if is_frame else names)
+    return SideEffects(placed=names if is_frame else frozenset(), values=frozenset() if is_frame else names)
 
 
-def _affixed(scope: Scope, node: tree.Affix) -> Writes:
+def _affixed(scope: Scope, node: tree.Affix) -> SideEffects:
     hung = _names(scope, node.child)
-    return Writes(hung=hung, placed=hung if node.at is not None else frozenset(), arms=_arms(scope, node.parent))
+    return SideEffects(hung=hung, placed=hung if node.at is not None else frozenset(), arms=_arms(scope, node.parent))
 
 
-def _unfixed(scope: Scope, node: tree.Unfix) -> Writes:
-    return Writes(hung=_names(scope, node.child), arms=_arms(scope, node.parent))
+def _unfixed(scope: Scope, node: tree.Unfix) -> SideEffects:
+    return SideEffects(hung=_names(scope, node.child), arms=_arms(scope, node.parent))
 
 
-def _poisoned(scope: Scope, node: tree.Poison) -> Writes:
+def _poisoned(scope: Scope, node: tree.Poison) -> SideEffects:
     names = _names(scope, node)
-    return Writes(placed=names, hung=names, values=names, arms=_arms(scope, node), grasps=True)
+    return SideEffects(placed=names, hung=names, values=names, arms=_arms(scope, node), grasps=True)
 
 
 # What statements may change by themselves; those that are missing change nothing.
-_OWN: Mapping[type, Callable[..., Writes]] = {
+_OWN: Mapping[type, Callable[..., SideEffects]] = {
     tree.Assign: _assigned,
     tree.Affix: _affixed,
     tree.Unfix: _unfixed,
-    tree.Open: lambda scope, node: Writes(arms=_arms(scope, node.arm)),
-    tree.ReadSystem: lambda scope, node: Writes(arms=_arms(scope, node.arm)),
-    tree.Grasp: lambda scope, node: Writes(arms=_arms(scope, node.arm) or frozenset({ANY_ARM}), grasps=True),
-    tree.ReadVisions: lambda scope, node: Writes(
+    tree.Open: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
+    tree.ReadSystem: lambda scope, node: SideEffects(arms=_arms(scope, node.arm)),
+    tree.Grasp: lambda scope, node: SideEffects(arms=_arms(scope, node.arm) or frozenset({ANY_ARM}), grasps=True),
+    tree.ReadVisions: lambda scope, node: SideEffects(
         placed=frozenset[str]().union(*(_names(scope, target) for target in node.targets))
     ),
-    tree.Move: lambda scope, node: Writes(moved=_names(scope, node.moved), arms=_arms(scope, node.moved)),
-    tree.For: lambda scope, node: Writes(values=_names(scope, node.variable)),
-    tree.Halt: lambda _scope, _node: Writes(halts=True),
-    tree.Retry: lambda _scope, _node: Writes(retries=True),
+    tree.Move: lambda scope, node: SideEffects(moved=_names(scope, node.moved), arms=_arms(scope, node.moved)),
+    tree.For: lambda scope, node: SideEffects(values=_names(scope, node.variable)),
+    tree.Halt: lambda _scope, _node: SideEffects(halts=True),
+    tree.Retry: lambda _scope, _node: SideEffects(retries=True),
     tree.Poison: _poisoned,
 }
 
@@ -261,7 +261,7 @@ def _arms(scope: Scope, node: tree.Expression | None) -> frozenset[str]:
     return frozenset({node.key}) if isinstance(node, tree.ArmName) else frozenset()
 
 
-def _union(several: Iterable[Writes]) -> Writes:
+def _union(several: Iterable[SideEffects]) -> SideEffects:
     found = NOTHING
     for one in several:
         found |= one
@@ -287,7 +287,9 @@ def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:
     return list(order)
 
 
-def _seen_from_outside(writes: Writes, procedure: str, given: Mapping[str, tree.Expression], scope: Scope) -> Writes:
+def _seen_from_outside(
+    writes: SideEffects, procedure: str, given: Mapping[str, tree.Expression], scope: Scope
+) -> SideEffects:
     """Return what a procedure changes, in the names of its caller: its own variables are nobody else's."""
 
     def outside(name: str, *, value: bool = False) -> str:
@@ -309,7 +311,7 @@ def _seen_from_outside(writes: Writes, procedure: str, given: Mapping[str, tree.
     def may_be_arm(name: str) -> bool:
         return name == ANY_ARM or is_arm(name) or _is_parameter(name, scope)
 
-    return Writes(
+    return SideEffects(
         placed=frames(writes.placed),
         hung=frames(writes.hung),
         moved=frames(writes.moved),

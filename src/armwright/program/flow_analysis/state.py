@@ -6,11 +6,11 @@ from contextlib import contextmanager
 import attrs
 
 from armwright.program.flow_analysis import constants
-from armwright.program.flow_analysis.facts import UNKNOWN, Parting
-from armwright.program.flow_analysis.frame_state import Hanging
-from armwright.program.flow_analysis.lattice import EVERYTHING, Book, Facts, same
+from armwright.program.flow_analysis.facts import UNKNOWN, Divergence
+from armwright.program.flow_analysis.frame_state import FrameState
+from armwright.program.flow_analysis.lattice import EVERYTHING, Facts, FactTable, same
 from armwright.program.flow_analysis.poses import Place
-from armwright.program.flow_analysis.side_effects import ANY_ARM, Writes, Writing
+from armwright.program.flow_analysis.side_effects import ANY_ARM, SideEffects, Writing
 from armwright.program.language.diagnostic import Findings, Label, Severity
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.names import is_any, is_arm
@@ -74,7 +74,7 @@ def _joined_arms(one: str | None, other: str | None) -> str | None:
     return one if one == other else UNKNOWN
 
 
-class Course:
+class FlowState:
     """The state that the statements of a program change one after the other.
 
     Attributes:
@@ -100,10 +100,12 @@ class Course:
         self.source, self.strict = source, strict
         self.writing = Writing(program, symbols)
         self.facts = Facts()
-        self.table = Hanging(cell, self.facts, rigid=self.writing.rigid)
-        self.numbers: Book[tuple[float, Span] | None] = Book(self.facts, default=None, unknown=None, joined=same)
-        self.steps: Book[Place | None] = Book(self.facts, default=None, unknown=None, joined=same)
-        self.last: Book[str | None] = Book(self.facts, default=None, unknown=UNKNOWN, joined=_joined_arms)
+        self.table = FrameState(cell, self.facts, rigid=self.writing.rigid)
+        self.numbers: FactTable[tuple[float, Span] | None] = FactTable(
+            self.facts, default=None, unknown=None, joined=same
+        )
+        self.steps: FactTable[Place | None] = FactTable(self.facts, default=None, unknown=None, joined=same)
+        self.last: FactTable[str | None] = FactTable(self.facts, default=None, unknown=UNKNOWN, joined=_joined_arms)
         self.main = Activation(scope=symbols.scope(None))
         self.now = self.main
         self.calls: list[Called] = []
@@ -274,11 +276,11 @@ class Course:
 
     # ---- forgetting ------------------------------------------------------------------------------------------------
 
-    def parting(self, span: Span, says: str, advice: str) -> Parting:
-        """Return what parts the ways here; see ``Parting``."""
-        return Parting(span, self.conditions, says, advice)
+    def parting(self, span: Span, says: str, advice: str) -> Divergence:
+        """Return what parts the ways here; see ``Divergence``."""
+        return Divergence(span, self.conditions, says, advice)
 
-    def forget_undone(self, writes: Writes, parting: Parting | None = None) -> None:
+    def forget_undone(self, writes: SideEffects, parting: Divergence | None = None) -> None:
         """Give up what a part of the program may change that is perhaps not done to its end.
 
         What had no value before may have one then, or none: there the ways part.
@@ -289,7 +291,7 @@ class Course:
         for name in lacking:
             self.table.sure.put(name, parting or False)
 
-    def forget(self, writes: Writes) -> None:
+    def forget(self, writes: SideEffects) -> None:
         """Give up what a part of the program may change."""
         if writes.everything:
             self.facts.wipe(EVERYTHING)
@@ -310,7 +312,7 @@ class Course:
         if arms or writes.placed or writes.hung:
             self.table.lose()
 
-    def _forget_moved(self, writes: Writes) -> set[str]:
+    def _forget_moved(self, writes: SideEffects) -> set[str]:
         """Give up where frames hang that MOVE may hang on an arm; return the arms that may be used."""
         arms = {name for name in self.kept(writes.arms) if name == ANY_ARM or is_arm(name)}
         for name in self.kept(writes.moved):

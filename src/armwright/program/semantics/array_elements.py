@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 from armwright.program.language.kinds import VariableType
-from armwright.program.semantics.expression_types import OF_KIND, Sort, bare, called, is_what
+from armwright.program.semantics.expression_types import OF_KIND, ExpressionType, bare, called, is_what
 from armwright.program.semantics.quantities import measure
 from armwright.program.semantics.scopes import Names
 from armwright.program.syntax import tree
 
 
-def single(names: Names, name: tree.Name, kind: VariableType) -> Sort | None:
+def single(names: Names, name: tree.Name, kind: VariableType) -> ExpressionType | None:
     """Return the sort of a variable named without an index; say once when it is an array."""
     if not kind.sizes:
         return OF_KIND[kind.kind]
@@ -26,7 +26,7 @@ def single(names: Names, name: tree.Name, kind: VariableType) -> Sort | None:
     return None
 
 
-def element(names: Names, node: tree.Index, sorts: Sequence[Sort | None]) -> Sort | None:
+def element(names: Names, node: tree.Index, sorts: Sequence[ExpressionType | None]) -> ExpressionType | None:
     """Return the sort of an element; say what is wrong with its indices.
 
     Args:
@@ -69,8 +69,8 @@ def _indices(count: int) -> str:
     return f"{count} {'indices' if count > 1 else 'index'}"
 
 
-def _index(names: Names, name: tree.Name, index: tree.Expression, sort: Sort | None, size: int) -> None:
-    if sort not in (None, Sort.SCALAR):
+def _index(names: Names, name: tree.Name, index: tree.Expression, sort: ExpressionType | None, size: int) -> None:
+    if sort not in (None, ExpressionType.SCALAR):
         what = is_what(index, sort)
         text = f"an index must be a number, but {called(index)} is {what}"
         names.found.say("E222", text, index.span, bare(what))

@@ -6,7 +6,7 @@ import attrs
 
 from armwright.program.language.units import Dimension
 from armwright.program.semantics import events
-from armwright.program.semantics.expression_types import FITTING, Sort, bare, called, is_what, plain_keys
+from armwright.program.semantics.expression_types import FITTING, ExpressionType, bare, called, is_what, plain_keys
 from armwright.program.semantics.quantities import measure
 from armwright.program.semantics.scopes import Names
 from armwright.program.syntax import tree
@@ -28,28 +28,31 @@ class Signature:
 
     takes: str
     count: int
-    sorts: frozenset[Sort]
-    gives: Sort
+    sorts: frozenset[ExpressionType]
+    gives: ExpressionType
     dimension: Dimension | None = None
 
 
-_SCALARS = FITTING[Sort.SCALAR]
-_TURN = Signature(takes="one angle", count=1, sorts=_SCALARS, gives=Sort.TRANS, dimension="angle")
+_SCALARS = FITTING[ExpressionType.SCALAR]
+_TURN = Signature(takes="one angle", count=1, sorts=_SCALARS, gives=ExpressionType.TRANS, dimension="angle")
 FUNCTIONS: Mapping[str, Signature] = {
-    "XYZ": Signature(takes="three lengths", count=3, sorts=_SCALARS, gives=Sort.TRANS, dimension="length"),
+    "XYZ": Signature(takes="three lengths", count=3, sorts=_SCALARS, gives=ExpressionType.TRANS, dimension="length"),
     "ROTX": _TURN,
     "ROTY": _TURN,
     "ROTZ": _TURN,
     "INV": Signature(
-        takes="one TRANS or FRAME", count=1, sorts=FITTING[Sort.TRANS] | {Sort.FRAME, Sort.INVERSE}, gives=Sort.TRANS
+        takes="one TRANS or FRAME",
+        count=1,
+        sorts=FITTING[ExpressionType.TRANS] | {ExpressionType.FRAME, ExpressionType.INVERSE},
+        gives=ExpressionType.TRANS,
     ),
-    "DIST": Signature(takes="two FRAMEs", count=2, sorts=FITTING[Sort.FRAME], gives=Sort.SCALAR),
-    "FORCE": Signature(takes="one axis, X, Y or Z", count=1, sorts=frozenset(), gives=Sort.SCALAR),
+    "DIST": Signature(takes="two FRAMEs", count=2, sorts=FITTING[ExpressionType.FRAME], gives=ExpressionType.SCALAR),
+    "FORCE": Signature(takes="one axis, X, Y or Z", count=1, sorts=frozenset(), gives=ExpressionType.SCALAR),
 }
-_INVERSES = {Sort.FRAME: Sort.INVERSE, Sort.INVERSE: Sort.FRAME}
+_INVERSES = {ExpressionType.FRAME: ExpressionType.INVERSE, ExpressionType.INVERSE: ExpressionType.FRAME}
 
 
-def result(names: Names, node: tree.Function, sorts: Sequence[Sort | None]) -> Sort | None:
+def result(names: Names, node: tree.Function, sorts: Sequence[ExpressionType | None]) -> ExpressionType | None:
     """Return what a function of the language gives; say what is wrong with its arguments.
 
     Args:
@@ -95,10 +98,10 @@ def _axis(names: Names, node: tree.Expression) -> None:
     )
 
 
-def _misfit(names: Names, node: tree.Function, argument: tree.Expression, sort: Sort) -> None:
+def _misfit(names: Names, node: tree.Function, argument: tree.Expression, sort: ExpressionType) -> None:
     what = is_what(argument, sort)
     takes = FUNCTIONS[node.name.key].takes
-    if sort is Sort.EVENT:
+    if sort is ExpressionType.EVENT:
         events.refuse(names, argument)
         return
     names.found.say(

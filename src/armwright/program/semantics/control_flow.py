@@ -4,10 +4,7 @@ from collections.abc import Mapping
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Check, Context
-from armwright.program.semantics.expression_types import (
-    Sort,
-    a_type,
-)
+from armwright.program.semantics.expression_types import ExpressionType, a_type
 from armwright.program.semantics.quantities import in_range, measure
 from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.type_check import condition, need, quantity, sort
@@ -59,7 +56,7 @@ def for_(context: Context, node: tree.For) -> None:
             )
     for bound in (node.first, node.last, node.step):
         if bound is not None:
-            need(names, bound, Sort.SCALAR, "E229", "FOR counts in numbers")
+            need(names, bound, ExpressionType.SCALAR, "E229", "FOR counts in numbers")
     if isinstance(node.step, tree.Number) and node.step.value == 0:
         text = "a FOR with STEP 0 would never end"
         names.found.say("E229", text, node.step.span, "goes nowhere", helps=("leave STEP out to count by 1",))
@@ -89,7 +86,7 @@ def _event(names: Names, node: tree.Variable, who: str) -> None:
     need(
         names,
         node,
-        Sort.EVENT,
+        ExpressionType.EVENT,
         "E223",
         f"{who} needs an EVENT",
         helps=lambda _: "an event is declared with EVENT as its type, such as `VAR ready : EVENT ;`",

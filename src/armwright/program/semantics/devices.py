@@ -4,12 +4,7 @@ from collections.abc import Mapping
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.semantics.context import Check, Context
-from armwright.program.semantics.expression_types import (
-    Sort,
-    a_type,
-    called,
-    written,
-)
+from armwright.program.semantics.expression_types import ExpressionType, a_type, called, written
 from armwright.program.semantics.quantities import in_range
 from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.type_check import declared, is_world, need, quantity, refuse_world, sort
@@ -55,7 +50,7 @@ def _vision_target(names: Names, target: tree.Mobile) -> None:
     elif is_world(target):
         refuse_world(names, target)
     else:
-        need(names, target, Sort.FRAME, "E215", "READ VISIONS finds a FRAME")
+        need(names, target, ExpressionType.FRAME, "E215", "READ VISIONS finds a FRAME")
 
 
 def read_system(context: Context, node: tree.ReadSystem) -> None:

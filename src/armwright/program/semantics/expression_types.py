@@ -14,7 +14,7 @@ _STRENGTH = {"OR": 1, "AND": 2, "+": 5, "-": 5, "*": 6, "/": 6}
 _COMPARISON, _NOT, _MINUS, _ATOM = 4, 3, 7, 8
 
 
-class Sort(enum.Enum):
+class ExpressionType(enum.Enum):
     """What the value of an expression is.
 
     ``MATRIX`` is twelve numbers that may be a FRAME or a TRANS, ``INVERSE`` what INV makes of a FRAME: the step
@@ -35,15 +35,15 @@ class Sort(enum.Enum):
         return self.value.split(" ", 1)[1]
 
 
-OF_KIND = {kind: Sort[kind.name] for kind in VariableKind}
+OF_KIND = {kind: ExpressionType[kind.name] for kind in VariableKind}
 # What each kind of variable, parameter or operand takes.
-FITTING = {sort: frozenset({sort}) for sort in Sort} | {
-    Sort.FRAME: frozenset({Sort.FRAME, Sort.MATRIX}),
-    Sort.TRANS: frozenset({Sort.TRANS, Sort.MATRIX}),
+FITTING = {sort: frozenset({sort}) for sort in ExpressionType} | {
+    ExpressionType.FRAME: frozenset({ExpressionType.FRAME, ExpressionType.MATRIX}),
+    ExpressionType.TRANS: frozenset({ExpressionType.TRANS, ExpressionType.MATRIX}),
 }
 
 
-def is_what(node: tree.Expression, sort: Sort) -> str:
+def is_what(node: tree.Expression, sort: ExpressionType) -> str:
     """Return what an expression is, with its article: of arms and numbers in the words of users."""
     if isinstance(node, tree.ArmName):
         return "an arm"

@@ -7,7 +7,7 @@ from armwright.program.semantics import events
 from armwright.program.semantics.context import Check, Context
 from armwright.program.semantics.expression_types import (
     FITTING,
-    Sort,
+    ExpressionType,
     bare,
     called,
     is_what,
@@ -18,7 +18,7 @@ from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.type_check import declared, is_world, need, refuse_world, sort
 from armwright.program.syntax import tree
 
-_TAKES = {Sort.SCALAR: "a number", Sort.FRAME: "a place", Sort.TRANS: "a step"}
+_TAKES = {ExpressionType.SCALAR: "a number", ExpressionType.FRAME: "a place", ExpressionType.TRANS: "a step"}
 
 
 def assign(context: Context, node: tree.Assign) -> None:
@@ -35,22 +35,22 @@ def assign(context: Context, node: tree.Assign) -> None:
         refuse_world(names, target)
     else:
         takes = sort(names, target)
-        if takes is Sort.EVENT:
+        if takes is ExpressionType.EVENT:
             events.refuse(names, target, "given a value")
         elif takes is not given and takes is not None and given is not None and given not in FITTING[takes]:
             _misfit(names, node, takes, given)
 
 
-def _misfit(names: Names, node: tree.Assign, takes: Sort, given: Sort) -> None:
+def _misfit(names: Names, node: tree.Assign, takes: ExpressionType, given: ExpressionType) -> None:
     target, value = node.target, node.value
-    if given is Sort.EVENT:
+    if given is ExpressionType.EVENT:
         events.refuse(names, value, "a value")
         return
     if not names.first("E217", *plain_keys(target)):
         return
     if names.std is Standard.RLO_83:
-        what = "one number" if takes is Sort.SCALAR else "twelve numbers in `( )`"
-        message, label = "", "a matrix" if given is Sort.MATRIX else "one number"
+        what = "one number" if takes is ExpressionType.SCALAR else "twelve numbers in `( )`"
+        message, label = "", "a matrix" if given is ExpressionType.MATRIX else "one number"
     else:
         what, is_one = _TAKES[takes], is_what(value, given)
         message, label = f", but {called(value)} is {is_one}", bare(is_one)
@@ -65,17 +65,17 @@ def _misfit(names: Names, node: tree.Assign, takes: Sort, given: Sort) -> None:
     )
 
 
-def _advice(target: tree.Expression, value: tree.Expression, takes: Sort, given: Sort) -> str:
+def _advice(target: tree.Expression, value: tree.Expression, takes: ExpressionType, given: ExpressionType) -> str:
     match takes, given:
-        case _, Sort.INVERSE:
+        case _, ExpressionType.INVERSE:
             return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
-        case Sort.SCALAR, Sort.CONDITION:
+        case ExpressionType.SCALAR, ExpressionType.CONDITION:
             return f"write `IF {written(value)} THEN {written(target)} = 1 ELSE {written(target)} = 0`"
-        case Sort.FRAME, Sort.TRANS:
+        case ExpressionType.FRAME, ExpressionType.TRANS:
             return f"for the place at this step from WORLD write `WORLD * {written(value)}`"
-        case Sort.TRANS, Sort.FRAME:
+        case ExpressionType.TRANS, ExpressionType.FRAME:
             return f"for the step from WORLD to this place write `INV(WORLD) * {written(value)}`"
-        case ((Sort.FRAME | Sort.TRANS), Sort.SCALAR):
+        case ((ExpressionType.FRAME | ExpressionType.TRANS), ExpressionType.SCALAR):
             return "write twelve numbers in `( )`, or make a step from numbers by XYZ, ROTX, ROTY and ROTZ"
         case _:
             return ""
@@ -91,19 +91,19 @@ def affix(context: Context, node: tree.Affix) -> None:
     swap = isinstance(node.child, tree.ArmName) and isinstance(node.parent, tree.Name | tree.Index)
     helps = (f"did you mean `AFFIX {whence} TO {written(node.child)}`?",) if swap else ()
     _child(names, node.child, "AFFIX hangs", "affixed to a frame", helps)
-    need(names, node.parent, Sort.FRAME, "E215", "AFFIX ... TO needs a FRAME or an arm")
+    need(names, node.parent, ExpressionType.FRAME, "E215", "AFFIX ... TO needs a FRAME or an arm")
     if node.at is None:
         return
     where, is_arm = written(node.at), isinstance(node.at, tree.ArmName)
 
-    def advice(found: Sort) -> str:
-        is_place = found is Sort.FRAME and not (is_arm and names.std is Standard.RLO_83)
+    def advice(found: ExpressionType) -> str:
+        is_place = found is ExpressionType.FRAME and not (is_arm and names.std is Standard.RLO_83)
         return f"for the step from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
 
     need(
         names,
         node.at,
-        Sort.TRANS,
+        ExpressionType.TRANS,
         "E210",
         "AT needs a TRANS",
         notes=("a FRAME is a place in the cell; a TRANS is the step from one frame to another",),
@@ -116,7 +116,7 @@ def unfix(context: Context, node: tree.Unfix) -> None:
     context.changes(node.child, node.span)
     _child(context.names, node.child, "UNFIX cuts", "unfixed")
     if node.parent is not None:
-        need(context.names, node.parent, Sort.FRAME, "E215", "FROM needs a FRAME or an arm")
+        need(context.names, node.parent, ExpressionType.FRAME, "E215", "FROM needs a FRAME or an arm")
 
 
 def _child(names: Names, node: tree.Mobile, verb: str, done: str, helps: tuple[str, ...] = ()) -> None:
@@ -128,7 +128,7 @@ def _child(names: Names, node: tree.Mobile, verb: str, done: str, helps: tuple[s
         text = f"{called(node)} cannot be {done.partition(' ')[0]}"
         names.found.say("E309", text, node.span, "the root of all frames")
     else:
-        need(names, node, Sort.FRAME, "E215", f"{verb} a FRAME")
+        need(names, node, ExpressionType.FRAME, "E215", f"{verb} a FRAME")
 
 
 CHECKS: Mapping[type, Check] = {tree.Assign: assign, tree.Affix: affix, tree.Unfix: unfix}

@@ -6,7 +6,7 @@ from armwright.program.language.diagnostic import Label
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
 from armwright.program.language.words import Standard
 from armwright.program.semantics.context import Check, Context
-from armwright.program.semantics.expression_types import Sort, written
+from armwright.program.semantics.expression_types import ExpressionType, written
 from armwright.program.semantics.quantities import in_range, measure
 from armwright.program.semantics.scopes import Names
 from armwright.program.semantics.type_check import condition, need, quantity
@@ -42,7 +42,7 @@ SPEED_NOTE = "100 is the normal speed and 120 the largest the arm allows"
 def move(context: Context, node: tree.Move) -> None:
     """Check one MOVE."""
     names = context.names
-    need(names, node.moved, Sort.FRAME, "E215", "MOVE moves an arm or a FRAME")
+    need(names, node.moved, ExpressionType.FRAME, "E215", "MOVE moves an arm or a FRAME")
     _place(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
     _combination(names, node.clauses)
     for clause in node.clauses:
@@ -73,18 +73,18 @@ def _place(names: Names, node: tree.Expression, code: str, what: str, move: tree
         )
         return
 
-    def helps(found: Sort) -> str:
-        if move is None or found is not Sort.TRANS:
+    def helps(found: ExpressionType) -> str:
+        if move is None or found is not ExpressionType.TRANS:
             return ""
         moved = "ARM_1" if isinstance(move.moved, tree.Poison) else written(move.moved)
         step = written(node)
         return f"to move by `{step}` from the present place write `MOVE {moved} TO {moved} * {step}`"
 
-    need(names, node, Sort.FRAME, code, what, helps=helps)
+    need(names, node, ExpressionType.FRAME, code, what, helps=helps)
 
 
 def _speed(names: Names, node: tree.Expression) -> None:
-    if not need(names, node, Sort.SCALAR, "E216", "SPEED needs a number or a SCALAR"):
+    if not need(names, node, ExpressionType.SCALAR, "E216", "SPEED needs a number or a SCALAR"):
         return
     if not isinstance(node, tree.Number) or not measure(names, node, None, "a speed has no unit"):
         return

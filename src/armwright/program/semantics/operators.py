@@ -3,50 +3,52 @@
 from collections.abc import Mapping
 
 from armwright.program.semantics import events
-from armwright.program.semantics.expression_types import Sort, bare, is_what, written
+from armwright.program.semantics.expression_types import ExpressionType, bare, is_what, written
 from armwright.program.semantics.scopes import Names
 from armwright.program.syntax import tree
 
 _ARITHMETIC = frozenset("+-*/")
 _COMPARISONS = frozenset(("<", "<=", "=", "<>", ">=", ">"))
-_PRODUCTS: Mapping[tuple[Sort, Sort], Sort] = {
-    (Sort.FRAME, Sort.TRANS): Sort.FRAME,
-    (Sort.FRAME, Sort.MATRIX): Sort.FRAME,
-    (Sort.TRANS, Sort.TRANS): Sort.TRANS,
-    (Sort.TRANS, Sort.MATRIX): Sort.TRANS,
-    (Sort.MATRIX, Sort.TRANS): Sort.MATRIX,
-    (Sort.MATRIX, Sort.MATRIX): Sort.MATRIX,
-    (Sort.INVERSE, Sort.FRAME): Sort.TRANS,
-    (Sort.INVERSE, Sort.MATRIX): Sort.TRANS,
+_PRODUCTS: Mapping[tuple[ExpressionType, ExpressionType], ExpressionType] = {
+    (ExpressionType.FRAME, ExpressionType.TRANS): ExpressionType.FRAME,
+    (ExpressionType.FRAME, ExpressionType.MATRIX): ExpressionType.FRAME,
+    (ExpressionType.TRANS, ExpressionType.TRANS): ExpressionType.TRANS,
+    (ExpressionType.TRANS, ExpressionType.MATRIX): ExpressionType.TRANS,
+    (ExpressionType.MATRIX, ExpressionType.TRANS): ExpressionType.MATRIX,
+    (ExpressionType.MATRIX, ExpressionType.MATRIX): ExpressionType.MATRIX,
+    (ExpressionType.INVERSE, ExpressionType.FRAME): ExpressionType.TRANS,
+    (ExpressionType.INVERSE, ExpressionType.MATRIX): ExpressionType.TRANS,
 }
-_PLACES = frozenset((Sort.FRAME, Sort.MATRIX))
-_STEPS = frozenset((Sort.TRANS, Sort.MATRIX))
+_PLACES = frozenset((ExpressionType.FRAME, ExpressionType.MATRIX))
+_STEPS = frozenset((ExpressionType.TRANS, ExpressionType.MATRIX))
 
 
-def result(names: Names, node: tree.Binary, left: Sort | None, right: Sort | None) -> Sort | None:
+def result(
+    names: Names, node: tree.Binary, left: ExpressionType | None, right: ExpressionType | None
+) -> ExpressionType | None:
     """Return what an operation other than AND and OR gives; say that it has no meaning between these two."""
     operation = node.operation
     comparison = operation in _COMPARISONS
-    if left is Sort.SCALAR and right is Sort.SCALAR:
-        return Sort.CONDITION if comparison else Sort.SCALAR
+    if left is ExpressionType.SCALAR and right is ExpressionType.SCALAR:
+        return ExpressionType.CONDITION if comparison else ExpressionType.SCALAR
     if left is None or right is None:
         # A comparison is a condition whatever it compares.
-        return Sort.CONDITION if comparison else None
+        return ExpressionType.CONDITION if comparison else None
     if operation == "*" and (left, right) in _PRODUCTS:
         return _PRODUCTS[left, right]
-    if Sort.EVENT in (left, right):
-        events.refuse(names, node.left if left is Sort.EVENT else node.right)
+    if ExpressionType.EVENT in (left, right):
+        events.refuse(names, node.left if left is ExpressionType.EVENT else node.right)
     else:
         _refuse(names, node, left, right)
-    return Sort.CONDITION if comparison else None
+    return ExpressionType.CONDITION if comparison else None
 
 
-def negative(names: Names, node: tree.Unary, sort: Sort | None) -> Sort | None:
+def negative(names: Names, node: tree.Unary, sort: ExpressionType | None) -> ExpressionType | None:
     """Return what a minus in front of an expression gives: only numbers have one."""
-    if sort is Sort.EVENT:
+    if sort is ExpressionType.EVENT:
         events.refuse(names, node.operand)
-    elif sort not in (None, Sort.SCALAR):
-        turned = sort in (Sort.TRANS, Sort.FRAME, Sort.MATRIX)
+    elif sort not in (None, ExpressionType.SCALAR):
+        turned = sort in (ExpressionType.TRANS, ExpressionType.FRAME, ExpressionType.MATRIX)
         _say(
             names,
             node,
@@ -54,10 +56,10 @@ def negative(names: Names, node: tree.Unary, sort: Sort | None) -> Sort | None:
             bare(is_what(node.operand, sort)),
             f"for the way back write `INV({written(node.operand)})`" if turned else "",
         )
-    return None if sort is not Sort.SCALAR else Sort.SCALAR
+    return None if sort is not ExpressionType.SCALAR else ExpressionType.SCALAR
 
 
-def _refuse(names: Names, node: tree.Binary, left: Sort, right: Sort) -> None:
+def _refuse(names: Names, node: tree.Binary, left: ExpressionType, right: ExpressionType) -> None:
     one, other = is_what(node.left, left), is_what(node.right, right)
     message = f"`{node.operation}` has no meaning between {one} and {other}"
     label = f"{bare(one)} {node.operation} {bare(other)}"
@@ -80,10 +82,10 @@ def _say(
     names.found.say("E221", message, node.span, label, secondary=secondary, helps=(help_,) if help_ else ())
 
 
-def _advice(node: tree.Binary, left: Sort, right: Sort) -> str:
+def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
     """Return what was probably meant, empty where nobody knows."""
     one, other = written(node.left), written(node.right)
-    if Sort.CONDITION in (left, right):
+    if ExpressionType.CONDITION in (left, right):
         return "a condition is no number; conditions are joined by AND and OR"
     if node.operation in _COMPARISONS:
         return f"for how far apart they are write `DIST({one}, {other})`" if {left, right} <= _PLACES else ""
@@ -97,18 +99,22 @@ def _advice(node: tree.Binary, left: Sort, right: Sort) -> str:
     return ""
 
 
-def _advice_on_product(node: tree.Binary, left: Sort, right: Sort) -> str:
+def _advice_on_product(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
     one, other = written(node.left), written(node.right)
     if node.operation == "/":
-        return f"for the way back write `{one} * INV({other})`" if right in _STEPS and left is not Sort.SCALAR else ""
+        return (
+            f"for the way back write `{one} * INV({other})`"
+            if right in _STEPS and left is not ExpressionType.SCALAR
+            else ""
+        )
     match left, right:
-        case Sort.FRAME, Sort.FRAME:
+        case ExpressionType.FRAME, ExpressionType.FRAME:
             return f"for the step from {one} to {other} write `INV({one}) * {other}`"
-        case ((Sort.TRANS | Sort.MATRIX), Sort.FRAME):
+        case ((ExpressionType.TRANS | ExpressionType.MATRIX), ExpressionType.FRAME):
             return f"a step comes behind the place it starts from: write `{other} * {one}`"
-        case (Sort.INVERSE, _) | (_, Sort.INVERSE):
+        case (ExpressionType.INVERSE, _) | (_, ExpressionType.INVERSE):
             return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
-        case (Sort.SCALAR, _) | (_, Sort.SCALAR):
+        case (ExpressionType.SCALAR, _) | (_, ExpressionType.SCALAR):
             return "a step is made from numbers by XYZ, ROTX, ROTY and ROTZ"
         case _:
             return ""

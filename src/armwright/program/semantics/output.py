@@ -4,9 +4,7 @@ from collections.abc import Mapping
 
 from armwright.program.semantics import events
 from armwright.program.semantics.context import Check, Context
-from armwright.program.semantics.expression_types import (
-    Sort,
-)
+from armwright.program.semantics.expression_types import ExpressionType
 from armwright.program.semantics.type_check import sort
 from armwright.program.syntax import tree
 
@@ -14,7 +12,7 @@ from armwright.program.syntax import tree
 def print_(context: Context, node: tree.Print) -> None:
     """Check what is printed: anything but an EVENT."""
     for item in node.items:
-        if not isinstance(item, tree.String) and sort(context.names, item) is Sort.EVENT:
+        if not isinstance(item, tree.String) and sort(context.names, item) is ExpressionType.EVENT:
             events.refuse(context.names, item, "printed")
 
 

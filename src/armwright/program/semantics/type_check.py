@@ -13,7 +13,7 @@ from armwright.program.semantics.builtins import FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.expression_types import (
     FITTING,
-    Sort,
+    ExpressionType,
     a_type,
     bare,
     called,
@@ -26,7 +26,7 @@ from armwright.program.semantics.scopes import Names
 from armwright.program.syntax import pose_literals, tree
 
 
-def sort(names: Names, node: tree.Expression) -> Sort | None:
+def sort(names: Names, node: tree.Expression) -> ExpressionType | None:
     """Return what an expression is; None where that is unknown, of which something has been said then.
 
     Args:
@@ -56,12 +56,12 @@ def refuse_world(names: Names, node: tree.Expression) -> None:
 def need(
     names: Names,
     node: tree.Expression,
-    wanted: Sort,
+    wanted: ExpressionType,
     code: str,
     what: str,
     *,
     notes: tuple[str, ...] = (),
-    helps: Callable[[Sort], str] | None = None,
+    helps: Callable[[ExpressionType], str] | None = None,
 ) -> bool:
     """Say that an expression is not what its place needs; of a plain name nothing more is asked then.
 
@@ -83,12 +83,12 @@ def need(
 def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
     names: Names,
     node: tree.Expression,
-    found: Sort | None,
-    wanted: Sort,
+    found: ExpressionType | None,
+    wanted: ExpressionType,
     code: str,
     what: str,
     notes: tuple[str, ...] = (),
-    helps: Callable[[Sort], str] | None = None,
+    helps: Callable[[ExpressionType], str] | None = None,
 ) -> bool:
     """Do what ``need`` does for an expression of which one knows what it is."""
     if found is wanted:
@@ -120,7 +120,7 @@ def quantity(names: Names, node: tree.Expression, wanted: Dimension, what: str) 
         wanted: what a number with a unit must measure.
         what: the first half of the message, such as ``PAUSE needs a time``.
     """
-    return need(names, node, Sort.SCALAR, "E216", what) and measure(names, node, wanted, what)
+    return need(names, node, ExpressionType.SCALAR, "E216", what) and measure(names, node, wanted, what)
 
 
 def condition(names: Names, node: tree.Expression, who: str) -> None:
@@ -128,26 +128,26 @@ def condition(names: Names, node: tree.Expression, who: str) -> None:
     _is_condition(names, node, sort(names, node), who)
 
 
-def _is_condition(names: Names, node: tree.Expression, found: Sort | None, who: str) -> None:
-    def helps(found: Sort) -> str:
-        if found is Sort.SCALAR and not isinstance(node, tree.Number):
+def _is_condition(names: Names, node: tree.Expression, found: ExpressionType | None, who: str) -> None:
+    def helps(found: ExpressionType) -> str:
+        if found is ExpressionType.SCALAR and not isinstance(node, tree.Number):
             return f"write `{written(node)} <> 0`"
         return "a condition compares two numbers, such as `n > 0`"
 
-    _fits(names, node, found, Sort.CONDITION, "E219", f"{who} needs a condition", helps=helps)
+    _fits(names, node, found, ExpressionType.CONDITION, "E219", f"{who} needs a condition", helps=helps)
 
 
-def _number(_names: Names, node: tree.Number) -> Sort | None:
+def _number(_names: Names, node: tree.Number) -> ExpressionType | None:
     # A number that was reported before is NaN; it may have been meant as a name.
-    return None if math.isnan(node.value) else Sort.SCALAR
+    return None if math.isnan(node.value) else ExpressionType.SCALAR
 
 
-def _name(names: Names, node: tree.Name) -> Sort | None:
+def _name(names: Names, node: tree.Name) -> ExpressionType | None:
     kind = names.type(node)
     return None if kind is None else array_elements.single(names, node, kind)
 
 
-def _index(names: Names, node: tree.Index) -> Sort | None:
+def _index(names: Names, node: tree.Index) -> ExpressionType | None:
     return array_elements.element(names, node, [sort(names, index) for index in node.indices])
 
 
@@ -155,7 +155,7 @@ def _poison(names: Names, node: tree.Poison) -> None:
     names.use(node.names)
 
 
-def _function(names: Names, node: tree.Function) -> Sort | None:
+def _function(names: Names, node: tree.Function) -> ExpressionType | None:
     name = node.name
     if name.key in FUNCTIONS:
         # An axis has a name but is no variable.
@@ -192,27 +192,27 @@ def _no_function(names: Names, node: tree.Function) -> None:
     names.found.say("E227", message, name.span, label, helps=(help_,) if help_ else ())
 
 
-def _unary(names: Names, node: tree.Unary) -> Sort | None:
+def _unary(names: Names, node: tree.Unary) -> ExpressionType | None:
     if node.operation == "NOT":
         condition(names, node.operand, "NOT")
-        return Sort.CONDITION
+        return ExpressionType.CONDITION
     return operators.negative(names, node, sort(names, node.operand))
 
 
-def _binary(names: Names, node: tree.Binary) -> Sort | None:
+def _binary(names: Names, node: tree.Binary) -> ExpressionType | None:
     first, chain = tree.chain(node)
     found = sort(names, first)
     for one in chain:
         if one.operation in ("AND", "OR"):
             _is_condition(names, one.left, found, one.operation)
             condition(names, one.right, one.operation)
-            found = Sort.CONDITION
+            found = ExpressionType.CONDITION
         else:
             found = operators.result(names, one, found, sort(names, one.right))
     return found
 
 
-def _matrix(names: Names, node: tree.Matrix) -> Sort | None:
+def _matrix(names: Names, node: tree.Matrix) -> ExpressionType | None:
     fault = pose_literals.check(node, names.units)
     if fault is not None:
         if len(node.items) == 3 and names.std is Standard.RLO_2:
@@ -220,17 +220,17 @@ def _matrix(names: Names, node: tree.Matrix) -> Sort | None:
         names.found.append(fault)
     for place, item in enumerate(node.items):
         if not isinstance(item, tree.Number):
-            need(names, item, Sort.SCALAR, "E216", "a matrix is made of numbers")
+            need(names, item, ExpressionType.SCALAR, "E216", "a matrix is made of numbers")
         elif item.unit is not None and fault is None:
             turns = place < 9
             what = "n, o, a of a matrix have no unit" if turns else "the last three numbers of a matrix are lengths"
             measure(names, item, None if turns else "length", what)
-    return None if fault is not None and fault.is_error else Sort.MATRIX
+    return None if fault is not None and fault.is_error else ExpressionType.MATRIX
 
 
-_SORTS: dict[type, Callable[..., Sort | None]] = {
+_SORTS: dict[type, Callable[..., ExpressionType | None]] = {
     tree.Number: _number,
-    tree.ArmName: lambda _names, _node: Sort.FRAME,
+    tree.ArmName: lambda _names, _node: ExpressionType.FRAME,
     tree.Name: _name,
     tree.Index: _index,
     tree.Poison: _poison,

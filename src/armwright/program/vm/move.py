@@ -21,7 +21,7 @@ from armwright.program.language.words import Standard
 from armwright.program.vm.contact import comes_down, contact_of, look_out, note_contact, send, stop
 from armwright.program.vm.machine import Machine
 from armwright.program.vm.move_diagnostics import CODES, stopped, ways_round, where_and_why
-from armwright.program.vm.move_request import Asked, Goal, asked_of
+from armwright.program.vm.move_request import Goal, MoveRequest, move_request
 from armwright.program.vm.process import Activation, Guard, Motion, Process
 from armwright.program.vm.recording import Run, RunStage, efforts, peaks_of
 from armwright.program.vm.simple_statements import work_out
@@ -39,7 +39,7 @@ def move(run: Machine, process: Process, step: Instruction) -> None:
     """Plan a MOVE and begin its first stage; in the action of a MOVE, when that one has come to rest."""
     if process.motion is not None and not _made_way(run, process, process.motion, step.span):
         return
-    asked = asked_of(run, process, step)
+    asked = move_request(run, process, step)
     moved = run.name(process, asked.begin.operands[0])
     arm, implied = _carrier(run, process, moved, asked.begin)
     run.claim(process, arm, step.span, moved)
@@ -141,7 +141,7 @@ def release(run: Machine, process: Process, keep: int) -> None:
 # ---- planning ------------------------------------------------------------------------------------------------------
 
 
-def _goal_name(run: Machine, process: Process, asked: Asked) -> str:
+def _goal_name(run: Machine, process: Process, asked: MoveRequest) -> str:
     goal = asked.begin.operands[1]
     return run.name(process, goal) if run.names_variable(process, goal) else asked.form.goal
 
@@ -190,7 +190,9 @@ def _one_at_a_time(run: Machine, process: Process, arm: str, span: Span) -> None
     run.fail(process, "E503", text, span, "begins in the middle of the other", secondary=[on_its_way])
 
 
-def _plan(run: Machine, process: Process, asked: Asked, arm: str, moved: str) -> list[tuple[Stage, tuple[str, ...]]]:
+def _plan(
+    run: Machine, process: Process, asked: MoveRequest, arm: str, moved: str
+) -> list[tuple[Stage, tuple[str, ...]]]:
     """Return the stages of a MOVE with the names of where they lead.
 
     Source:
@@ -225,7 +227,7 @@ def _pose(run: Machine, process: Process, goal: Goal) -> Array:
     return run.pose(process, goal.operand, goal.step)
 
 
-def _timed(run: Machine, process: Process, asked: Asked, stages: Sequence[Stage]) -> list[Stage]:
+def _timed(run: Machine, process: Process, asked: MoveRequest, stages: Sequence[Stage]) -> list[Stage]:
     """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
     asked_for, least = asked.duration, sum(stage.trajectory.duration for stage in stages)
     assert asked_for is not None  # noqa: S101 - asked for only then
@@ -246,7 +248,7 @@ def _timed(run: Machine, process: Process, asked: Asked, stages: Sequence[Stage]
 
 
 def _fail_move(
-    run: Machine, process: Process, obstacle: Obstacle, *, asked: Asked, stage: StagePlan, arm: str
+    run: Machine, process: Process, obstacle: Obstacle, *, asked: MoveRequest, stage: StagePlan, arm: str
 ) -> NoReturn:
     label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
     goal, kind = asked.goals[label], stage.kind.value

@@ -20,7 +20,7 @@ class Goal(NamedTuple):
     step: Instruction
 
 
-class Asked(NamedTuple):
+class MoveRequest(NamedTuple):
     """What the instructions of one MOVE ask for."""
 
     begin: Instruction
@@ -33,7 +33,7 @@ class Asked(NamedTuple):
     span: Span
 
 
-def asked_of(run: Machine, process: Process, step: Instruction) -> Asked:
+def move_request(run: Machine, process: Process, step: Instruction) -> MoveRequest:
     """Gather the instructions of a MOVE, from MVBEG to MVEND."""
     instructions, at = run.code.instructions, process.at - 1
     first = at
@@ -60,7 +60,7 @@ def asked_of(run: Machine, process: Process, step: Instruction) -> Asked:
         blend=Op.MVBLD in numbers,
     )
     duration = numbers.get(Op.MVDUR)
-    return Asked(
+    return MoveRequest(
         begin=begin,
         form=form,
         goals={goal.label: goal for several in goals.values() for goal in several},
