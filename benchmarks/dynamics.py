@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from armwright.arm.load import load_arm
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 from oracles.with_pinocchio import pinocchio_model
 
 ROWS = 200_000

@@ -7,7 +7,7 @@ import roboticstoolbox as rtb
 from eaik.IK_DH import DhRobot
 
 from armwright.arm.load import load_arm
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 from armwright.kinematics.forward import link_poses
 
 ROWS = 200_000

@@ -14,7 +14,7 @@ _CALL = """
 import time
 import numpy as np
 from armwright.arm.load import load_arm
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 arm = load_arm("puma560")
 start = time.perf_counter()
 fast = compile_arm(arm)

@@ -10,7 +10,7 @@ from spatialmath import SE3
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 from armwright.kinematics.forward import forward
 from armwright.motion.straight import straight_line
 from kinematics import toolbox_robot

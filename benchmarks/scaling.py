@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from armwright.arm.load import load_arm
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 from oracles.arms import random_arm
 from oracles.with_pinocchio import pinocchio_model
 
@@ -80,7 +80,7 @@ import sys
 from pathlib import Path
 import numpy as np
 from armwright.arm.load import load_arm
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 fast = compile_arm(load_arm("puma560")).inverse_dynamics
 q = np.zeros((2, 6))
 fast(q, q, q)

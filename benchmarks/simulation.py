@@ -5,8 +5,8 @@ from measure import in_turn, progress, section, table  # isort: skip - sets the 
 import numpy as np
 
 from armwright.arm.load import load_arm
-from armwright.dynamics.integrators import Adaptive, Gill
-from armwright.dynamics.simulate import simulate
+from armwright.simulation.integrators import Adaptive, Gill
+from armwright.simulation.simulate import simulate
 
 DURATION = 5.0
 

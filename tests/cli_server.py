@@ -80,7 +80,7 @@ def _load() -> None:
 
     for name in ("armwright.cli.app", "armwright.arm.load", "armwright.program.api", "armwright.cell.reader",
                  "armwright.program.vm.interpreter", "armwright.report.files", "armwright.motion.moves",
-                 "armwright.clearance.reader", "armwright.dynamics.compiled", "rich.markdown"):  # fmt: skip
+                 "armwright.clearance.reader", "armwright.compiled.arm", "rich.markdown"):  # fmt: skip
         importlib.import_module(name)
 
 

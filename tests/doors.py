@@ -7,7 +7,6 @@ import numpy as np
 
 import armwright
 from armwright.dynamics.bejczy import bejczy_efforts
-from armwright.dynamics.controllers import computed_torque, pd, standing
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.forward_dynamics import toacc
 from armwright.dynamics.lagrange_euler import coriolis_matrix, coriolis_tensor
@@ -17,6 +16,7 @@ from armwright.kinematics.differential import differential_inverse
 from armwright.kinematics.jacobian import jacobian_rate, tool_twist
 from armwright.kinematics.manipulability import manipulability
 from armwright.kinematics.singularities import singularity_factors
+from armwright.simulation.controllers import computed_torque, pd, standing
 
 PUMA = armwright.load_arm("puma560-seed")
 Q = (0.1, 0.6, 0.2, 0.3, 0.9, 0.1)

@@ -13,7 +13,8 @@ from armwright.clearance.kernel import Layout, emit_simulation
 from armwright.clearance.linkage import Linkage, Place
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings
-from armwright.dynamics.compiled import compile_arm, emit_quantity
+from armwright.compiled.arm import compile_arm
+from armwright.compiled.quantities import emit_quantity
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward import forward
 from armwright.tracing.emit import emit

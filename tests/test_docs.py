@@ -15,9 +15,9 @@ from armwright.clearance.estimation.measured import RestMeasured, read_measured
 from armwright.clearance.ideal import closed, tip_of
 from armwright.clearance.reader import read_linkage
 from armwright.clearance.scenario import assembly_guess
-from armwright.dynamics.integrators import Adaptive
-from armwright.dynamics.simulation import JointState, Status
 from armwright.errors import FileFormatError
+from armwright.simulation.integrators import Adaptive
+from armwright.simulation.result import JointState, Status
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study.stanford_torque import joint_table, torques

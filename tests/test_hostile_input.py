@@ -11,11 +11,8 @@ import pytest
 import armwright
 from armwright.arm.model import Arm, Joint, Limits, Link, Motor
 from armwright.dynamics.bejczy import bejczy_efforts, fitted
-from armwright.dynamics.controllers import gravity_compensation, pd, standing
 from armwright.dynamics.energy import kinetic_energy
 from armwright.dynamics.forward_dynamics import toacc
-from armwright.dynamics.integrators import Adaptive, Gill
-from armwright.dynamics.simulation import Brake, Status
 from armwright.errors import (
     ArmwrightError,
     InvalidValueError,
@@ -29,6 +26,9 @@ from armwright.kinematics.differential import differential_inverse
 from armwright.kinematics.jacobian import jacobian_rate, tool_twist
 from armwright.kinematics.manipulability import manipulability
 from armwright.kinematics.singularities import singularity_factors
+from armwright.simulation.controllers import gravity_compensation, pd, standing
+from armwright.simulation.integrators import Adaptive, Gill
+from armwright.simulation.result import Brake, Status
 from doors import DOORS, MANY, ONE, OTHER, PUMA, Door, Q
 
 WRONG: dict[str, tuple[Any, type[ArmwrightError], str]] = {
@@ -321,7 +321,7 @@ def test_arguments_without_a_meaning(call: Callable[[], object], kind: type[Armw
         (lambda: simulated(controller=lambda *_: "full"), KindError, "controller at 0 s: expected numbers, got 'full'"),
         (lambda: simulated(controller=tired), ShapeError, "efforts of the controller at "),
         (lambda: simulated(integrator="gill"), KindError, "integrator: expected one such as Gill() or Adaptive()"),
-        (lambda: simulated(integrator=Gill), KindError, "got <class 'armwright.dynamics.integrators.Gill'>"),
+        (lambda: simulated(integrator=Gill), KindError, "got <class 'armwright.simulation.integrators.Gill'>"),
         (lambda: simulated(brakes=Brake(joint=0)), KindError, "brakes: expected a list of Brake, got Brake(joint=0"),
         (lambda: simulated(brakes=[0]), KindError, "brakes: expected a list of Brake, got [0]"),
         (lambda: simulated(brakes=[Brake(joint=6)]), InvalidValueError, "brake: expected a joint from 0 to 5, got 6"),

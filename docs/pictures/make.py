@@ -19,13 +19,13 @@ from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import Simulation as Rattling
 from armwright.clearance.simulation import simulate as simulate_play
-from armwright.dynamics.integrators import Adaptive
-from armwright.dynamics.simulation import Event, JointState, Simulation
 from armwright.kinematics.inverse.solution import Branch
 from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.report.calibrated import calibrated
 from armwright.report.calibrated_files import distances_figure
 from armwright.report.svg import alike, steady
+from armwright.simulation.integrators import Adaptive
+from armwright.simulation.result import Event, JointState, Simulation
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study import puma_moves

@@ -39,13 +39,12 @@ if TYPE_CHECKING:
     from armwright.clearance.correction import correct_nodes, correct_path
     from armwright.clearance.estimation.static import estimate_at_rest
     from armwright.clearance.reader import load_linkage
-    from armwright.dynamics.compiled import compile_arm
+    from armwright.compiled.arm import compile_arm
     from armwright.dynamics.forward_dynamics import forward_dynamics
     from armwright.dynamics.lagrange_euler import coriolis_matrix, coriolis_tensor, pose_derivative_matrices
     from armwright.dynamics.mass_matrix import mass_matrix
     from armwright.dynamics.newton_euler import inverse_dynamics, link_forces
     from armwright.dynamics.payload import payload
-    from armwright.dynamics.simulate import simulate
     from armwright.dynamics.terms import terms
     from armwright.errors import ArmwrightError, CacheWarning, GravityWarning, UnitWarning
     from armwright.kinematics.damping import damped_rates
@@ -73,6 +72,7 @@ if TYPE_CHECKING:
     from armwright.motion.trapezoid import trapezoid
     from armwright.motion.xspline import xspline, xspline_along
     from armwright.motion.xspline_online import xspline_kernel
+    from armwright.simulation.simulate import simulate
 
 _HOME = {
     "Arm": "arm.model",
@@ -90,7 +90,7 @@ _HOME = {
     "calibrate_nongeometric": "calibration.nongeometric",
     "calibrate_points": "calibration.fitting",
     "cartesian_move": "motion.moves",
-    "compile_arm": "dynamics.compiled",
+    "compile_arm": "compiled.arm",
     "continuity": "motion.continuity",
     "coriolis_matrix": "dynamics.lagrange_euler",
     "coriolis_tensor": "dynamics.lagrange_euler",
@@ -144,7 +144,7 @@ _HOME = {
     "replace_goal": "motion.online",
     "retarget": "motion.online",
     "settling": "accuracy.settling",
-    "simulate": "dynamics.simulate",
+    "simulate": "simulation.simulate",
     "singularities": "kinematics.singularities",
     "slowing_for_efforts": "motion.efforts",
     "slowing_for_limits": "motion.limit_use",

@@ -9,8 +9,8 @@ import pytest
 import armwright
 import doors
 from armwright.arm.model import Arm, Joint, Limits, Link
-from armwright.dynamics.controllers import gravity_compensation
 from armwright.errors import ArmwrightError, UnitWarning
+from armwright.simulation.controllers import gravity_compensation
 from doors import DOORS, PUMA
 
 DEGREES = (10.0, 90.0, 20.0, 30.0, 90.0, 0.0)

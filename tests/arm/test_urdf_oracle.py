@@ -15,7 +15,7 @@ from armwright.arm.urdf.writer import urdf_text
 from armwright.arm.write import toml_text
 from armwright.arrays import Array
 from armwright.calibration.chain import chain_of
-from armwright.dynamics.compiled import emit_quantity
+from armwright.compiled.quantities import emit_quantity
 from armwright.dynamics.energy import kinetic_energy
 from armwright.dynamics.forward_dynamics import forward_dynamics
 from armwright.dynamics.lagrange_euler import lagrange_euler

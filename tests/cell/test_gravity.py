@@ -19,12 +19,11 @@ from armwright.cell.frames import WORLD, Node
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.dynamics.compiled import emit_quantity
+from armwright.compiled.quantities import emit_quantity
 from armwright.dynamics.energy import potential_energy
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.payload import payload
 from armwright.dynamics.shares import gravity_efforts
-from armwright.dynamics.simulate import simulate
 from armwright.dynamics.terms import terms
 from armwright.errors import FileFormatError, GravityWarning, InvalidValueError
 from armwright.kinematics.forward import forward
@@ -37,6 +36,7 @@ from armwright.program import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.interpreter import warnings as warnings_of
 from armwright.program.vm.recording import Recording
+from armwright.simulation.simulate import simulate
 from armwright.spatial.poses import pose
 from oracles.with_pinocchio import pinocchio_model, with_load, with_rotors
 from samples import Sample

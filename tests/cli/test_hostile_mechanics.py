@@ -13,8 +13,8 @@ from armwright.arm.model import Link
 from armwright.cli.app import main
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.payload import payload
-from armwright.dynamics.simulate import simulate
 from armwright.errors import FileFormatError
+from armwright.simulation.simulate import simulate
 from cli_calls import armwright
 
 Q = "10,20,30,40,50,60"

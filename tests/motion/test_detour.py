@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward import forward

@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
-from armwright.dynamics.compiled import compile_arm
+from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.motion.efforts import _largest_part, _Shares, effort_peaks, slowing_for_efforts

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.compiled import CompiledArm, compile_arm
+from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.errors import InvalidValueError, KindError, RotationWarning, ShapeError, UnknownNameError
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.compiled import CompiledArm, compile_arm
+from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.jacobian import jacobian

@@ -8,7 +8,7 @@ import armwright
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.dynamics.compiled import CompiledArm, compile_arm
+from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, KindError
 from armwright.kinematics.forward import forward

@@ -81,7 +81,7 @@ def codes(incomplete: str) -> list[str]:
 
 def quantities(incomplete: str) -> list[str]:
     """Complete the name of a compiled quantity."""
-    from armwright.dynamics.compiled import quantity_names
+    from armwright.compiled.quantities import quantity_names
 
     return _beginning(quantity_names(), incomplete)
 

@@ -28,7 +28,7 @@ def kernel(
     **Example:** `armwright kernel stanford-jpl inverse_dynamics --count`
     """
     from armwright.arm.load import load_arm
-    from armwright.dynamics.compiled import emit_quantity
+    from armwright.compiled.quantities import emit_quantity
 
     emitted = emit_quantity(load_arm(arm), quantity)
     total = sum(emitted.operations.values())

@@ -14,7 +14,7 @@ from armwright.cli.results import write_results
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
-    from armwright.dynamics.simulation import JointState, Simulation
+    from armwright.simulation.result import JointState, Simulation
 
 
 # More changes of joints than this are counted, not listed.
@@ -54,11 +54,11 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
     from armwright.cli.load import load_in_hand
-    from armwright.dynamics.controllers import gravity_compensation, no_effort
-    from armwright.dynamics.integrators import Adaptive, Gill
     from armwright.dynamics.payload import payload
-    from armwright.dynamics.simulate import simulate as run
     from armwright.report.motion_table import motion_csv
+    from armwright.simulation.controllers import gravity_compensation, no_effort
+    from armwright.simulation.integrators import Adaptive, Gill
+    from armwright.simulation.simulate import simulate as run
 
     model = load_arm(arm)
     if load is not None:

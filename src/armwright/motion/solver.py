@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm
 from armwright.arrays import Array
-from armwright.dynamics.compiled import CompiledArm
+from armwright.compiled.arm import CompiledArm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward import forward
 from armwright.kinematics.inverse.closed_form import inverse_branches

@@ -5,7 +5,7 @@ import numpy as np
 
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.dynamics.simulation import JointState, Simulation, Status
+from armwright.simulation.result import JointState, Simulation, Status
 from oracles.arms import random_arm
 
 # Energy that a ledger may miss, beside the energies in it: what the fixed step leaves, far above rounding.

@@ -1,10 +1,8 @@
-"""An arm's quantities as compiled kernels: the same equations as everywhere, traced for that arm."""
+"""The quantities of an arm that can be compiled: their equations, shapes and conditions, and their emitted sources."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property, partial
-from typing import Any, NamedTuple, TypeAlias
-
-import attrs
+from functools import partial
+from typing import Any, NamedTuple
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import admitted, ask_for_degrees
@@ -26,113 +24,6 @@ from armwright.tracing.vectors import Matrix, Vector
 
 Numbers = Sequence[Scalar]
 Rows = list[list[Scalar]]
-# Of arrays with any leading axes.
-Function: TypeAlias = Callable[..., Any]
-
-
-def compile_arm(arm: Arm) -> "CompiledArm":
-    """Return an arm whose quantities are compiled, each when it is first asked for.
-
-    A first compilation takes some seconds and is kept on disk: see ``armwright.files.store.cache_folder``.
-    """
-    return CompiledArm(arm=arm)
-
-
-@attrs.frozen(kw_only=True, slots=False)
-class CompiledArm:
-    """Functions of one arm, as fast as the processor goes.
-
-    They are called like the plain functions of the same names, without the arm, and give the same numbers but for
-    rounding. A configuration has the same bits alone, in any batch and on any number of threads. Each takes
-    ``threads=``, how many cores to use (all, when left out), and ``out=``, arrays to fill: see ``Kernel.function``.
-    Positions that look like degrees get the same warning; no angle may be beyond 1e12, no other number beyond 1e100.
-
-    Attributes:
-        arm: the arm, with n joints.
-    """
-
-    arm: Arm
-
-    @cached_property
-    def forward(self) -> Function:
-        """Of q (..., n): the tool pose (..., 4, 4)."""
-        return self._function("forward")
-
-    @cached_property
-    def link_poses(self) -> Function:
-        """Of q (..., n): the poses of frames 0 to n and of the tool (..., n + 2, 4, 4)."""
-        return self._function("link_poses")
-
-    @cached_property
-    def jacobian(self) -> Function:
-        """Of q (..., n): the Jacobian of the tool point along base axes (..., 6, n)."""
-        return self._function("jacobian")
-
-    @cached_property
-    def pose_and_jacobian(self) -> Function:
-        """Of q (..., n): the tool pose (..., 4, 4) and the Jacobian (..., 6, n)."""
-        return self._function("pose_and_jacobian")
-
-    @cached_property
-    def inverse_branches(self) -> Function:
-        """Of poses (..., 4, 4) and near (..., 6): eight postures (..., 8, 6), and whether a joint is free (..., 8).
-
-        Raises:
-            UnsupportedArmError: the arm has no closed form.
-        """
-        return self._function("inverse_branches")
-
-    @cached_property
-    def inverse_dynamics(self) -> Function:
-        """Of q, qd, qdd (..., n): the efforts (..., n), drives included."""
-        return self._function("inverse_dynamics")
-
-    @cached_property
-    def inverse_dynamics_with_wrench(self) -> Function:
-        """Of q, qd, qdd (..., n) and a wrench (..., 6) on the tool along base axes: the efforts (..., n)."""
-        return self._function("inverse_dynamics_with_wrench")
-
-    @cached_property
-    def forward_dynamics(self) -> Function:
-        """Of q, qd, tau (..., n): the accelerations (..., n).
-
-        Calls raise UnsupportedArmError where some joint moves nothing that resists an acceleration.
-        """
-        return self._function("forward_dynamics")
-
-    @cached_property
-    def mass_matrix(self) -> Function:
-        """Of q (..., n): the mass matrix (..., n, n), rotor inertia included."""
-        return self._function("mass_matrix")
-
-    @cached_property
-    def mass_and_bias(self) -> Function:
-        """Of q, qd (..., n): the mass matrix (..., n, n) and the efforts that speeds and gravity take (..., n).
-
-        With them tau = M qdd + bias + friction.
-        """
-        return self._function("mass_and_bias")
-
-    def __reduce__(self) -> tuple[Callable[[Arm], "CompiledArm"], tuple[Arm]]:
-        """Let another process compile for itself: it finds the kernels on disk."""
-        return compile_arm, (self.arm,)
-
-    def kernel(self, name: str) -> Kernel:
-        """Return the kernel behind a function, whose part for one configuration other compiled code can call.
-
-        Args:
-            name: of the function.
-
-        Raises:
-            UnknownNameError: no such function.
-            UnsupportedArmError: the arm has no such function.
-        """
-        emitted = emit_quantity(self.arm, name)
-        plain, remark = _QUANTITIES[name].plain, partial(_ask_for_degrees, self.arm, emitted.inputs)
-        return Kernel(emitted=emitted, explain=partial(plain, self.arm), remark=remark)
-
-    def _function(self, name: str) -> Function:
-        return self.kernel(name).function(name, str(getattr(type(self), name).__doc__))
 
 
 def emit_quantity(arm: Arm, name: str) -> Emitted:
@@ -159,6 +50,22 @@ def emit_quantity(arm: Arm, name: str) -> Emitted:
 
     bounds = dict.fromkeys(_POSITIONS, admitted(arm).tolist())
     return emit(f"{name} of {arm.name}", equation, inputs, shapes=outputs, flags=quantity.flags, bounds=bounds)
+
+
+def quantity_kernel(arm: Arm, name: str) -> Kernel:
+    """Return the kernel of a quantity, with the errors and the warnings of the plain function; compiled when called.
+
+    Args:
+        arm: the arm.
+        name: of a quantity of ``CompiledArm``.
+
+    Raises:
+        UnknownNameError: no such quantity.
+        UnsupportedArmError: the arm has no such quantity.
+    """
+    emitted = emit_quantity(arm, name)
+    plain, remark = _QUANTITIES[name].plain, partial(_ask_for_degrees, arm, emitted.inputs)
+    return Kernel(emitted=emitted, explain=partial(plain, arm), remark=remark)
 
 
 def quantity_names() -> tuple[str, ...]:

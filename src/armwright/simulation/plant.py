@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
-from armwright.dynamics.compiled import CompiledArm, compile_arm
-from armwright.dynamics.controllers import Controller
-from armwright.dynamics.settle import settle
-from armwright.dynamics.simulation import Brake, JointState
+from armwright.compiled.arm import CompiledArm, compile_arm
+from armwright.simulation.complementarity import solve_complementarity
+from armwright.simulation.controllers import Controller
+from armwright.simulation.result import Brake, JointState
 
 # A speed and a distance that are nothing [rad/s, m/s, rad, m]. Events are found to within them.
 STILL = 1e-11
@@ -163,7 +163,7 @@ class Plant:
         lower = np.where(at_upper | braked, -np.inf, -self.forward)
         upper = np.where(at_lower | braked, np.inf, self.backward)
         M, _, _, left = self._pushed(t, q, qd, np.where(at_rest, 0.0, np.sign(qd)), at_rest)
-        way = settle(M, left, at_rest, lower, upper).way
+        way = solve_complementarity(M, left, at_rest, lower, upper).way
         held = at_rest & (way == 0)
         state = np.where(
             braked,
@@ -184,7 +184,7 @@ class Plant:
         """Return speeds after impacts that leave no speed against a stop or under a brake, and the energy lost."""
         M, _ = self.compiled.mass_and_bias(q, qd)
         lower, upper = np.where(from_above, -np.inf, 0.0), np.where(from_below, np.inf, 0.0)
-        after = settle(M, M @ qd, from_below | from_above, lower, upper).x
+        after = solve_complementarity(M, M @ qd, from_below | from_above, lower, upper).x
         return after, float(qd @ M @ qd - after @ M @ after) / 2
 
     def watch(self, t: float, q: Array, qd: Array, phase: Phase) -> float:

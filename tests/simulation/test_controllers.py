@@ -6,7 +6,10 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link, Motor
-from armwright.dynamics.controllers import (
+from armwright.dynamics.payload import payload
+from armwright.dynamics.shares import gravity_efforts
+from armwright.errors import InvalidValueError, ShapeError
+from armwright.simulation.controllers import (
     computed_torque,
     gravity_compensation,
     no_effort,
@@ -14,11 +17,8 @@ from armwright.dynamics.controllers import (
     pd_with_gravity,
     standing,
 )
-from armwright.dynamics.integrators import Adaptive, Gill
-from armwright.dynamics.payload import payload
-from armwright.dynamics.shares import gravity_efforts
-from armwright.dynamics.simulate import simulate
-from armwright.errors import InvalidValueError, ShapeError
+from armwright.simulation.integrators import Adaptive, Gill
+from armwright.simulation.simulate import simulate
 from oracles.arms import random_arm
 
 

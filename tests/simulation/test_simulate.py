@@ -8,16 +8,16 @@ from scipy.integrate import solve_ivp
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link
-from armwright.dynamics.controllers import gravity_compensation, pd, standing
 from armwright.dynamics.energy import kinetic_energy
-from armwright.dynamics.integrators import Adaptive, Gill
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.shares import gravity_efforts
-from armwright.dynamics.simulate import simulate
-from armwright.dynamics.simulation import Brake, JointState, Status
-from dynamics.machines import balanced, block, free, lawful, lift, pendulum
+from armwright.simulation.controllers import gravity_compensation, pd, standing
+from armwright.simulation.integrators import Adaptive, Gill
+from armwright.simulation.result import Brake, JointState, Status
+from armwright.simulation.simulate import simulate
 from oracles.arms import random_arm
 from oracles.with_pinocchio import pinocchio_model
+from simulation.machines import balanced, block, free, lawful, lift, pendulum
 
 COARSE = Gill(length=1e-2)
 

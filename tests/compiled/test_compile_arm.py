@@ -3,8 +3,10 @@
 import inspect
 import pickle
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import attrs
 import numpy as np
 import pytest
 from numba import njit
@@ -12,13 +14,14 @@ from numba import njit
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
-from armwright.dynamics.compiled import CompiledArm, compile_arm, emit_quantity, quantity_names
+from armwright.compiled.arm import CompiledArm, compile_arm
+from armwright.compiled.quantities import emit_quantity, quantity_names
 from armwright.dynamics.forward_dynamics import forward_dynamics
 from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.inverse.closed_form import inverse_branches
+from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
 from armwright.kinematics.jacobian import jacobian
 from oracles.arms import random_arm, random_postures
 from samples import WHOLE, Sample
@@ -222,14 +225,97 @@ def test_right_angles_make_it_cheaper() -> None:
 
 
 def test_help() -> None:
-    """The functions have the names, the arguments and the texts that help shows."""
-    fast = compile_arm(load_arm("stanford")).inverse_dynamics
+    """Every function is a method whose signature and docstring an editor and ``help`` show, with an arm and without."""
+    fast = compile_arm(load_arm("stanford"))
 
-    assert str(inspect.signature(fast)) == "(q, qd, qdd, *, threads=None, out=None)"
-    assert fast.__name__ == "inverse_dynamics"
-    assert "drives included" in (fast.__doc__ or "")
+    for name in quantity_names():
+        method, function = getattr(CompiledArm, name), getattr(fast, name)
+        of_arm = inspect.signature(function)
+        assert [*inspect.signature(method).parameters] == ["self", *of_arm.parameters]
+        assert [*of_arm.parameters] == [*fast.kernel(name).emitted.inputs, "threads", "out"]
+        assert len(str(of_arm)) < 200
+        assert function.__name__ == name
+        assert function.__doc__ == method.__doc__
+    assert str(inspect.signature(fast.forward)).startswith("(q: 'ArrayLike', *, threads: 'int | None' = None, out:")
+    assert "[N m] or [N]" in (fast.inverse_dynamics.__doc__ or "")
     with pytest.raises(TypeError, match="missing 1 required positional argument: 'qdd'"):
-        fast(np.zeros(6), np.zeros(6))
+        fast.inverse_dynamics(np.zeros(6), np.zeros(6))  # type: ignore[call-arg]
+
+
+def test_called_by_the_class(rng: np.random.Generator) -> None:
+    """A method called with its arm as first argument, as a method may be, gives the bits of the arm's function."""
+    fast, q = compile_arm(load_arm("stanford")), rng.normal(size=(3, 6))
+
+    np.testing.assert_array_equal(CompiledArm.forward(fast, q), fast.forward(q=q))
+    for by_class, of_arm in zip(CompiledArm.pose_and_jacobian(fast, q), fast.pose_and_jacobian(q), strict=True):
+        np.testing.assert_array_equal(by_class, of_arm)
+
+
+def test_asked_for_again() -> None:
+    """An arm that has been compiled comes back with its functions, for its content and not for the object at hand."""
+    stanford = load_arm("stanford")
+    fast = compile_arm(stanford)
+
+    assert compile_arm(attrs.evolve(stanford)) is fast
+    assert compile_arm(stanford).forward is fast.forward
+    assert compile_arm(load_arm("ur5")) is not fast
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("name", "another"), ("gravity", (-0.0, 0.0, -9.80665)), ("gravity_from", "world"), ("base_link", "floor")],
+)
+def test_any_other_arm(field: str, value: Any) -> None:
+    """An arm that differs in a name, in who says where down is or in the sign of a zero is compiled for itself."""
+    arm = load_arm("stanford")
+    other = attrs.evolve(arm, **{field: value})
+
+    assert compile_arm(other) is not compile_arm(arm)
+    assert getattr(compile_arm(other).arm, field) is getattr(other, field)
+
+
+def test_no_more_than_some_are_kept() -> None:
+    """Of very many arms those asked for last are kept, and an arm that is asked for again stays."""
+    arms = [Arm(name=f"arm {i}", joints=[Joint(kind="revolute", a=1.0)]) for i in range(200)]
+    first, second = compile_arm(arms[0]), compile_arm(arms[1])
+    for arm in arms:
+        compile_arm(arm)
+        assert compile_arm(arms[0]) is first
+
+    assert compile_arm(arms[1]) is not second
+
+
+def test_asked_for_by_many_threads() -> None:
+    """Threads that ask for one arm at the same time all get the same compiled arm."""
+    arm = Arm(name="of many threads", joints=[Joint(kind="revolute", a=1.0)] * 6)
+    with ThreadPoolExecutor(8) as pool:
+        compiled = list(pool.map(compile_arm, [attrs.evolve(arm) for _ in range(100)]))
+
+    assert all(one is compiled[0] for one in compiled)
+
+
+def test_plain_functions_keep_their_bits(rng: np.random.Generator) -> None:
+    """The plain functions are the reference: no arm that was compiled before changes a bit of what they give.
+
+    Neither does an equal arm, which differs in the signs of its zeros.
+    """
+    q, qd, qdd = rng.normal(size=(3, 4, 6))
+
+    def plain(arm: Arm) -> list[bytes]:
+        X = forward(arm, q)
+        kinematics = (X, jacobian(arm, q), *inverse_branches(arm, X, q), inverse(arm, X[0], q[0]).branches[0].q)
+        dynamics = (inverse_dynamics(arm, q, qd, qdd), mass_matrix(arm, q), forward_dynamics(arm, q, qd, qdd))
+        return [array.tobytes() for array in (*kinematics, *dynamics)]
+
+    untouched, arm = (attrs.evolve(load_arm("stanford"), name=name) for name in ("untouched", "compiled"))
+    expected = plain(untouched)
+    for same in (attrs.evolve(arm, base=np.where(arm.base == 0, -0.0, arm.base)), arm):
+        fast = compile_arm(same)
+        fast.inverse_dynamics(q, qd, qdd)
+        fast.inverse_branches(fast.forward(q), q)
+        assert plain(arm) == expected
+    compile_arm(untouched).forward(q)
+    assert plain(untouched) == expected
 
 
 def test_to_another_process(rng: np.random.Generator) -> None:

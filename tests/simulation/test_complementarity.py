@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from armwright.dynamics.settle import settle
+from armwright.simulation.complementarity import solve_complementarity
 
 ROUNDING = 1e-9
 
@@ -17,7 +17,7 @@ def _mass(rng: np.random.Generator, n: int) -> np.ndarray:
 
 def _hold_is_lawful(M: np.ndarray, b: np.ndarray, at_rest: np.ndarray, bounds: tuple[np.ndarray, np.ndarray]) -> None:
     lower, upper = bounds
-    x, r, _ = settle(M, b, at_rest, lower, upper)
+    x, r, _ = solve_complementarity(M, b, at_rest, lower, upper)
     np.testing.assert_allclose(M @ x, b + r, atol=ROUNDING * (1 + np.abs(b).max()))
     assert not r[~at_rest].any()
     for i in np.flatnonzero(at_rest):
@@ -43,7 +43,7 @@ def test_it_is_the_only_answer(rng: np.random.Generator) -> None:
     for _ in range(50):
         M, b = _mass(rng, 3), rng.normal(scale=3, size=3)
         bounds = np.array((-1.0, 1.0))
-        found = settle(M, b, np.ones(3, dtype=bool), np.full(3, -1.0), np.full(3, 1.0))
+        found = solve_complementarity(M, b, np.ones(3, dtype=bool), np.full(3, -1.0), np.full(3, 1.0))
         lawful = []
         for way in itertools.product((-1, 0, 1), repeat=3):
             free = [i for i in range(3) if way[i]]
@@ -63,8 +63,8 @@ def test_one_block_by_hand() -> None:
     M, rest = np.array([[4.0]]), np.array([True])
     lower, upper = np.array([-3.0]), np.array([3.0])
 
-    held = settle(M, np.array([2.0]), rest, lower, upper)
-    slides = settle(M, np.array([5.0]), rest, lower, upper)
+    held = solve_complementarity(M, np.array([2.0]), rest, lower, upper)
+    slides = solve_complementarity(M, np.array([5.0]), rest, lower, upper)
 
     assert (held.x[0], held.r[0], held.way[0]) == (0.0, -2.0, 0)
     assert (slides.x[0], slides.r[0], slides.way[0]) == (0.5, -3.0, 1)
@@ -75,5 +75,5 @@ def test_one_joint_drags_another() -> None:
     M, b = np.array([[2.0, 1.9], [1.9, 2.0]]), np.array([4.0, 0.0])
     rest, strong, weak = np.array([False, True]), np.array([9.0, 9.0]), np.array([1.0, 1.0])
 
-    assert settle(M, b, rest, -strong, strong).way[1] == 0
-    assert settle(M, b, rest, -weak, weak).way[1] == -1
+    assert solve_complementarity(M, b, rest, -strong, strong).way[1] == 0
+    assert solve_complementarity(M, b, rest, -weak, weak).way[1] == -1

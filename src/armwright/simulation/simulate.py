@@ -3,7 +3,7 @@
 Between events the motion is smooth: some joints move, each in a direction that its dry friction opposes, and others
 are held. An event ends that: a speed falls to zero, a stop is met, the effort that holds a joint exceeds what can
 hold it, a brake goes on or off. At an event, which joints are held from then on is one system of inequalities with
-one answer (``settle``), so nothing chatters and no speed creeps.
+one answer (``solve_complementarity``), so nothing chatters and no speed creeps.
 """
 
 import itertools
@@ -17,14 +17,14 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, exactly, number, one_per_joint
-from armwright.dynamics.controllers import Controller, no_effort
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.forward_dynamics import check_pivots, eliminated
-from armwright.dynamics.integrators import Gill, Integrator, Slope, Step, first_crossing
 from armwright.dynamics.mass_matrix import mass_matrix
-from armwright.dynamics.plant import Moment, Phase, Plant, Start
-from armwright.dynamics.simulation import Brake, Event, JointState, Simulation, Status
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
+from armwright.simulation.controllers import Controller, no_effort
+from armwright.simulation.integrators import Gill, Integrator, Slope, Step, first_crossing
+from armwright.simulation.plant import Moment, Phase, Plant, Start
+from armwright.simulation.result import Brake, Event, JointState, Simulation, Status
 from armwright.tracing.assignments import LARGEST_ANGLE
 
 # So many events within so short a time [s] are an entanglement.

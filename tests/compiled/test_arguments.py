@@ -11,7 +11,7 @@ from numba import njit
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import LARGEST
-from armwright.dynamics.compiled import CompiledArm, compile_arm
+from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import ArmwrightError, InvalidValueError, ShapeError, UnitWarning
 from armwright.kinematics.forward import forward

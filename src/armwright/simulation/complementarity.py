@@ -25,7 +25,7 @@ _ROUNDING = 1e-13
 Signs = npt.NDArray[np.int8]
 
 
-class Settled(NamedTuple):
+class ComplementaritySolution(NamedTuple):
     """The answer.
 
     Attributes:
@@ -39,7 +39,9 @@ class Settled(NamedTuple):
     way: Signs
 
 
-def settle(M: Array, b: Array, at_rest: npt.NDArray[np.bool_], lower: Array, upper: Array) -> Settled:
+def solve_complementarity(
+    M: Array, b: Array, at_rest: npt.NDArray[np.bool_], lower: Array, upper: Array
+) -> ComplementaritySolution:
     """Find which joints at rest are held, and the accelerations of all.
 
     Args:
@@ -63,7 +65,7 @@ def settle(M: Array, b: Array, at_rest: npt.NDArray[np.bool_], lower: Array, upp
         better = np.where(at_rest & (way * x < -_ROUNDING * np.abs(x).max()), 0, better).astype(np.int8)
         wrong = np.flatnonzero(better != way)
         if not len(wrong):
-            return Settled(x=x, r=r, way=way)
+            return ComplementaritySolution(x=x, r=r, way=way)
         if len(wrong) < fewest:
             fewest, patience = len(wrong), 3
         else:

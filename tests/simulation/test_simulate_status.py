@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from armwright.arm.model import Arm, Joint
-from armwright.dynamics.controllers import pd, standing
-from armwright.dynamics.integrators import Adaptive, Gill
-from armwright.dynamics.simulate import simulate
-from armwright.dynamics.simulation import Brake, Status
 from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
-from dynamics.machines import block, lawful, lift, pendulum, rough
+from armwright.simulation.controllers import pd, standing
+from armwright.simulation.integrators import Adaptive, Gill
+from armwright.simulation.result import Brake, Status
+from armwright.simulation.simulate import simulate
+from simulation.machines import block, lawful, lift, pendulum, rough
 
 COARSE = Gill(length=1e-2)
 

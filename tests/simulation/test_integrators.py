@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from armwright.dynamics.integrators import Adaptive, Gill, Stepper, first_crossing, gill
 from armwright.errors import InvalidValueError, UnknownNameError
+from armwright.simulation.integrators import Adaptive, Gill, Stepper, first_crossing, gill
 
 SWING = np.array((1.0, 0.0))
 

@@ -1,0 +1,323 @@
+"""An arm whose laws are compiled: the same equations as everywhere, traced for that arm."""
+
+from __future__ import annotations  # what help shows keeps the names of array types, which are long
+
+import inspect
+from collections import OrderedDict
+from collections.abc import Callable
+from threading import Lock
+from typing import Any, TypeVar, cast
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arm.positions import known_arm
+from armwright.arrays import Array, ArrayLike, Flags
+from armwright.compiled.quantities import quantity_kernel
+from armwright.tracing.kernel import Kernel
+
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
+# Arms whose functions are kept, those asked for last.
+_MOST_ARMS = 64
+_COMPILED: OrderedDict[object, CompiledArm] = OrderedDict()
+_COMPILED_LOCK = Lock()
+
+
+def compile_arm(arm: Arm) -> CompiledArm:
+    """Return an arm whose quantities are compiled, each when it is first asked for.
+
+    A first compilation takes some seconds and is kept on disk: see ``armwright.files.store.cache_folder``. Of the arms
+    asked for last the compiled ones are kept, so asking again costs nothing. Threads may ask at the same time.
+
+    Args:
+        arm: the arm, with n joints.
+
+    Raises:
+        KindError: ``arm`` is no arm.
+    """
+    key = _bits(known_arm(arm))
+    with _COMPILED_LOCK:
+        compiled = _COMPILED.pop(key, None) or CompiledArm(arm=arm)
+        _COMPILED[key] = compiled
+        if len(_COMPILED) > _MOST_ARMS:
+            _COMPILED.popitem(last=False)
+    return compiled
+
+
+def _bits(value: object) -> object:
+    """Return what two values have in common if no bit of them differs: arms that are equal may differ in -0.0."""
+    if isinstance(value, np.ndarray):
+        return value.shape, value.tobytes()
+    if isinstance(value, tuple):
+        return tuple(map(_bits, value))
+    if attrs.has(kind := type(value)):
+        return tuple(_bits(getattr(value, field.name)) for field in attrs.fields(kind))
+    return value.hex() if isinstance(value, float) else value
+
+
+class _KernelMethod:
+    """A method that is, for each arm, the function of a kernel: a call goes there without a detour."""
+
+    def __init__(self, method: Callable[..., Any]) -> None:
+        self._method = method
+
+    def __get__(self, compiled: CompiledArm | None, _owner: type) -> Callable[..., Any]:
+        method = self._method
+        if compiled is None:
+            return method
+        function = compiled.kernel(method.__name__).function(method.__name__, str(method.__doc__))
+        function.__signature__ = inspect.signature(method.__get__(compiled))  # type: ignore[attr-defined]
+        # Found there before this descriptor from now on.
+        compiled.__dict__[method.__name__] = function
+        return function
+
+
+def _kernel_method(method: _Method) -> _Method:
+    """Let a method of ``CompiledArm`` be the function of the kernel of its name."""
+    return cast("_Method", _KernelMethod(method))
+
+
+@attrs.frozen(kw_only=True, slots=False)
+class CompiledArm:
+    """Functions of one arm, as fast as the processor goes.
+
+    They are called like the plain functions of the same names, without the arm, and give the same numbers but for
+    rounding. A configuration has the same bits alone, in any batch and on any number of threads. Positions that look
+    like degrees get the same warning.
+
+    Every function takes, by name, ``threads``, how many cores to use (all when left out), and ``out``, the arrays to
+    fill: writable, in C order, of the shape of the result. Every function raises
+
+    - KindError: an input is something else than real numbers.
+    - ShapeError: a last axis, the leading axes or ``out`` do not fit.
+    - InvalidValueError: a number is NaN, infinite or beyond 1e100, an angle is beyond 1e12, or ``threads`` is below 1.
+
+    Attributes:
+        arm: the arm, with n joints.
+    """
+
+    arm: Arm
+
+    @_kernel_method
+    def forward(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the tool pose in the base frame.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (..., 4, 4) to fill.
+
+        Returns:
+            X_BT: (..., 4, 4) homogeneous poses, translations in [m].
+        """
+        return self._array("forward", q, threads=threads, out=out)
+
+    @_kernel_method
+    def link_poses(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the poses of all frames in the base frame.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (..., n + 2, 4, 4) to fill.
+
+        Returns:
+            (..., n + 2, 4, 4) homogeneous poses of frames 0 to n and of the tool, translations in [m].
+        """
+        return self._array("link_poses", q, threads=threads, out=out)
+
+    @_kernel_method
+    def jacobian(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the Jacobian of the tool point along the axes of the base.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (..., 6, n) to fill.
+
+        Returns:
+            J: (..., 6, n), linear rows first: velocity [m/s] and angular velocity [rad/s] per joint velocity.
+        """
+        return self._array("jacobian", q, threads=threads, out=out)
+
+    @_kernel_method
+    def pose_and_jacobian(
+        self, q: ArrayLike, *, threads: int | None = None, out: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
+        """Return the tool pose and the Jacobian together, as ``forward`` and ``jacobian`` do.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (..., 4, 4) and (..., 6, n) to fill.
+
+        Returns:
+            X_BT: (..., 4, 4) homogeneous poses, translations in [m].
+            J: (..., 6, n) Jacobian of the tool point along the axes of the base.
+        """
+        return self._arrays("pose_and_jacobian", q, threads=threads, out=out)
+
+    @_kernel_method
+    def inverse_branches(
+        self,
+        pose: ArrayLike,
+        near: ArrayLike,
+        *,
+        threads: int | None = None,
+        out: tuple[Array, Flags] | None = None,
+    ) -> tuple[Array, Flags]:
+        """Return all eight IK branches of poses, unjudged, as ``kinematics.inverse`` does for a closed form.
+
+        Args:
+            pose: (..., 4, 4) tool poses in the base frame.
+            near: (..., 6) joint positions [rad] or [m]; angles come back within half a turn of it, and a free joint
+                takes its value from it.
+            threads: how many cores to use; all when None.
+            out: (..., 8, 6) and (..., 8) to fill.
+
+        Returns:
+            q: (..., 8, 6) joint positions [rad] or [m].
+            singular: (..., 8) whether a joint is free there.
+
+        Raises:
+            UnsupportedArmError: the arm has no closed form.
+        """
+        return self._arrays("inverse_branches", pose, near, threads=threads, out=out)
+
+    @_kernel_method
+    def inverse_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, threads: int | None = None, out: Array | None = None
+    ) -> Array:
+        """Return the efforts that a motion takes, drives included.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            qdd: (..., n) joint accelerations [rad/s²] or [m/s²].
+            threads: how many cores to use; all when None.
+            out: (..., n) to fill.
+
+        Returns:
+            tau: (..., n) efforts [N m] or [N].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+        return self._array("inverse_dynamics", q, qd, qdd, threads=threads, out=out)
+
+    @_kernel_method
+    def inverse_dynamics_with_wrench(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        wrench: ArrayLike,
+        *,
+        threads: int | None = None,
+        out: Array | None = None,
+    ) -> Array:
+        """Return the efforts that a motion takes while the surroundings push at the tool.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            qdd: (..., n) joint accelerations [rad/s²] or [m/s²].
+            wrench: (..., 6) force [N] and moment [N m] on the tool along the axes of the base.
+            threads: how many cores to use; all when None.
+            out: (..., n) to fill.
+
+        Returns:
+            tau: (..., n) efforts [N m] or [N].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+        return self._array("inverse_dynamics_with_wrench", q, qd, qdd, wrench, threads=threads, out=out)
+
+    @_kernel_method
+    def forward_dynamics(
+        self, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, *, threads: int | None = None, out: Array | None = None
+    ) -> Array:
+        """Return the accelerations that efforts of the drives cause.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            tau: (..., n) efforts [N m] or [N].
+            threads: how many cores to use; all when None.
+            out: (..., n) to fill.
+
+        Returns:
+            qdd: (..., n) joint accelerations [rad/s²] or [m/s²].
+
+        Raises:
+            UnsupportedArmError: some joint moves nothing that resists an acceleration, or nothing is known of the mass
+                of some link.
+        """
+        return self._array("forward_dynamics", q, qd, tau, threads=threads, out=out)
+
+    @_kernel_method
+    def mass_matrix(self, q: ArrayLike, *, threads: int | None = None, out: Array | None = None) -> Array:
+        """Return the mass matrix, rotor inertia included.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            threads: how many cores to use; all when None.
+            out: (..., n, n) to fill.
+
+        Returns:
+            M: (..., n, n) [kg m²], [kg m] or [kg].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+        return self._array("mass_matrix", q, threads=threads, out=out)
+
+    @_kernel_method
+    def mass_and_bias(
+        self, q: ArrayLike, qd: ArrayLike, *, threads: int | None = None, out: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
+        """Return the mass matrix, and the efforts that velocities and gravity take: tau = M qdd + bias + friction.
+
+        Args:
+            q: (..., n) joint positions [rad] or [m].
+            qd: (..., n) joint velocities [rad/s] or [m/s].
+            threads: how many cores to use; all when None.
+            out: (..., n, n) and (..., n) to fill.
+
+        Returns:
+            M: (..., n, n) mass matrix, rotor inertia included [kg m²], [kg m] or [kg].
+            bias: (..., n) efforts [N m] or [N].
+
+        Raises:
+            UnsupportedArmError: nothing is known of the mass of some link.
+        """
+        return self._arrays("mass_and_bias", q, qd, threads=threads, out=out)
+
+    def kernel(self, quantity: str) -> Kernel:
+        """Return the kernel behind a function, whose part for one configuration other compiled code can call.
+
+        Args:
+            quantity: name of the function.
+
+        Raises:
+            UnknownNameError: no such function.
+            UnsupportedArmError: the arm has no such function.
+        """
+        return quantity_kernel(self.arm, quantity)
+
+    def __reduce__(self) -> tuple[Callable[[Arm], CompiledArm], tuple[Arm]]:
+        """Let another process compile for itself: it finds the kernels on disk."""
+        return compile_arm, (self.arm,)
+
+    def _array(self, quantity: str, *inputs: ArrayLike, threads: int | None, out: Array | None) -> Array:
+        """Evaluate a quantity of one output."""
+        result: Array = self.kernel(quantity)(*inputs, threads=threads, out=out)
+        return result
+
+    def _arrays(self, quantity: str, *inputs: ArrayLike, threads: int | None, out: Any) -> tuple[Array, Any]:
+        """Evaluate a quantity of two outputs."""
+        result: tuple[Array, Any] = self.kernel(quantity)(*inputs, threads=threads, out=out)
+        return result
