@@ -8,8 +8,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Limits
 from armwright.arrays import Array
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.recognise import closed_form_of
-from armwright.kinematics.inverse.shoulder import Shoulder
+from armwright.kinematics.inverse.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse.recognise import closed_form_geometry
 from armwright.kinematics.jacobian import jacobian
 from armwright.kinematics.singularities import determinant_factors, factor_names
 from armwright.spatial.poses import pose
@@ -115,9 +115,9 @@ def _right_angle(arm: Arm, rng: np.random.Generator) -> EdgeSet:
 
 def _singular(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
     """Sets at and beside each zero of each factor of the determinant."""
-    sets, shoulder = [], closed_form_of(arm)
-    for k, (factor, joint) in enumerate(zip(factor_names(shoulder), (1, 2, 4), strict=True)):
-        exact = np.array([_zero(arm, shoulder, rng, k, joint) for _ in range(_FEW)])
+    sets, geometry = [], closed_form_geometry(arm)
+    for k, (factor, joint) in enumerate(zip(factor_names(geometry), (1, 2, 4), strict=True)):
+        exact = np.array([_zero(arm, geometry, rng, k, joint) for _ in range(_FEW)])
         for decade in DECADES:
             shift = decade * np.eye(arm.n)[joint]
             q = exact if not decade else np.concatenate([exact + shift, exact - shift])
@@ -126,14 +126,14 @@ def _singular(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
     return sets
 
 
-def _zero(arm: Arm, shoulder: Shoulder, rng: np.random.Generator, factor: int, joint: int) -> Array:
+def _zero(arm: Arm, geometry: ClosedFormGeometry, rng: np.random.Generator, factor: int, joint: int) -> Array:
     """Return a posture at which one factor vanishes, by the choice of one joint, and the others do not."""
     span = np.linspace(-3.0, 3.0, 60) if arm.joints[joint].revolute else np.linspace(-1.2, 1.2, 60)
     while True:
         q = _random(arm, rng, 1)[0]
 
         def factors(x: float, q: Array = q) -> list[float]:
-            return determinant_factors(shoulder, shoulder.angles([*q[:joint].tolist(), x, *q[joint + 1 :].tolist()]))
+            return determinant_factors(geometry, geometry.angles([*q[:joint].tolist(), x, *q[joint + 1 :].tolist()]))
 
         values = [factors(x)[factor] for x in span.tolist()]
         crossings = [i for i in range(len(span) - 1) if values[i] * values[i + 1] < 0]

@@ -13,8 +13,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.solution import Answer
+from armwright.kinematics.inverse.solution import Outcome
+from armwright.kinematics.inverse.solve import inverse
 
 # Two models that put the hand this near to each other at random postures are one [m] and entries of a rotation.
 _SAME_MODEL = 1e-12
@@ -66,12 +66,12 @@ class Armwright:
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:
         """Ask for a pose."""
         solution = inverse(arm, X, near)
-        reached = solution.answer is not Answer.OUT_OF_REACH
+        reached = solution.outcome is not Outcome.OUT_OF_REACH
         return Reply(
             rows=np.array([branch.q for branch in solution]),
             claimed=np.full(len(solution.branches), reached),
             reached=reached,
-            inside=solution.answer in (Answer.SOLVED, Answer.SINGULAR),
+            inside=solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR),
             errors=np.array([(branch.position_error, branch.rotation_error) for branch in solution]),
         )
 

@@ -50,8 +50,8 @@ if TYPE_CHECKING:
     from armwright.kinematics.damping import damped_rates
     from armwright.kinematics.differential import differential_inverse
     from armwright.kinematics.forward import forward, link_poses
-    from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
-    from armwright.kinematics.inverse.turns import images
+    from armwright.kinematics.inverse.solve import inverse, inverse_branches
+    from armwright.kinematics.inverse.wrapping import equivalent_configurations
     from armwright.kinematics.jacobian import jacobian
     from armwright.kinematics.manipulability import manipulability
     from armwright.kinematics.singularities import singularities
@@ -105,14 +105,14 @@ _HOME = {
     "distance_accuracy": "accuracy.distance",
     "distance_repeatability": "accuracy.distance",
     "effort_peaks": "motion.efforts",
+    "equivalent_configurations": "kinematics.inverse.wrapping",
     "estimate_at_rest": "clearance.estimation.static",
     "exchangeability": "accuracy.variation",
     "forward": "kinematics.forward",
     "forward_dynamics": "dynamics.forward_dynamics",
     "hold": "motion.trajectory",
-    "images": "kinematics.inverse.turns",
-    "inverse": "kinematics.inverse.closed_form",
-    "inverse_branches": "kinematics.inverse.closed_form",
+    "inverse": "kinematics.inverse.solve",
+    "inverse_branches": "kinematics.inverse.solve",
     "inverse_calibrated": "calibration.compensation",
     "inverse_dynamics": "dynamics.newton_euler",
     "jacobian": "kinematics.jacobian",
@@ -197,12 +197,12 @@ __all__ = [
     "distance_accuracy",
     "distance_repeatability",
     "effort_peaks",
+    "equivalent_configurations",
     "estimate_at_rest",
     "exchangeability",
     "forward",
     "forward_dynamics",
     "hold",
-    "images",
     "inverse",
     "inverse_branches",
     "inverse_calibrated",

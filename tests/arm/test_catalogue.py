@@ -11,8 +11,8 @@ from armwright.arm.model import STANDARD_GRAVITY, Arm
 from armwright.arrays import Array
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.solution import Answer
+from armwright.kinematics.inverse.solution import Outcome
+from armwright.kinematics.inverse.solve import inverse
 from armwright.spatial.poses import pose
 from oracles.arms import random_postures
 from samples import Sample
@@ -110,7 +110,7 @@ def test_tool_down_in_front(sample: Sample) -> None:
     for rng in sample.cases(1000):
         X = pose(np.diag((1.0, -1.0, -1.0)), rng.uniform((0.3, -0.4, -0.6), (0.8, 0.4, 0.4)))
         found = {name: inverse(load_arm(name), X) for name in allowed}
-        reached += found["puma560"].answer is not Answer.OUT_OF_REACH
+        reached += found["puma560"].outcome is not Outcome.OUT_OF_REACH
         for name, solution in found.items():
             allowed[name] += bool(solution.allowed)
     sample.record("tool-down poses in front of a PUMA that its limits allow", reached, reached - allowed["puma560"])
@@ -250,10 +250,10 @@ def test_ur5_stretched_out() -> None:
     tau = holding(load_arm("ur5"), np.zeros(6))
     wrist = 1.219 + 1.219 + 0.1879
     elbow = 2.33 * (0.39225 - 0.15) + wrist * 0.39225
-    shoulder = 8.393 * (0.425 - 0.2125) + elbow + (2.33 + wrist) * 0.425
+    geometry = 8.393 * (0.425 - 0.2125) + elbow + (2.33 + wrist) * 0.425
 
     # The arm points along -x, so that a positive turn of either joint lowers it.
-    np.testing.assert_allclose(tau[1:3], (-shoulder * STANDARD_GRAVITY, -elbow * STANDARD_GRAVITY), rtol=ROUNDING)
+    np.testing.assert_allclose(tau[1:3], (-geometry * STANDARD_GRAVITY, -elbow * STANDARD_GRAVITY), rtol=ROUNDING)
 
 
 def test_cylinders_of_the_ur5() -> None:

@@ -20,8 +20,8 @@ from armwright.dynamics.payload import payload
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.recognise import find_geometry
+from armwright.kinematics.inverse.solve import inverse
 from armwright.simulation.controllers import gravity_compensation
 from armwright.simulation.simulate import simulate
 from urdf_texts import ARM_WITH_GRIPPER, LIMIT, MASS, joint, link, one, robot
@@ -118,9 +118,9 @@ def test_tables_of_built_arms_are_plain(read: Callable[..., Arm]) -> None:
         (0, 0, 0),
     ]
     np.testing.assert_allclose([j.d for j in arm.joints], (0, 0.1, 0, 0.4, 0, 0), atol=ROUNDING)
-    shoulder = shoulder_of(arm)
-    assert shoulder is not None
-    assert shoulder.family == "puma"
+    geometry = find_geometry(arm)
+    assert geometry is not None
+    assert geometry.family == "puma"
 
 
 def test_welded_links_are_one_body(read: Callable[..., Arm]) -> None:

@@ -19,7 +19,7 @@ from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.recognise import find_geometry
 from oracles.arms import random_arm, squared
 from oracles.urdf import oracle
 
@@ -96,7 +96,7 @@ def test_catalogue(name: str, rng: np.random.Generator, back: Callable[[Arm], Ar
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=ROUND_TRIP * max(1.0, np.abs(theirs).max()))
     for limit in ("lower", "upper", "speed", "effort"):
         np.testing.assert_array_equal(again.limit(limit), arm.limit(limit))
-    families = [shoulder.family if (shoulder := shoulder_of(one)) else None for one in (arm, again)]
+    families = [geometry.family if (geometry := find_geometry(one)) else None for one in (arm, again)]
     assert families[0] == families[1]
 
 

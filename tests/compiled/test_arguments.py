@@ -15,7 +15,7 @@ from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import ArmwrightError, InvalidValueError, ShapeError, UnitWarning
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.turns import images
+from armwright.kinematics.inverse.wrapping import equivalent_configurations
 from armwright.kinematics.jacobian import jacobian
 from samples import Sample
 
@@ -190,7 +190,7 @@ def test_all_images_of_a_posture() -> None:
     q = np.array([0.1, -1.2, 1.1, -0.4, 0.9, 0.3])
     postures, _ = compile_arm(arm).inverse_branches(forward(arm, q), q)
 
-    found = images(arm, postures[np.abs(postures - q).max(axis=-1).argmin()])
+    found = equivalent_configurations(arm, postures[np.abs(postures - q).max(axis=-1).argmin()])
 
     assert len(found) == 2**6
     with warnings.catch_warnings():

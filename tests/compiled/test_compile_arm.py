@@ -21,7 +21,7 @@ from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
+from armwright.kinematics.inverse.solve import inverse, inverse_branches
 from armwright.kinematics.jacobian import jacobian
 from oracles.arms import random_arm, random_postures
 from samples import WHOLE, Sample

@@ -17,8 +17,8 @@ from armwright.kinematics.differential import (
     wrist_motion,
 )
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.recognise import find_geometry
+from armwright.kinematics.inverse.solve import inverse
 from armwright.kinematics.jacobian import jacobian
 from armwright.tracing.graph import Graph, evaluate
 from armwright.tracing.scalar import Scalar
@@ -122,28 +122,28 @@ def test_arms_built_like_the_puma(way: Way, number: int) -> None:
 def test_plain_numbers_and_arrays(way: object, puma: Arm, rng: np.random.Generator) -> None:
     """The equations give for floats what they give for arrays."""
     q, twist = random_postures(puma, rng, 20), rng.normal(size=(20, 6))
-    shoulder = shoulder_of(puma)
-    assert shoulder is not None
+    geometry = find_geometry(puma)
+    assert geometry is not None
     name = "blocks" if way is rates_by_blocks else "derivative"
 
     many = differential_inverse(puma, q, twist, way=name).rates  # type: ignore[arg-type]
 
     for row, posture, asked in zip(many, q.tolist(), twist.tolist(), strict=True):
-        motion = wrist_motion(puma, shoulder, posture, asked, "base")
-        one = way(shoulder, shoulder.angles(posture), motion)  # type: ignore[operator]
+        motion = wrist_motion(puma, geometry, posture, asked, "base")
+        one = way(geometry, geometry.angles(posture), motion)  # type: ignore[operator]
         assert all(isinstance(rate, float) for rate in one)
-        np.testing.assert_allclose(np.array(shoulder.signs) * one, row, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(np.array(geometry.signs) * one, row, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("way", [rates_by_blocks, rates_by_derivative])
 def test_the_equations_can_be_traced(way: object, puma: Arm, rng: np.random.Generator) -> None:
     """Run on traced scalars both ways leave a graph that gives what they give for floats."""
-    shoulder = shoulder_of(puma)
-    assert shoulder is not None
+    geometry = find_geometry(puma)
+    assert geometry is not None
 
     def rates(q: list[Scalar], twist: list[Scalar]) -> list[Scalar]:
-        motion = wrist_motion(puma, shoulder, q, twist, "base")
-        return way(shoulder, shoulder.angles(q), motion)  # type: ignore[operator]
+        motion = wrist_motion(puma, geometry, q, twist, "base")
+        return way(geometry, geometry.angles(q), motion)  # type: ignore[operator]
 
     inputs = Graph().inputs(12)
     outputs = [rate.node for rate in rates(inputs[:6], inputs[6:])]

@@ -11,8 +11,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Limits
 from armwright.arrays import Array
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
-from armwright.kinematics.inverse.solution import Answer, InverseSolution
+from armwright.kinematics.inverse.solution import InverseSolution, Outcome
+from armwright.kinematics.inverse.solve import inverse, inverse_branches
 from armwright.kinematics.jacobian import jacobian
 from armwright.kinematics.singularities import singularity_factors
 from armwright.spatial.poses import pose
@@ -118,7 +118,7 @@ def test_verdict_on_the_grid(name: str) -> None:
         X = forward(arm, posture)
         solution = inverse(arm, X, posture)
 
-        assert solution.answer in (Answer.SOLVED, Answer.SINGULAR), posture
+        assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR), posture
         assert 1 <= len(solution.branches) <= 8
         assert _apart(solution) > 1e-6
         assert np.abs(solution.best.q - posture).max() < 1e-6
@@ -134,7 +134,7 @@ def test_exactly_singular(case: str) -> None:
 
     solution = inverse(arm, X, q)
 
-    assert solution.answer in (Answer.SOLVED, Answer.SINGULAR)
+    assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR)
     assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
     assert _apart(solution) > 1e-6
     # At the edge of a reach half of the digits of the posture are lost, and none of the pose.
@@ -162,7 +162,7 @@ def test_next_to_a_singularity(case: str, distance: float, way: int) -> None:
 
     solution = inverse(arm, X, beside)
 
-    assert solution.answer in (Answer.SOLVED, Answer.SINGULAR)
+    assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR)
     assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
     assert len(solution.branches) <= 8
     assert _apart(solution) > 1e-9
@@ -184,7 +184,7 @@ def test_at_every_limit(name: str, rng: np.random.Generator) -> None:
 
             solution = inverse(arm, forward(arm, q), q)
 
-            assert solution.answer is Answer.SOLVED
+            assert solution.outcome is Outcome.SOLVED
             np.testing.assert_allclose(solution.best.q, q, atol=POSTURE)
             assert solution.best.allowed
 
@@ -219,7 +219,7 @@ def test_typed_poses(name: str, digits: int, off: float, rng: np.random.Generato
             continue
         solution = inverse(arm, np.round(forward(arm, q), digits), q)
 
-        assert solution.answer is Answer.SOLVED or _at_a_limit(arm, q, off / smallest)
+        assert solution.outcome is Outcome.SOLVED or _at_a_limit(arm, q, off / smallest)
         nearest = min(solution, key=lambda branch: float(np.abs(branch.q - q).max()))
         assert np.abs(nearest.q - q).max() < off / smallest
         assert nearest.position_error < RESIDUAL
@@ -241,14 +241,14 @@ def test_typed_poses_at_the_edge_of_the_reach(digits: int, beyond: float) -> Non
     for q1 in np.linspace(-3, 3, 30):
         X = np.round(forward(arm, (q1, 0.4, ELBOW, 0.6, 0.5, 0.7)), digits)
         solution = inverse(arm, X)
-        answers.add(solution.answer)
+        answers.add(solution.outcome)
 
         assert solution.distance < beyond
-        if solution.answer is Answer.OUT_OF_REACH:
-            assert inverse(arm, solution.nearest_pose).answer is not Answer.OUT_OF_REACH
+        if solution.outcome is Outcome.OUT_OF_REACH:
+            assert inverse(arm, solution.nearest_pose).outcome is not Outcome.OUT_OF_REACH
         else:
             assert solution.best.position_error < 2e-6
-    assert answers == ({Answer.SOLVED} if digits == 6 else {Answer.SOLVED, Answer.OUT_OF_REACH})
+    assert answers == ({Outcome.SOLVED} if digits == 6 else {Outcome.SOLVED, Outcome.OUT_OF_REACH})
 
 
 def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
@@ -258,7 +258,7 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
     """
     arm = load_arm("puma560-seed")
     fore, side = math.hypot(0.02, 0.433), 0.149
-    counts = dict.fromkeys(Answer, 0)
+    counts = dict.fromkeys(Outcome, 0)
     for _ in range(300):
         X = forward(arm, random_postures(arm, rng, 1)[0])
         X[:3, 3] = rng.uniform(-0.95, 0.95, size=3) * rng.choice((1.0, 0.2))
@@ -267,17 +267,17 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
 
         solution = inverse(arm, X)
 
-        assert (solution.answer is not Answer.OUT_OF_REACH) == reached
-        counts[solution.answer] += 1
-        if solution.answer is Answer.OUT_OF_LIMITS:
+        assert (solution.outcome is not Outcome.OUT_OF_REACH) == reached
+        counts[solution.outcome] += 1
+        if solution.outcome is Outcome.OUT_OF_LIMITS:
             # By brute force: no posture of the eight is inside by whole turns of any joint.
             q, _ = inverse_branches(arm, X)
             turns = q[..., None] + 2 * np.pi * np.arange(-2, 3)
             lower, upper = arm.limit("lower")[:, None], arm.limit("upper")[:, None]
             assert not ((turns >= lower) & (turns <= upper)).any(axis=-1).all(axis=-1).any()
-    assert counts[Answer.SOLVED] > 20
-    assert counts[Answer.OUT_OF_REACH] > 20
-    assert counts[Answer.OUT_OF_LIMITS] > 2
+    assert counts[Outcome.SOLVED] > 20
+    assert counts[Outcome.OUT_OF_REACH] > 20
+    assert counts[Outcome.OUT_OF_LIMITS] > 2
 
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
@@ -290,7 +290,7 @@ def test_right_angle_of_joint_2(name: str, rng: np.random.Generator) -> None:
             continue
         solution = inverse(arm, forward(arm, q), q)
 
-        assert solution.answer is Answer.SOLVED
+        assert solution.outcome is Outcome.SOLVED
         assert np.abs(solution.best.q - q).max() < POSTURE
         assert _apart(solution) > 1e-6
 
@@ -315,17 +315,17 @@ def test_made_outside_the_limits(name: str, rng: np.random.Generator) -> None:
     arm = load_arm(name)
     turn = 2 * np.pi * np.array([joint.revolute for joint in arm.joints])[:, None] * np.arange(-2, 3)
     lower, upper = arm.limit("lower")[:, None], arm.limit("upper")[:, None]
-    answers = dict.fromkeys(Answer, 0)
+    answers = dict.fromkeys(Outcome, 0)
     for q in random_postures(_wide(name), rng, 100):
         X = forward(arm, q)
         solution = inverse(arm, X)
         images = inverse_branches(arm, X)[0][..., None] + turn
         allowed = ((images >= lower) & (images <= upper)).any(axis=-1).all(axis=-1)
 
-        assert solution.answer is (Answer.SOLVED if allowed.any() else Answer.OUT_OF_LIMITS)
+        assert solution.outcome is (Outcome.SOLVED if allowed.any() else Outcome.OUT_OF_LIMITS)
         assert any(np.abs(np.angle(np.exp(1j * (branch.q - q)))).max() < 1e-6 for branch in solution)
-        answers[solution.answer] += 1
-    assert min(answers[Answer.SOLVED], answers[Answer.OUT_OF_LIMITS]) > 5
+        answers[solution.outcome] += 1
+    assert min(answers[Outcome.SOLVED], answers[Outcome.OUT_OF_LIMITS]) > 5
 
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
@@ -349,12 +349,12 @@ def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Gene
 
         solution = inverse(arm, X)
 
-        assert solution.answer is Answer.OUT_OF_REACH
+        assert solution.outcome is Outcome.OUT_OF_REACH
         assert solution.allowed == ()
         assert solution.distance == pytest.approx(short, abs=1e-9)
         assert solution.turn < RESIDUAL
         np.testing.assert_allclose(solution.nearest_pose[:3, :3], R, atol=RESIDUAL)
-        assert inverse(arm, solution.nearest_pose).answer is not Answer.OUT_OF_REACH
+        assert inverse(arm, solution.nearest_pose).outcome is not Outcome.OUT_OF_REACH
 
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
@@ -374,7 +374,7 @@ def test_free_joint_with_little_room(name: str, room: float, rng: np.random.Gene
 
         solution = inverse(arm, X)
 
-        assert solution.answer in (Answer.SOLVED, Answer.SINGULAR)
+        assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR)
         assert any(branch.free and branch.allowed for branch in solution)
         assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
 

@@ -11,11 +11,11 @@ from armwright.arm.model import Arm, Joint, Limits
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward import forward, link_poses, per_joint, stack
-from armwright.kinematics.inverse.branches import branches, one_branch
-from armwright.kinematics.inverse.closed_form import BRANCHES, inverse, inverse_branches
-from armwright.kinematics.inverse.posture import posture
-from armwright.kinematics.inverse.recognise import closed_form_of, shoulder_of
-from armwright.kinematics.inverse.solution import Answer
+from armwright.kinematics.inverse.branch_angles import branch_angles
+from armwright.kinematics.inverse.branches import branches, single_branch
+from armwright.kinematics.inverse.recognise import closed_form_geometry, find_geometry
+from armwright.kinematics.inverse.solution import Outcome
+from armwright.kinematics.inverse.solve import BRANCHES, inverse, inverse_branches
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
 from armwright.tracing.graph import Graph, evaluate
@@ -76,7 +76,7 @@ def test_any_table_of_a_build_is_solved(family: str, number: int) -> None:
 
     found, _ = inverse_branches(arm, X, q)
 
-    assert shoulder_of(arm).family == family  # type: ignore[union-attr]
+    assert find_geometry(arm).family == family  # type: ignore[union-attr]
     assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < POSTURE
     np.testing.assert_allclose(forward(arm, found), np.broadcast_to(X[:, None], (500, 8, 4, 4)), atol=RESIDUAL)
 
@@ -119,7 +119,7 @@ def test_arms_without_a_closed_form(rng: np.random.Generator) -> None:
     puma = load_arm("puma560")
     offset = attrs.evolve(puma, joints=[*puma.joints[:4], attrs.evolve(puma.joints[4], a=0.05), puma.joints[5]])
     for arm in (random_arm(rng, 6), random_arm(rng, 5), random_arm(rng, 7), offset, load_arm("ntu-3r")):
-        assert shoulder_of(arm) is None
+        assert find_geometry(arm) is None
         with pytest.raises(UnsupportedArmError, match=r"no closed-form .* built like puma560, stanford or ur5"):
             inverse_branches(arm, np.eye(4))
 
@@ -131,9 +131,9 @@ def test_a_shoulder_ahead_of_its_axis_reaches_farther() -> None:
     arm = attrs.evolve(puma, joints=ahead)
     reach = 0.2 + 0.432 + math.hypot(0.02, 0.433)
 
-    assert shoulder_of(arm).farthest == pytest.approx(reach)  # type: ignore[union-attr]
+    assert find_geometry(arm).max_reach == pytest.approx(reach)  # type: ignore[union-attr]
     solution = inverse(arm, pose(np.eye(3), (reach + 0.5, 0.0, 0.0)))
-    assert solution.answer is Answer.OUT_OF_REACH
+    assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.5, abs=1e-9)
     np.testing.assert_allclose(solution.nearest_pose[:3, 3], (reach, 0, 0), atol=1e-6)  # flat at its least
 
@@ -145,18 +145,18 @@ def test_nearest_pose_is_nearest_for_any_build(family: str) -> None:
     rng = np.random.default_rng(3)
     arm = _random_build(rng, family)
     arm = attrs.evolve(arm, base=np.eye(4), joints=[attrs.evolve(joint, limits=TURN) for joint in arm.joints])
-    shoulder = shoulder_of(arm)
-    assert shoulder is not None
+    geometry = find_geometry(arm)
+    assert geometry is not None
     out = 0
     for _ in range(20):
         # Places near the first axis, and beyond the reach.
-        near_axis = shoulder.X_BS[:3, 3] + rng.normal(size=3) * (0.05, 0.05, 0.3)
+        near_axis = geometry.X_BS[:3, 3] + rng.normal(size=3) * (0.05, 0.05, 0.3)
         X = random_pose(rng)
-        X[:3, 3] = near_axis - X[:3, :3] @ shoulder.p_TW
+        X[:3, 3] = near_axis - X[:3, :3] @ geometry.p_TW
         if family != "stanford" and rng.random() < 0.5:
             X[:3, 3] += 1.3 * rng.normal(size=3)
         solution = inverse(arm, X)
-        if solution.answer is not Answer.OUT_OF_REACH:
+        if solution.outcome is not Outcome.OUT_OF_REACH:
             continue
         out += 1
         assert solution.turn < RESIDUAL
@@ -166,23 +166,23 @@ def test_nearest_pose_is_nearest_for_any_build(family: str) -> None:
         for step in rng.normal(size=(20, 3)) * 0.02:
             if np.linalg.norm(way - step) < 0.999 * np.linalg.norm(way):
                 nearer = pose(X[:3, :3], solution.nearest_pose[:3, 3] + step)
-                assert inverse(arm, nearer).answer is Answer.OUT_OF_REACH
+                assert inverse(arm, nearer).outcome is Outcome.OUT_OF_REACH
     assert out >= 3
 
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5"])
 def test_the_equations_can_be_traced(name: str, rng: np.random.Generator) -> None:
     """Run on traced scalars the equations of every branch leave a graph that gives what they give for floats."""
-    shoulder = shoulder_of(load_arm(name))
-    assert shoulder is not None
+    geometry = find_geometry(load_arm(name))
+    assert geometry is not None
     for signs in BRANCHES:
         inputs = Graph().inputs(18)
-        traced = posture(shoulder, inputs[:3], [inputs[i : i + 3] for i in (3, 6, 9)], signs, inputs[12:])
+        traced = branch_angles(geometry, inputs[:3], [inputs[i : i + 3] for i in (3, 6, 9)], signs, inputs[12:])
         p, R, near = rng.uniform(-0.4, 0.4, size=3), random_pose(rng)[:3, :3], rng.normal(size=6)
 
         values = evaluate(inputs[0].graph, [x.node for x in traced.angles], [*p, *R.ravel(), *near])
 
-        plain = posture(shoulder, p.tolist(), R.tolist(), signs, near.tolist())
+        plain = branch_angles(geometry, p.tolist(), R.tolist(), signs, near.tolist())
         apart = np.angle(np.exp(1j * (np.array(values) - plain.angles)))  # half a turn either way is one
         np.testing.assert_allclose(apart, 0, atol=RESIDUAL)
 
@@ -266,7 +266,7 @@ def test_ur5_out_of_reach(ur5: Arm) -> None:
     """Straight above its base axis the UR5's wrist cannot be: the plane of the arm runs 109.15 mm beside the axis."""
     solution = inverse(ur5, pose(np.diag((1.0, -1.0, -1.0)), (0.0, 0.0, 0.3)))
 
-    assert solution.answer is Answer.OUT_OF_REACH
+    assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.10915, abs=1e-9)
 
 
@@ -286,12 +286,12 @@ def _on_axis(arm: Arm, rng: np.random.Generator) -> Array:
     """A posture of an elbow arm without side offset whose wrist centre is on the first axis."""
     q = rng.uniform(-1, 1, size=6)
     q[2] = np.radians(100)
-    shoulder = shoulder_of(arm)
-    assert shoulder is not None
+    geometry = find_geometry(arm)
+    assert geometry is not None
     # Turn joint 2 until the wrist centre, at a fixed distance now, is above joint 2.
-    _, q3 = shoulder.angles(q.tolist())[1:3]
-    u = shoulder.upper + shoulder.fore[0] * np.cos(q3) + shoulder.fore[1] * np.sin(q3)
-    v = shoulder.fore[0] * np.sin(q3) - shoulder.fore[1] * np.cos(q3)
+    _, q3 = geometry.angles(q.tolist())[1:3]
+    u = geometry.upper_arm + geometry.forearm[0] * np.cos(q3) + geometry.forearm[1] * np.sin(q3)
+    v = geometry.forearm[0] * np.sin(q3) - geometry.forearm[1] * np.cos(q3)
     q[1] = np.arctan2(u, v)  # u cos - v sin = 0
     return q
 
@@ -307,7 +307,7 @@ def test_wrist_above_the_first_axis_keeps_joint_1(rng: np.random.Generator) -> N
     near = q + np.array((0.5, 0, 0, 0, 0, 0))
     solution = inverse(attrs.evolve(arm, joints=[attrs.evolve(joint, limits=TURN) for joint in arm.joints]), X, near)
 
-    assert solution.answer is Answer.SINGULAR
+    assert solution.outcome is Outcome.SINGULAR
     assert all(set(branch.free) >= {1, 4, 5, 6} for branch in solution)
     assert solution.best.q[0] == pytest.approx(near[0])
     assert all(max(branch.position_error, branch.rotation_error) < RESIDUAL for branch in solution)
@@ -332,11 +332,11 @@ def test_free_joint_moves_on_to_bring_the_others_inside() -> None:
 def test_one_branch_is_one_of_eight(name: str, rng: np.random.Generator) -> None:
     """A branch solved by itself has the joint positions that it has among all eight, of singular poses too."""
     arm = load_arm(name)
-    shoulder = closed_form_of(arm)
+    geometry = closed_form_geometry(arm)
     for q in random_postures(arm, rng, 5):
         q[4] = rng.choice((q[4], 0.0))
         X, near = forward(arm, q), rng.uniform(-3, 3, (3, arm.n))
         place = ([X[i, :3].tolist() for i in range(3)], X[:3, 3].tolist(), per_joint(near))
-        for i, expected in enumerate(branches(arm, shoulder, *place).q):
-            found = one_branch(arm, shoulder, *place, branch=i)
+        for i, expected in enumerate(branches(arm, geometry, *place).q):
+            found = single_branch(arm, geometry, *place, branch=i)
             np.testing.assert_array_equal(stack(found, (3,)), stack(expected, (3,)))

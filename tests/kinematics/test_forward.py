@@ -8,7 +8,7 @@ from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solve import inverse
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import nearest_rotation

@@ -9,10 +9,10 @@ from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse, inverse_branches
-from armwright.kinematics.inverse.recognise import shoulder_of
-from armwright.kinematics.inverse.solution import Answer, NoPostureError
-from armwright.kinematics.inverse.turns import images
+from armwright.kinematics.inverse.recognise import find_geometry
+from armwright.kinematics.inverse.solution import NoSolutionError, Outcome
+from armwright.kinematics.inverse.solve import inverse, inverse_branches
+from armwright.kinematics.inverse.wrapping import equivalent_configurations
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
 from oracles.arms import random_postures
@@ -65,7 +65,7 @@ def test_judged_solution(name: str, rng: np.random.Generator) -> None:
             continue
         solution = inverse(arm, forward(arm, q), q)
 
-        assert solution.answer is Answer.SOLVED
+        assert solution.outcome is Outcome.SOLVED
         np.testing.assert_allclose(solution.best.q, q, atol=POSTURE)
         assert all(branch.allowed for branch in solution.allowed)
         assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
@@ -88,7 +88,7 @@ def test_grid_of_right_angles(name: str) -> None:
         X = forward(arm, q)
         solution = inverse(arm, X, q)
 
-        assert solution.answer in (Answer.SOLVED, Answer.SINGULAR), q
+        assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR), q
         np.testing.assert_allclose(forward(arm, solution.best.q), X, atol=RESIDUAL)
         assert len(solution.branches) <= 8
         postures = np.array([branch.q for branch in solution])
@@ -122,7 +122,7 @@ def test_wrist_singularity_keeps_joint_4() -> None:
 
     solution = inverse(arm, X, near=np.radians([10, 20, 30, 70, 0, 0]))
 
-    assert solution.answer is Answer.SINGULAR
+    assert solution.outcome is Outcome.SINGULAR
     assert solution.best.free == (4, 6)
     np.testing.assert_allclose(np.degrees(solution.best.q[3:]), (70, 0, 20), atol=1e-6)
 
@@ -146,22 +146,22 @@ def test_typed_poses_solve(rng: np.random.Generator) -> None:
         solution = inverse(arm, np.round(forward(arm, q), 6))
 
         assert solution.branches[0].position_error < 2e-6
-        assert solution.answer is not Answer.OUT_OF_REACH
+        assert solution.outcome is not Outcome.OUT_OF_REACH
 
 
 def test_out_of_reach_says_how_far() -> None:
     """The wrist of the PUMA reaches sqrt((a2 + |a3, d4|)² + d3²) from its shoulder; a metre farther is a metre out."""
     arm = load_arm("puma560-seed")
-    farthest = shoulder_of(arm).farthest  # type: ignore[union-attr]
+    farthest = find_geometry(arm).max_reach  # type: ignore[union-attr]
     assert farthest == pytest.approx(math.hypot(0.432 + math.hypot(0.02, 0.433), 0.149))
 
     solution = inverse(arm, _at(farthest + 1.0, 0, 0))
 
-    assert solution.answer is Answer.OUT_OF_REACH
+    assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(1.0, abs=1e-9)
     assert solution.allowed == ()
     np.testing.assert_allclose(solution.nearest_pose[:3, 3], (farthest, 0, 0), atol=1e-9)
-    with pytest.raises(NoPostureError, match=r"1000\.0 mm out of reach of 'puma560-seed'"):
+    with pytest.raises(NoSolutionError, match=r"1000\.0 mm out of reach of 'puma560-seed'"):
         _ = solution.best
 
 
@@ -172,18 +172,18 @@ def test_nearest_pose_is_nearest(rng: np.random.Generator) -> None:
     for target in [(0.0, 0.05, 0.3), (0.01, 0.0, 0.0), (0.9, 0.9, 0.9), (0.05, 0.05, 1.2)]:
         solution = inverse(arm, _at(*target))
 
-        assert solution.answer is Answer.OUT_OF_REACH
+        assert solution.outcome is Outcome.OUT_OF_REACH
         assert solution.distance <= np.linalg.norm(reached - target, axis=-1).min() + 1e-9
-        assert inverse(arm, solution.nearest_pose).answer is not Answer.OUT_OF_REACH
+        assert inverse(arm, solution.nearest_pose).outcome is not Outcome.OUT_OF_REACH
 
 
 def test_out_of_limits_says_which_joint() -> None:
     """The boom of the Stanford arm ends at 1117.6 mm; a hand 3 m out would need it 1.88 m longer."""
     solution = inverse(load_arm("stanford"), _at(3.0, 0, 0.2))
 
-    assert solution.answer is Answer.OUT_OF_LIMITS
+    assert solution.outcome is Outcome.OUT_OF_LIMITS
     with pytest.raises(
-        NoPostureError, match=r"joint 3 would stand at 2996\.5 mm, 1878\.9 mm beyond its limit 1117\.6 mm"
+        NoSolutionError, match=r"joint 3 would stand at 2996\.5 mm, 1878\.9 mm beyond its limit 1117\.6 mm"
     ):
         _ = solution.best
 
@@ -192,12 +192,12 @@ def test_images_by_whole_turns() -> None:
     """Joint 6 of the PUMA turns through 520 degrees: 150 and -210 degrees are one pose and two positions."""
     arm = load_arm("puma560-seed")
 
-    q = images(arm, np.radians([0, 0, 0, 0, 30, 150]))
+    q = equivalent_configurations(arm, np.radians([0, 0, 0, 0, 30, 150]))
 
     assert sorted(np.degrees(q[:, 5]).round(6)) == [-210, 150]
 
 
-def test_nearest_image_is_taken() -> None:
+def test_nearest_equivalent_is_taken() -> None:
     """From -200 degrees joint 6 goes to -210 and not to 150."""
     arm = load_arm("puma560-seed")
     X = forward(arm, np.radians([0, 0, 0, 0, 30, 150]))

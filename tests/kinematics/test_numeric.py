@@ -8,12 +8,12 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.judge import EDGE
 from armwright.kinematics.inverse.numeric import numeric_inverse
-from armwright.kinematics.inverse.recognise import shoulder_of
-from armwright.kinematics.inverse.solution import Answer, NoPostureError
-from armwright.kinematics.inverse.turns import middle
+from armwright.kinematics.inverse.ranking import POSE_TOLERANCE
+from armwright.kinematics.inverse.recognise import find_geometry
+from armwright.kinematics.inverse.solution import NoSolutionError, Outcome
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import mid_range
 from armwright.kinematics.jacobian import jacobian
 from armwright.spatial.poses import pose
 from oracles.arms import random_arm, random_postures
@@ -52,7 +52,7 @@ def test_short_arms_find_their_posture_again(joints: int, sample: Sample) -> Non
         for q in random_postures(arm, rng, 5):
             solution = inverse(arm, forward(arm, q))
 
-            assert solution.answer is Answer.SOLVED
+            assert solution.outcome is Outcome.SOLVED
             assert min(np.abs(branch.q - q).max() for branch in solution) < POSTURE
             assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
     sample.record(f"postures of skew arms of {joints} joints found again, 5 each", sample.count(20), 0)
@@ -68,11 +68,11 @@ def test_six_skew_turns_find_their_posture_again(rng: np.random.Generator, sampl
     for _ in range(arms):
         arm = random_arm(rng, 6)
         arm = attrs.evolve(arm, joints=[attrs.evolve(joint, kind="revolute", limits=TURN) for joint in arm.joints])
-        assert shoulder_of(arm) is None
+        assert find_geometry(arm) is None
         for q in random_postures(arm, rng, 4):
             solution = inverse(arm, forward(arm, q))
 
-            assert solution.answer is Answer.SOLVED
+            assert solution.outcome is Outcome.SOLVED
             assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
             again += int(min(np.abs(branch.q - q).max() for branch in solution) < POSTURE)
     assert again >= 0.9 * 4 * arms - 1
@@ -90,9 +90,9 @@ def test_against_the_closed_form(name: str, rng: np.random.Generator) -> None:
             continue
         X = forward(arm, q)
         exact = np.array([branch.q for branch in inverse(arm, X).allowed])
-        searched = numeric_inverse(arm, X, middle(arm))
+        searched = numeric_inverse(arm, X, mid_range(arm))
 
-        assert searched.answer is Answer.SOLVED
+        assert searched.outcome is Outcome.SOLVED
         for branch in searched:
             turned = np.abs(np.angle(np.exp(1j * (exact - branch.q)))) if name == "ur5" else np.abs(exact - branch.q)
             assert turned.max(axis=-1).min() < POSTURE
@@ -107,7 +107,7 @@ def test_seven_joints(rng: np.random.Generator) -> None:
 
         solution = inverse(SEVEN, forward(SEVEN, q), near)
 
-        assert solution.answer is Answer.SOLVED
+        assert solution.outcome is Outcome.SOLVED
         assert len(solution.branches) > 1
         assert all(max(b.position_error, b.rotation_error) < RESIDUAL and b.allowed for b in solution)
         ways = [np.linalg.norm(branch.q - near) for branch in solution]
@@ -137,10 +137,10 @@ def test_out_of_reach_of_a_short_arm(elbow: Arm) -> None:
     """A pose straight ahead, 0.5 m beyond the stretched arm, is 500 mm out of reach, and stretched is the nearest."""
     solution = inverse(elbow, pose(np.eye(3), (2.0, 0.0, 0.0)))
 
-    assert solution.answer is Answer.OUT_OF_REACH
+    assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.5, abs=1e-6)
     np.testing.assert_allclose(solution.nearest_pose, pose(np.eye(3), (1.5, 0, 0)), atol=1e-5)
-    with pytest.raises(NoPostureError, match=r"^the pose is 500\.0 mm out of reach of 'elbow'; the nearest in reach"):
+    with pytest.raises(NoSolutionError, match=r"^the pose is 500\.0 mm out of reach of 'elbow'; the nearest in reach"):
         _ = solution.best
 
 
@@ -154,7 +154,7 @@ def test_a_pose_out_of_the_plane(elbow: Arm) -> None:
 
     solution = inverse(elbow, X)
 
-    assert solution.answer is Answer.OUT_OF_REACH
+    assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.2, abs=1e-6)
     assert solution.turn == pytest.approx(0.1, abs=1e-6)
     assert "200.0 mm and 5.73 deg out of reach" in solution.explain()
@@ -168,7 +168,7 @@ def test_out_of_limits_is_another_answer(elbow: Arm) -> None:
 
     solution = inverse(short, forward(elbow, [0.3, 1.1]))
 
-    assert solution.answer is Answer.OUT_OF_LIMITS
+    assert solution.outcome is Outcome.OUT_OF_LIMITS
     assert [violation.joint for violation in solution.branches[0].violations] == [2]
     np.testing.assert_allclose(solution.branches[0].q, (0.3, 1.1), atol=POSTURE)
 
@@ -188,7 +188,7 @@ def test_a_posture_at_its_limits(rng: np.random.Generator) -> None:
 
         solution = inverse(arm, forward(arm, q))
 
-        assert solution.answer is Answer.SOLVED
+        assert solution.outcome is Outcome.SOLVED
         assert solution.best.violations == ()
 
 
@@ -215,7 +215,7 @@ def test_free_joints_of_a_singular_posture() -> None:
 
     solution = inverse(arm, forward(arm, [0.2, 1.0, 0.4, 0.5]), near=[0.2, 1.0, 0.7, 0.0])
 
-    assert solution.answer is Answer.SINGULAR
+    assert solution.outcome is Outcome.SINGULAR
     assert all(branch.free == (3, 4) for branch in solution)
     assert solution.best.q[2] + solution.best.q[3] == pytest.approx(0.9)
 
@@ -228,7 +228,7 @@ def test_a_stretched_arm_is_not_free(elbow: Arm) -> None:
 
     solution = inverse(three, forward(three, [0.3, 0.0, 0.0]))
 
-    assert solution.answer is Answer.SOLVED
+    assert solution.outcome is Outcome.SOLVED
     assert len(solution.branches) == 1
     np.testing.assert_allclose(solution.best.q, (0.3, 0, 0), atol=1e-4)  # half of the digits are left at the edge
 
@@ -239,8 +239,8 @@ def test_typed_poses_of_a_short_arm(rng: np.random.Generator) -> None:
     for q in rng.uniform(-1.5, 1.5, size=(20, arm.n)):
         solution = inverse(arm, np.round(forward(arm, q), 6))
 
-        assert solution.answer in (Answer.SOLVED, Answer.SINGULAR)
-        assert solution.best.position_error < EDGE
+        assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR)
+        assert solution.best.position_error < POSE_TOLERANCE
 
 
 def test_arms_without_limits(rng: np.random.Generator) -> None:
@@ -254,7 +254,7 @@ def test_arms_without_limits(rng: np.random.Generator) -> None:
         ],
     )
     for q in rng.uniform(-0.5, 0.5, size=(10, 3)):
-        assert inverse(arm, forward(arm, q)).answer is Answer.SOLVED
+        assert inverse(arm, forward(arm, q)).outcome is Outcome.SOLVED
 
 
 def test_not_a_rotation() -> None:

@@ -10,7 +10,7 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
 from armwright.kinematics.damping import damped_rates
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.recognise import find_geometry
 from armwright.kinematics.jacobian import jacobian, tool_twist
 from armwright.kinematics.singularities import singularities, singularity_factors
 from oracles.arms import random_arm, random_pose, random_postures
@@ -66,7 +66,7 @@ def test_determinant_is_the_product(name: str, rng: np.random.Generator) -> None
     q = rng.uniform(-3, 3, size=(500, 6))
 
     determinant = np.linalg.det(jacobian(arm, q))
-    product = singularity_factors(arm, q).prod(axis=-1) * (shoulder_of(arm).upper or 1.0)  # type: ignore[union-attr]
+    product = singularity_factors(arm, q).prod(axis=-1) * (find_geometry(arm).upper_arm or 1.0)  # type: ignore[union-attr]
 
     sign = np.sign(determinant[0] * product[0])
     np.testing.assert_allclose(determinant, sign * product, atol=ROUNDING)

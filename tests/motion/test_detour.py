@@ -10,7 +10,7 @@ from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solve import inverse
 from armwright.kinematics.jacobian import jacobian
 from armwright.motion.detour import line_or_detour
 from armwright.motion.follow import PathError

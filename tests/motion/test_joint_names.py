@@ -9,7 +9,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solve import inverse
 from armwright.motion.certificate import slower
 from armwright.motion.detour import line_or_detour
 from armwright.motion.follow import PathError

@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.errors import InvalidValueError, KindError, RotationWarning, ShapeError, UnknownNameError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solve import inverse
 from armwright.motion import detour
 from armwright.motion.blends import blended
 from armwright.motion.continuity import continuity

@@ -9,7 +9,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solve import inverse
 from armwright.motion.follow import TURN_PER_METRE, PathError, follow
 from armwright.motion.path import Path, closest_to_axis, place_knots, report_speed, report_step
 from armwright.motion.plan import Manner, StageError, StageGoal, plan

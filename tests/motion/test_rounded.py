@@ -18,7 +18,7 @@ DEVIATION = 1e-4
 
 
 def start() -> np.ndarray:
-    from armwright.kinematics.inverse.closed_form import inverse
+    from armwright.kinematics.inverse.solve import inverse
 
     return inverse(ARM, pose(DOWN, (0.45, 0.0, 0.25))).best.q
 

@@ -14,7 +14,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solve import inverse
 from armwright.kinematics.jacobian import jacobian
 from armwright.kinematics.singularities import singularities, singularity_factors
 from armwright.motion.chain import Room, chain, step_by_step

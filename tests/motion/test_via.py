@@ -12,7 +12,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import IncapableArmError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
+from armwright.kinematics.inverse.solve import inverse
 from armwright.motion.chain import chain
 from armwright.motion.continuity import continuity
 from armwright.motion.efforts import slowing_for_efforts

@@ -12,9 +12,9 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.kinematics.inverse.closed_form import BRANCHES
-from armwright.kinematics.inverse.recognise import shoulder_of
-from armwright.kinematics.inverse.shoulder import first_three
+from armwright.kinematics.inverse.geometry import first_three
+from armwright.kinematics.inverse.recognise import find_geometry
+from armwright.kinematics.inverse.solve import BRANCHES
 from armwright.tracing.emit import LANES, emit
 from armwright.tracing.kernel import CalledOff, Kernel, on_cores_for_long
 from armwright.tracing.scalar import atan2, cos, sin
@@ -135,15 +135,15 @@ def test_bad_input(stanford: Kernel) -> None:
 def test_choices_and_arc_tangents(rng: np.random.Generator) -> None:
     """A kernel of the PUMA's first three joints, full of arc tangents, puts the wrist where the equation does."""
     arm = load_arm("puma560")
-    shoulder = shoulder_of(arm)
-    assert shoulder is not None
+    geometry = find_geometry(arm)
+    assert geometry is not None
     side, elbow, _ = BRANCHES[2]
-    kernel = Kernel(emitted=emit("shoulder", lambda p: [first_three(shoulder, p, side, elbow)], {"p": 3}))
+    kernel = Kernel(emitted=emit("shoulder", lambda p: [first_three(geometry, p, side, elbow)], {"p": 3}))
     points = rng.uniform(-0.5, 0.5, size=(500, 3))
 
     found = kernel(points)
 
-    expected = np.array([first_three(shoulder, p.tolist(), side, elbow) for p in points])
+    expected = np.array([first_three(geometry, p.tolist(), side, elbow) for p in points])
     difference = np.angle(np.exp(1j * (found - expected)))
     assert np.abs(difference).max() < 1e-7  # next to the edge of the reach a root loses half of the digits
     assert np.median(np.abs(difference)) < 1e-15

@@ -36,7 +36,7 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
-    from armwright.kinematics.inverse.closed_form import inverse as postures
+    from armwright.kinematics.inverse.solve import inverse as postures
 
     model = load_arm(arm)
     X = _pose(xyz, rpy, noap)
@@ -55,11 +55,11 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
             for branch in solution
         ]
         status = ExitStatus.DONE if solution.allowed else ExitStatus.INFEASIBLE
-        said = {"exit_status": status, "answer": solution.answer, "distance": solution.distance}
+        said = {"exit_status": status, "answer": solution.outcome, "distance": solution.distance}
         print_json({**said, "branches": branches})
     else:
         _print(model, solution)
-        if solution.answer == "out of reach":
+        if solution.outcome == "out of reach":
             _ask_for_the_unit(model, X, metres=noap is not None)
     if not solution.allowed:
         raise typer.Exit(ExitStatus.INFEASIBLE)
@@ -86,12 +86,12 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
 
 def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
     """Say that a place out of reach would be in reach in the other unit, if it would."""
-    from armwright.kinematics.inverse.closed_form import inverse as postures
-    from armwright.kinematics.inverse.solution import Answer
+    from armwright.kinematics.inverse.solution import Outcome
+    from armwright.kinematics.inverse.solve import inverse as postures
 
     other = X.copy()
     other[:3, 3] *= 1e-3 if metres else 1e3
-    if postures(model, other).answer is not Answer.OUT_OF_REACH:
+    if postures(model, other).outcome is not Outcome.OUT_OF_REACH:
         option, unit, typed = ("--noap", "m", "mm") if metres else ("--xyz", "mm", "m")
         print(f"note: {option} is in {unit}; in {typed} the pose would be in reach")
 
@@ -99,7 +99,7 @@ def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
 def _print(model: "Arm", solution) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001
     from armwright.cli.joints import unit_names, units
 
-    print(f"{solution.answer}" + ("" if solution.allowed else f": {solution.explain()}"))
+    print(f"{solution.outcome}" + ("" if solution.allowed else f": {solution.explain()}"))
     if solution.branches:
         print("  ".join(f"{name:>9}" for name in unit_names(model)) + "   branch")
     for branch in solution:

@@ -15,7 +15,7 @@ from armwright.dynamics.newton_euler import drive_effort, newton_euler
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward import link_frames, tool_frame
 from armwright.kinematics.inverse.branches import branches, merged
-from armwright.kinematics.inverse.recognise import closed_form_of
+from armwright.kinematics.inverse.recognise import closed_form_geometry
 from armwright.kinematics.jacobian import frame_columns
 from armwright.tracing.emit import Emitted, Guarded, emit
 from armwright.tracing.kernel import Kernel
@@ -101,7 +101,7 @@ def _jacobian(arm: Arm, q: Numbers) -> Rows:
 
 def _inverse_branches(arm: Arm, X_BT: Numbers, near: Numbers) -> Rows:
     R = [list(X_BT[4 * i : 4 * i + 3]) for i in range(3)]
-    q, singular = merged(branches(arm, closed_form_of(arm), R, [X_BT[4 * i + 3] for i in range(3)], near))
+    q, singular = merged(branches(arm, closed_form_geometry(arm), R, [X_BT[4 * i + 3] for i in range(3)], near))
     return [[x for row in q for x in row], singular]
 
 

@@ -1,7 +1,7 @@
 """Joint rates of the PUMA for a twist of its tool, in closed form, two ways: no matrix is inverted.
 
-Both work at the wrist centre, with the angles of the build (see ``Shoulder``) and the letters of the book: p the wrist
-centre in the shoulder frame, n, o, a the axes of the last wrist frame, and a d before a letter for its rate.
+Both work at the wrist centre, with the angles of the build (see ``ClosedFormGeometry``) and the letters of the book: p
+the wrist centre in the shoulder frame, n, o, a the axes of the last wrist frame, and a d before a letter for its rate.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,8 @@ from armwright.arm.positions import known_arm, positions
 from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, of_shape, read_only
 from armwright.errors import ArmwrightError, UnsupportedArmError, one_of
 from armwright.kinematics.forward import link_frames, per_joint, stack, tool_frame
-from armwright.kinematics.inverse.recognise import shoulder_of
-from armwright.kinematics.inverse.shoulder import Shoulder
+from armwright.kinematics.inverse.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse.recognise import find_geometry
 from armwright.kinematics.jacobian import Axes, known_axes, together
 from armwright.kinematics.singularities import determinant_factors
 from armwright.tracing.scalar import Scalar, cos, select, sin
@@ -116,8 +116,8 @@ def differential_inverse(
     Source:
         The seed on the differential kinematics of the PUMA, (a) and (b); the illegible inverse of (b) derived anew.
     """
-    shoulder = shoulder_of(known_arm(arm))
-    if shoulder is None or shoulder.family != "puma" or not np.array_equal(shoulder.R_3W, np.eye(3)):
+    geometry = find_geometry(known_arm(arm))
+    if geometry is None or geometry.family != "puma" or not np.array_equal(geometry.R_3W, np.eye(3)):
         raise UnsupportedArmError(
             f"arm '{arm.name}': no differential inverse in closed form; expected an arm built like puma560 "
             "(damped_rates takes any arm)"
@@ -127,34 +127,36 @@ def differential_inverse(
     q, twist = together(positions(arm, q), of_shape(twist, (6,), "twist", LARGEST), "q", "twist")
     lead = q.shape[:-1]
     joints, asked = per_joint(q), per_joint(twist)
-    angles = shoulder.angles(joints)
+    angles = geometry.angles(joints)
     solve = rates_by_blocks if way == "blocks" else rates_by_derivative
-    rates = solve(shoulder, angles, wrist_motion(arm, shoulder, joints, asked, frame))
-    factors = stack(determinant_factors(shoulder, angles), lead)
+    rates = solve(geometry, angles, wrist_motion(arm, geometry, joints, asked, frame))
+    factors = stack(determinant_factors(geometry, angles), lead)
     singular = np.abs(factors) < SINGULAR_FACTOR
-    found = stack([sign * rate for sign, rate in zip(shoulder.signs, rates, strict=True)], lead)
+    found = stack([sign * rate for sign, rate in zip(geometry.signs, rates, strict=True)], lead)
     return DifferentialInverse(
         rates=np.where(singular.any(axis=-1, keepdims=True), np.nan, found), factors=factors, singular=singular
     )
 
 
-def wrist_motion(arm: Arm, shoulder: Shoulder, q: Sequence[Scalar], twist: Sequence[Scalar], frame: Axes) -> Motion:
+def wrist_motion(
+    arm: Arm, geometry: ClosedFormGeometry, q: Sequence[Scalar], twist: Sequence[Scalar], frame: Axes
+) -> Motion:
     """Return how the wrist moves for a twist of the tool, over abstract scalars."""
     R_BT, p_BT = tool_frame(arm, link_frames(arm, q)[-1])
     v, w = list(twist[:3]), list(twist[3:])
     if frame == "tool":
         v, w = apply(R_BT, v), apply(R_BT, w)
-    lever = apply(R_BT, shoulder.p_TW.tolist())
-    R_SB = shoulder.X_BS[:3, :3].T.tolist()
+    lever = apply(R_BT, geometry.p_TW.tolist())
+    R_SB = geometry.X_BS[:3, :3].T.tolist()
     return Motion(
-        p=apply(R_SB, subtract(add(p_BT, lever), shoulder.X_BS[:3, 3].tolist())),
+        p=apply(R_SB, subtract(add(p_BT, lever), geometry.X_BS[:3, 3].tolist())),
         v=apply(R_SB, add(v, cross(w, lever))),
-        R=product(R_SB, product(R_BT, shoulder.R_T6.tolist())),
+        R=product(R_SB, product(R_BT, geometry.R_T6.tolist())),
         w=apply(R_SB, w),
     )
 
 
-def rates_by_blocks(shoulder: Shoulder, angles: Sequence[Scalar], motion: Motion) -> Vector:
+def rates_by_blocks(geometry: ClosedFormGeometry, angles: Sequence[Scalar], motion: Motion) -> Vector:
     """Solve the wrist-partitioned Jacobian block by block, over abstract scalars.
 
     Seen along the axes of frame 3 at the wrist centre, joint 1 alone moves the wrist centre out of the plane of the
@@ -165,7 +167,7 @@ def rates_by_blocks(shoulder: Shoulder, angles: Sequence[Scalar], motion: Motion
             [J31 J32 J33]            [J61 0 0  1   0  J66]
 
     Args:
-        shoulder: a ``puma``.
+        geometry: a ``puma``.
         angles: six angles of the build.
         motion: of the wrist.
 
@@ -173,16 +175,16 @@ def rates_by_blocks(shoulder: Shoulder, angles: Sequence[Scalar], motion: Motion
         Rates of the six angles; without meaning, but finite, where a factor of the determinant vanishes.
 
     Source:
-        The seed on the differential kinematics of the PUMA, way (b); its J21 has the shoulder's ahead added here.
+        The seed on the differential kinematics of the PUMA, way (b); its J21 has the shoulder's offset added here.
     """
-    a2, (a3, d4) = shoulder.upper, shoulder.fore
+    a2, (a3, d4) = geometry.upper_arm, geometry.forearm
     _, t2, t3, t4, t5, _ = angles
     c2, c3, s3, c4, s4, c5, s5 = cos(t2), cos(t3), sin(t3), cos(t4), sin(t4), cos(t5), sin(t5)
     R_S3 = _forearm(angles)
     v, w = apply(transpose(R_S3), motion.v), apply(transpose(R_S3), motion.w)
     J41, J61 = R_S3[2][0], R_S3[2][2]
-    J11, J31 = -J61 * shoulder.side, J41 * shoulder.side
-    J21 = shoulder.ahead + a2 * c2 + a3 * J61 - d4 * J41
+    J11, J31 = -J61 * geometry.plane_offset, J41 * geometry.plane_offset
+    J21 = geometry.shoulder_offset + a2 * c2 + a3 * J61 - d4 * J41
     J12, J32 = a2 * s3 + d4, -a2 * c3 - a3
     J13, J33 = d4, -a3
     J45, J55, J46, J56, J66 = -s4, c4, c4 * s5, s4 * s5, c5
@@ -196,7 +198,7 @@ def rates_by_blocks(shoulder: Shoulder, angles: Sequence[Scalar], motion: Motion
     return [d1, d2, d3, z - J66 * d6, d5, d6]
 
 
-def rates_by_derivative(shoulder: Shoulder, angles: Sequence[Scalar], motion: Motion) -> Vector:
+def rates_by_derivative(geometry: ClosedFormGeometry, angles: Sequence[Scalar], motion: Motion) -> Vector:
     """Differentiate the closed form of the inverse, joint by joint in its order, over abstract scalars.
 
     Each line of the inverse gives one rate: side = -s1 px + c1 py that of joint 1, the distance of the wrist centre
@@ -204,7 +206,7 @@ def rates_by_derivative(shoulder: Shoulder, angles: Sequence[Scalar], motion: Mo
     of the wrist.
 
     Args:
-        shoulder: a ``puma``.
+        geometry: a ``puma``.
         angles: six angles of the build.
         motion: of the wrist.
 
@@ -214,7 +216,7 @@ def rates_by_derivative(shoulder: Shoulder, angles: Sequence[Scalar], motion: Mo
     Source:
         The seed on the differential kinematics of the PUMA, way (a); joint 2 by its atan2 of Paul (1981).
     """
-    a2, (a3, d4) = shoulder.upper, shoulder.fore
+    a2, (a3, d4) = geometry.upper_arm, geometry.forearm
     t1, _, t3, t4, t5, _ = angles
     c1, s1, c3, s3 = cos(t1), sin(t1), cos(t3), sin(t3)
     px, py, Z = motion.p
@@ -222,7 +224,7 @@ def rates_by_derivative(shoulder: Shoulder, angles: Sequence[Scalar], motion: Mo
     # -s1 px + c1 py = side
     out = c1 * px + s1 * py
     d1 = (-s1 * vx + c1 * vy) / _safe(out)
-    X, dX = out - shoulder.ahead, c1 * vx + s1 * vy + shoulder.side * d1
+    X, dX = out - geometry.shoulder_offset, c1 * vx + s1 * vy + geometry.plane_offset * d1
     # a3 c3 + d4 s3 = (X² + Z² - a2² - a3² - d4²) / 2 a2
     elbow = _safe(d4 * c3 - a3 * s3)
     d3 = (X * dX + Z * dZ) / (a2 * elbow)

@@ -10,8 +10,8 @@ from armwright.arm.positions import known_arm, one_posture, positions
 from armwright.arrays import Array, ArrayLike, by_fields, number, read_only
 from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward import per_joint, stack
-from armwright.kinematics.inverse.recognise import shoulder_of
-from armwright.kinematics.inverse.shoulder import Shoulder, turned
+from armwright.kinematics.inverse.geometry import ClosedFormGeometry, rotated_about_y
+from armwright.kinematics.inverse.recognise import find_geometry
 from armwright.kinematics.jacobian import jacobian
 from armwright.kinematics.manipulability import scaled_rows
 from armwright.tracing.scalar import Scalar, cos, sin
@@ -66,12 +66,12 @@ class Singularities:
         return bool(self.near)
 
 
-def factor_names(shoulder: Shoulder) -> tuple[str, str, str]:
+def factor_names(geometry: ClosedFormGeometry) -> tuple[str, str, str]:
     """Return what the three factors of a build are called."""
-    return ("shoulder", "slide" if shoulder.family == "stanford" else "elbow", "wrist")
+    return ("shoulder", "slide" if geometry.family == "stanford" else "elbow", "wrist")
 
 
-def determinant_factors(shoulder: Shoulder, angles: Sequence[Scalar]) -> Vector:
+def determinant_factors(geometry: ClosedFormGeometry, angles: Sequence[Scalar]) -> Vector:
     """Return the three factors of the determinant of the Jacobian, over abstract scalars.
 
     The determinant is their product, times the length of the upper arm where there is one, with one sign for all
@@ -83,22 +83,22 @@ def determinant_factors(shoulder: Shoulder, angles: Sequence[Scalar]) -> Vector:
     - wrist: s5.
 
     Args:
-        shoulder: the build.
+        geometry: the build.
         angles: six angles of the build.
 
     Source:
         PUMA: the seed on its differential kinematics. The others: the columns of the Jacobian at the wrist centre.
     """
     _, second, third, fourth, fifth, _ = angles
-    if shoulder.family == "stanford":
-        X, _ = turned(second, shoulder.fore[0], third)
-        return [shoulder.ahead + X, third, sin(fifth)]
-    a3, d4 = shoulder.fore
-    upper, _ = turned(second, shoulder.upper, 0.0)
-    fore, _ = turned(second + third, a3, d4)
-    X = shoulder.ahead + upper + fore
-    if shoulder.family == "parallel":
-        X = X + turned(second + third + fourth, *shoulder.crank)[0]
+    if geometry.family == "stanford":
+        X, _ = rotated_about_y(second, geometry.forearm[0], third)
+        return [geometry.shoulder_offset + X, third, sin(fifth)]
+    a3, d4 = geometry.forearm
+    upper, _ = rotated_about_y(second, geometry.upper_arm, 0.0)
+    fore, _ = rotated_about_y(second + third, a3, d4)
+    X = geometry.shoulder_offset + upper + fore
+    if geometry.family == "parallel":
+        X = X + rotated_about_y(second + third + fourth, *geometry.wrist_link)[0]
     return [X, d4 * cos(third) - a3 * sin(third), sin(fifth)]
 
 
@@ -106,7 +106,7 @@ def singularity_factors(arm: Arm, q: ArrayLike) -> Array:
     """Return the three factors of the determinant of the Jacobian for many postures.
 
     Args:
-        arm: an arm of 6 joints with a closed form: see ``shoulder_of``.
+        arm: an arm of 6 joints with a closed form: see ``find_geometry``.
         q: (..., 6) joint positions [rad] or [m].
 
     Returns:
@@ -118,14 +118,14 @@ def singularity_factors(arm: Arm, q: ArrayLike) -> Array:
         ShapeError: the last axis of ``q`` is not 6 long.
         InvalidValueError: a number is NaN or infinite.
     """
-    shoulder = shoulder_of(known_arm(arm))
-    if shoulder is None:
+    geometry = find_geometry(known_arm(arm))
+    if geometry is None:
         raise UnsupportedArmError(
             f"arm '{arm.name}': the determinant of its Jacobian has no known factors; use its singular values "
             "(singularities, manipulability)"
         )
     q = positions(arm, q)
-    return stack(determinant_factors(shoulder, shoulder.angles(per_joint(q))), q.shape[:-1])
+    return stack(determinant_factors(geometry, geometry.angles(per_joint(q))), q.shape[:-1])
 
 
 def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: float = 1.0) -> Singularities:
@@ -171,13 +171,13 @@ def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: fl
 
 
 def _factors(arm: Arm, q: Array, threshold: float) -> tuple[Factor, ...]:
-    shoulder = shoulder_of(arm)
-    if shoulder is None:
+    geometry = find_geometry(arm)
+    if geometry is None:
         return ()
     values = singularity_factors(arm, q).tolist()
-    reach = shoulder.farthest if np.isfinite(shoulder.farthest) else 1.0
-    fore = 1.0 if shoulder.family == "stanford" else float(np.hypot(*shoulder.fore))
+    reach = geometry.max_reach if np.isfinite(geometry.max_reach) else 1.0
+    fore = 1.0 if geometry.family == "stanford" else float(np.hypot(*geometry.forearm))
     return tuple(
         Factor(name=name, value=value, scale=scale, near=abs(value) < threshold * scale)
-        for name, value, scale in zip(factor_names(shoulder), values, (reach, fore, 1.0), strict=True)
+        for name, value, scale in zip(factor_names(geometry), values, (reach, fore, 1.0), strict=True)
     )

@@ -13,8 +13,8 @@ from armwright.arm.positions import known_arm, positions
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.differential import SINGULAR_FACTOR, SingularPostureError
-from armwright.kinematics.inverse.recognise import shoulder_of
-from armwright.kinematics.inverse.shoulder import Shoulder
+from armwright.kinematics.inverse.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse.recognise import find_geometry
 from armwright.kinematics.singularities import determinant_factors
 
 _FACTORS = ("shoulder", "elbow", "wrist")
@@ -40,10 +40,10 @@ def wrist_partitioned_jacobian(arm: Arm, q: ArrayLike) -> Array:
         InvalidValueError: a number is NaN or infinite.
 
     Source:
-        The seed on the differential kinematics of the PUMA, way (b); its J21 has the shoulder's ahead added here.
+        The seed on the differential kinematics of the PUMA, way (b); its J21 has the shoulder's offset added here.
     """
-    shoulder = _puma(arm)
-    return np.asarray(_blocks(shoulder, positions(arm, q)) * np.array(shoulder.signs))
+    geometry = _puma(arm)
+    return np.asarray(_blocks(geometry, positions(arm, q)) * np.array(geometry.signs))
 
 
 def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
@@ -70,14 +70,14 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     Source:
         The seed on the differential kinematics of the PUMA, way (b); its inverse is partly illegible and derived anew.
     """
-    shoulder = _puma(arm)
+    geometry = _puma(arm)
     q = positions(arm, q)
-    factors = np.stack(np.broadcast_arrays(*determinant_factors(shoulder, _angles(shoulder, q))), axis=-1)
+    factors = np.stack(np.broadcast_arrays(*determinant_factors(geometry, _angles(geometry, q))), axis=-1)
     for place in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
         *which, factor = place
         raise SingularPostureError(_FACTORS[factor], float(factors[*place]), tuple(which))
-    J = _blocks(shoulder, q)
-    out, plane, bend = factors[..., 0], shoulder.upper * factors[..., 1], factors[..., 2]
+    J = _blocks(geometry, q)
+    out, plane, bend = factors[..., 0], geometry.upper_arm * factors[..., 1], factors[..., 2]
     inverse = np.zeros_like(J)
     # Joint 1 alone moves the wrist centre out of the plane of the arm, joints 2 and 3 move it in the plane.
     inverse[..., 0, 1] = 1 / out
@@ -91,38 +91,38 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     inverse[..., 3, 3:5] = -J[..., 5, 5, None] * inverse[..., 5, 3:5]
     inverse[..., 3, 5] = 1.0
     inverse[..., 3:, :3] = -inverse[..., 3:, 3:] @ J[..., 3:, :3] @ inverse[..., :3, :3]
-    return np.asarray(inverse * np.array(shoulder.signs)[:, None])
+    return np.asarray(inverse * np.array(geometry.signs)[:, None])
 
 
-def _puma(arm: Arm) -> Shoulder:
+def _puma(arm: Arm) -> ClosedFormGeometry:
     """Return the build of an arm like the PUMA.
 
     Raises:
         UnsupportedArmError: it is another.
     """
-    shoulder = shoulder_of(known_arm(arm))
-    if shoulder is None or shoulder.family != "puma" or not np.array_equal(shoulder.R_3W, np.eye(3)):
+    geometry = find_geometry(known_arm(arm))
+    if geometry is None or geometry.family != "puma" or not np.array_equal(geometry.R_3W, np.eye(3)):
         raise UnsupportedArmError(
             f"arm '{arm.name}': no wrist-partitioned Jacobian; expected an arm built like puma560 "
             "(jacobian takes any arm)"
         )
-    return shoulder
+    return geometry
 
 
-def _angles(shoulder: Shoulder, q: Array) -> list[Array]:
-    return [np.asarray(angle) for angle in shoulder.angles(list(np.moveaxis(q, -1, 0)))]
+def _angles(geometry: ClosedFormGeometry, q: Array) -> list[Array]:
+    return [np.asarray(angle) for angle in geometry.angles(list(np.moveaxis(q, -1, 0)))]
 
 
-def _blocks(shoulder: Shoulder, q: Array) -> Array:
+def _blocks(geometry: ClosedFormGeometry, q: Array) -> Array:
     """Return the Jacobian (..., 6, 6) for rates of the angles of the build."""
-    a2, (a3, d4) = shoulder.upper, shoulder.fore
-    _, t2, t3, t4, t5, _ = _angles(shoulder, q)
+    a2, (a3, d4) = geometry.upper_arm, geometry.forearm
+    _, t2, t3, t4, t5, _ = _angles(geometry, q)
     c23, s23 = np.cos(t2 + t3), np.sin(t2 + t3)
     c4, s4, c5, s5 = np.cos(t4), np.sin(t4), np.cos(t5), np.sin(t5)
     J = np.zeros((*q.shape[:-1], 6, 6))
-    J[..., 0, 0], J[..., 0, 1], J[..., 0, 2] = -c23 * shoulder.side, a2 * np.sin(t3) + d4, d4
-    J[..., 1, 0] = shoulder.ahead + a2 * np.cos(t2) + a3 * c23 + d4 * s23
-    J[..., 2, 0], J[..., 2, 1], J[..., 2, 2] = -s23 * shoulder.side, -a2 * np.cos(t3) - a3, -a3
+    J[..., 0, 0], J[..., 0, 1], J[..., 0, 2] = -c23 * geometry.plane_offset, a2 * np.sin(t3) + d4, d4
+    J[..., 1, 0] = geometry.shoulder_offset + a2 * np.cos(t2) + a3 * c23 + d4 * s23
+    J[..., 2, 0], J[..., 2, 1], J[..., 2, 2] = -s23 * geometry.plane_offset, -a2 * np.cos(t3) - a3, -a3
     J[..., 3, 0], J[..., 3, 4], J[..., 3, 5] = -s23, -s4, c4 * s5
     J[..., 4, 1], J[..., 4, 2], J[..., 4, 4], J[..., 4, 5] = 1.0, 1.0, c4, s4 * s5
     J[..., 5, 0], J[..., 5, 3], J[..., 5, 5] = c23, 1.0, c5

@@ -7,8 +7,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
-from armwright.kinematics.inverse.numeric import next_postures
-from armwright.kinematics.inverse.turns import nearest_turn, travels
+from armwright.kinematics.inverse.numeric import descend_from
+from armwright.kinematics.inverse.wrapping import joint_distances, wrapped_near
 from armwright.motion.solver import Solver
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
@@ -117,7 +117,7 @@ def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
 def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
     """Solve poses (k, 4, 4) each by the posture nearest to its guide (k, n); returns what ``chain`` does."""
     if solver.inverse_branches is None:
-        q = next_postures(solver.arm, X, guide)
+        q = descend_from(solver.arm, X, guide)
     else:
         q = _nearest_of(solver.arm, solver.inverse_branches(X, guide)[0], guide)
     off = np.flatnonzero(missed(solver, q, X))
@@ -168,7 +168,7 @@ def _astray(X: Array, X_asked: Array, room: Room) -> bool:
 def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None) -> Array:
     """Return the posture (n,) at a pose that is nearest to ``q``, of ``candidates`` (k, n) where they are known."""
     if solver.inverse_branches is None:
-        return np.asarray(next_postures(solver.arm, X[None], q[None])[0])
+        return np.asarray(descend_from(solver.arm, X[None], q[None])[0])
     if candidates is None:
         candidates = solver.inverse_branches(X, q)[0]
     return _nearest_of(solver.arm, candidates, q)
@@ -176,8 +176,8 @@ def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None
 
 def _nearest_of(arm: Arm, candidates: Array, q: Array) -> Array:
     """Return of candidates (..., k, n) those that are reached soonest from postures (..., n)."""
-    turned = nearest_turn(arm, candidates, q[..., None, :])
-    nearest = travels(arm, q[..., None, :], turned).argmin(axis=-1)
+    turned = wrapped_near(arm, candidates, q[..., None, :])
+    nearest = joint_distances(arm, q[..., None, :], turned).argmin(axis=-1)
     return np.asarray(np.take_along_axis(turned, nearest[..., None, None], axis=-2)[..., 0, :])
 
 

@@ -12,9 +12,9 @@ from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damping import damped_rates
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.judge import clean_pose
-from armwright.kinematics.inverse.turns import images, travel
+from armwright.kinematics.inverse.ranking import exact_pose
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import equivalent_configurations, joint_distance
 from armwright.motion.deviation import Spline, Ways, deviation_of
 from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.limit_use import slowing_for_limits
@@ -128,7 +128,7 @@ def line_or_detour(
     """
     one_of("way round", by, ("via", "damped"))
     solver = solver_of(arm)
-    q, B = one_posture(solver.arm, q_start, "q_start"), clean_pose(X_goal)
+    q, B = one_posture(solver.arm, q_start, "q_start"), exact_pose(X_goal)
     asked = timed_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
     straight: Detour | None = None
     try:
@@ -225,8 +225,8 @@ def _on_joint_moves(solver: Solver, q: Array, X_goal: Array) -> Iterator[list[Ar
     configuration. The poses round it are the same in every call.
     """
     arm = solver.arm
-    ends = [image for branch in inverse(arm, X_goal, q).allowed for image in images(arm, branch.q)]
-    ends = sorted(ends, key=lambda end: travel(arm, q, end))[:_JOINT_MOVES]
+    ends = [image for branch in inverse(arm, X_goal, q).allowed for image in equivalent_configurations(arm, branch.q)]
+    ends = sorted(ends, key=lambda end: joint_distance(arm, q, end))[:_JOINT_MOVES]
     if not ends:
         return
     yield [np.asarray(solver.forward(q + part * (end - q))) for end in ends for part in _ON_THE_WAY]

@@ -8,8 +8,8 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import ArmwrightError
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.solution import Answer, violations
+from armwright.kinematics.inverse.solution import Outcome, violations
+from armwright.kinematics.inverse.solve import inverse
 from armwright.motion.certificate import LimitName, checked_deviation, slower
 from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of
@@ -231,7 +231,7 @@ def _solve(solver: Solver, path: Path, knots: Knots, q_start: Array, guide: Guid
     if missed is not None:
         place = knots.segments[missed], knots.fractions[missed]
         solution = inverse(arm, X[missed], q[missed - 1])
-        if solution.answer is Answer.OUT_OF_REACH:
+        if solution.outcome is Outcome.OUT_OF_REACH:
             raise PathError("reach", *place, solution.explain())
         before, why = q[missed - 1], changing(arm, q[missed - 1])
         message = f"near {_place(path, knots, missed)} {why}"

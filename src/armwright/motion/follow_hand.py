@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse.closed_form import inverse
 from armwright.kinematics.inverse.solution import Violation, violations
-from armwright.kinematics.inverse.turns import travel
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import joint_distance
 from armwright.motion.blends import Ends
 from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import HandBounds, cubic_peaks, half_sines, hand_bounds
@@ -195,7 +195,7 @@ def _starts(arm: Arm, X: Array, near: Array) -> list[Posture]:
     if not solution.allowed:
         raise PathError(cause_of(solution), 0, 0.0, f"pose 1: {solution.explain()}")
     starts = [Posture(branch.label, branch.q) for branch in solution.allowed]
-    return sorted(starts, key=lambda posture: travel(arm, near, posture.q))
+    return sorted(starts, key=lambda posture: joint_distance(arm, near, posture.q))
 
 
 def _first_knots(hand: HandPath, step: float, fewest: int) -> Array:

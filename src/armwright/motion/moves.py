@@ -10,9 +10,9 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.judge import typed_poses
-from armwright.kinematics.inverse.turns import middle
+from armwright.kinematics.inverse.ranking import typed_poses
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import mid_range
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
 from armwright.motion.certificate import Certificate, LimitName, checked_deviation
 from armwright.motion.detour import By, Detour, line_or_detour
@@ -299,7 +299,7 @@ def exact_poses(poses: ArrayLike) -> Array:
 
 
 def _near(arm: Arm, near: ArrayLike | None) -> Array:
-    return middle(arm) if near is None else one_posture(arm, near, "near")
+    return mid_range(arm) if near is None else one_posture(arm, near, "near")
 
 
 def _timing(times: ArrayLike, blend: ArrayLike | None, count: int) -> tuple[Array, Array]:

@@ -10,8 +10,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.turns import images, travel
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import equivalent_configurations, joint_distance
 from armwright.motion.certificate import slower
 from armwright.motion.detour import By, Detour, line_or_detour
 from armwright.motion.follow import PathError, follow
@@ -309,8 +309,8 @@ def _postures(arm: Arm, X: Array, q: Array, number: int) -> list[Array]:
     solution = inverse(arm, X, q)
     if not solution.allowed:
         raise StageError(number, _at_pose(cause_of(solution), solution.explain(), 0, X))
-    postures = [image for branch in solution.allowed for image in images(arm, branch.q)]
-    return sorted(postures, key=lambda posture: travel(arm, q, posture))
+    postures = [image for branch in solution.allowed for image in equivalent_configurations(arm, branch.q)]
+    return sorted(postures, key=lambda posture: joint_distance(arm, q, posture))
 
 
 def _direct(arm: Arm, q: Array, goal: Array, manner: Manner) -> Stage:

@@ -7,8 +7,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.turns import images
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import equivalent_configurations
 from armwright.motion.follow import PathError
 from armwright.motion.stops import cause_of
 
@@ -36,7 +36,9 @@ def postures_at(arm: Arm, X: Array, near: Array) -> list[list[Posture]]:
         solution = inverse(arm, each, near)
         if not solution.allowed:
             raise PathError(cause_of(solution), max(i - 1, 0), min(i, 1.0), f"pose {i + 1}: {solution.explain()}")
-        layers.append([Posture(branch.label, q) for branch in solution.allowed for q in images(arm, branch.q)])
+        layers.append(
+            [Posture(branch.label, q) for branch in solution.allowed for q in equivalent_configurations(arm, branch.q)]
+        )
         near = layers[-1][0].q
     return layers
 

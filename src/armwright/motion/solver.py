@@ -10,8 +10,8 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse_branches
-from armwright.kinematics.inverse.recognise import shoulder_of
+from armwright.kinematics.inverse.recognise import find_geometry
+from armwright.kinematics.inverse.solve import inverse_branches
 
 AnyArm: TypeAlias = Arm | CompiledArm
 
@@ -35,7 +35,7 @@ class Solver(NamedTuple):
 def solver_of(arm: AnyArm) -> Solver:
     """Return the functions of an arm: kernels of a compiled one, else the plain functions, which compile nothing."""
     if isinstance(arm, CompiledArm):
-        closed = shoulder_of(arm.arm) is not None
+        closed = find_geometry(arm.arm) is not None
         return Solver(arm.arm, arm.forward, arm.inverse_dynamics, arm.inverse_branches if closed else None)
-    branches = partial(inverse_branches, arm) if shoulder_of(known_arm(arm)) is not None else None
+    branches = partial(inverse_branches, arm) if find_geometry(known_arm(arm)) is not None else None
     return Solver(arm, partial(forward, arm), partial(inverse_dynamics, arm), branches)

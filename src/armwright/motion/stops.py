@@ -6,8 +6,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.solution import Answer, InverseSolution, violations
+from armwright.kinematics.inverse.solution import InverseSolution, Outcome, violations
+from armwright.kinematics.inverse.solve import inverse
 from armwright.kinematics.jacobian import jacobian
 from armwright.kinematics.singularities import singularities
 from armwright.motion.chain import Room, Step, missed, on_one_branch, step_by_step
@@ -95,7 +95,7 @@ def nearest_singularity(arm: Arm, q: ArrayLike) -> str:
 
 def cause_of(solution: InverseSolution) -> Cause:
     """Return why no posture of a solution can be taken."""
-    return "reach" if solution.answer is Answer.OUT_OF_REACH else "limits"
+    return "reach" if solution.outcome is Outcome.OUT_OF_REACH else "limits"
 
 
 def at_speed(arm: Arm, joint: int, factor: float) -> str:
@@ -143,7 +143,7 @@ def _stop(solver: Solver, before: Step, step: Step, times: Array, *, poses_only:
     arm, place = solver.arm, before.place
     if missed(solver, step.q, step.X):
         solution = inverse(arm, step.X, before.q)
-        if solution.answer is Answer.OUT_OF_REACH:
+        if solution.outcome is Outcome.OUT_OF_REACH:
             return Stop("reach", step.place, None, solution.explain())
         return Stop("singular", place, idlest(arm, before.q), changing(arm, before.q))
     if poses_only:

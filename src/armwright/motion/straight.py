@@ -10,9 +10,9 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, number
 from armwright.errors import IncapableArmError, InvalidValueError
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.judge import clean_pose
-from armwright.kinematics.inverse.solution import Answer, violations
+from armwright.kinematics.inverse.ranking import exact_pose
+from armwright.kinematics.inverse.solution import Outcome, violations
+from armwright.kinematics.inverse.solve import inverse
 from armwright.motion.certificate import CLOSEST, Certificate, LimitName, checked_deviation, slowing
 from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned, turning_points
@@ -236,7 +236,7 @@ def _ends(solver: Solver, q_start: ArrayLike, X_goal: ArrayLike, deviation: floa
     """Return the posture and the pose at the start, and the pose at the end, of a line that the arm can end."""
     checked_deviation(deviation)
     q = one_posture(solver.arm, q_start, "q_start")
-    B = clean_pose(X_goal)
+    B = exact_pose(X_goal)
     for fault in violations(solver.arm, q):
         raise PathError("limits", 0, 0.0, f"at the start {fault}", joint=fault.joint, reason=str(fault))
     return q, np.asarray(solver.forward(q)), B
@@ -350,7 +350,7 @@ def _solved(solver: Solver, line: Line, s: Array, q_start: Array, guide: Guide |
     if missed is not None:
         solution = inverse(solver.arm, X[missed], q[missed - 1])
         at = f"on the line near {at_place(line, s[missed])}"
-        if solution.answer is Answer.OUT_OF_REACH:
+        if solution.outcome is Outcome.OUT_OF_REACH:
             why = solution.explain()
             raise PathError("reach", 0, float(s[missed]), f"{at}: {why}", reason=why)
         before, why = q[missed - 1], changing(solver.arm, q[missed - 1])

@@ -15,8 +15,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.turns import middle
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import mid_range
 from armwright.motion.blends import blended, via_deviations
 from armwright.motion.chain import chain
 from armwright.motion.detour import By
@@ -256,7 +256,7 @@ def _stopped(arm: Arm, way: Way) -> str:
     if way == "joint":
         return ""
     try:
-        along(arm, study_poses(), path_of(way), np.array(TIMES), BLEND, near=middle(arm), ends="running")
+        along(arm, study_poses(), path_of(way), np.array(TIMES), BLEND, near=mid_range(arm), ends="running")
     except PathError as error:
         return str(error)
     return ""

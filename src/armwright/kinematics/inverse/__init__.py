@@ -1,1 +1,1 @@
-"""Inverse kinematics: postures that put the hand at a pose, labelled and judged; closed forms where there are."""
+"""Inverse kinematics: configurations that put the hand at a pose, labelled and judged; closed forms where there are."""

@@ -8,25 +8,25 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward import forward, link_frames, per_joint, stack, tool_frame
-from armwright.kinematics.inverse.judge import EDGE, Candidate, errors, judge
+from armwright.kinematics.inverse.ranking import POSE_TOLERANCE, Candidate, pose_errors, rank
 from armwright.kinematics.inverse.solution import InverseSolution
-from armwright.kinematics.inverse.turns import nearest_image, travel
+from armwright.kinematics.inverse.wrapping import joint_distance, midpoints, nearest_equivalent
 from armwright.kinematics.jacobian import frame_columns
 from armwright.spatial.rotations import rotation_vector
 
-# Starting postures in one round, and rounds at most: there is another while none has led to the pose and, where the
-# postures can be counted, while the last one brought a new one.
+# Starting configurations in one round, and rounds at most: there is another while none has led to the pose and, where
+# the solutions can be counted, while the last one brought a new one.
 _STARTS = 48
 _ROUNDS = 5
 _STEPS = 150
 # A residual this small, in parts of the size of the arm, is rounding.
 _MET = 1e-15
-# A posture whose residual no longer falls by this part in a step stands at the bottom of its valley.
+# A configuration whose residual no longer falls by this part in a step stands at the bottom of its valley.
 _STILL = 1e-9
 # The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds.
 _DAMPING, _FAILED, _SUCCEEDED = 1.0, 8.0, 0.25
-# Postures closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
-_SAME_POSTURE = 1e-5
+# Configurations closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
+_SAME_CONFIGURATION = 1e-5
 # A joint motion is taken for free where the hand is not moved by it to first order (singular values below this part
 # of the largest), nor by so long a motion along it once the other joints have made up for its curvature [rad] or [m].
 _IDLE = 1e-6
@@ -39,7 +39,7 @@ class _Task:
 
     Attributes:
         arm: the arm.
-        X: (4, 4) the pose, or (k, 4, 4), one for each of k postures.
+        X: (4, 4) the pose, or (k, 4, 4), one for each of k configurations.
         lower: (n,) lower bounds, may be infinite.
         upper: (n,) upper bounds.
         size: how long the arm is, for what is small [m].
@@ -55,14 +55,14 @@ class _Task:
 
 
 def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
-    """Return postures that put the tool at one pose, found by damped least squares from many starts.
+    """Return configurations that put the tool at one pose, found by damped least squares from many starts.
 
-    The starts are the present posture and points spread evenly over the joint limits, always the same ones. The
+    The starts are the present configuration and points spread evenly over the joint limits, always the same ones. The
     limits are kept on the way. When no start leads to the pose the search is made again without limits, to tell a
-    pose that only the limits keep from one that is out of reach; then the best posture found comes back, in which a
-    turn by one radian counts as much as a quarter of the arm's length.
+    pose that only the limits keep from one that is out of reach; then the configuration with the least error comes
+    back, in which a rotation by one radian counts as much as a quarter of the arm's length.
 
-    An arm of six joints or fewer has a finite number of postures: those that were found are given, most often all.
+    An arm of six joints or fewer has a finite number of solutions: those that were found are given, most often all.
     With more joints they are endless, and those that were found are examples, nearest first.
 
     Args:
@@ -76,24 +76,29 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     """
     size = _size(arm)
     limited = _Task(
-        arm=arm, X=X, lower=arm.limit("lower"), upper=arm.limit("upper"), size=size, length=max(size / 4, EDGE)
+        arm=arm,
+        X=X,
+        lower=arm.limit("lower"),
+        upper=arm.limit("upper"),
+        size=size,
+        length=max(size / 4, POSE_TOLERANCE),
     )
     tried, met = _search(limited, near)
     if not len(met):
         endless = np.full(arm.n, np.inf)
         free = attrs.evolve(limited, lower=-endless, upper=endless)
         more = _descend(free, np.concatenate([tried, _starts(limited, near, 0, _STARTS)]))
-        met = np.array([nearest_image(arm, q, near) for q in _met(free, more)]).reshape(-1, arm.n)
+        met = np.array([nearest_equivalent(arm, q, near) for q in _met(free, more)]).reshape(-1, arm.n)
         tried = np.concatenate([tried, more])
     if not len(met):
         best = tried[_residuals(limited, tried).argmin()]
-        best = nearest_image(arm, best, near)
-        return judge(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_POSTURE, X_near=forward(arm, best))
-    return judge(arm, X, _named(limited, met, near), near, apart=_SAME_POSTURE)
+        best = nearest_equivalent(arm, best, near)
+        return rank(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_CONFIGURATION, X_near=forward(arm, best))
+    return rank(arm, X, _named(limited, met, near), near, apart=_SAME_CONFIGURATION)
 
 
-def next_postures(arm: Arm, X: Array, near: Array) -> Array:
-    """Return the postures (k, n) that single descents from postures ``near`` lead to, whatever the limits.
+def descend_from(arm: Arm, X: Array, near: Array) -> Array:
+    """Return the configurations (k, n) that single descents from configurations ``near`` lead to, whatever the limits.
 
     For poses close to those of ``near``, as on a path; whether they are met is for the caller to see.
 
@@ -103,12 +108,12 @@ def next_postures(arm: Arm, X: Array, near: Array) -> Array:
         near: (k, n) joint positions.
     """
     size, endless = _size(arm), np.full(arm.n, np.inf)
-    task = _Task(arm=arm, X=X, lower=-endless, upper=endless, size=size, length=max(size / 4, EDGE))
+    task = _Task(arm=arm, X=X, lower=-endless, upper=endless, size=size, length=max(size / 4, POSE_TOLERANCE))
     return _descend(task, near)
 
 
 def _search(task: _Task, near: Array) -> tuple[Array, Array]:
-    """Return all postures (k, n) that the descents ended in, and those (l, n) that meet the pose."""
+    """Return all configurations (k, n) that the descents ended in, and those (l, n) that meet the pose."""
     tried = met = np.empty((0, task.arm.n))
     for number in range(_ROUNDS):
         ends = _descend(task, _starts(task, near, number * _STARTS, _STARTS))
@@ -122,9 +127,11 @@ def _search(task: _Task, near: Array) -> tuple[Array, Array]:
 
 
 def _named(task: _Task, met: Array, near: Array) -> list[Candidate]:
-    """Number the postures, nearest first, one of each free family."""
+    """Number the configurations, nearest first, one of each free family."""
     found: list[Candidate] = []
-    for q in sorted((nearest_image(task.arm, q, near) for q in met), key=lambda q: travel(task.arm, near, q)):
+    for q in sorted(
+        (nearest_equivalent(task.arm, q, near) for q in met), key=lambda q: joint_distance(task.arm, near, q)
+    ):
         if any(_same(task.arm, q, other) for other in found):
             continue
         found.append(Candidate(q, f"numeric {len(found) + 1}", _free_joints(task, q)))
@@ -132,12 +139,12 @@ def _named(task: _Task, met: Array, near: Array) -> list[Candidate]:
 
 
 def _same(arm: Arm, q: Array, other: Candidate) -> bool:
-    """Whether a posture is another one, or a member of the family that is free there."""
+    """Whether a configuration is another one, or a member of the family that is free there."""
     held = [i for i in range(arm.n) if i + 1 not in other.free]
     apart = q - other.q
     revolute = np.array([joint.revolute for joint in arm.joints])
     apart = np.where(revolute, np.remainder(apart + np.pi, 2 * np.pi) - np.pi, apart)
-    return bool((np.abs(apart[held]) < _SAME_POSTURE).all())
+    return bool((np.abs(apart[held]) < _SAME_CONFIGURATION).all())
 
 
 def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
@@ -157,19 +164,19 @@ def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
         loose = attrs.evolve(task, lower=-endless, upper=endless)
         moved = _descend(loose, (q + _FREE_WAY * idle)[None])[0]
         if len(_met(loose, moved[None])) and np.linalg.norm(moved - q) > _FREE_WAY / 2:
-            joints.update(int(i) + 1 for i in np.flatnonzero(np.abs(moved - q) > _SAME_POSTURE))
+            joints.update(int(i) + 1 for i in np.flatnonzero(np.abs(moved - q) > _SAME_CONFIGURATION))
     return tuple(sorted(joints))
 
 
 def _met(task: _Task, q: Array) -> Array:
-    """Return those of the postures (k, n) that meet the pose."""
-    distance, angle = errors(task.arm, q, task.X)
-    return q[(distance <= EDGE) & (angle <= EDGE)]
+    """Return those of the configurations (k, n) that meet the pose."""
+    distance, angle = pose_errors(task.arm, q, task.X)
+    return q[(distance <= POSE_TOLERANCE) & (angle <= POSE_TOLERANCE)]
 
 
 def _residuals(task: _Task, q: Array) -> Array:
-    """Return how far each of the postures (k, n) is from the pose, place and turn together (k,) [m]."""
-    distance, angle = errors(task.arm, q, task.X)
+    """Return how far each of the configurations (k, n) is from the pose, position and orientation together (k,) [m]."""
+    distance, angle = pose_errors(task.arm, q, task.X)
     return np.hypot(distance, task.length * angle)
 
 
@@ -199,7 +206,7 @@ def _descend(task: _Task, q: Array) -> Array:
 
 
 def _bounded_step(task: _Task, q: Array, e: Array, J: Array, damping: Array) -> Array:
-    """Return the postures (k, n) after one damped step; a joint at a bound that the step would pass holds still."""
+    """Return configurations (k, n) after one damped step; a joint at a bound that the step would pass holds still."""
     lower, upper = task.lower, task.upper
     H = np.swapaxes(J, -1, -2) @ J
     g = (np.swapaxes(J, -1, -2) @ e[..., None])[..., 0]
@@ -221,7 +228,7 @@ def _bounded_step(task: _Task, q: Array, e: Array, J: Array, damping: Array) -> 
 
 
 def _residual_and_jacobian(task: _Task, q: Array, X: Array) -> tuple[Array, Array]:
-    """Return what postures (k, n) miss of poses (..., 4, 4), (k, 6), and its slope (k, 6, n), turns in metres."""
+    """Return the residuals (k, 6) of configurations (k, n) at poses (..., 4, 4) [m], and their Jacobians (k, 6, n)."""
     scalars, lead = per_joint(q), q.shape[:-1]
     frames = link_frames(task.arm, scalars)
     R, p = tool_frame(task.arm, frames[-1])
@@ -234,7 +241,7 @@ def _residual_and_jacobian(task: _Task, q: Array, X: Array) -> tuple[Array, Arra
 
 
 def _starts(task: _Task, near: Array, first: int, count: int) -> Array:
-    """Return starting postures ``first`` to ``first + count``, the present one being number 0.
+    """Return starting configurations ``first`` to ``first + count``, the present one being number 0.
 
     They fill the box of the limits evenly: each is the last one moved on by the powers of 1/g, where g is the number
     above 1 with gⁿ⁺¹ = g + 1, modulo the box.
@@ -246,8 +253,7 @@ def _starts(task: _Task, near: Array, first: int, count: int) -> Array:
     fractions = (0.5 + np.arange(first, first + count)[:, None] * g ** -np.arange(1.0, n + 1)) % 1.0
     around = np.clip(near, task.lower, task.upper)
     reach = np.array([math.pi if joint.revolute else task.size for joint in task.arm.joints])
-    bounded = np.isfinite(task.lower) & np.isfinite(task.upper)
-    middle = np.where(bounded, (np.where(bounded, task.lower, 0) + np.where(bounded, task.upper, 0)) / 2, around)
+    middle = midpoints(task.lower, task.upper, around)
     low, high = np.maximum(task.lower, middle - reach), np.minimum(task.upper, middle + reach)
     starts: Array = low + fractions * (high - low)
     if first == 0:

@@ -7,8 +7,8 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.kinematics.forward import per_joint
-from armwright.kinematics.inverse.posture import Posture, posture
-from armwright.kinematics.inverse.shoulder import Shoulder, Sign, turned
+from armwright.kinematics.inverse.branch_angles import BranchAngles, branch_angles
+from armwright.kinematics.inverse.geometry import ClosedFormGeometry, Sign, rotated_about_y
 
 # Angles of joint 1 looked at for the nearest place, and how often the neighbourhood of the best is looked at again,
 # each time twenty times closer: below 1e-8 rad the distance, flat at its least, has no digit left to tell.
@@ -17,27 +17,27 @@ _CLOSER = 7
 _FINER = 20
 
 
-def nearest_centre(shoulder: Shoulder, p: Array, R: Array) -> Array:
+def nearest_wrist_centre(geometry: ClosedFormGeometry, p: Array, R: Array) -> Array:
     """Return the point nearest to ``p`` where the wrist centre can be while the hand is turned by ``R``.
 
     Args:
-        shoulder: the build.
+        geometry: the build.
         p: (3,) wrist centre asked for, in the shoulder frame [m].
         R: (3, 3) turn of the last wrist frame, seen from the shoulder frame.
     """
-    if shoulder.family == "parallel" or shoulder.ahead:
-        return _nearest_by_turning(shoulder, p, R)
-    return _nearest_in_ring(shoulder, p)
+    if geometry.family == "parallel" or geometry.shoulder_offset:
+        return _nearest_by_turning(geometry, p, R)
+    return _nearest_in_ring(geometry, p)
 
 
-def _nearest_in_ring(shoulder: Shoulder, p: Array) -> Array:
+def _nearest_in_ring(geometry: ClosedFormGeometry, p: Array) -> Array:
     """Solve a shoulder whose joint 2 is on the axis of joint 1.
 
     Seen in the half-plane of ``p``, the reach is the ring between two circles, less the strip beside the axis.
     """
     x, y, height = (float(value) for value in p)
-    rho, side = math.hypot(x, y), abs(shoulder.side)
-    inner, outer = math.hypot(shoulder.inner, side), math.hypot(shoulder.outer, side)
+    rho, side = math.hypot(x, y), abs(geometry.plane_offset)
+    inner, outer = math.hypot(geometry.inner_radius, side), math.hypot(geometry.outer_radius, side)
     rounding = 1e-12 * max(1.0, rho, abs(height))
 
     def reachable(point: tuple[float, float]) -> bool:
@@ -56,13 +56,13 @@ def _nearest_in_ring(shoulder: Shoulder, p: Array) -> Array:
     return np.array((best[0] * c, best[0] * s, best[1]))
 
 
-def _nearest_by_turning(shoulder: Shoulder, p: Array, R: Array) -> Array:
+def _nearest_by_turning(geometry: ClosedFormGeometry, p: Array, R: Array) -> Array:
     """Look through the angles of joint 1: at each the nearest place is that of a ring in the plane of the arm."""
     rows: list[list[float]] = R.tolist()
-    flips: tuple[Sign, ...] = (1, -1) if shoulder.family == "parallel" else (1,)
+    flips: tuple[Sign, ...] = (1, -1) if geometry.family == "parallel" else (1,)
     best: tuple[float, Array] | None = None
     for flip in flips:
-        places = _places(shoulder, p, rows, flip)
+        places = _places(geometry, p, rows, flip)
         theta, width = np.linspace(-np.pi, np.pi, _LOOKS, endpoint=False), 2 * np.pi / _LOOKS
         for _ in range(_CLOSER + 1):
             found = places(theta)
@@ -75,32 +75,32 @@ def _nearest_by_turning(shoulder: Shoulder, p: Array, R: Array) -> Array:
     return best[1]
 
 
-def _places(shoulder: Shoulder, p: Array, R: list[list[float]], flip: Sign) -> Callable[[Array], Array]:
+def _places(geometry: ClosedFormGeometry, p: Array, R: list[list[float]], flip: Sign) -> Callable[[Array], Array]:
     """Return the function from angles of joint 1 (k,) to the nearest places (k, 3) in reach at them."""
 
     def places(theta: Array) -> Array:
         c, s = np.cos(theta), np.sin(theta)
-        X, Z = c * p[0] + s * p[1] - shoulder.ahead, np.full_like(theta, p[2])
+        X, Z = c * p[0] + s * p[1] - geometry.shoulder_offset, np.full_like(theta, p[2])
         foot_x, foot_z = np.zeros_like(theta), np.zeros_like(theta)
-        if shoulder.family == "parallel":
-            raised = _crank_turn(shoulder, theta, R, flip)
-            foot_x, foot_z = turned(raised, *shoulder.crank)
+        if geometry.family == "parallel":
+            raised = _wrist_link_angle(geometry, theta, R, flip)
+            foot_x, foot_z = rotated_about_y(raised, *geometry.wrist_link)
         x, z = X - foot_x, Z - foot_z
         distance = np.hypot(x, z)
-        wanted = np.clip(distance, shoulder.inner, shoulder.outer)
+        wanted = np.clip(distance, geometry.inner_radius, geometry.outer_radius)
         safe = np.where(distance > 0, distance, 1.0)
-        x = np.where(distance > 0, x / safe, 1.0) * wanted + foot_x + shoulder.ahead
+        x = np.where(distance > 0, x / safe, 1.0) * wanted + foot_x + geometry.shoulder_offset
         z = z / safe * wanted + foot_z
-        return np.stack([c * x - s * shoulder.side, s * x + c * shoulder.side, z], axis=-1)
+        return np.stack([c * x - s * geometry.plane_offset, s * x + c * geometry.plane_offset, z], axis=-1)
 
     return places
 
 
-def _crank_turn(shoulder: Shoulder, theta: Array, R: list[list[float]], flip: Sign) -> Array:
-    """Return the turn of the crank (k,) that the orientation asks for at angles of joint 1 (k,)."""
+def _wrist_link_angle(geometry: ClosedFormGeometry, theta: Array, R: list[list[float]], flip: Sign) -> Array:
+    """Return the angle of the wrist link (k,) that the orientation asks for at angles of joint 1 (k,)."""
     # A wrist centre straight beside joint 1 makes the branch stand at just that angle.
     c, s = np.cos(theta), np.sin(theta)
-    far = 1.0 + abs(shoulder.side)
-    p = [far * c - shoulder.side * s, far * s + shoulder.side * c, np.zeros_like(theta)]
-    found: Posture = posture(shoulder, p, R, (1, 1, flip), per_joint(np.zeros((len(theta), 6))))
+    far = 1.0 + abs(geometry.plane_offset)
+    p = [far * c - geometry.plane_offset * s, far * s + geometry.plane_offset * c, np.zeros_like(theta)]
+    found: BranchAngles = branch_angles(geometry, p, R, (1, 1, flip), per_joint(np.zeros((len(theta), 6))))
     return np.asarray(found.angles[1] + found.angles[2] + found.angles[3])

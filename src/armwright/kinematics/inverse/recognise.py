@@ -10,7 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.inverse.axes import SAME, Axes, joint_axes, meeting, parallel, perpendicular
-from armwright.kinematics.inverse.shoulder import Family, Shoulder, turned
+from armwright.kinematics.inverse.geometry import ClosedFormGeometry, Family, rotated_about_y
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import nearest_rotation
 
@@ -20,7 +20,7 @@ _SWAP = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 
 
 @lru_cache(maxsize=64)  # asked for at every solve, and an arm does not change
-def shoulder_of(arm: Arm) -> Shoulder | None:
+def find_geometry(arm: Arm) -> ClosedFormGeometry | None:
     """Return the build of an arm that has a closed-form inverse, or None.
 
     Six joints, the first a turn at a right angle to the axis of the second, and then one of
@@ -53,19 +53,19 @@ def shoulder_of(arm: Arm) -> Shoulder | None:
     return None
 
 
-def closed_form_of(arm: Arm) -> Shoulder:
-    """Return the build of an arm, as ``shoulder_of`` does.
+def closed_form_geometry(arm: Arm) -> ClosedFormGeometry:
+    """Return the build of an arm, as ``find_geometry`` does.
 
     Raises:
         UnsupportedArmError: it has no closed form.
     """
-    shoulder = shoulder_of(arm)
-    if shoulder is None:
+    geometry = find_geometry(arm)
+    if geometry is None:
         raise UnsupportedArmError(
             f"arm '{arm.name}': no closed-form inverse kinematics; expected an arm built like puma560, stanford or ur5 "
             "(6 joints; a spherical wrist or three parallel axes)"
         )
-    return shoulder
+    return geometry
 
 
 def _wrist_centre(axes: Axes) -> Array | None:
@@ -91,7 +91,7 @@ class _Seen:
         self.points = (p - origin) @ R
         self.directions = axes.directions @ R
         self.centre = (centre - origin) @ R
-        self.ahead, self.side = float(self.points[1, 0]), float(self.centre[1])
+        self.shoulder_offset, self.plane_offset = float(self.points[1, 0]), float(self.centre[1])
         self.R_TS = axes.X_BT[:3, :3].T @ R
         self.p_TW = axes.X_BT[:3, :3].T @ (centre - axes.X_BT[:3, 3])
 
@@ -110,24 +110,24 @@ class _Seen:
         *,
         signs: Sequence[float],
         offsets: Sequence[float],
-        upper: float = 0.0,
-        fore: tuple[float, float],
-        crank: tuple[float, float] = (0.0, 0.0),
+        upper_arm: float = 0.0,
+        forearm: tuple[float, float],
+        wrist_link: tuple[float, float] = (0.0, 0.0),
         tilt: float = 0.0,
         R_3W: Array,
         R_SW: Array,
-    ) -> Shoulder:
-        """Put the shoulder together; ``R_SW`` is the last frame of the wrist at joint positions 0."""
-        return Shoulder(
+    ) -> ClosedFormGeometry:
+        """Put the geometry together; ``R_SW`` is the last frame of the wrist at joint positions 0."""
+        return ClosedFormGeometry(
             family=family,
             X_BS=self.X_BS,
             signs=tuple(signs),
             offsets=tuple(offsets),
-            ahead=self.ahead,
-            side=self.side,
-            upper=upper,
-            fore=fore,
-            crank=crank,
+            shoulder_offset=self.shoulder_offset,
+            plane_offset=self.plane_offset,
+            upper_arm=upper_arm,
+            forearm=forearm,
+            wrist_link=wrist_link,
             tilt=tilt,
             R_3W=R_3W,
             R_T6=nearest_rotation(self.R_TS @ R_SW),
@@ -135,7 +135,7 @@ class _Seen:
         )
 
 
-def _with_elbow(axes: Axes, wrist: Array) -> Shoulder | None:
+def _with_elbow(axes: Axes, wrist: Array) -> ClosedFormGeometry | None:
     seen = _Seen(axes, wrist)
     upper = seen.way(seen.points[1], seen.points[2])
     fore = seen.way(seen.points[2], seen.centre)
@@ -151,30 +151,30 @@ def _with_elbow(axes: Axes, wrist: Array) -> Shoulder | None:
         "puma",
         signs=(1, seen.sign(2), seen.sign(3), 1, 1, 1),
         offsets=(0, raised, folded - raised, offset_4, offset_5, 0),
-        upper=math.hypot(*upper),
-        fore=_as_floats(turned(-folded, *fore)),
+        upper_arm=math.hypot(*upper),
+        forearm=_as_floats(rotated_about_y(-folded, *fore)),
         R_3W=R_3W,
         R_SW=R_SW,
     )
 
 
-def _with_slide(axes: Axes, wrist: Array) -> Shoulder:
+def _with_slide(axes: Axes, wrist: Array) -> ClosedFormGeometry:
     seen = _Seen(axes, wrist)
     along = seen.directions[2]
     raised = math.atan2(along[0], along[2])
-    beside, length = turned(-raised, *seen.way(seen.points[1], seen.centre))
+    beside, length = rotated_about_y(-raised, *seen.way(seen.points[1], seen.centre))
     R_3W, offset_4, offset_5, R_SW = _wrist(seen, raised, parallel(seen.directions[3], along))
     return seen.build(
         "stanford",
         signs=(1, seen.sign(2), 1, 1, 1, 1),
         offsets=(0, raised, length, offset_4, offset_5, 0),
-        fore=(float(beside) if abs(beside) > SAME else 0.0, 0.0),
+        forearm=(float(beside) if abs(beside) > SAME else 0.0, 0.0),
         R_3W=R_3W,
         R_SW=R_SW,
     )
 
 
-def _with_parallel_axes(axes: Axes, crossing: Array) -> Shoulder | None:
+def _with_parallel_axes(axes: Axes, crossing: Array) -> ClosedFormGeometry | None:
     seen = _Seen(axes, crossing)
     upper = seen.way(seen.points[1], seen.points[2])
     fore = seen.way(seen.points[2], seen.points[3])
@@ -190,9 +190,9 @@ def _with_parallel_axes(axes: Axes, crossing: Array) -> Shoulder | None:
         "parallel",
         signs=(1, seen.sign(2), seen.sign(3), seen.sign(4), 1, 1),
         offsets=(0, raised, folded - raised, -folded, offset_5, 0),
-        upper=math.hypot(*upper),
-        fore=(math.hypot(*fore), 0.0),
-        crank=seen.way(seen.points[3], seen.centre),
+        upper_arm=math.hypot(*upper),
+        forearm=(math.hypot(*fore), 0.0),
+        wrist_link=seen.way(seen.points[3], seen.centre),
         tilt=math.atan2(axis_5[0], axis_5[2]),
         R_3W=_SWAP,
         R_SW=A @ _about_z(offset_5) @ _SWAP,

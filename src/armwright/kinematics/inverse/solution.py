@@ -16,11 +16,11 @@ _AT_LIMIT = 1e-9
 _SHOWN_TURN = 1e-5
 
 
-class Answer(enum.StrEnum):
+class Outcome(enum.StrEnum):
     """One word on a pose.
 
-    ``SOLVED``: at least one posture inside the limits. ``SINGULAR``: the same, but a joint is free there.
-    ``OUT_OF_LIMITS``: postures exist, none inside the limits. ``OUT_OF_REACH``: no posture exists.
+    ``SOLVED``: at least one configuration inside the limits. ``SINGULAR``: the same, but a joint is free there.
+    ``OUT_OF_LIMITS``: configurations exist, none inside the limits. ``OUT_OF_REACH``: no configuration exists.
     """
 
     SOLVED = "solved"
@@ -64,12 +64,12 @@ class Violation:
 
 @attrs.frozen(kw_only=True)
 class Branch:
-    """One posture.
+    """One solution.
 
     Attributes:
         q: (n,) joint positions [rad] or [m].
         label: such as ``right, up, no-flip``.
-        violations: joints outside their limits; empty when the posture can be taken.
+        violations: joints outside their limits; empty when the configuration can be taken.
         free: numbers of the joints that may turn together without moving the hand, from 1; empty unless singular.
         position_error: distance of the hand from the asked place [m].
         rotation_error: angle of the hand from the asked orientation [rad].
@@ -92,12 +92,12 @@ class Branch:
 
 @attrs.frozen(kw_only=True)
 class InverseSolution:
-    """All postures for one pose.
+    """All solutions for one pose.
 
     Attributes:
         arm: the arm.
-        answer: one word on the whole.
-        branches: the postures, those inside the limits first, each nearest to the asked starting point first.
+        outcome: one word on the whole.
+        branches: the solutions, those inside the limits first, each nearest to the asked starting point first.
         distance: how far the pose is out of reach [m]; 0 where it is in reach.
         nearest_pose: (4, 4) the pose in reach nearest to the asked one: with a closed form of the same orientation,
             else the best that was found.
@@ -105,7 +105,7 @@ class InverseSolution:
     """
 
     arm: Arm
-    answer: Answer
+    outcome: Outcome
     branches: tuple[Branch, ...]
     distance: float
     nearest_pose: Array = attrs.field(converter=read_only, eq=content)
@@ -120,7 +120,7 @@ class InverseSolution:
     @property
     def allowed(self) -> tuple[Branch, ...]:
         """The branches inside the limits, nearest first; none when the pose is out of reach."""
-        if self.answer is Answer.OUT_OF_REACH:
+        if self.outcome is Outcome.OUT_OF_REACH:
             return ()
         return tuple(branch for branch in self.branches if branch.allowed)
 
@@ -129,15 +129,15 @@ class InverseSolution:
         """The nearest branch inside the limits.
 
         Raises:
-            NoPostureError: there is none; the text says why and how far out.
+            NoSolutionError: there is none; the text says why and how far out.
         """
         for branch in self.allowed:
             return branch
-        raise NoPostureError(self)
+        raise NoSolutionError(self)
 
     def explain(self) -> str:
-        """Say in one sentence why no posture can be taken."""
-        if self.answer is Answer.OUT_OF_REACH:
+        """Say in one sentence why no configuration can be taken."""
+        if self.outcome is Outcome.OUT_OF_REACH:
             x, y, z = self.nearest_pose[:3, 3] * 1e3
             turned = f" and {math.degrees(self.turn):.2f} deg" if self.turn > _SHOWN_TURN else ""
             return (
@@ -149,8 +149,8 @@ class InverseSolution:
         return f"no posture of '{self.arm.name}' is inside the joint limits; in the closest, {faults}"
 
 
-class NoPostureError(ArmwrightError, ValueError):
-    """No posture inside the limits puts the hand at the pose; ``solution`` holds what was found."""
+class NoSolutionError(ArmwrightError, ValueError):
+    """No configuration inside the limits puts the hand at the pose; ``solution`` holds what was found."""
 
     def __init__(self, solution: InverseSolution) -> None:
         """Keep the solution; its explanation is the text."""

@@ -1,4 +1,4 @@
-"""Free families: where a pose leaves a joint open, the member that is inside the limits."""
+"""Self-motion: where a pose leaves a joint free, the configuration that is inside the limits."""
 
 from collections.abc import Callable
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse.turns import nearest_image
+from armwright.kinematics.inverse.wrapping import nearest_equivalent
 
-# Places of a free joint that are tried for one inside the limits; then, where none is, the neighbourhoods of those
+# Positions of a free joint that are tried for one inside the limits; then, where none is, the neighbourhoods of those
 # that pass the limits least are looked at, each time four times closer: down to 1e-9 of the step.
 _TRIED = 721
 _LEAST = 8
@@ -17,13 +17,13 @@ _FINER = 4
 # How far a joint is moved to see which way another goes with it [rad].
 _PROBE = 0.5
 _TURN = 2 * np.pi
-# Turns by which the place is looked at where another joint reaches a limit.
-_IMAGES = np.arange(-2, 3)
+# Whole turns by which positions are shifted where another joint reaches a limit.
+_WHOLE_TURNS = np.arange(-2, 3)
 # Joints that are together this far outside their limits are inside [rad] or [m].
 _INSIDE = 1e-10
 
 
-def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Array], *, joint: int) -> Array:
+def search_within_limits(arm: Arm, q: Array, near: Array, members: Callable[[Array], Array], *, joint: int) -> Array:
     """Move a free joint on from ``near``, as little as it must, until all joints are inside their limits.
 
     As little as it must, that is to a step of the search; where no step is inside, because another joint has room for
@@ -33,19 +33,19 @@ def moved_inside(arm: Arm, q: Array, near: Array, members: Callable[[Array], Arr
         arm: the arm.
         q: (n,) the member with that joint near, which comes back when no other is inside.
         near: (n,) where the arm is.
-        members: returns the members (k, n) of the family that places (k, n) of the arm lead to.
+        members: returns the members (k, n) of the family that joint positions (k, n) to stay near lead to.
         joint: number of the free joint, from 1.
     """
-    # What lies more than half a turn away is an image of what does not, which may be outside the limits.
+    # What lies more than half a turn away is equivalent to what does not, which may be outside the limits.
     for turn in (np.pi, _TURN):
         room = _room(arm, near, joint, turn)
-        found = _found_inside(arm, near, members, joint, room) if room[0] <= room[1] else None
+        found = _search(arm, near, members, joint, room) if room[0] <= room[1] else None
         if found is not None:
             return found
     return q
 
 
-def _found_inside(
+def _search(
     arm: Arm, near: Array, members: Callable[[Array], Array], joint: int, room: tuple[float, float]
 ) -> Array | None:
     """Return the member nearest to ``near`` of those with all joints inside that a search of a room finds."""
@@ -56,7 +56,7 @@ def _found_inside(
         excess = _excess(arm, rows)
         inside = np.flatnonzero(excess < _INSIDE)
         if inside.size:
-            return nearest_image(arm, rows[inside[np.abs(places[inside] - start).argmin()]], near)
+            return nearest_equivalent(arm, rows[inside[np.abs(places[inside] - start).argmin()]], near)
         around = np.pad(excess, 1, constant_values=np.inf)
         low = np.flatnonzero((excess <= around[:-2]) & (excess <= around[2:]))
         low = low[excess[low].argsort(kind="stable")][:_LEAST]
@@ -65,7 +65,7 @@ def _found_inside(
     return None
 
 
-def turned_inside(
+def counter_rotate_within_limits(
     arm: Arm, q: Array, near: Array, members: Callable[[Array], Array], *, joint: int, other: int
 ) -> Array:
     """Turn two joints whose axes lie on one line, against each other, until both are inside their limits.
@@ -77,7 +77,7 @@ def turned_inside(
         arm: the arm.
         q: (n,) the member with the joint near, which comes back when no other is inside.
         near: (n,) where the arm is.
-        members: returns the members (k, n) of the family that places (k, n) of the arm lead to.
+        members: returns the members (k, n) of the family that joint positions (k, n) to stay near lead to.
         joint: number of the free joint, from 1.
         other: number of the joint that turns with it.
     """
@@ -88,13 +88,13 @@ def turned_inside(
     here, probed = members(_placed(near, joint, start + np.array((0.0, _PROBE))))[:, other - 1]
     way = 1.0 if abs(np.remainder(probed - here + np.pi, _TURN) - np.pi - _PROBE) < _PROBE else -1.0
     ends = [limit for limit in (limits.lower, limits.upper) if np.isfinite(limit)]
-    reached = [way * (end - here + _TURN * (_IMAGES - np.round((end - here) / _TURN))) for end in ends]
+    reached = [way * (end - here + _TURN * (_WHOLE_TURNS - np.round((end - here) / _TURN))) for end in ends]
     turns = np.concatenate([[0.0, lower - start, upper - start], *reached])
     turns = turns[(turns >= lower - start) & (turns <= upper - start)]
     turns = turns[np.abs(turns).argsort(kind="stable")]
     rows = members(_placed(near, joint, start + turns))
     inside = np.flatnonzero(_excess(arm, rows) < _INSIDE)
-    return nearest_image(arm, rows[inside[0]], near) if inside.size else q
+    return nearest_equivalent(arm, rows[inside[0]], near) if inside.size else q
 
 
 def _placed(near: Array, joint: int, values: Array) -> Array:
@@ -116,7 +116,7 @@ def _room(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, float]
 
 
 def _excess(arm: Arm, q: Array) -> Array:
-    """Return how far outside their limits the joints of postures (k, n) are, whole turns aside, summed up (k,)."""
+    """Return the sums (k,) of how far the joints of configurations (k, n) are outside limits, whole turns aside."""
     total = np.zeros(len(q))
     for joint, values in zip(arm.joints, q.T, strict=True):
         lower, upper = joint.limits.lower, joint.limits.upper

@@ -1,4 +1,4 @@
-"""Judging postures: residuals, limits, duplicates, order, and one word on the whole."""
+"""Ranking configurations: residuals, limits, duplicates, order, and one word on the whole."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -9,8 +9,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, of_shape
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solution import Answer, Branch, InverseSolution, violations
-from armwright.kinematics.inverse.turns import same_posture, travel
+from armwright.kinematics.inverse.solution import Branch, InverseSolution, Outcome, violations
+from armwright.kinematics.inverse.wrapping import joint_distance, same_configuration
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import angle_between, nearest_rotation, orthonormality_error
 
@@ -20,20 +20,20 @@ _TYPED_ROTATION = 2e-2
 _COMPUTED = 1e-14
 # The last row of a pose is 0 0 0 1 but for the rounding of a product.
 _LAST_ROW = 1e-9
-# A place this far outside counts as the edge of the reach: six typed digits of a metre [m]; an orientation this far
+# A position this far outside counts as the edge of the reach: six typed digits of a metre [m]; an orientation this far
 # off likewise [rad].
-EDGE = 2e-6
+POSE_TOLERANCE = 2e-6
 
 
 class Candidate(NamedTuple):
-    """A posture (n,) with its name and the joints that are free there."""
+    """A configuration (n,) with its name and the joints that are free there."""
 
     q: Array
     label: str
     free: tuple[int, ...] = ()
 
 
-def clean_pose(X_BT: ArrayLike) -> Array:
+def exact_pose(X_BT: ArrayLike) -> Array:
     """Return one pose (4, 4), its rotation made exact.
 
     Raises:
@@ -76,30 +76,30 @@ def typed_poses(X_BT: ArrayLike) -> Array:
     return X
 
 
-def errors(arm: Arm, q: Array, X: Array) -> tuple[Array, Array]:
-    """Return how far from a pose postures put the hand: distances (...) [m] and angles (...) [rad]."""
+def pose_errors(arm: Arm, q: Array, X: Array) -> tuple[Array, Array]:
+    """Return how far from a pose configurations put the hand: distances (...) [m] and angles (...) [rad]."""
     X_q = forward(arm, q)
     return np.linalg.norm(X_q[..., :3, 3] - X[..., :3, 3], axis=-1), angle_between(X[..., :3, :3], X_q[..., :3, :3])
 
 
-def judge(
+def rank(
     arm: Arm, X: Array, candidates: Iterable[Candidate], near: Array, *, apart: float, X_near: Array | None = None
 ) -> InverseSolution:
-    """Return the solution made of candidate postures.
+    """Return the solution made of candidate configurations.
 
     Args:
         arm: the arm.
         X: (4, 4) the pose asked for.
-        candidates: postures that meet it or, out of reach, come near it; duplicates are dropped.
-        near: (n,) where the arm is; the nearest posture comes first.
-        apart: postures closer than this are one [rad] or [m].
+        candidates: configurations that meet it or, out of reach, come near it; duplicates are dropped.
+        near: (n,) where the arm is; the nearest configuration comes first.
+        apart: configurations closer than this are one [rad] or [m].
         X_near: (4, 4) the pose in reach nearest to the one asked for; None when that itself is in reach.
     """
     kept: list[Candidate] = []
     for candidate in candidates:
-        if not any(same_posture(arm, candidate.q, other.q, apart) for other in kept):
+        if not any(same_configuration(arm, candidate.q, other.q, apart) for other in kept):
             kept.append(candidate)
-    distances, angles = errors(arm, np.array([candidate.q for candidate in kept]), X)
+    distances, angles = pose_errors(arm, np.array([candidate.q for candidate in kept]), X)
     branches = [
         Branch(
             q=q,
@@ -111,18 +111,18 @@ def judge(
         )
         for (q, label, free), distance, angle in zip(kept, distances, angles, strict=True)
     ]
-    branches.sort(key=lambda branch: (not branch.allowed, travel(arm, near, branch.q)))
+    branches.sort(key=lambda branch: (not branch.allowed, joint_distance(arm, near, branch.q)))
     allowed = [branch for branch in branches if branch.allowed]
     if X_near is not None:
-        answer = Answer.OUT_OF_REACH
+        outcome = Outcome.OUT_OF_REACH
     elif not allowed:
-        answer = Answer.OUT_OF_LIMITS
+        outcome = Outcome.OUT_OF_LIMITS
     else:
-        answer = Answer.SINGULAR if all(branch.free for branch in allowed) else Answer.SOLVED
+        outcome = Outcome.SINGULAR if all(branch.free for branch in allowed) else Outcome.SOLVED
     nearest = X if X_near is None else X_near
     return InverseSolution(
         arm=arm,
-        answer=answer,
+        outcome=outcome,
         branches=tuple(branches),
         distance=float(np.linalg.norm(nearest[:3, 3] - X[:3, 3])),
         turn=float(angle_between(X[:3, :3], nearest[:3, :3])),

@@ -4,7 +4,7 @@ The builds solved here all turn about a first axis and carry the arm in a plane 
 begin with the same question, which angle of joint 1 puts the point at that distance from the axis, and go on in the
 plane of the arm, with an elbow or with a slide.
 
-Angles are those of the build, not the joints' own: see ``Shoulder``.
+Angles are those of the build, not the joints' own: see ``ClosedFormGeometry``.
 """
 
 import math
@@ -21,13 +21,13 @@ Sign: TypeAlias = Literal[1, -1]
 
 # Roots of less than this part of their terms are 0: the two branches fall together there, and what rounding leaves
 # of the radicand would be drawn out to a thousand times its size.
-_LOST = 1e-14
+_VANISHING = 1e-14
 # A wrist centre this close to an axis is on it [m].
 ON_AXIS = 1e-12
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Shoulder:
+class ClosedFormGeometry:
     """What a closed form needs of an arm: the lengths of its build, and how its joints count.
 
     In the shoulder frame z is the axis of joint 1 and the origin is at the height of joint 2; y is the axis of
@@ -41,12 +41,12 @@ class Shoulder:
         X_BS: (4, 4) the shoulder frame, seen from the base.
         signs: whether the joints count as the angles of the build do, 1 or -1.
         offsets: angles of the build where the joints stand at 0 [rad]; of a slide its length [m].
-        ahead: distance of joint 2 from the axis of joint 1, along x [m].
-        side: distance of the plane of the arm from the axis of joint 1 [m].
-        upper: length of the upper arm [m]; 0 with a slide.
-        fore: (along, across) of the forearm, from joint 3 to the wrist centre or to joint 4: the a3 and d4 of the
+        shoulder_offset: distance of joint 2 from the axis of joint 1, along x [m].
+        plane_offset: distance of the plane of the arm from the axis of joint 1 [m].
+        upper_arm: length of the upper arm [m]; 0 with a slide.
+        forearm: (along, across) of the forearm, from joint 3 to the wrist centre or to joint 4: the a3 and d4 of the
             PUMA; with a slide, how far the wrist centre lies beside the line through joint 2 [m].
-        crank: (x, z) from joint 4 to the point where the axes 5 and 6 meet, all turns at 0 (``parallel``) [m].
+        wrist_link: (x, z) from joint 4 to the point where the axes 5 and 6 meet, all turns at 0 (``parallel``) [m].
         tilt: turn about y of the axis of joint 5 from z, all turns at 0 (``parallel``) [rad].
         R_3W: (3, 3) the fixed turn from the forearm to the frame in which joints 4 to 6 are z, y, z angles.
         R_T6: (3, 3) the fixed turn from the tool to the last of those.
@@ -57,30 +57,32 @@ class Shoulder:
     X_BS: Array
     signs: tuple[float, ...]
     offsets: tuple[float, ...]
-    ahead: float
-    side: float
-    upper: float
-    fore: tuple[float, float]
-    crank: tuple[float, float]
+    shoulder_offset: float
+    plane_offset: float
+    upper_arm: float
+    forearm: tuple[float, float]
+    wrist_link: tuple[float, float]
     tilt: float
     R_3W: Array
     R_T6: Array
     p_TW: Array
 
     @property
-    def inner(self) -> float:
+    def inner_radius(self) -> float:
         """Smallest distance of the wrist centre, or of joint 4, from joint 2 [m]."""
-        return abs(self.upper - math.hypot(*self.fore)) if self.upper else abs(self.fore[0])
+        return abs(self.upper_arm - math.hypot(*self.forearm)) if self.upper_arm else abs(self.forearm[0])
 
     @property
-    def outer(self) -> float:
+    def outer_radius(self) -> float:
         """Largest distance of the wrist centre, or of joint 4, from joint 2 [m]; a slide has none but its limit."""
-        return self.upper + math.hypot(*self.fore) if self.upper else math.inf
+        return self.upper_arm + math.hypot(*self.forearm) if self.upper_arm else math.inf
 
     @property
-    def farthest(self) -> float:
+    def max_reach(self) -> float:
         """Largest distance of the wrist centre from the shoulder [m]; infinite for a slide."""
-        return math.hypot(abs(self.ahead) + self.outer + math.hypot(*self.crank), self.side)
+        return math.hypot(
+            abs(self.shoulder_offset) + self.outer_radius + math.hypot(*self.wrist_link), self.plane_offset
+        )
 
     def angles(self, q: Vector) -> Vector:
         """Return the angles of the build for joint positions, over abstract scalars."""
@@ -91,49 +93,49 @@ class Shoulder:
         return [s * (x - o) for s, x, o in zip(self.signs, angles, self.offsets, strict=True)]
 
 
-def turned(angle: Scalar, x: Scalar, z: Scalar) -> tuple[Scalar, Scalar]:
+def rotated_about_y(angle: Scalar, x: Scalar, z: Scalar) -> tuple[Scalar, Scalar]:
     """Turn the point (x, z) about y, over abstract scalars: from x towards -z."""
     c, s = cos(angle), sin(angle)
     return c * x + s * z, c * z - s * x
 
 
-def first_three(shoulder: Shoulder, p: Vector, arm: Sign, elbow: Sign, free: Vector | None = None) -> Vector:
+def first_three(geometry: ClosedFormGeometry, p: Vector, arm: Sign, elbow: Sign, free: Vector | None = None) -> Vector:
     """Return the angles 1 to 3 (of a slide: its length) that put the wrist centre at ``p``; not of a parallel arm.
 
-    A point out of reach gives the posture that stretches, or folds, towards it.
+    A point out of reach gives the configuration that stretches, or folds, towards it.
 
     Args:
-        shoulder: a ``puma`` or a ``stanford``.
+        geometry: a ``puma`` or a ``stanford``.
         p: wrist centre in the shoulder frame [m].
         arm: 1 for the left arm as PUMA users say, which reaches out on the side joint 1 faces; -1 for the right.
-        elbow: 1 or -1, which of the two elbow postures; for a slide, forwards or backwards.
+        elbow: 1 or -1, which of the two elbow configurations; for a slide, forwards or backwards.
         free: the angles that joints 1 and 2 take where the wrist centre is on their axis.
 
     Source:
         PUMA: Paul (1981) ch. 3. Stanford: Paul (1981) ch. 3; TR-83-008 appendix 1.
     """
     free_1, free_2 = (0.0, 0.0) if free is None else free[:2]
-    theta_1, X = turn(shoulder, p, arm, free_1)
-    if shoulder.family == "stanford":
-        return [theta_1, *slide(shoulder, X, p[2], elbow, free_2)]
-    return [theta_1, *bend(shoulder, X, p[2], elbow, free_2)]
+    theta_1, X = solve_joint_1(geometry, p, arm, free_1)
+    if geometry.family == "stanford":
+        return [theta_1, *solve_slide(geometry, X, p[2], elbow, free_2)]
+    return [theta_1, *solve_elbow(geometry, X, p[2], elbow, free_2)]
 
 
-def turn(shoulder: Shoulder, p: Vector, arm: Sign, free: Scalar) -> tuple[Scalar, Scalar]:
+def solve_joint_1(geometry: ClosedFormGeometry, p: Vector, arm: Sign, free: Scalar) -> tuple[Scalar, Scalar]:
     """Return angle 1 and how far ahead of joint 2 the wrist centre is then, in the plane of the arm.
 
     With the wrist centre on the axis, and the plane through the axis, any angle will do: ``free`` is taken.
     """
     x, y, _ = p
     square = x * x + y * y
-    across = _root(square - shoulder.side**2, square)
-    theta = atan2(y, x) - atan2(shoulder.side, arm * across)
-    return select(square < ON_AXIS**2, free, theta), arm * across - shoulder.ahead
+    across = _root(square - geometry.plane_offset**2, square)
+    theta = atan2(y, x) - atan2(geometry.plane_offset, arm * across)
+    return select(square < ON_AXIS**2, free, theta), arm * across - geometry.shoulder_offset
 
 
-def bend(shoulder: Shoulder, X: Scalar, Z: Scalar, elbow: Sign, free: Scalar) -> Vector:
+def solve_elbow(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, elbow: Sign, free: Scalar) -> Vector:
     """Return angles 2 and 3 that put the end of the forearm at (X, Z) from joint 2; ``free`` where that is 0, 0."""
-    a2, (a3, d4) = shoulder.upper, shoulder.fore
+    a2, (a3, d4) = geometry.upper_arm, geometry.forearm
     fore = a3 * a3 + d4 * d4
     K = (X * X + Z * Z - a2 * a2 - fore) / (2 * a2)
     theta_3 = math.atan2(d4, a3) + elbow * atan2(_root(fore - K * K, fore), K)
@@ -143,28 +145,28 @@ def bend(shoulder: Shoulder, X: Scalar, Z: Scalar, elbow: Sign, free: Scalar) ->
     return [select(X * X + Z * Z < ON_AXIS**2, free, theta_2), theta_3]
 
 
-def slide(shoulder: Shoulder, X: Scalar, Z: Scalar, forwards: Sign, free: Scalar) -> Vector:
+def solve_slide(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, forwards: Sign, free: Scalar) -> Vector:
     """Return angle 2 and the length of the slide that reach (X, Z) from joint 2; ``free`` where that is 0, 0."""
-    square, f = X * X + Z * Z, shoulder.fore[0]
+    square, f = X * X + Z * Z, geometry.forearm[0]
     length = forwards * _root(square - f * f, square)
     theta_2 = atan2(X * length - Z * f, X * f + Z * length)
     return [select(square < ON_AXIS**2, free, theta_2), length]
 
 
-def stray(shoulder: Shoulder, p: Vector, X: Scalar, Z: Scalar) -> Scalar:
-    """Return how far the posture that stretches towards ``p`` stays from it [m]; 0 in reach.
+def reach_error(geometry: ClosedFormGeometry, p: Vector, X: Scalar, Z: Scalar) -> Scalar:
+    """Return how far the configuration that stretches towards ``p`` stays from it [m]; 0 in reach.
 
     Args:
-        shoulder: the build.
+        geometry: the build.
         p: wrist centre in the shoulder frame [m].
         X: how far ahead of joint 2 the end of the forearm, or of the slide, should be, in the plane of the arm [m].
         Z: how far above it.
     """
     from_axis, distance = sqrt(p[0] * p[0] + p[1] * p[1]), sqrt(X * X + Z * Z)
-    beside = _positive(abs(shoulder.side) - from_axis)
-    short = _positive(shoulder.inner - distance)
-    if math.isfinite(shoulder.outer):
-        short = short + _positive(distance - shoulder.outer)
+    beside = _positive(abs(geometry.plane_offset) - from_axis)
+    short = _positive(geometry.inner_radius - distance)
+    if math.isfinite(geometry.outer_radius):
+        short = short + _positive(distance - geometry.outer_radius)
     return sqrt(beside * beside + short * short)
 
 
@@ -173,4 +175,4 @@ def _positive(x: Scalar) -> Scalar:
 
 
 def _root(radicand: Scalar, terms: Scalar) -> Scalar:
-    return sqrt(select(radicand < _LOST * terms, 0.0, radicand))
+    return sqrt(select(radicand < _VANISHING * terms, 0.0, radicand))

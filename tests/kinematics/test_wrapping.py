@@ -7,8 +7,8 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Limits
 from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.closed_form import inverse
-from armwright.kinematics.inverse.turns import images, nearest_image
+from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse.wrapping import equivalent_configurations, nearest_equivalent
 
 Q = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 
@@ -24,19 +24,19 @@ def test_room_for_many_turns(turns: float) -> None:
     """Limits of very many turns have very many images: some thousand are listed, the nearest among them."""
     arm = wide(turns)
 
-    rows = images(arm, Q)
+    rows = equivalent_configurations(arm, Q)
 
     assert 1000 < len(rows) <= 4096
     assert (np.abs(rows - Q).max(axis=1) < 1e-9).sum() == 1
     near = np.array(Q) + 2 * np.pi * np.array([3, -2, 0, 1, 0, 0])
-    np.testing.assert_allclose(nearest_image(arm, Q, near), near, atol=1e-9)
+    np.testing.assert_allclose(nearest_equivalent(arm, Q, near), near, atol=1e-9)
     solution = inverse(arm, forward(arm, Q), near)
     assert len(solution.branches) == 8
 
 
 def test_all_of_few() -> None:
     """Where there is room for two turns of every joint, all images are listed."""
-    rows = images(wide(1.0), Q)
+    rows = equivalent_configurations(wide(1.0), Q)
 
     assert len(rows) == 64
     np.testing.assert_allclose(np.unique(np.round((rows - Q) / (2 * np.pi), 9)), [-1, 0])
@@ -44,6 +44,6 @@ def test_all_of_few() -> None:
 
 def test_limits_far_from_here() -> None:
     """The image nearest to a start far away is the one at the nearer end of the limits."""
-    q = nearest_image(wide(10_000.0, offset=50_000.0), Q, Q)
+    q = nearest_equivalent(wide(10_000.0, offset=50_000.0), Q, Q)
 
     np.testing.assert_allclose(q, np.array(Q) + 40_000 * 2 * np.pi, atol=1e-6)

@@ -1,0 +1,123 @@
+"""One branch of one arm: all six angles that put the hand at a pose, over abstract scalars."""
+
+import math
+from typing import NamedTuple
+
+from armwright.kinematics.inverse.geometry import (
+    ON_AXIS,
+    ClosedFormGeometry,
+    Sign,
+    first_three,
+    reach_error,
+    rotated_about_y,
+    solve_elbow,
+    solve_joint_1,
+)
+from armwright.kinematics.inverse.wrist import last_three
+from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
+from armwright.tracing.vectors import Matrix, Vector, product, transpose
+
+
+class BranchAngles(NamedTuple):
+    """Angles of the build, and which of the three choices a pose may leave open it does.
+
+    ``turn_free``: the wrist centre is on the axis of joint 1. ``raise_free``: it is, or joint 4 is, on the axis of
+    joint 2. ``wrist_free``: joint 5 is straight. ``reach_error``: how far the tool stays from a position out of
+    reach [m].
+    """
+
+    angles: Vector
+    turn_free: Scalar
+    raise_free: Scalar
+    wrist_free: Scalar
+    reach_error: Scalar
+
+
+def branch_angles(
+    geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector
+) -> BranchAngles:
+    """Return the angles of one branch.
+
+    Args:
+        geometry: of the arm.
+        p: wrist centre in the shoulder frame [m].
+        R: orientation of the last wrist frame (``R_T6`` from the tool), seen from the shoulder frame.
+        signs: which arm, which elbow (or way of the slide), which wrist.
+        near: six angles; a free one takes its value from here.
+    """
+    arm, elbow, flip = signs
+    if geometry.family == "parallel":
+        return _parallel(geometry, p, R, signs, near)
+    first = first_three(geometry, p, arm, elbow, near)
+    raised = first[1] if geometry.family == "stanford" else first[1] + first[2]
+    R_SW = product(_about_z_then_y(first[0], raised), geometry.R_3W.tolist())
+    last, wrist_free = last_three(product(transpose(R_SW), R), flip, near[3])
+    _, X = solve_joint_1(geometry, p, arm, near[0])
+    return BranchAngles(
+        [*first, *last], _on_first_axis(p), _zero(X, p[2]), wrist_free, reach_error(geometry, p, X, p[2])
+    )
+
+
+def _parallel(
+    geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector
+) -> BranchAngles:
+    """Solve three parallel axes: joint 1 by the side, joints 5 and 6 and the sum of 2 to 4 by the turn, 2 by the place.
+
+    The turn beyond joint 1 is about y, z and y: the parallel joints together, joint 5, joint 6. With joint 5 straight
+    only the sum of the outer two is given; joint 6 then stays near, or where the arm still reaches.
+
+    Source:
+        Hawkins (2013), "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", in other frames.
+    """
+    arm, elbow, flip = signs
+    other: Sign = -1 if flip > 0 else 1
+    theta_1, X = solve_joint_1(geometry, p, arm, near[0])
+    R_SW = product(_about_z_then_y(theta_1, 0.0), geometry.R_3W.tolist())
+    # Read backwards, so that it is joint 6 that is free with joint 5 straight, and not the sum.
+    back = transpose(product(transpose(R_SW), R))
+    last, wrist_free = last_three(back, other, -near[5])
+    lift = _into_reach(geometry, X, p[2], -last[2] - geometry.tilt)
+    lift = select(back[2][2] < 0, -lift, lift)
+    last, wrist_free = last_three(back, other, -near[5] + lift)
+    theta_6, theta_5, raised = -last[0], -last[1], -last[2] - geometry.tilt
+    x, z = rotated_about_y(raised, *geometry.wrist_link)
+    theta_2, theta_3 = solve_elbow(geometry, X - x, p[2] - z, elbow, near[1])
+    angles = [theta_1, theta_2, theta_3, raised - theta_2 - theta_3, theta_5, theta_6]
+    error = reach_error(geometry, p, X - x, p[2] - z)
+    return BranchAngles(angles, _on_first_axis(p), _zero(X - x, p[2] - z), wrist_free, error)
+
+
+def _into_reach(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, raised: Scalar) -> Scalar:
+    """Return by how much the wrist link must be turned on for the two links before it to reach its foot; 0 if they do.
+
+    The foot of the wrist link is as far from joint 2 as the cosine rule says; turned towards (X, Z) it is nearest.
+    """
+    length = math.hypot(*geometry.wrist_link)
+    if not length:
+        return 0.0 * X
+    distance = sqrt(X * X + Z * Z)
+    double = 2 * length * select(distance < ON_AXIS, ON_AXIS, distance)
+    least = _arc_cosine((distance * distance + length * length - geometry.inner_radius**2) / double)
+    most = _arc_cosine((distance * distance + length * length - geometry.outer_radius**2) / double)
+    apart = raised + math.atan2(-geometry.wrist_link[1], geometry.wrist_link[0]) - atan2(-Z, X)
+    apart = atan2(sin(apart), cos(apart))
+    size = abs(apart)
+    size = select(size < least, least, select(most < size, most, size))
+    return select(apart < 0, -size, size) - apart
+
+
+def _arc_cosine(x: Scalar) -> Scalar:
+    return atan2(sqrt(1 - x * x), x)
+
+
+def _about_z_then_y(first: Scalar, second: Scalar) -> Matrix:
+    c1, s1, c2, s2 = cos(first), sin(first), cos(second), sin(second)
+    return [[c1 * c2, -s1, c1 * s2], [s1 * c2, c1, s1 * s2], [-s2, 0.0, c2]]
+
+
+def _on_first_axis(p: Vector) -> Scalar:
+    return p[0] * p[0] + p[1] * p[1] < ON_AXIS**2
+
+
+def _zero(x: Scalar, z: Scalar) -> Scalar:
+    return x * x + z * z < ON_AXIS**2
