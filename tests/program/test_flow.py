@@ -49,14 +49,14 @@ class Trial:
             run_on(self.machine, lambda _, line: self.begun.add(line))
         except RunError as error:
             self.failed = source.line(error.diagnostic.span.start)
-        recovered = (one.text for one in self.machine.effects if one.kind == "ERROR")
+        recovered = (one.text for one in self.machine.state.effects if one.kind == "ERROR")
         self.recovered = {int(text.split("in line ")[1].split(":")[0]) for text in recovered}
 
     def escaped(self) -> Iterator[Diagnostic]:
         """Give the errors of statements that were come to and did not fail."""
         source = self.compilation.source
         # Where the run ended while other processes were at work they may not have got so far.
-        beside = self.failed is not None and len(self.machine.processes) > 1
+        beside = self.failed is not None and len(self.machine.state.processes) > 1
         for one in self.compilation.diagnostics:
             line = source.line(one.span.start)
             called = any(label.text.endswith("is called here") for label in one.secondary)
@@ -68,7 +68,7 @@ class Trial:
         """Give what was done by another arm than the one that was named."""
         flow = self.compilation.flow
         assert flow is not None
-        for one in self.machine.effects:
+        for one in self.machine.state.effects:
             start = one.span.start
             if one.kind in ("MOVE", "GRASP") and flow.arms.get(start, one.arm) != one.arm:
                 yield one.text

@@ -139,10 +139,10 @@ class Watch:
 def _value(view: Machine, kept: str) -> "Array | float | None":
     kind = view.type_of(kept).kind
     if kind is VariableKind.FRAME:
-        return view.tree.world(kept) if view.has_place(kept) else None
+        return view.state.tree.world(kept) if view.has_place(kept) else None
     if kind is VariableKind.EVENT:
-        return float(view.events.get(kept, 0))
-    return view.values.get(kept)
+        return float(view.state.events.get(kept, 0))
+    return view.state.values.get(kept)
 
 
 def _same(one: "Array | float | None", other: "Array | float | None") -> bool:

@@ -84,7 +84,7 @@ class Debugger:
     @property
     def over(self) -> bool:
         """Whether the program is over; it can only be taken back then."""
-        return self.machine.over or (self.stop is not None and self.stop.over)
+        return self.machine.state.over or (self.stop is not None and self.stop.over)
 
     def resume(self, command: Command, path: Path = ()) -> None:
         """Let the run go on; ``work`` does it.
@@ -161,14 +161,14 @@ class Debugger:
         self._way, self.stop = None, stop
         if self._origin is not None:
             # What was done again on the way back is no news.
-            self._told, self._origin = len(self.machine.effects), None
-        self._told = min(self._told, len(self.machine.effects))
+            self._told, self._origin = len(self.machine.state.effects), None
+        self._told = min(self._told, len(self.machine.state.effects))
 
     def news(self) -> list[Effect]:
         """Return what the program has done since this was last asked for."""
         if self._origin is not None:
             return []
-        effects = self.machine.effects[self._told :]
+        effects = self.machine.state.effects[self._told :]
         self._told += len(effects)
         return effects
 
@@ -226,7 +226,7 @@ class Debugger:
             CountError: the count makes no sense.
         """
         kind = self.machine.type_of(kept)
-        known = kept.partition("[")[0] in {*self.machine.types, *self.machine.tree}
+        known = kept.partition("[")[0] in {*self.machine.state.types, *self.machine.state.tree}
         if kind.sizes or not known:
             raise ExpressionError(f"`{kept}` cannot be watched: it is no frame, variable or element")
         self._check(condition, hits, None)
@@ -293,12 +293,12 @@ class Debugger:
     @property
     def time(self) -> float:
         """The time on the clock of the cell [s]."""
-        return self.view.ticks * self.view.cell.period
+        return self.view.state.ticks * self.view.cell.period
 
     @property
     def processes(self) -> list[Process]:
         """The processes of the program, in the order of the text."""
-        return sorted(self.machine.processes, key=lambda one: one.path)
+        return sorted(self.machine.state.processes, key=lambda one: one.path)
 
     def stack(self, path: Path = ()) -> list[Frame]:
         """Return where a process is, the innermost first.
@@ -367,9 +367,9 @@ class Debugger:
         def change(machine: Machine) -> None:
             assert not isinstance(value, Element)  # noqa: S101 - elements have been read
             if isinstance(value, np.ndarray) and kind.kind is VariableKind.FRAME:
-                machine.place(process_of(machine, path) or machine.program, kept, value, frame.span)
+                machine.place(process_of(machine, path) or machine.state.program, kept, value, frame.span)
             else:
-                machine.values[kept] = value
+                machine.state.values[kept] = value
 
         try:
             self._going.timeline.change(change)

@@ -68,7 +68,7 @@ class Going:
     @property
     def view(self) -> Machine:
         """The machine as it is seen now."""
-        return seen(self.machine, max(self.ticks, self.machine.ticks))
+        return seen(self.machine, max(self.ticks, self.machine.state.ticks))
 
     def land(self, position: Position, *, passed: bool = True, told: frozenset[int] = frozenset()) -> None:
         """Come to a moment that the run has been at.
@@ -196,13 +196,13 @@ class Going:
     def _advance(self, process: Process | None, step: Step | None) -> Stop | None:
         """Do one step of the program; return why the run stops with it."""
         timeline, machine = self.timeline, self.machine
-        done, effects = timeline.done, len(machine.effects)
+        done, effects = timeline.done, len(machine.state.effects)
         path = () if process is None else process.path
         try:
             timeline.advance()
         except RunError as error:
             if self._raised == done or "uncaught" not in self.catches:
-                self.ticks = max(self.ticks, machine.ticks)
+                self.ticks = max(self.ticks, machine.state.ticks)
                 return Stop(
                     reason="failed",
                     path=path,
@@ -214,11 +214,11 @@ class Going:
                 done, path, Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)
             )
         if "caught" in self.catches and self._raised != done:
-            caught = next((one for one in machine.effects[effects:] if one.kind == "ERROR"), None)
+            caught = next((one for one in machine.state.effects[effects:] if one.kind == "ERROR"), None)
             if caught is not None:
                 return self._before_error(done, path, Stop(reason="exception", text=caught.text, caught=True))
-        self.ticks = max(self.ticks, machine.ticks)
-        if machine.over:
+        self.ticks = max(self.ticks, machine.state.ticks)
+        if machine.state.over:
             return Stop(reason="end", path=path)
         changed = self._changed(path)
         reason = None if step is None else step.took(machine, path)
@@ -232,7 +232,7 @@ class Going:
         self.timeline.seek(done)
         self._raised = done
         if self.timeline.ready is None:
-            stuck = (one for one in self.machine.processes if one.waiting and one.waiting.what != "branches")
+            stuck = (one for one in self.machine.state.processes if one.waiting and one.waiting.what != "branches")
             path = min(one.path for one in stuck)
         return attrs.evolve(stop, path=path)
 
@@ -260,7 +260,7 @@ class Going:
     def _wanted(self, watch: Watch) -> bool:
         if watch.hits and not counts(watch.hits, watch.changes):
             return False
-        process = self.timeline.ready or self.machine.program
+        process = self.timeline.ready or self.machine.state.program
         try:
             return not watch.condition or self._holds(watch.condition, process)
         except ExpressionError:
@@ -286,7 +286,7 @@ class Going:
                     own = process.path == path and (len(process.stack) <= depth or now is None)
                     # A branch comes out of the process that began it.
                     if own or (len(process.path) < len(path) and path[: len(process.path)] == process.path):
-                        at = max(process.due or 0, self.machine.ticks)
+                        at = max(process.due or 0, self.machine.state.ticks)
                         found = (self.timeline.done, at), process.path
                 self.timeline.advance()
             if found is not None:
@@ -304,7 +304,7 @@ class Going:
             if done > limit:
                 continue
             self.timeline.seek(done)
-            if done and self.machine.ticks >= tick:
+            if done and self.machine.state.ticks >= tick:
                 continue
             while (
                 self.timeline.done < limit
@@ -323,7 +323,7 @@ class Going:
             if done >= limit[0] and done:
                 continue
             self.land((done, 0), passed=False)
-            self.ticks, self._silent = self.machine.ticks, True
+            self.ticks, self._silent = self.machine.state.ticks, True
             begun, found = self.position, None
             while self.position < limit:
                 stop = yield from self.forward(until=limit)

@@ -21,9 +21,9 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression
 from armwright.program.syntax.lexer import TokenKind, scan
 from armwright.program.syntax.token_stream import LostError, Tokens
+from armwright.program.vm.expressions import evaluate_instructions
 from armwright.program.vm.machine import Machine, RunError
 from armwright.program.vm.process import Activation, Process, Value
-from armwright.program.vm.simple_statements import work_out
 from armwright.spatial.poses import from_noap
 
 
@@ -48,7 +48,7 @@ class Parsed:
 
 def names_at(machine: Machine, procedure: str | None) -> dict[str, VariableType]:
     """Return what can be named: frames of the cell, arms aside, names of the program, and of the procedure if any."""
-    inner = (name for name in machine.tree if not set(name) & set(".'["))
+    inner = (name for name in machine.state.tree if not set(name) & set(".'["))
     own = {} if procedure is None else machine.code.procedures[procedure].types
     cell = {name: VariableType(VariableKind.FRAME) for name in inner if name not in machine.cell.arms}
     return {**cell, **PREDECLARED, **machine.code.types, **own}
@@ -104,7 +104,7 @@ def compute(machine: Machine, process: Process, frame: Frame, parsed: Parsed) ->
     try:
         here, asking, operand = _worked_out(machine, process, frame, parsed)
         if parsed.sort is ExpressionType.EVENT:
-            return float(here.events.get(here.name(asking, operand), 0))
+            return float(here.state.events.get(here.name(asking, operand), 0))
         return here.read(asking, operand, Instruction(op=Op.PRINT, span=parsed.node.span))
     except RunError as error:
         raise ExpressionError(str(error)) from None
@@ -172,7 +172,7 @@ def _worked_out(machine: Machine, process: Process, frame: Frame, parsed: Parsed
     here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
     here.constants = [from_noap(one) if isinstance(one, tuple) else float(one) for one in emitter.constants]
     asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
-    work_out(here, asking, steps)
+    evaluate_instructions(here, asking, steps)
     return here, asking, operand
 
 

@@ -4,28 +4,16 @@ A run is the same every time, so any moment of it can be come to again: by what 
 the steps from there. Moments are kept now and then, more rarely the longer a program runs.
 """
 
-import io
-import pickle
 import time
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
 from armwright.cell.simulator import Simulator
-from armwright.motion.plan import Stage
-from armwright.motion.trajectory import Trajectory
 from armwright.program.bytecode.instructions import Code, Op
-from armwright.program.language.kinds import VariableType
-from armwright.program.language.source import Span
 from armwright.program.vm.interpreter import Limits, Machine, advance, due, ready
 from armwright.program.vm.process import Process
-from armwright.program.vm.recording import Effect, Run, RunStage
 
-# Things that never change are not copied but held.
-_HELD = (Code, Cell, FrameTree, Stage, Trajectory, Limits, VariableType, Effect, Run, RunStage, Span, np.ndarray)
 # A moment is kept when the way from the last one has taken so long [s], or so many times what keeping one takes.
 _OFTEN = 0.05
 _SHARE = 20.0
@@ -37,11 +25,11 @@ Change = Callable[[Machine], None]
 
 
 class _Moment(NamedTuple):
-    """What is kept of a moment: after how many steps, the state without what never changes, and that."""
+    """What is kept of a moment: after how many steps, and copies that nobody changes."""
 
     done: int
-    state: bytes
-    held: list[object]
+    machine: Machine
+    marks: "Marks"
 
 
 class Marks:
@@ -58,6 +46,12 @@ class Marks:
         self.blocked: set[Path] = set()
         self.came: dict[Path, int] = {}
         self.visits: dict[int, int] = {}
+
+    def copy(self) -> "Marks":
+        """Return the same marks."""
+        marks = Marks()
+        marks.blocked, marks.came, marks.visits = set(self.blocked), dict(self.came), dict(self.visits)
+        return marks
 
 
 class Timeline:
@@ -173,45 +167,15 @@ class Timeline:
 
     def _moment(self) -> _Moment:
         began = time.perf_counter()
-        file = io.BytesIO()
-        pickler = _Pickler(file)
-        pickler.dump((self.machine, self.marks))
+        moment = _Moment(self.done, self.machine.copy(), self.marks.copy())
         self._begun = time.perf_counter()
         # One that the machine was busy with something else for says little of the next.
         cost = self._begun - began
         self._cost = min(cost, 2 * self._cost) if self._cost else cost
-        return _Moment(self.done, file.getvalue(), pickler.held)
+        return moment
 
     def _restore(self, moment: _Moment) -> None:
-        self.machine, self.marks = _Unpickler(io.BytesIO(moment.state), moment.held).load()
+        self.machine, self.marks = moment.machine.copy(), moment.marks.copy()
         self.done, self._broken = moment.done, False
         self._begun = time.perf_counter()
         self._change()
-
-
-class _Pickler(pickle.Pickler):
-    """Writes a state; of what never changes only its number."""
-
-    def __init__(self, file: io.BytesIO) -> None:
-        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
-        self.held: list[object] = []
-        self._numbers: dict[int, int] = {}
-
-    def persistent_id(self, obj: Any) -> int | None:
-        if not isinstance(obj, _HELD):
-            return None
-        number = self._numbers.setdefault(id(obj), len(self.held))
-        if number == len(self.held):
-            self.held.append(obj)
-        return number
-
-
-class _Unpickler(pickle.Unpickler):
-    """Reads a state again, which never left this process."""
-
-    def __init__(self, file: io.BytesIO, held: list[object]) -> None:
-        super().__init__(file)
-        self._held = held
-
-    def persistent_load(self, pid: Any) -> Any:
-        return self._held[pid]

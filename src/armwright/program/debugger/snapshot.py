@@ -25,30 +25,31 @@ def seen(machine: Machine, ticks: int) -> Machine:
         ticks: not behind the time of the next step.
     """
     view = copy.copy(machine)
-    view.ticks = ticks
-    moving = {one.motion.arm for one in machine.processes if one.motion is not None}
+    view.state = copy.copy(machine.state)
+    view.state.ticks = ticks
+    moving = {one.motion.arm for one in machine.state.processes if one.motion is not None}
     for name, arm in machine.cell.arms.items():
-        last = machine.runs[name][-1] if machine.runs[name] else None
+        last = machine.state.runs[name][-1] if machine.state.runs[name] else None
         if name not in moving and (last is None or view.now > last.t0 + last.duration):
             # It rests, and the frame table knows where.
             continue
         X_BH = forward(arm.arm, machine.hardware.posture(name, view.now))
-        view.tree = view.tree.place(name, view.tree.world(base_name(name)) @ X_BH)
+        view.state.tree = view.state.tree.place(name, view.state.tree.world(base_name(name)) @ X_BH)
     return view
 
 
 def process_of(machine: Machine, path: Path) -> Process | None:
     """Return a process by its place among the branches; None where it has ended or not begun."""
-    return next((one for one in machine.processes if one.path == path), None)
+    return next((one for one in machine.state.processes if one.path == path), None)
 
 
 def mover(machine: Machine, frame: str) -> Process | None:
     """Return the process that moves a frame by moving an arm; None where it rests."""
-    if frame not in machine.tree:
+    if frame not in machine.state.tree:
         return None
-    above = (frame, *machine.tree.ancestors(frame))
+    above = (frame, *machine.state.tree.ancestors(frame))
     arm = next((name for name in above if is_arm(name)), None)
-    return next((one for one in machine.processes if one.motion is not None and one.motion.arm == arm), None)
+    return next((one for one in machine.state.processes if one.motion is not None and one.motion.arm == arm), None)
 
 
 @attrs.frozen(kw_only=True)

@@ -47,7 +47,7 @@ class Step:
         stage, self.stage = self.stage, stage_of(process)
         if self.stage is None or self.stage == stage:
             return None
-        record = machine.stages[self.stage[1]]
+        record = machine.state.stages[self.stage[1]]
         return f"{record.arm} begins {record.stage.kind} {' '.join(record.to)}"
 
     def ends(self, process: Process) -> bool:

@@ -70,7 +70,7 @@ def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
 
 def frames(machine: Machine) -> list[str]:
     """Return the single frames of a program and its cell, bases of arms and variables of procedures aside."""
-    return [name for name in machine.tree if name != WORLD and not set(name) & set(".'[")]
+    return [name for name in machine.state.tree if name != WORLD and not set(name) & set(".'[")]
 
 
 def variable(machine: Machine, kept: str, *, name: str = "") -> Shown:
@@ -86,11 +86,11 @@ def variable(machine: Machine, kept: str, *, name: str = "") -> Shown:
     if kind.sizes:
         return _array(machine, kept, called, kind)
     if kind.kind is VariableKind.EVENT:
-        count = str(machine.events.get(kept, 0))
+        count = str(machine.state.events.get(kept, 0))
         return Shown(name=called, value=count, type="EVENT", expression=called, kept=kept)
     if kind.kind is VariableKind.FRAME:
         return _frame(machine, kept, called)
-    value = machine.values.get(kept)
+    value = machine.state.values.get(kept)
     if value is None:
         return Shown(name=called, value=_NOTHING, type=str(kind), expression=called, kept=kept)
     return attrs.evolve(result(machine, called, value, str(kind)), expression=called, kept=kept)
@@ -106,9 +106,9 @@ def result(machine: Machine, name: str, value: Value, kind: str) -> Shown:
 def frames_text(machine: Machine) -> list[str]:
     """Return the tree of frames, a line each, what hangs on something under it."""
     below: dict[str, list[str]] = {}
-    for name in machine.tree:
+    for name in machine.state.tree:
         if name != WORLD and not name.endswith(".BASE"):
-            parent = machine.tree.parent(name) or WORLD
+            parent = machine.state.tree.parent(name) or WORLD
             # An arm hangs on its own base, which no program can name.
             below.setdefault(WORLD if parent.endswith(".BASE") else parent, []).append(name)
     lines = [WORLD]
@@ -126,11 +126,11 @@ def frames_text(machine: Machine) -> list[str]:
 def _frame(machine: Machine, kept: str, called: str) -> Shown:
     if not machine.has_place(kept):
         return Shown(name=called, value=_NOTHING, type="FRAME", expression=called, kept=kept)
-    parent = machine.tree.parent(kept)
+    parent = machine.state.tree.parent(kept)
     hangs = "" if parent is None else f" on {_above(machine, parent)}"
     return Shown(
         name=called,
-        value=_matrix(machine, machine.tree.world(kept)),
+        value=_matrix(machine, machine.state.tree.world(kept)),
         type=f"FRAME{hangs}",
         inside=lambda: _inside(machine, kept),
         expression=called,
@@ -139,20 +139,20 @@ def _frame(machine: Machine, kept: str, called: str) -> Shown:
 
 
 def _inside(machine: Machine, kept: str) -> list[Shown]:
-    lines = _columns(machine, machine.tree.world(kept))
-    parent = machine.tree.parent(kept)
+    lines = _columns(machine, machine.state.tree.world(kept))
+    parent = machine.state.tree.parent(kept)
     if parent is not None:
         above = _above(machine, parent)
-        X = machine.tree.relation(kept, parent)
+        X = machine.state.tree.relation(kept, parent)
         place = variable(machine, parent) if parent != WORLD else None
         lines += [
             Shown(name="parent", value=above, type="FRAME", inside=place.inside if place else None, expression=above),
             attrs.evolve(result(machine, "relation", X, "TRANS"), name="relation"),
         ]
-        if machine.tree.nodes[kept].rigid:
+        if machine.state.tree.nodes[kept].rigid:
             lines.append(Shown(name="rigid", value="true"))
-    if kept in machine.written:
-        lines.append(Shown(name="set in line", value=str(machine.code.source.line(machine.written[kept].start))))
+    if kept in machine.state.written:
+        lines.append(Shown(name="set in line", value=str(machine.code.source.line(machine.state.written[kept].start))))
     return lines
 
 
@@ -184,7 +184,7 @@ def _numbers(machine: Machine, X: Array) -> list[str]:
 def _place(machine: Machine, name: str) -> str:
     if not machine.has_place(name):
         return _NOTHING
-    return f"({', '.join(_numbers(machine, machine.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
+    return f"({', '.join(_numbers(machine, machine.state.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
 
 
 def _array(machine: Machine, kept: str, called: str, kind: VariableType) -> Shown:
@@ -239,8 +239,8 @@ def _arm(machine: Machine, name: str) -> Shown:
     ]
 
     def inside() -> list[Shown]:
-        X_WH = machine.tree.world(base_name(name)) @ forward(arm, q)
-        holds = machine.hands[name].holds
+        X_WH = machine.state.tree.world(base_name(name)) @ forward(arm, q)
+        holds = machine.state.hands[name].holds
         force = ", ".join(f"{one:.6g}" for one in machine.hardware.force(name, machine.now).tolist())
         return [
             *joints,
@@ -255,10 +255,10 @@ def _arm(machine: Machine, name: str) -> Shown:
 
 def _motion(machine: Machine, arm: str) -> str:
     """Return which stage of which MOVE an arm is in."""
-    motion = next((one.motion for one in machine.processes if one.motion and one.motion.arm == arm), None)
+    motion = next((one.motion for one in machine.state.processes if one.motion and one.motion.arm == arm), None)
     if motion is None:
         return "nothing"
-    stage = machine.stages[motion.record]
+    stage = machine.state.stages[motion.record]
     line = machine.code.source.line(motion.span.start)
     since = machine.now - stage.t0
     return f"{stage.stage.kind} {' '.join(stage.to)} of line {line}, {since:.3f} s of {stage.duration:.3f} s"
@@ -266,7 +266,7 @@ def _motion(machine: Machine, arm: str) -> str:
 
 def _run(machine: Machine, process: Process) -> Iterable[Shown]:
     yield Shown(name="clock", value=f"{machine.now:.6g} s")
-    yield Shown(name="servo tick", value=str(machine.ticks))
+    yield Shown(name="servo tick", value=str(machine.state.ticks))
     yield Shown(name="devices on", value=", ".join(map(machine.spelled, sorted(machine.hardware.running()))) or "none")
     yield Shown(name="arm used last", value=process.last_arm or "none")
     yield Shown(name="priority", value=f"{process.priority:g}")

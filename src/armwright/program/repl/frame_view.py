@@ -19,12 +19,12 @@ def frames(session: Session) -> list[str]:
     """Return the frame tree as lines: each frame under the one it hangs on, seen from the world."""
     units, machine = session.state.symbols.units, session.state.machine
     rows = [["frame", "x", "y", "z", units.length.lower(), "z", "y", "x", "deg"]]
-    for name, depth, rigid in _walk(machine.tree):
+    for name, depth, rigid in _walk(machine.state.tree):
         shown = "  " * depth + session.spelled(name) + (" (rigidly)" if rigid else "")
         if not machine.has_place(name):
             rows.append([shown, "no value yet"])
             continue
-        X = machine.tree.world(name)
+        X = machine.state.tree.world(name)
         place = [_number(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
         rows.append([shown, *place, "", *map(_degrees, to_zyx(X[:3, :3]).tolist()), ""])
     return _aligned(rows)
@@ -64,10 +64,10 @@ def arms(session: Session) -> list[str]:
             f"{_degrees(value)} deg" if joint.revolute else f"{_number(value * 1e3, 2)} mm"
             for joint, value in zip(place.arm.joints, q.tolist(), strict=True)
         ]
-        hand = machine.hands[name]
+        hand = machine.state.hands[name]
         at = f"at {session.spelled(hand.at)}" if hand.at else "at no frame"
         holds = f", closed on {session.spelled(hand.holds)}" if hand.holds else ""
-        hanging = [session.spelled(one) for one, node in machine.tree.nodes.items() if node.parent == name]
+        hanging = [session.spelled(one) for one, node in machine.state.tree.nodes.items() if node.parent == name]
         carries = f", carries {', '.join(hanging)}" if hanging else ""
         lines += [f"{name}  {place.arm.name}", f"  joints  {', '.join(shown)}", f"  hand    {at}{holds}{carries}"]
     return lines or ["no arms: begin with `--cell`, or with an IMPORT of a cell"]

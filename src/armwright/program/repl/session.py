@@ -29,7 +29,6 @@ from armwright.program.repl.snapshots import (
     go_through,
     new_warnings,
     rename,
-    twin,
     with_code,
 )
 from armwright.program.repl.undo_report import SILENT, taken_back
@@ -340,12 +339,12 @@ class Session:
         refused = failed = False
         for number, statement in enumerate(entry.statements):
             before, shown = self.state, statement.span.start in entry.shown
-            if before.machine.over and not shown:
+            if before.machine.state.over and not shown:
                 remarks.append("the program has come to a HALT; `:undo` goes back to before it")
                 refused = True
                 break
             machine = with_code(before.machine, checked.code(statement), self.limits)
-            machine.over = False
+            machine.state.over = False
             try:
                 go_through(machine)
             except RunError as error:
@@ -353,7 +352,7 @@ class Session:
                 failed = True
                 remarks += [*taken_back(before.machine, machine), *_left(len(entry.statements) - number - 1)]
                 break
-            effects += machine.effects[len(before.machine.effects) :]
+            effects += machine.state.effects[len(before.machine.state.effects) :]
             found += new_warnings(before.machine, machine)
             if not shown:
                 text = " ".join(source.slice(statement.span).split())
@@ -370,7 +369,7 @@ class Session:
     def _declare(self, checked: _Checked) -> None:
         before, heading, source = self.state, checked.heading, checked.source
         changed = checked.cell is not before.cell
-        machine = fresh(checked.cell, source, self.limits) if changed else twin(before.machine)
+        machine = fresh(checked.cell, source, self.limits) if changed else before.machine.copy()
         rename(machine, heading.renamed)
         forget(machine, heading.dropped)
         for header in heading.imports:

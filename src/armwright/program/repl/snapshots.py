@@ -1,6 +1,5 @@
 """A machine between two statements: going on from there without losing the way back."""
 
-import copy
 from collections.abc import Callable, Iterable, Mapping
 
 import attrs
@@ -14,40 +13,14 @@ from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source, Span
 from armwright.program.semantics.symbols import PREDECLARED
 from armwright.program.vm.interpreter import advance, due, warnings
-from armwright.program.vm.machine import Hand, Limits, Machine
+from armwright.program.vm.machine import Limits, Machine
 from armwright.program.vm.process import Activation, Process
 from armwright.program.vm.recording import Recording
-from armwright.spatial.poses import from_noap
 
 
 def fresh(cell: Cell, source: Source, limits: Limits) -> Machine:
     """Return a machine that has done nothing yet."""
     return Machine(Code(instructions=(), types=PREDECLARED, source=source), cell, Simulator(cell), limits)
-
-
-def twin(machine: Machine) -> Machine:
-    """Return a machine in the same state, between two statements; what one of them does does not change the other."""
-    hardware = machine.hardware
-    assert isinstance(hardware, Simulator)  # noqa: S101 - only a simulated cell can be taken back
-    other = copy.copy(machine)
-    other.hardware = hardware.twin()
-    other.types, other.values = dict(machine.types), dict(machine.values)
-    other.events, other.written = dict(machine.events), dict(machine.written)
-    other.locks, other.owners = {}, {}
-    other.hands = {name: Hand(hand.at, hand.holds) for name, hand in machine.hands.items()}
-    other.effects, other.stages, other.trees = list(machine.effects), list(machine.stages), list(machine.trees)
-    other.runs = {name: list(runs) for name, runs in machine.runs.items()}
-    other.pushes = {name: list(pushes) for name, pushes in machine.pushes.items()}
-    other.program = Process(
-        path=(),
-        priority=0.0,
-        at=0,
-        wake=machine.ticks,
-        stack=[Activation(kind="main")],
-        last_arm=machine.program.last_arm,
-    )
-    other.processes = [other.program]
-    return other
 
 
 def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
@@ -58,15 +31,23 @@ def with_code(machine: Machine, code: Code, limits: Limits) -> Machine:
         code: of what is to be done next.
         limits: when that is taken to run for ever.
     """
-    other = twin(machine)
-    other.code, other.types = code, dict(code.types)
-    other.constants = [from_noap(value) if isinstance(value, tuple) else float(value) for value in code.constants]
-    other.limits = attrs.evolve(limits, time=machine.now + limits.time)
-    other.idle = 0
+    copied = machine.copy()
+    state = copied.state
+    state.types, state.locks, state.owners, state.idle = dict(code.types), {}, {}, 0
     for name, kind in code.types.items():
         if kind == VariableType(VariableKind.FRAME):
-            other.tree = other.tree.declare(name)
-    return other
+            state.tree = state.tree.declare(name)
+    state.program = Process(
+        path=(),
+        priority=0.0,
+        at=0,
+        wake=state.ticks,
+        stack=[Activation(kind="main")],
+        last_arm=state.program.last_arm,
+    )
+    state.processes = [state.program]
+    until = attrs.evolve(limits, time=machine.now + limits.time)
+    return Machine(code, copied.cell, copied.hardware, until, state)
 
 
 def go_through(machine: Machine) -> None:
@@ -75,19 +56,19 @@ def go_through(machine: Machine) -> None:
     Raises:
         RunError: as ``interpret.run`` does.
     """
-    program = machine.program
-    while not machine.over:
+    program = machine.state.program
+    while not machine.state.over:
         process = due(machine)
         at_end = machine.code.instructions[program.at].op is Op.STOP
         if process is program and at_end and program.pending is None and program.motion is None:
-            machine.ticks = max(machine.ticks, program.wake)
+            machine.state.ticks = max(machine.state.ticks, program.wake)
             return
         advance(machine, process)
 
 
 def new_warnings(before: Machine, after: Machine) -> tuple[Diagnostic, ...]:
     """Return the warnings about motions that one machine has made and its twin has not."""
-    stages = tuple(after.stages[len(before.stages) :])
+    stages = tuple(after.state.stages[len(before.state.stages) :])
     if not stages:
         return ()
     recording = Recording(
@@ -96,7 +77,7 @@ def new_warnings(before: Machine, after: Machine) -> tuple[Diagnostic, ...]:
         effects=(),
         stages=stages,
         streams=(),
-        trees=tuple(after.trees),
+        trees=tuple(after.state.trees),
         postures={},
     )
     return warnings(recording)
@@ -112,12 +93,12 @@ def rename(machine: Machine, names: Mapping[str, str]) -> None:
         base, bracket, indices = kept.partition("[")
         return f"{names.get(base, base)}{bracket}{indices}"
 
-    machine.tree = _renamed(machine.tree, names, other)
-    machine.trees = [(time, _renamed(tree, names, other)) for time, tree in machine.trees]
-    machine.values = {other(name): value for name, value in machine.values.items()}
-    machine.events = {other(name): count for name, count in machine.events.items()}
-    machine.written = {other(name): span for name, span in machine.written.items()}
-    for hand in machine.hands.values():
+    machine.state.tree = _renamed(machine.state.tree, names, other)
+    machine.state.trees = [(time, _renamed(tree, names, other)) for time, tree in machine.state.trees]
+    machine.state.values = {other(name): value for name, value in machine.state.values.items()}
+    machine.state.events = {other(name): count for name, count in machine.state.events.items()}
+    machine.state.written = {other(name): span for name, span in machine.state.written.items()}
+    for hand in machine.state.hands.values():
         hand.at = hand.at and other(hand.at)
         hand.holds = hand.holds and other(hand.holds)
 
@@ -131,18 +112,18 @@ def _renamed(tree: FrameTree, names: Mapping[str, str], other: Callable[[str], s
 def forget(machine: Machine, names: Iterable[str]) -> None:
     """Take declared variables away that were never used."""
     for name in names:
-        if name in machine.tree and not machine.has_place(name):
-            machine.tree = machine.tree.without(name)
+        if name in machine.state.tree and not machine.has_place(name):
+            machine.state.tree = machine.state.tree.without(name)
 
 
 def bring(machine: Machine, frames: Mapping[str, Node], span: Span) -> None:
     """Put frames of an imported file where they stand, those aside that have a place already."""
-    nodes = dict(machine.tree.nodes)
+    nodes = dict(machine.state.tree.nodes)
     waiting = {name: node for name, node in frames.items() if not machine.has_place(name)}
     while ready := [name for name, node in waiting.items() if node.parent == WORLD or node.parent in nodes]:
         nodes.update((name, waiting.pop(name)) for name in ready)
     machine.cell = attrs.evolve(machine.cell, frames={**frames, **machine.cell.frames})
-    machine.tree = FrameTree(nodes)
+    machine.state.tree = FrameTree(nodes)
     for name in frames:
         if name in nodes:
-            machine.grow(machine.tree, name, span)
+            machine.grow(machine.state.tree, name, span)

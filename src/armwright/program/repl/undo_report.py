@@ -21,33 +21,35 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
         before: the state that holds again.
         after: what the statement had come to.
     """
-    done = [effect.text for effect in after.effects[len(before.effects) :] if effect.kind not in SILENT]
+    done = [effect.text for effect in after.state.effects[len(before.state.effects) :] if effect.kind not in SILENT]
     left = len(done) - _MOST_SAID
     done = [*done[:_MOST_SAID], f"{left} more"] if left > 1 else done
     said = [f"before that it had done: {'; '.join(done)}"] if done else []
     back = _arms(before, after)
     if frames := [after.spelled(name) for name in _frames(before, after)]:
         back.append(f"{'frames' if len(frames) > 1 else 'frame'} {', '.join(frames)}")
-    if after.ticks > before.ticks:
+    if after.state.ticks > before.state.ticks:
         back.append(f"the clock to {before.now:.3f} s")
     return [*said, *([f"put back: {', '.join(back)}"] if back else [])]
 
 
 def _arms(before: Machine, after: Machine) -> list[str]:
     """Return the arms that stand otherwise after than before."""
-    places = ((name, before.hardware.posture(name, before.now)) for name in after.hands)
+    places = ((name, before.hardware.posture(name, before.now)) for name in after.state.hands)
     return [name for name, q in places if np.abs(q - after.hardware.posture(name, after.now)).max() > _ROUNDING]
 
 
 def _frames(before: Machine, after: Machine) -> list[str]:
     """Return the frames that stand or hang otherwise after than before, arms and their bases aside."""
-    names = [name for name in after.tree if name != WORLD and not is_arm(name) and not name.endswith(".BASE")]
-    return [name for name in names if name in before.tree and _differs(before, after, name)]
+    names = [name for name in after.state.tree if name != WORLD and not is_arm(name) and not name.endswith(".BASE")]
+    return [name for name in names if name in before.state.tree and _differs(before, after, name)]
 
 
 def _differs(before: Machine, after: Machine, name: str) -> bool:
-    if before.has_place(name) != after.has_place(name) or before.tree.parent(name) != after.tree.parent(name):
+    if before.has_place(name) != after.has_place(name) or before.state.tree.parent(name) != after.state.tree.parent(
+        name
+    ):
         return True
     if not after.has_place(name):
         return False
-    return not np.allclose(before.tree.world(name), after.tree.world(name), rtol=0, atol=_ROUNDING)
+    return not np.allclose(before.state.tree.world(name), after.state.tree.world(name), rtol=0, atol=_ROUNDING)

@@ -26,42 +26,42 @@ _IN_HAND = 0.8
 _SLOWEST = 1.0
 
 
-def stop(run: Machine, process: Process, span: Span) -> int:
+def stop(machine: Machine, process: Process, span: Span) -> int:
     """Stop the arm of a process in a controlled way; return when it is at rest [ticks].
 
     The frame table holds the place where it comes to rest from now on. An arm that is being stopped already is left to
     it.
     """
-    motion, period = process.motion, run.cell.period
+    motion, period = process.motion, machine.cell.period
     assert motion is not None  # noqa: S101 - asked for only then
     if motion.rest is None:
-        note_contact(run, motion)
-        runs = run.runs[motion.arm]
-        local = run.now - runs[-1].t0 if runs else 0.0
-        motion.rest = run.ticks
+        note_contact(machine, motion)
+        runs = machine.state.runs[motion.arm]
+        local = machine.now - runs[-1].t0 if runs else 0.0
+        motion.rest = machine.state.ticks
         if runs and local < runs[-1].duration - _ROUNDING:
-            motion.rest += _stop_on_the_way(run, motion, local)
+            motion.rest += _stop_on_the_way(machine, motion, local)
         else:
-            _begin(run, motion, hold(run.hardware.posture(motion.arm, run.now), period))
-    end = max(motion.rest, run.ticks)
-    run.set_hand(motion.arm, span, at=end)
+            _begin(machine, motion, hold(machine.hardware.posture(motion.arm, machine.now), period))
+    end = max(motion.rest, machine.state.ticks)
+    machine.set_hand(motion.arm, span, at=end)
     return end
 
 
-def _stop_on_the_way(run: Machine, motion: Motion, local: float) -> int:
+def _stop_on_the_way(machine: Machine, motion: Motion, local: float) -> int:
     """Stop an arm in the middle of its stage; return how many ticks it takes."""
-    arm, runs, period = run.cell.arms[motion.arm].arm, run.runs[motion.arm], run.cell.period
+    arm, runs, period = machine.cell.arms[motion.arm].arm, machine.state.runs[motion.arm], machine.cell.period
     last = runs[-1]
     braking = brake(last.trajectory, local, arm.limit("acceleration"), period=period)
-    tau = efforts(arm, braking, period, _begin(run, motion, braking))
+    tau = efforts(arm, braking, period, _begin(machine, motion, braking))
     runs[-1] = attrs.evolve(last, duration=local)
-    runs.append(Run(t0=run.now, trajectory=braking, duration=braking.duration, tau=tau))
+    runs.append(Run(t0=machine.now, trajectory=braking, duration=braking.duration, tau=tau))
     if motion.record >= 0:
         done = join([last.trajectory.until(local), braking])
         before = [] if last.tau is None else [last.tau[: round(local / period)]]
         peak, when = peaks_of(np.concatenate([*before, tau]), period)
-        run.stages[motion.record] = attrs.evolve(
-            run.stages[motion.record],
+        machine.state.stages[motion.record] = attrs.evolve(
+            machine.state.stages[motion.record],
             motion=done,
             length=hand_length(arm, done),
             peak_effort=peak,
@@ -71,60 +71,60 @@ def _stop_on_the_way(run: Machine, motion: Motion, local: float) -> int:
     return math.ceil(braking.duration / period - _ROUNDING)
 
 
-def _begin(run: Machine, motion: Motion, trajectory: Trajectory) -> Push:
-    push = send(run, motion, trajectory)
-    look_out(run, motion)
+def _begin(machine: Machine, motion: Motion, trajectory: Trajectory) -> Push:
+    push = send(machine, motion, trajectory)
+    look_out(machine, motion)
     return push
 
 
-def send(run: Machine, motion: Motion, trajectory: Trajectory) -> Push:
+def send(machine: Machine, motion: Motion, trajectory: Trajectory) -> Push:
     """Let the arm of a motion follow a trajectory in place of what it does now; return what will push on its hand."""
-    run.hardware.begin(motion.arm, trajectory, run.now, motion.tip)
-    return _pushed(run, motion.arm)
+    machine.hardware.begin(motion.arm, trajectory, machine.now, motion.tip)
+    return _pushed(machine, motion.arm)
 
 
-def _pushed(run: Machine, arm: str) -> Push:
+def _pushed(machine: Machine, arm: str) -> Push:
     """Look at what pushes on the hand of an arm from now on, and remember it."""
-    push = Push(run.now, run.hardware.wrenches(arm, run.now))
-    run.pushes[arm].append(push)
+    push = Push(machine.now, machine.hardware.wrenches(arm, machine.now))
+    machine.state.pushes[arm].append(push)
     return push
 
 
-def pushed_otherwise(run: Machine, arm: str, records: Sequence[int]) -> None:
+def pushed_otherwise(machine: Machine, arm: str, records: Sequence[int]) -> None:
     """Work out anew what the motors of an arm give from now on: what it pressed with may have been let go.
 
     Args:
-        run: the program.
+        machine: that runs the program.
         arm: its name.
         records: numbers of the stages that it is on.
     """
-    if not any(push.wrenches.any() for push in run.pushes[arm]):
+    if not any(push.wrenches.any() for push in machine.state.pushes[arm]):
         return
-    push, period, last = _pushed(run, arm), run.cell.period, run.runs[arm][-1]
-    done = round((run.now - last.t0) / period)
+    push, period, last = _pushed(machine, arm), machine.cell.period, machine.state.runs[arm][-1]
+    done = round((machine.now - last.t0) / period)
     if last.tau is None or done >= len(last.tau):
         return
     later = Push(last.t0, np.concatenate([np.zeros((done, 6)), push.wrenches]))
-    tau = efforts(run.cell.arms[arm].arm, last.trajectory, period, later, len(last.tau) - 1)
+    tau = efforts(machine.cell.arms[arm].arm, last.trajectory, period, later, len(last.tau) - 1)
     tau[:done] = last.tau[:done]
-    run.runs[arm][-1] = attrs.evolve(last, tau=tau)
+    machine.state.runs[arm][-1] = attrs.evolve(last, tau=tau)
     peak, when = peaks_of(tau, period)
     for record in records:
-        run.stages[record] = attrs.evolve(run.stages[record], peak_effort=peak, peak_time=when)
+        machine.state.stages[record] = attrs.evolve(machine.state.stages[record], peak_effort=peak, peak_time=when)
 
 
 # ---- contact -------------------------------------------------------------------------------------------------------
 
 
-def look_out(run: Machine, motion: Motion) -> None:
+def look_out(machine: Machine, motion: Motion) -> None:
     """See when an arm presses too deep by what it has begun to do, if it ever does."""
-    deep = run.hardware.too_deep_at(motion.arm)
-    motion.alarm = None if deep is None else max(run.ticks, math.ceil(deep / run.cell.period - _ROUNDING))
+    deep = machine.hardware.too_deep_at(motion.arm)
+    motion.alarm = None if deep is None else max(machine.state.ticks, math.ceil(deep / machine.cell.period - _ROUNDING))
 
 
-def note_contact(run: Machine, motion: Motion, at: int | None = None) -> None:
+def note_contact(machine: Machine, motion: Motion, at: int | None = None) -> None:
     """Remember how hard an arm has pressed by now, or by a later tick, before it begins something else."""
-    pressed = run.hardware.pressed(motion.arm, run.now if at is None else at * run.cell.period)
+    pressed = machine.hardware.pressed(motion.arm, machine.now if at is None else at * machine.cell.period)
     if pressed.depth > motion.pressed.depth:
         motion.pressed = pressed
 
@@ -141,19 +141,19 @@ def _deep(pressed: Press) -> str:
     return f"{pressed.depth * 1e3:.3g} mm deep, {pressed.force:.3g} N"
 
 
-def too_deep(run: Machine, process: Process, motion: Motion) -> NoReturn:
+def too_deep(machine: Machine, process: Process, motion: Motion) -> NoReturn:
     """Stop an arm that presses deeper than the cell allows, and say so.
 
     Raises:
         RunError: always.
     """
     motion.alarm = None
-    end = stop(run, process, motion.span)
-    note_contact(run, motion, end)
+    end = stop(machine, process, motion.span)
+    note_contact(machine, motion, end)
     # On its way to rest it may come deeper; that is said now.
     motion.alarm = None
-    allowed = run.cell.contact_deepest
-    least = _least_depth(run, motion)
+    allowed = machine.cell.contact_deepest
+    least = _least_depth(machine, motion)
     notes = [f"the arm is stopped within its limits, and has pressed {_deep(motion.pressed)} then"]
     helps = ["stop sooner: at a smaller force, or at a lower speed"]
     if least is not None and least > allowed:
@@ -164,10 +164,10 @@ def too_deep(run: Machine, process: Process, motion: Motion) -> NoReturn:
         helps = _slower(motion, allowed / least)
     elif least is not None:
         notes.append(f"stopped from the first contact on, it would press {least * 1e3:.3g} mm deep")
-    run.fail(
+    raise machine.error(
         process,
         "E404",
-        f"`{run.spelled(motion.moved)}` presses into the plane{_height(run)} deeper than {allowed * 1e3:g} mm",
+        f"`{machine.spelled(motion.moved)}` presses into the plane{_height(machine)} deeper than {allowed * 1e3:g} mm",
         motion.span,
         "this MOVE is stopped there",
         notes=notes,
@@ -183,35 +183,35 @@ def _slower(motion: Motion, share: float) -> list[str]:
     return [f"come down more slowly: `WITH SPEED = {speed}`"]
 
 
-def _least_depth(run: Machine, motion: Motion) -> float | None:
+def _least_depth(machine: Machine, motion: Motion) -> float | None:
     """Return how deep a stop from the first servo tick in contact on presses [m]; None where nothing came down."""
-    if motion.touch is None or run.cell.contact_height is None:
+    if motion.touch is None or machine.cell.contact_height is None:
         return None
     trajectory, local = motion.touch
-    place, period = run.cell.arms[motion.arm], run.cell.period
+    place, period = machine.cell.arms[motion.arm], machine.cell.period
     tick = min(math.ceil(local / period - _ROUNDING) * period, trajectory.duration)
     braking = brake(trajectory, tick, place.arm.limit("acceleration"), period=period)
     q: Array = braking(np.arange(round(braking.duration / period) + 1) * period)
-    X_WT = run.tree.world(base_name(motion.arm)) @ forward(place.arm, q) @ motion.tip
-    return run.cell.contact_height - float(X_WT[:, 2, 3].min())
+    X_WT = machine.state.tree.world(base_name(motion.arm)) @ forward(place.arm, q) @ motion.tip
+    return machine.cell.contact_height - float(X_WT[:, 2, 3].min())
 
 
-def comes_down(run: Machine, process: Process, motion: Motion, to: str) -> NoReturn:
+def comes_down(machine: Machine, process: Process, motion: Motion, to: str) -> NoReturn:
     """Refuse a stage that would come down on the plane, or press too deep into it, where no ON looks out for that.
 
     Raises:
         RunError: always.
     """
-    run.fail(
+    raise machine.error(
         process,
         "E404",
-        f"`{run.spelled(motion.moved)}` comes down on the plane{_height(run)} on its way to `{to}`",
+        f"`{machine.spelled(motion.moved)}` comes down on the plane{_height(machine)} on its way to `{to}`",
         motion.span,
         "this MOVE is stopped there, and no ON of this MOVE looks out for it",
         helps=["look out for the contact: `ON FORCE(Z) > 10 DO HALT`"],
     )
 
 
-def _height(run: Machine) -> str:
-    plane = run.cell.contact_height
+def _height(machine: Machine) -> str:
+    plane = machine.cell.contact_height
     return "" if plane is None else f" at z = {plane * 1e3:g} mm"

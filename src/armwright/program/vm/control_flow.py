@@ -1,18 +1,15 @@
 """Jumps, procedures, processes, events, locks, attempts, and the end of a program."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from armwright.program.bytecode.instructions import Instruction, JumpTarget, Op
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.source import Span
 from armwright.program.vm.contact import contact_of, note_contact, stop
-from armwright.program.vm.machine import Machine, RunError
-from armwright.program.vm.move import halt, move, release
-from armwright.program.vm.process import Activation, Attempt, Pending, Process, Waiting
-from armwright.program.vm.simple_statements import HANDLERS as ACTIONS
+from armwright.program.vm.machine import Handler, Machine, RunError
+from armwright.program.vm.move import halt, release
+from armwright.program.vm.process import Activation, Attempt, EarlyEnd, Pending, Process, Waiting
 from armwright.program.vm.synchronization import give_up, lock, signal, unlock, wait
-
-Handler = Callable[[Machine, Process, Instruction], None]
 
 # A last pass that rounding would leave out is made.
 _ROUNDING = 1e-9
@@ -26,55 +23,55 @@ def _place(step: Instruction, at: int) -> int:
     return place.index
 
 
-def _jump(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+def _jump(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     process.at = _place(step, 0)
 
 
-def _jump_if_not(run: Machine, process: Process, step: Instruction) -> None:
-    if not run.read(process, step.operands[0], step):
+def _jump_if_not(machine: Machine, process: Process, step: Instruction) -> None:
+    if not machine.read(process, step.operands[0], step):
         process.at = _place(step, 1)
 
 
-def _for(run: Machine, process: Process, step: Instruction) -> None:
+def _for(machine: Machine, process: Process, step: Instruction) -> None:
     variable, count, *bounds = step.operands[:5]
-    done = run.number(process, count, step)
-    first, last, by = (run.number(process, bound, step) for bound in bounds)
+    done = machine.number(process, count, step)
+    first, last, by = (machine.number(process, bound, step) for bound in bounds)
     if by == 0:
-        run.fail(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
+        raise machine.error(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
     if done > (last - first) / by + _ROUNDING:
         process.at = _place(step, 5)
         return
-    run.write(process, variable, first + done * by, step)
-    run.write(process, count, done + 1, step)
+    machine.write(process, variable, first + done * by, step)
+    machine.write(process, count, done + 1, step)
 
 
 # ---- procedures ----------------------------------------------------------------------------------------------------
 
 
-def _call(run: Machine, process: Process, step: Instruction) -> None:
+def _call(machine: Machine, process: Process, step: Instruction) -> None:
     name = str(step.operands[0])
-    procedure = run.code.procedures[name]
-    if len(process.stack) > run.limits.depth:
-        text = f"procedures call one another more than {run.limits.depth} deep"
-        run.fail(process, "E505", text, step.span, f"`{run.spelled(name)}` is called once more")
-    run.activations += 1
+    procedure = machine.code.procedures[name]
+    if len(process.stack) > machine.limits.depth:
+        text = f"procedures call one another more than {machine.limits.depth} deep"
+        raise machine.error(process, "E505", text, step.span, f"`{machine.spelled(name)}` is called once more")
+    machine.state.activations += 1
     bindings, own = {}, []
     for key, kind in procedure.types.items():
-        kept = f"{key}'{run.activations}"
+        kept = f"{key}'{machine.state.activations}"
         if key in procedure.parameters:
             operand = step.operands[1 + procedure.parameters.index(key)]
             by_value = not kind.sizes and kind.kind in (VariableKind.SCALAR, VariableKind.TRANS)
-            if not by_value and run.names_variable(process, operand):
-                bindings[key] = run.name(process, operand)
+            if not by_value and machine.names_variable(process, operand):
+                bindings[key] = machine.name(process, operand)
                 continue
             if not by_value:
-                run.grow(run.tree.place(kept, run.pose(process, operand, step)), kept, step.span)
+                machine.grow(machine.state.tree.place(kept, machine.pose(process, operand, step)), kept, step.span)
             elif kind.kind is VariableKind.SCALAR:
-                run.values[kept] = run.number(process, operand, step)
+                machine.state.values[kept] = machine.number(process, operand, step)
             else:
-                run.values[kept] = run.pose(process, operand, step)
+                machine.state.values[kept] = machine.pose(process, operand, step)
         bindings[key] = kept
-        run.types[kept] = kind
+        machine.state.types[kept] = kind
         own.append(kept)
     process.stack.append(
         Activation(
@@ -90,41 +87,41 @@ def _call(run: Machine, process: Process, step: Instruction) -> None:
     process.at = procedure.start
 
 
-def _return(run: Machine, process: Process, step: Instruction) -> None:
+def _return(machine: Machine, process: Process, step: Instruction) -> None:
     process.at = process.now.back
-    _leave(run, process, step.span)
+    _leave(machine, process, step.span)
 
 
-def _leave(run: Machine, process: Process, span: Span) -> None:
+def _leave(machine: Machine, process: Process, span: Span) -> None:
     """Leave the present activation: its variables are gone, its locks given back."""
     activation = process.stack.pop()
-    release(run, process, activation.locks)
+    release(machine, process, activation.locks)
     for kept in activation.own:
-        kind = run.types.pop(kept)
-        elements = [name for name in run.tree if name.startswith(f"{kept}[")] if kind.sizes else []
+        kind = machine.state.types.pop(kept)
+        elements = [name for name in machine.state.tree if name.startswith(f"{kept}[")] if kind.sizes else []
         for name in (kept, *elements):
-            if kind.kind is VariableKind.FRAME and name in run.tree:
-                run.grow(run.tree.without(name), name, span)
-                run.written.pop(name, None)
-                for hand in run.hands.values():
+            if kind.kind is VariableKind.FRAME and name in machine.state.tree:
+                machine.grow(machine.state.tree.without(name), name, span)
+                machine.state.written.pop(name, None)
+                for hand in machine.state.hands.values():
                     hand.forget(name)
-        for name in [one for one in run.values if one == kept or one.startswith(f"{kept}[")]:
-            del run.values[name]
-        run.events.pop(kept, None)
+        for name in [one for one in machine.state.values if one == kept or one.startswith(f"{kept}[")]:
+            del machine.state.values[name]
+        machine.state.events.pop(kept, None)
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------
 
 
-def _fork(run: Machine, process: Process, step: Instruction) -> None:
+def _fork(machine: Machine, process: Process, step: Instruction) -> None:
     now = process.now
-    _room(run, process, step)
-    rank = run.number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
+    _room(machine, process, step)
+    rank = machine.number(process, step.operands[1], step) if len(step.operands) > 1 else process.priority
     branch = Process(
         path=(*process.path, len(process.branches)),
         priority=rank,
         at=_place(step, 0),
-        wake=run.ticks,
+        wake=machine.state.ticks,
         stack=[Activation(kind="main", bindings=now.bindings, passing=dict(now.passing), wrote=dict(now.wrote))],
         parent=process,
         last_arm=process.last_arm,
@@ -132,128 +129,132 @@ def _fork(run: Machine, process: Process, step: Instruction) -> None:
     process.branches.append(branch)
 
 
-def _room(run: Machine, process: Process, step: Instruction) -> None:
+def _room(machine: Machine, process: Process, step: Instruction) -> None:
     """See to it that there is room for one process more: a procedure may begin a COBEGIN in which it is called again.
 
     Raises:
         RunError: there are too many of them.
     """
-    most = run.limits.processes
+    most = machine.limits.processes
     deep = len(process.path) >= most // 10
-    if not deep and len(run.processes) + len(process.branches) < most:
+    if not deep and len(machine.state.processes) + len(process.branches) < most:
         return
     text = f"COBEGINs begin one another more than {most // 10} deep" if deep else f"more than {most} processes run"
-    run.fail(process, "E505", text, step.span, "one more would begin here")
+    raise machine.error(process, "E505", text, step.span, "one more would begin here")
 
 
-def _join(run: Machine, process: Process, step: Instruction) -> None:
+def _join(machine: Machine, process: Process, step: Instruction) -> None:
     """Let the branches go, all at once, and wait for them."""
-    run.processes += process.branches
+    machine.state.processes += process.branches
     for branch in process.branches:
-        branch.wake = run.ticks
-    process.waiting = Waiting("branches", (), step.span, run.starts())
+        branch.wake = machine.state.ticks
+    process.waiting = Waiting("branches", (), step.span, machine.starts())
 
 
-def _quit(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
-    end(run, process)
+def _quit(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+    end(machine, process)
     parent = process.parent
     assert parent is not None  # noqa: S101 - only branches end so
     if all(branch.done for branch in parent.branches):
         parent.branches = []
-        parent.waiting, parent.wake = None, run.ticks
+        parent.waiting, parent.wake = None, machine.state.ticks
 
 
-def end(run: Machine, process: Process) -> None:
+def end(machine: Machine, process: Process) -> None:
     """Take a process out of the run."""
-    give_up(run, process)
-    release(run, process, 0)
+    give_up(machine, process)
+    release(machine, process, 0)
     process.done = True
     process.motion = process.pending = None
-    if process in run.processes:  # not where the branch after it could not begin: then its COBEGIN let none go
-        run.processes.remove(process)
+    if (
+        process in machine.state.processes
+    ):  # not where the branch after it could not begin: then its COBEGIN let none go
+        machine.state.processes.remove(process)
 
 
-def _pause(run: Machine, process: Process, step: Instruction) -> None:
-    seconds = run.number(process, step.operands[0], step)
+def _pause(machine: Machine, process: Process, step: Instruction) -> None:
+    seconds = machine.number(process, step.operands[0], step)
     if not 0 <= seconds <= _LONGEST_PAUSE:
         text = f"a PAUSE of {seconds:g} s is not possible"
-        run.fail(process, "E231", text, step.span, f"expected 0 to {_LONGEST_PAUSE:g} s")
+        raise machine.error(process, "E231", text, step.span, f"expected 0 to {_LONGEST_PAUSE:g} s")
     text = f"PAUSE {seconds:g}"
-    run.take_time(process, seconds, Pending(kind="PAUSE", text=text, since=run.starts(), span=step.span))
+    machine.take_time(process, seconds, Pending(kind="PAUSE", text=text, since=machine.starts(), span=step.span))
 
 
 # ---- attempts and ends ---------------------------------------------------------------------------------------------
 
 
-def _try(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+def _try(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     attempt = Attempt(process.at - 1, _place(step, 0), recovering=False, locks=len(process.locks))
     process.now.attempts.append(attempt)
 
 
-def _well(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+def _well(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     process.now.attempts.pop()
     process.at = _place(step, 0)
 
 
-def _recovered(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+def _recovered(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     process.now.attempts.pop()
 
 
-def _retry(run: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
+def _retry(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
     attempts = process.now.attempts
     while not attempts[-1].recovering:
         attempts.pop()
-    release(run, process, attempts[-1].locks)
+    release(machine, process, attempts[-1].locks)
     # TRY itself is run again and puts the attempt back.
     process.at = attempts.pop().start
 
 
-def _halt(run: Machine, process: Process, step: Instruction) -> None:
+def _halt(machine: Machine, process: Process, step: Instruction) -> None:
     """End the program; in a procedure that an action calls, the MOVE of that action, as in the action itself."""
     if not any(one.kind == "action" for one in process.stack):
-        finish(run, process, step.span, "HALT")
+        finish(machine, process, step.span, "HALT")
         return
     while process.now.kind != "action":
-        _leave(run, process, step.span)
-    halt(run, process, step)
+        _leave(machine, process, step.span)
+    halt(machine, process, step)
 
 
-def _stop(run: Machine, process: Process, step: Instruction) -> None:
-    finish(run, process, step.span, "END")
+def _stop(machine: Machine, process: Process, step: Instruction) -> None:
+    finish(machine, process, step.span, "END")
 
 
-def rest(run: Machine, span: Span) -> list[str]:
+def rest(machine: Machine, span: Span) -> list[str]:
     """Bring every arm to rest and switch every device off: the run is over once all is still.
 
     Returns:
         The devices that were on.
     """
-    for process in run.processes:
-        give_up(run, process)
-    run.ticks = max([run.ticks, *(_still(run, process, span) for process in run.processes)])
-    off = sorted(run.hardware.running())
+    for process in machine.state.processes:
+        give_up(machine, process)
+    machine.state.ticks = max(
+        [machine.state.ticks, *(_still(machine, process, span) for process in machine.state.processes)]
+    )
+    off = sorted(machine.hardware.running())
     for device in off:
-        run.hardware.operate(device, on=False)
-    run.over = True
+        machine.hardware.operate(device, on=False)
+    machine.state.over = True
     return off
 
 
-def _still(run: Machine, process: Process, span: Span) -> int:
+def _still(machine: Machine, process: Process, span: Span) -> int:
     """Give up the motion of a process, if it makes one; return when its arm is at rest."""
     if process.motion is None:
-        return run.ticks
-    motion, end_of_motion = process.motion, stop(run, process, span)
-    note_contact(run, motion, end_of_motion)
+        return machine.state.ticks
+    motion, end_of_motion = process.motion, stop(machine, process, span)
+    note_contact(machine, motion, end_of_motion)
     words, contact = contact_of(motion)
     process.motion = None
-    run.effect(process, "STOP", f"{motion.arm} stops{words}", span, until=end_of_motion, arm=motion.arm, data=contact)
-    if not motion.data.get("halted"):
-        motion.data["braked"] = True
-        motion.text += "; braked"
-    run.effect(
+    machine.effect(
+        process, "STOP", f"{motion.arm} stops{words}", span, until=end_of_motion, arm=motion.arm, data=contact
+    )
+    motion.ended = motion.ended or EarlyEnd.BRAKED
+    machine.effect(
         process,
         "MOVE",
-        motion.text,
+        motion.trace,
         motion.span,
         since=motion.begun,
         until=end_of_motion,
@@ -263,18 +264,18 @@ def _still(run: Machine, process: Process, span: Span) -> int:
     return end_of_motion
 
 
-def finish(run: Machine, process: Process, span: Span, word: str) -> None:
+def finish(machine: Machine, process: Process, span: Span, word: str) -> None:
     """End the program: arms at rest, devices off, the frame table true."""
-    off = rest(run, span)
-    run.effect(process, "END", f"{word}{words_of(run, off)}", span, data={"switched_off": off})
+    off = rest(machine, span)
+    machine.effect(process, "END", f"{word}{words_of(machine, off)}", span, data={"switched_off": off})
 
 
-def words_of(run: Machine, off: Sequence[str]) -> str:
+def words_of(machine: Machine, off: Sequence[str]) -> str:
     """Return what is said behind the end of a program of the devices that it switched off."""
-    return "".join(f"; {run.spelled(device)} OFF" for device in off)
+    return "".join(f"; {machine.spelled(device)} OFF" for device in off)
 
 
-def recover(run: Machine, process: Process, error: RunError) -> bool:
+def recover(machine: Machine, process: Process, error: RunError) -> bool:
     """Go on in the RECOVER part of the innermost TRY around what went wrong.
 
     What the process had begun is stopped: its branches, its motion; branches without a TRY of their own hand the
@@ -283,27 +284,27 @@ def recover(run: Machine, process: Process, error: RunError) -> bool:
     Returns:
         Whether there is one.
     """
-    span, at_rest = error.diagnostic.span, run.ticks
+    span, at_rest = error.diagnostic.span, machine.state.ticks
     while True:
-        ends = [_cancel(run, branch, span) for branch in process.branches]
+        ends = [_cancel(machine, branch, span) for branch in process.branches]
         process.branches = []
         # The arm of the branch that failed may be the last to come to rest.
-        process.wake = at_rest = max([at_rest, *ends, _still(run, process, span)])
-        give_up(run, process)
+        process.wake = at_rest = max([at_rest, *ends, _still(machine, process, span)])
+        give_up(machine, process)
         process.pending = None
-        if (attempt := _attempt(run, process, span)) is not None:
+        if (attempt := _attempt(machine, process, span)) is not None:
             process.at = attempt.recovery
-            release(run, process, attempt.locks)
-            said = f"{error.diagnostic.code} in line {run.code.source.line(span.start)}: {error.diagnostic.message}"
-            run.effect(process, "ERROR", said, span, data={"code": error.diagnostic.code})
+            release(machine, process, attempt.locks)
+            said = f"{error.diagnostic.code} in line {machine.code.source.line(span.start)}: {error.diagnostic.message}"
+            machine.effect(process, "ERROR", said, span, data={"code": error.diagnostic.code})
             return True
         if process.parent is None:
-            run.ticks = process.wake
+            machine.state.ticks = process.wake
             return False
         process = process.parent
 
 
-def _attempt(run: Machine, process: Process, span: Span) -> Attempt | None:
+def _attempt(machine: Machine, process: Process, span: Span) -> Attempt | None:
     """Return the innermost attempt that has not failed yet, now failed, with all activations inside it left."""
     while True:
         attempts = process.now.attempts
@@ -315,23 +316,20 @@ def _attempt(run: Machine, process: Process, span: Span) -> Attempt | None:
                 return failed
         if len(process.stack) == 1:
             return None
-        _leave(run, process, span)
+        _leave(machine, process, span)
 
 
-def _cancel(run: Machine, process: Process, span: Span) -> int:
+def _cancel(machine: Machine, process: Process, span: Span) -> int:
     """End a branch with all its own; return when its arms are at rest."""
     if process.done:
-        return run.ticks
-    ends = [_cancel(run, branch, span) for branch in process.branches]
-    ends.append(_still(run, process, span))
-    end(run, process)
+        return machine.state.ticks
+    ends = [_cancel(machine, branch, span) for branch in process.branches]
+    ends.append(_still(machine, process, span))
+    end(machine, process)
     return max(ends)
 
 
 HANDLERS: Mapping[Op, Handler] = {
-    **ACTIONS,
-    Op.MVEND: move,
-    Op.MVHLT: halt,
     Op.JMP: _jump,
     Op.JZ: _jump_if_not,
     Op.FOR: _for,
@@ -351,9 +349,4 @@ HANDLERS: Mapping[Op, Handler] = {
     Op.RETRY: _retry,
     Op.HALT: _halt,
     Op.STOP: _stop,
-    # The parts of a MOVE are gathered by its end.
-    **dict.fromkeys(
-        (Op.MVBEG, Op.MVDIR, Op.MVSTR, Op.MVVIA, Op.MVAPP, Op.MVDEP, Op.MVSPD, Op.MVBLD, Op.MVDUR, Op.MVON),
-        lambda *_: None,
-    ),
 }

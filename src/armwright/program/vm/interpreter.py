@@ -5,7 +5,7 @@ served first, then the one that comes first in the text; so a run is the same on
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -13,11 +13,12 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell
-from armwright.program.bytecode.instructions import Code
+from armwright.program.bytecode.instructions import Code, Op
 from armwright.program.language.diagnostic import Diagnostic, Severity
+from armwright.program.vm import control_flow, devices, expressions, frames, move, output
 from armwright.program.vm.contact import too_deep
-from armwright.program.vm.control_flow import HANDLERS, recover, rest, words_of
-from armwright.program.vm.machine import Limits, Machine, RunError
+from armwright.program.vm.control_flow import recover, rest, words_of
+from armwright.program.vm.machine import Handler, Limits, Machine, RunError
 from armwright.program.vm.move import go_on
 from armwright.program.vm.move_diagnostics import detour_warning, stops_warning
 from armwright.program.vm.process import Process
@@ -28,6 +29,15 @@ from armwright.program.vm.synchronization import deadlock
 _FINAL = ("E504", "E506")
 # A time this part of a period before a tick is on it.
 _ON_A_TICK = 1e-6
+
+HANDLERS: Mapping[Op, Handler] = {
+    **expressions.HANDLERS,
+    **frames.HANDLERS,
+    **devices.HANDLERS,
+    **move.HANDLERS,
+    **control_flow.HANDLERS,
+    **output.HANDLERS,
+}
 
 # Called now and then: the time on the clock [s], the line of the next statement.
 Progress = Callable[[float, int], None]
@@ -67,7 +77,7 @@ def run(machine: Machine, progress: Progress | None = None) -> None:
         RunError: as ``interpret`` does.
     """
     instructions = machine.code.instructions
-    while not machine.over:
+    while not machine.state.over:
         process = due(machine)
         if progress and instructions[process.at].begins:
             progress(machine.now, machine.code.line(instructions[process.at]))
@@ -82,14 +92,14 @@ def due(machine: Machine) -> Process:
     """
     process = ready(machine)
     if process is None:
-        raise _stopped(machine, deadlock(machine), machine.program, None)
+        raise _stopped(machine, deadlock(machine), machine.state.program, None)
     return process
 
 
 def ready(machine: Machine) -> Process | None:
     """Return the process that is served next; None where all wait for one another."""
     best = None
-    for process in machine.processes:
+    for process in machine.state.processes:
         if (due := process.due) is not None:
             rank = (due, -process.priority, process.path)
             if best is None or rank < best[0]:
@@ -111,16 +121,16 @@ def advance(machine: Machine, process: Process) -> None:
 
 
 def _advance(machine: Machine, process: Process) -> None:
-    if process.due is not None and process.due > machine.ticks:
+    if process.due is not None and process.due > machine.state.ticks:
         last = machine.limits.time / machine.cell.period + _ON_A_TICK
-        machine.ticks, machine.idle = process.due, 0
-        if machine.ticks > last:
+        machine.state.ticks, machine.state.idle = process.due, 0
+        if machine.state.ticks > last:
             # The clock stops there, and arms that are on their way have come as far as that.
-            machine.ticks = max(0, math.floor(last))
+            machine.state.ticks = max(0, math.floor(last))
             under_way = process.pending or process.motion or machine.code.instructions[process.at]
             text = f"the program is still running after {machine.limits.time:g} s on the clock of the cell"
-            machine.fail(process, "E506", text, under_way.span, "it has come to here")
-    if process.motion is not None and process.motion.alarm is not None and process.motion.alarm <= machine.ticks:
+            raise machine.error(process, "E506", text, under_way.span, "it has come to here")
+    if process.motion is not None and process.motion.alarm is not None and process.motion.alarm <= machine.state.ticks:
         too_deep(machine, process, process.motion)
     if (pending := process.pending) is not None:
         process.pending = None
@@ -140,11 +150,11 @@ def _advance(machine: Machine, process: Process) -> None:
         go_on(machine, process)
         return
     step = machine.code.instructions[process.at]
-    machine.idle += 1
-    if machine.idle > machine.limits.steps:
+    machine.state.idle += 1
+    if machine.state.idle > machine.limits.steps:
         text = f"the program has done {machine.limits.steps} steps and no time has gone by"
         help_ = "a loop needs a MOVE, a PAUSE or a WAIT in it, or an end"
-        machine.fail(process, "E504", text, step.span, "it is still running here", helps=[help_])
+        raise machine.error(process, "E504", text, step.span, "it is still running here", helps=[help_])
     process.at += 1
     HANDLERS[step.op](machine, process, step)
 
@@ -153,7 +163,7 @@ def _stopped(machine: Machine, error: RunError, process: Process, arm: str | Non
     """Return the error with the frames as they are when all arms are at rest and all devices off."""
     off = rest(machine, error.diagnostic.span)
     failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm, process=process.title)
-    return RunError(error.diagnostic, machine.tree, machine.now, lambda: _failed(machine, failure, off))
+    return RunError(error.diagnostic, machine.state.tree, machine.now, lambda: _failed(machine, failure, off))
 
 
 def _failed(machine: Machine, failure: Failure, off: Sequence[str]) -> Recording:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import TypeAlias
 
 import attrs
 import numpy as np
@@ -11,6 +11,7 @@ from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree
 from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell, base_name
+from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError
 from armwright.kinematics.forward import forward
 from armwright.program.bytecode.instructions import Code, Instruction, Operand
@@ -18,18 +19,16 @@ from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
 from armwright.program.language.source import Span
-from armwright.program.vm.process import Activation, Element, Pending, Process, Start, Value
+from armwright.program.vm.process import Element, Pending, Process, Start, Value
 from armwright.program.vm.recording import (
     Effect,
     EffectKind,
-    Push,
     Recording,
-    Run,
-    RunStage,
     in_order,
     stream,
     thinned,
 )
+from armwright.program.vm.state import MachineState
 from armwright.program.vm.value_text import shown
 from armwright.spatial.poses import from_noap, to_noap
 
@@ -78,52 +77,37 @@ class Limits:
     time: float = 3600.0
 
 
-@attrs.define
-class Hand:
-    """The fingers of an arm: at which frame the hand arrived last, and what they closed on."""
-
-    at: str | None = None
-    holds: str | None = None
-
-    def forget(self, name: str) -> None:
-        """Know nothing any more of a frame that there is no more."""
-        self.at = None if self.at == name else self.at
-        self.holds = None if self.holds == name else self.holds
-
-
 class Machine:
     """A program on its way in a cell."""
 
-    def __init__(self, code: Code, cell: Cell, hardware: Hardware, limits: Limits | None = None) -> None:
-        """Stand in front of the first instruction."""
+    def __init__(
+        self,
+        code: Code,
+        cell: Cell,
+        hardware: Hardware,
+        limits: Limits | None = None,
+        state: MachineState | None = None,
+    ) -> None:
+        """Stand in front of the first instruction, or where ``state`` has come to."""
         self.code, self.cell, self.hardware = code, cell, hardware
         self.limits = limits or Limits()
-        self.types: dict[str, VariableType] = dict(code.types)
-        self.tree = cell.tree()
-        for name, kind in code.types.items():
-            if kind == VariableType(VariableKind.FRAME):
-                self.tree = self.tree.declare(name)
+        self.state = state or MachineState.initial(code, cell)
         self.constants = [from_noap(value) if isinstance(value, tuple) else float(value) for value in code.constants]
-        self.values: dict[str, float | Array] = {}
-        self.events: dict[str, int] = {}
-        self.locks: dict[str, Process] = {}
-        self.owners: dict[str, list[Process]] = {}
-        self.hands: dict[str, Hand] = {name: Hand() for name in cell.arms}
-        self.ticks, self.idle, self.activations, self.begun = 0, 0, 0, 0
-        self.over = False
-        self.written: dict[str, Span] = {}  # where each frame last got its place or its parent
-        self.effects: list[Effect] = []
-        self.stages: list[RunStage] = []
-        self.runs: dict[str, list[Run]] = {name: [] for name in cell.arms}
-        self.pushes: dict[str, list[Push]] = {name: [] for name in cell.arms}
-        self.trees = [(0.0, self.tree)]
-        self.program = Process(path=(), priority=0.0, at=0, wake=0, stack=[Activation(kind="main")])
-        self.processes = [self.program]
+
+    def copy(self) -> "Machine":
+        """Return a machine in the same state; what one of them does changes nothing in the other.
+
+        Raises:
+            TypeError: the hardware is a real cell, which cannot be copied.
+        """
+        if not isinstance(self.hardware, Simulator):
+            raise TypeError(f"only a simulated cell can be copied, not a {type(self.hardware).__name__}")
+        return Machine(self.code, self.cell, self.hardware.copy(), self.limits, self.state.copy())
 
     @property
     def now(self) -> float:
         """The time [s]."""
-        return self.ticks * self.cell.period
+        return self.state.ticks * self.cell.period
 
     def recording(self) -> Recording:
         """Return all that happened so far."""
@@ -131,13 +115,15 @@ class Machine:
         return Recording(
             cell=cell,
             duration=self.now,
-            effects=in_order(self.effects),
-            stages=tuple(self.stages),
+            effects=in_order(self.state.effects),
+            stages=tuple(self.state.stages),
             streams=tuple(
-                stream(name, place, self.runs[name], self.pushes[name], duration=self.now, period=cell.period)
+                stream(
+                    name, place, self.state.runs[name], self.state.pushes[name], duration=self.now, period=cell.period
+                )
                 for name, place in cell.arms.items()
             ),
-            trees=tuple(self.trees),
+            trees=tuple(self.state.trees),
             postures={name: self.hardware.posture(name, self.now) for name in cell.arms},
         )
 
@@ -161,9 +147,9 @@ class Machine:
     def type_of(self, name: str) -> VariableType:
         """Return what a kept name holds; of an element, what the element holds."""
         base, bracket, _ = name.partition("[")
-        if is_arm(name) or base not in self.types:
+        if is_arm(name) or base not in self.state.types:
             return VariableType(VariableKind.FRAME)
-        return VariableType(self.types[base].kind) if bracket else self.types[base]
+        return VariableType(self.state.types[base].kind) if bracket else self.state.types[base]
 
     def read(self, process: Process, operand: Operand, step: Instruction) -> Value:
         """Return the value of an operand.
@@ -185,11 +171,11 @@ class Machine:
             self.look(process, name)
             if not self.has_place(name):
                 text = f"frame `{self.spelled(name)}` is used before it has a value"
-                self.fail(process, "E304", text, step.span, "no value here")
-            return self.tree.world(name)
-        if (value := self.values.get(name)) is None:
+                raise self.error(process, "E304", text, step.span, "no value here")
+            return self.state.tree.world(name)
+        if (value := self.state.values.get(name)) is None:
             text = f"`{self.spelled(name)}` is used before it has a value"
-            self.fail(process, "E303", text, step.span, "no value here")
+            raise self.error(process, "E303", text, step.span, "no value here")
         return value
 
     def number(self, process: Process, operand: Operand, step: Instruction) -> float:
@@ -214,7 +200,7 @@ class Machine:
         name = self.name(process, operand)
         if self.type_of(name).kind is not VariableKind.FRAME:
             assert not isinstance(value, Element)  # noqa: S101 - elements are read before they are written
-            self.values[name] = value
+            self.state.values[name] = value
             return
         assert isinstance(value, np.ndarray)  # noqa: S101 - the checker knows the kinds
         self.place(process, name, value, step.span)
@@ -228,7 +214,7 @@ class Machine:
 
     def has_place(self, name: str) -> bool:
         """Whether a frame stands somewhere."""
-        return name in self.tree and self.tree.has_value(name)
+        return name in self.state.tree and self.state.tree.has_value(name)
 
     def label(self, process: Process, operand: Operand) -> str:
         """Return what an operand is called in the trace: as the program writes it."""
@@ -247,41 +233,41 @@ class Machine:
             RunError: it cannot be placed.
         """
         self.look(process, name)
-        leader = self.tree.leader(name)
+        leader = self.state.tree.leader(name)
         if is_arm(name) or name == WORLD:
             text = f"`{self.spelled(name)}` cannot be given a value"
-            self.fail(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
+            raise self.error(process, "E218", text, span, "an arm" if is_arm(name) else "the root of all frames")
         if leader != name and (is_arm(leader) or leader == WORLD):
             text = f"`{self.spelled(name)}` hangs rigidly on {self.spelled(leader)}, which no value moves"
-            self.fail(process, "E310", text, span, "cannot be placed")
-        self.grow(self.tree.place(name, X), name, span)
+            raise self.error(process, "E310", text, span, "cannot be placed")
+        self.grow(self.state.tree.place(name, X), name, span)
 
     def set_hand(self, arm: str, span: Span, *, at: int | None = None) -> None:
         """Let the frame table know where an arm is now, or will be at a later tick."""
         q = self.hardware.posture(arm, self.now if at is None else at * self.cell.period)
         X_BH = forward(self.cell.arms[arm].arm, q)
-        self.grow(self.tree.place(arm, self.tree.world(base_name(arm)) @ X_BH), arm, span)
+        self.grow(self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH), arm, span)
 
     def look(self, process: Process, name: str) -> None:
         """Let the frame table know where a frame is now, if an arm that is on its way carries it."""
-        if name not in self.tree or not any(one.motion for one in self.processes):
+        if name not in self.state.tree or not any(one.motion for one in self.state.processes):
             return
-        arm = next((one for one in (name, *self.tree.ancestors(name)) if is_arm(one)), None)
-        mover = next((one for one in self.processes if one.motion and one.motion.arm == arm), None)
+        arm = next((one for one in (name, *self.state.tree.ancestors(name)) if is_arm(one)), None)
+        mover = next((one for one in self.state.processes if one.motion and one.motion.arm == arm), None)
         # A condition of a MOVE finds the arm of this MOVE where it is.
         if arm is not None and mover is not None and not (mover is process and process.now.kind == "condition"):
             X_BH = forward(self.cell.arms[arm].arm, self.hardware.posture(arm, self.now))
-            self.tree = self.tree.place(arm, self.tree.world(base_name(arm)) @ X_BH)
+            self.state.tree = self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH)
 
     def grow(self, tree: FrameTree, name: str, span: Span) -> None:
         """Take another frame tree, in which ``name`` got its place or its parent."""
-        self.tree = tree
-        self.written[name] = span
-        if len(self.trees) > 1 and self.trees[-1][0] == self.now:
-            self.trees.pop()
-        self.trees.append((self.now, tree))
-        if len(self.trees) > 2 * _MOST_TREES:
-            self.trees = thinned(self.trees, self.now / _MOST_TREES)
+        self.state.tree = tree
+        self.state.written[name] = span
+        if len(self.state.trees) > 1 and self.state.trees[-1][0] == self.now:
+            self.state.trees.pop()
+        self.state.trees.append((self.now, tree))
+        if len(self.state.trees) > 2 * _MOST_TREES:
+            self.state.trees = thinned(self.state.trees, self.now / _MOST_TREES)
 
     # ---- arms and time ---------------------------------------------------------------------------------------------
 
@@ -299,16 +285,18 @@ class Machine:
         """
         if arm not in self.cell.arms:
             known = ", ".join(sorted(self.cell.arms)) or "none"
-            self.fail(process, "E302", f"the cell has no arm {arm}", span, "no such arm", notes=[f"arms: {known}"])
+            raise self.error(
+                process, "E302", f"the cell has no arm {arm}", span, "no such arm", notes=[f"arms: {known}"]
+            )
         process.last_arm = arm
-        owners = self.owners.setdefault(arm, [])
+        owners = self.state.owners.setdefault(arm, [])
         owners[:] = [owner for owner in owners if not owner.done]
         for owner in owners:
             if not (owner.descends_from(process) or process.descends_from(owner)):
                 text = f"{arm} is used by {owner.title} and by {process.title} of one COBEGIN"
                 note = "each arm belongs to one process at a time"
                 hung = self._hung(moved, arm)
-                self.fail(process, "E503", text, span, f"belongs to {owner.title}", secondary=hung, notes=[note])
+                raise self.error(process, "E503", text, span, f"belongs to {owner.title}", secondary=hung, notes=[note])
         if process not in owners:
             owners.append(process)
 
@@ -316,20 +304,20 @@ class Machine:
         """Return where a frame, or what it hangs on, was hung on an arm."""
         if moved is None or moved == arm:
             return []
-        above = [moved, *self.tree.ancestors(moved)]
+        above = [moved, *self.state.tree.ancestors(moved)]
         name = above[above.index(arm) - 1]
         text = f"{self.spelled(name)} was affixed to {arm} here"
-        return [Label(self.written[name], text)] if name in self.written else []
+        return [Label(self.state.written[name], text)] if name in self.state.written else []
 
     def take_time(self, process: Process, seconds: float, pending: Pending) -> None:
         """Let the time of a statement go by before it takes effect."""
         process.pending = pending
-        process.wake = self.ticks + math.ceil(seconds / self.cell.period - _ON_A_TICK)
+        process.wake = self.state.ticks + math.ceil(seconds / self.cell.period - _ON_A_TICK)
 
     def starts(self) -> Start:
         """Return the present tick as the start of what takes time, behind all that has begun before."""
-        self.begun += 1
-        return Start(self.ticks, self.begun)
+        self.state.begun += 1
+        return Start(self.state.ticks, self.state.begun)
 
     def effect(
         self,
@@ -345,7 +333,7 @@ class Machine:
     ) -> None:
         """Record what a process did up to now, or does up to a later tick."""
         start, period = since or self.starts(), self.cell.period
-        self.effects.append(
+        self.state.effects.append(
             Effect(
                 t0=start.tick * period,
                 t1=self.now if until is None else until * period,
@@ -361,7 +349,7 @@ class Machine:
 
     # ---- errors ----------------------------------------------------------------------------------------------------
 
-    def fail(
+    def error(
         self,
         process: Process,
         code: str,
@@ -372,12 +360,8 @@ class Machine:
         secondary: Sequence[Label] = (),
         notes: Sequence[str] = (),
         helps: Sequence[str] = (),
-    ) -> NoReturn:
-        """Say why a process cannot go on.
-
-        Raises:
-            RunError: always.
-        """
+    ) -> RunError:
+        """Return the error that says why a process cannot go on."""
         calls = [
             Label(one.called, f"{self.spelled(one.name)} is called here")
             for one in process.stack[:0:-1]
@@ -392,4 +376,8 @@ class Machine:
             notes=tuple(notes),
             helps=tuple(helps),
         )
-        raise RunError(diagnostic, self.tree, self.now)
+        return RunError(diagnostic, self.state.tree, self.now)
+
+
+# Executes an instruction for a process.
+Handler: TypeAlias = Callable[[Machine, Process, Instruction], None]

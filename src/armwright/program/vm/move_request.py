@@ -33,23 +33,23 @@ class MoveRequest(NamedTuple):
     span: Span
 
 
-def move_request(run: Machine, process: Process, step: Instruction) -> MoveRequest:
+def move_request(machine: Machine, process: Process, step: Instruction) -> MoveRequest:
     """Gather the instructions of a MOVE, from MVBEG to MVEND."""
-    instructions, at = run.code.instructions, process.at - 1
+    instructions, at = machine.code.instructions, process.at - 1
     first = at
     while instructions[first].op is not Op.MVBEG:
         first -= 1
     begin, parts = instructions[first], instructions[first + 1 : at]
-    goals: dict[str, list[Goal]] = {"goal": [_goal(run, process, begin.operands[1], begin)]}
+    goals: dict[str, list[Goal]] = {"goal": [_goal(machine, process, begin.operands[1], begin)]}
     numbers: dict[Op, float] = {}
     guards = []
     for part in parts:
         if part.op in (Op.MVVIA, Op.MVAPP, Op.MVDEP):
-            goals[part.op] = [_goal(run, process, operand, part) for operand in part.operands]
+            goals[part.op] = [_goal(machine, process, operand, part) for operand in part.operands]
         elif part.op in (Op.MVSPD, Op.MVBLD, Op.MVDUR):
-            numbers[part.op] = _quantity(run, process, part)
+            numbers[part.op] = _quantity(machine, process, part)
         elif part.op is Op.MVON:
-            guards.append(_guard(run, part))
+            guards.append(_guard(machine, part))
     goals = _told_apart(goals)
     form = Form(
         goal=goals["goal"][0].label,
@@ -72,12 +72,12 @@ def move_request(run: Machine, process: Process, step: Instruction) -> MoveReque
     )
 
 
-def _goal(run: Machine, process: Process, operand: Operand, step: Instruction) -> Goal:
+def _goal(machine: Machine, process: Process, operand: Operand, step: Instruction) -> Goal:
     span = step.span
     if isinstance(operand, str) and operand.startswith("%"):
         span = process.now.wrote[operand]
     where = Instruction(op=step.op, operands=step.operands, span=span)
-    return Goal(run.label(process, operand), operand, where if step.op is not Op.MVBEG else step)
+    return Goal(machine.label(process, operand), operand, where if step.op is not Op.MVBEG else step)
 
 
 def _told_apart(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
@@ -92,31 +92,31 @@ def _told_apart(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
     return goals
 
 
-def _quantity(run: Machine, process: Process, part: Instruction) -> float:
+def _quantity(machine: Machine, process: Process, part: Instruction) -> float:
     """Return speed, blend [m] or duration [s], checked."""
     operand = part.operands[0]
-    value = run.number(process, operand, part)
-    name = f"{run.label(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
+    value = machine.number(process, operand, part)
+    name = f"{machine.label(process, operand)} = {value:g}" if isinstance(operand, str) else f"{value:g}"
     if part.op is Op.MVSPD:
         if not LOWEST_SPEED <= value <= HIGHEST_SPEED:
             message = f"speed {name} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}"
-            run.fail(process, "E207", message, part.span, "out of range")
+            raise machine.error(process, "E207", message, part.span, "out of range")
         return value
     what = "the blend" if part.op is Op.MVBLD else "the duration"
     if part.op is Op.MVDUR and value > _LONGEST:
         text = f"{what} {name} s is not possible"
-        run.fail(process, "E231", text, part.span, f"expected {_LONGEST:g} s or less")
+        raise machine.error(process, "E231", text, part.span, f"expected {_LONGEST:g} s or less")
     if value <= 0:
-        run.fail(process, "E231", f"{what} {name} is not above 0", part.span, "expected more than 0")
-    return value * run.code.units.metres if part.op is Op.MVBLD else value
+        raise machine.error(process, "E231", f"{what} {name} is not above 0", part.span, "expected more than 0")
+    return value * machine.code.units.metres if part.op is Op.MVBLD else value
 
 
-def _guard(run: Machine, part: Instruction) -> Guard:
+def _guard(machine: Machine, part: Instruction) -> Guard:
     condition, truth, action = part.operands
     assert isinstance(condition, JumpTarget)  # noqa: S101 - the translator lands them
     assert isinstance(action, JumpTarget)  # noqa: S101
     at, looks = condition.index, False
-    while (step := run.code.instructions[at]).op is not Op.RET:
+    while (step := machine.code.instructions[at]).op is not Op.RET:
         looks = looks or step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV)
         at += 1
     return Guard(condition=condition.index, truth=str(truth), action=action.index, looks=looks)

@@ -1,6 +1,8 @@
 """What a running program consists of: processes, the procedures they are in, the motions they make."""
 
-from typing import Literal, TypeAlias
+import enum
+from collections.abc import Callable
+from typing import Any, Literal, TypeAlias
 
 import attrs
 import numpy as np
@@ -81,6 +83,16 @@ class Activation:
     own: tuple[str, ...] = ()
     locks: int = 0
 
+    def copy(self, shared: Callable[[dict[str, Any]], dict[str, Any]]) -> "Activation":
+        """Return a copy; ``shared`` copies names, and the same names once."""
+        return attrs.evolve(
+            self,
+            bindings=shared(self.bindings),
+            passing=shared(self.passing),
+            wrote=shared(self.wrote),
+            attempts=list(self.attempts),
+        )
+
 
 @attrs.define
 class Guard:
@@ -101,6 +113,13 @@ class Guard:
     done: bool = False
 
 
+class EarlyEnd(enum.StrEnum):
+    """What ends a motion before its goal."""
+
+    HALTED = "halted"  # HALT in an action of it, or another MOVE
+    BRAKED = "braked"  # an error, or the end of the program
+
+
 @attrs.define
 class Motion:
     """A MOVE under way.
@@ -110,8 +129,9 @@ class Motion:
         moved: the frame that shall come to the goal; the arm itself or what hangs on it.
         tip: (4, 4) that frame seen from the hand.
         span: the statement.
+        goal: the frame to come to, or the expression of it.
+        implied: whether what is moved hangs on the arm only since this MOVE.
         text: what the trace says of it.
-        data: further facts for the trace.
         stages: what is still to do after the present stage, with the names of where they lead.
         speed: as asked for.
         depth: how many activations its process had when it began; those after them belong to its actions.
@@ -125,14 +145,16 @@ class Motion:
         alarm: when the arm presses deeper than the cell allows [ticks], if it goes on as it does; None if it does not.
         touch: the trajectory of a stage that comes into contact, and when on it [s]; None before.
         pressed: the deepest contact so far.
+        ended: what ended it before its goal; None where nothing did.
     """
 
     arm: str
     moved: str
     tip: Array
     span: Span
+    goal: str
+    implied: bool
     text: str
-    data: dict[str, object]
     stages: list[tuple[Stage, tuple[str, ...]]]
     speed: float
     depth: int
@@ -146,6 +168,27 @@ class Motion:
     alarm: int | None = None
     touch: tuple[Trajectory, float] | None = None
     pressed: Press = attrs.field(factory=lambda: Press(0.0, 0.0))
+    ended: "EarlyEnd | None" = None
+
+    @property
+    def trace(self) -> str:
+        """What the trace says of it, with what ended it early."""
+        return self.text if self.ended is None else f"{self.text}; {self.ended}"
+
+    @property
+    def data(self) -> dict[str, object]:
+        """Further facts for the events."""
+        facts: dict[str, object] = {
+            "moved": self.moved,
+            "goal": self.goal,
+            "speed": self.speed,
+            "implied_affix": self.implied,
+        }
+        return facts if self.ended is None else {**facts, self.ended.value: True}
+
+    def copy(self) -> "Motion":
+        """Return a copy; what never changes is shared."""
+        return attrs.evolve(self, stages=list(self.stages), guards=[attrs.evolve(guard) for guard in self.guards])
 
 
 @attrs.frozen
@@ -248,6 +291,20 @@ class Process:
         if motion is None or any(one.kind == "action" for one in self.stack[motion.depth :]):
             return None
         return motion
+
+    def copy(self, shared: Callable[[dict[str, Any]], dict[str, Any]]) -> "Process":
+        """Return a copy that still has the parent and the branches of this one.
+
+        Args:
+            shared: copies names, and the same names once.
+        """
+        return attrs.evolve(
+            self,
+            stack=[activation.copy(shared) for activation in self.stack],
+            motion=None if self.motion is None else self.motion.copy(),
+            locks=list(self.locks),
+            branches=list(self.branches),
+        )
 
     def descends_from(self, other: "Process") -> bool:
         """Whether another process began this one, directly or through others, or is this one."""

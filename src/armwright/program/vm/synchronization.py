@@ -8,50 +8,50 @@ from armwright.program.vm.process import Process, Waiting
 from armwright.program.vm.recording import EffectKind
 
 
-def signal(run: Machine, process: Process, step: Instruction) -> None:
+def signal(machine: Machine, process: Process, step: Instruction) -> None:
     """Raise an event, and let those go on that wait for it."""
-    name = run.name(process, step.operands[0])
-    run.events[name] = run.events.get(name, 0) + 1
-    for other in run.processes:
+    name = machine.name(process, step.operands[0])
+    machine.state.events[name] = machine.state.events.get(name, 0) + 1
+    for other in machine.state.processes:
         if other.waiting and other.waiting.what == "event" and name in other.waiting.names:
-            other.waiting, other.wake = None, run.ticks
-    run.effect(process, "SIGNAL", f"SIGNAL {run.spelled(name)}", step.span, data={"event": name})
+            other.waiting, other.wake = None, machine.state.ticks
+    machine.effect(process, "SIGNAL", f"SIGNAL {machine.spelled(name)}", step.span, data={"event": name})
 
 
-def wait(run: Machine, process: Process, step: Instruction) -> None:
+def wait(machine: Machine, process: Process, step: Instruction) -> None:
     """Take an event, or wait until there is one."""
-    name = run.name(process, step.operands[0])
-    waiting = process.unmet or Waiting("event", (name,), step.span, run.starts())
-    if run.events.get(name, 0) == 0:
+    name = machine.name(process, step.operands[0])
+    waiting = process.unmet or Waiting("event", (name,), step.span, machine.starts())
+    if machine.state.events.get(name, 0) == 0:
         _hold(process, waiting)
         return
-    run.events[name] -= 1
-    _told(run, process, waiting)
+    machine.state.events[name] -= 1
+    _told(machine, process, waiting)
 
 
-def lock(run: Machine, process: Process, step: Instruction) -> None:
+def lock(machine: Machine, process: Process, step: Instruction) -> None:
     """Take the locks of several variables together, or wait until all of them can be had."""
-    names = sorted({run.name(process, operand) for operand in step.operands})
-    waiting = process.unmet or Waiting("locks", tuple(names), step.span, run.starts())
-    if any(_locked_by(run, name) - {process} for name in names):
+    names = sorted({machine.name(process, operand) for operand in step.operands})
+    waiting = process.unmet or Waiting("locks", tuple(names), step.span, machine.starts())
+    if any(_locked_by(machine, name) - {process} for name in names):
         _hold(process, waiting)
         return
     for name in names:
-        run.locks[name] = process
+        machine.state.locks[name] = process
     process.locks += names
-    _told(run, process, waiting)
+    _told(machine, process, waiting)
 
 
-def unlock(run: Machine, process: Process, step: Instruction) -> None:
+def unlock(machine: Machine, process: Process, step: Instruction) -> None:
     """Give locks back."""
-    names = {run.name(process, operand) for operand in step.operands}
-    release(run, process, len(process.locks) - len(names))
+    names = {machine.name(process, operand) for operand in step.operands}
+    release(machine, process, len(process.locks) - len(names))
 
 
-def give_up(run: Machine, process: Process) -> None:
+def give_up(machine: Machine, process: Process) -> None:
     """Take note of an event or a lock that a process has waited for in vain, when it is ended."""
     if process.unmet is not None:
-        _told(run, process, process.unmet, in_vain=True)
+        _told(machine, process, process.unmet, in_vain=True)
     process.waiting = None
 
 
@@ -61,45 +61,42 @@ def _hold(process: Process, waiting: Waiting) -> None:
     process.waiting = process.unmet = waiting
 
 
-def _told(run: Machine, process: Process, waiting: Waiting, *, in_vain: bool = False) -> None:
+def _told(machine: Machine, process: Process, waiting: Waiting, *, in_vain: bool = False) -> None:
     """Record what a process has waited for, from the time at which it began to wait."""
     names = waiting.names
     is_event = waiting.what == "event"
     kind: EffectKind = "WAIT" if is_event else "LOCK"
-    text = f"{kind} {', '.join(map(run.spelled, names))}{', in vain' if in_vain else ''}"
+    text = f"{kind} {', '.join(map(machine.spelled, names))}{', in vain' if in_vain else ''}"
     data: dict[str, object] = {"event": names[0]} if is_event else {"variables": list(names)}
     if in_vain:
         data["in_vain"] = True
-    run.effect(process, kind, text, waiting.span, since=waiting.since, data=data)
+    machine.effect(process, kind, text, waiting.span, since=waiting.since, data=data)
     process.unmet = None
 
 
-def _locked_by(run: Machine, name: str) -> set[Process]:
+def _locked_by(machine: Machine, name: str) -> set[Process]:
     """Return the processes that hold a variable; a whole array and its elements keep one another waiting."""
     array, bracket, _ = name.partition("[")
     return {
         holder
-        for held, holder in run.locks.items()
+        for held, holder in machine.state.locks.items()
         if held == name or (bracket and held == array) or (not bracket and held.startswith(f"{name}["))
     }
 
 
-def deadlock(run: Machine) -> RunError:
+def deadlock(machine: Machine) -> RunError:
     """Return the error of processes that all wait for one another."""
-    stuck = [one for one in run.processes if one.waiting and one.waiting.what != "branches"]
+    stuck = [one for one in machine.state.processes if one.waiting and one.waiting.what != "branches"]
     stuck.sort(key=lambda one: one.path)
     says = []
     for one in stuck:
         assert one.waiting is not None  # noqa: S101 - chosen so
-        names = ", ".join(map(run.spelled, one.waiting.names))
+        names = ", ".join(map(machine.spelled, one.waiting.names))
         what = f"waits for {names}" if one.waiting.what == "event" else f"waits for the lock of {names}"
         locks = one.waiting.what == "locks"
-        holders = {holder for name in one.waiting.names if locks for holder in _locked_by(run, name)} - {one}
+        holders = {holder for name in one.waiting.names if locks for holder in _locked_by(machine, name)} - {one}
         held = ", ".join(holder.title for holder in sorted(holders, key=lambda holder: holder.path))
         says.append((one.waiting.span, f"{one.title} {what}{f', held by {held}' if held else ''}"))
     (span, label), *others = says
     text = f"{len(says)} processes wait for ever" if others else "the program waits for ever"
-    try:
-        run.fail(stuck[0], "E501", text, span, label, secondary=[Label(*other) for other in others])
-    except RunError as error:
-        return error
+    return machine.error(stuck[0], "E501", text, span, label, secondary=[Label(*other) for other in others])

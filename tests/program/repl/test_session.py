@@ -44,18 +44,25 @@ def codes(answer: Answer) -> list[str]:
 def places(machine: Machine) -> dict[str, list[float] | None]:
     """Return where everything is."""
     return {
-        name: machine.tree.world(name).ravel().tolist() if machine.has_place(name) else None for name in machine.tree
+        name: machine.state.tree.world(name).ravel().tolist() if machine.has_place(name) else None
+        for name in machine.state.tree
     }
 
 
 def everything(talk: Session) -> tuple[object, ...]:
     """Return all that an error or an undo has to bring back, as plain data."""
     machine = talk.state.machine
-    postures = {name: machine.hardware.posture(name, machine.now).tolist() for name in machine.hands}
-    parents = {name: machine.tree.parent(name) for name in machine.tree}
-    values = {name: np.asarray(value).tolist() for name, value in machine.values.items()}
-    hands = {name: (hand.at, hand.holds) for name, hand in machine.hands.items()}
-    rest = (dict(machine.events), machine.now, machine.hardware.running(), len(machine.effects), len(machine.trees))
+    postures = {name: machine.hardware.posture(name, machine.now).tolist() for name in machine.state.hands}
+    parents = {name: machine.state.tree.parent(name) for name in machine.state.tree}
+    values = {name: np.asarray(value).tolist() for name, value in machine.state.values.items()}
+    hands = {name: (hand.at, hand.holds) for name, hand in machine.state.hands.items()}
+    rest = (
+        dict(machine.state.events),
+        machine.now,
+        machine.hardware.running(),
+        len(machine.state.effects),
+        len(machine.state.trees),
+    )
     return places(machine), parents, postures, values, hands, *rest, talk.program()
 
 
@@ -111,7 +118,7 @@ def test_an_arm_stands_where_the_last_statement_left_it() -> None:
     assert first.trace == ("ARM_1 MOVE: PTP a @100",)
     assert second.trace == ("ARM_1 MOVE: LINE b @100",)
     assert second.effects[0].t0 == then
-    np.testing.assert_allclose(talk.state.machine.tree.world("ARM_1"), down(0.5, -0.1, 0.15), atol=EXACT)
+    np.testing.assert_allclose(talk.state.machine.state.tree.world("ARM_1"), down(0.5, -0.1, 0.15), atol=EXACT)
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
@@ -143,7 +150,7 @@ def test_programs_do_what_they_do(name: str, *, line_by_line: bool) -> None:
     assert machine.now == pytest.approx(recording.duration, abs=1e-9)
     for frame in recording.tree:
         if recording.tree.has_value(frame):
-            np.testing.assert_allclose(machine.tree.world(frame), recording.tree.world(frame), atol=EXACT)
+            np.testing.assert_allclose(machine.state.tree.world(frame), recording.tree.world(frame), atol=EXACT)
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
@@ -176,7 +183,7 @@ def test_branches_side_by_side() -> None:
     answer = talk.load(Source("p08", corpus_text("p08")))
 
     assert not answer.is_wrong
-    np.testing.assert_allclose(talk.state.machine.tree.world("PART"), down(0.70, -0.20, 0.05), atol=EXACT)
+    np.testing.assert_allclose(talk.state.machine.state.tree.world("PART"), down(0.70, -0.20, 0.05), atol=EXACT)
     assert talk.enter("OPEN ARM_2").trace == ("ARM_2 OPEN",)
 
 
@@ -452,14 +459,14 @@ def test_undo_and_redo() -> None:
 def test_the_camera_gives_its_answers_again() -> None:
     """After an undo the camera sees what it saw the first time."""
     talk = session("VAR part : FRAME", "READ VISIONS (part)", cell=_seeing())
-    first = talk.state.machine.tree.world("PART")
+    first = talk.state.machine.state.tree.world("PART")
     talk.enter("READ VISIONS (part)")
-    second = talk.state.machine.tree.world("PART")
+    second = talk.state.machine.state.tree.world("PART")
 
     talk.undo(2)
     talk.enter("READ VISIONS (part)")
 
-    np.testing.assert_array_equal(talk.state.machine.tree.world("PART"), first)
+    np.testing.assert_array_equal(talk.state.machine.state.tree.world("PART"), first)
     assert not np.allclose(first, second)
 
 
@@ -488,7 +495,7 @@ def test_a_name_declared_anew() -> None:
     assert answer.remarks == ("`f` is declared anew; what it was before is now called `f_1`",)
     assert talk.enter("f").printed == ("3",)
     assert talk.enter("DIST(f_1, part)").printed == ("0",)
-    assert talk.state.machine.tree.parent("PART") == "F_1"
+    assert talk.state.machine.state.tree.parent("PART") == "F_1"
     assert "AFFIX part TO f_1 ;" in talk.program()
     cell = cell_of("cell1")
     recording = interpret(code_of(talk.program(), cell), cell, Simulator(cell))
@@ -500,7 +507,7 @@ def test_an_unused_name_declared_anew() -> None:
     talk = session("VAR f, g : FRAME", "VAR f : SCALAR", "f = 1")
 
     assert "VAR g : FRAME ;\n    f : SCALAR ;" in talk.program()
-    assert "F" not in talk.state.machine.tree
+    assert "F" not in talk.state.machine.state.tree
 
 
 def test_a_procedure_declared_anew() -> None:

@@ -58,7 +58,7 @@ def scope(debugger: Debugger, name: str, path: tuple[int, ...] = (), level: int 
 
 
 def printed(debugger: Debugger) -> list[str]:
-    return [str(one.data["printed"]) for one in debugger.machine.effects if one.kind == "PRINT"]
+    return [str(one.data["printed"]) for one in debugger.machine.state.effects if one.kind == "PRINT"]
 
 
 # ---- steps ---------------------------------------------------------------------------------------------------------
@@ -69,7 +69,7 @@ def test_next_goes_over_calls() -> None:
     debugger = load(CALLS)
 
     assert lines(debugger, "next", 4) == [11, 12, 13, 14]
-    np.testing.assert_allclose(debugger.view.tree.world("A")[:3, 3], (0, 0, 2), atol=ROUNDING)
+    np.testing.assert_allclose(debugger.view.state.tree.world("A")[:3, 3], (0, 0, 2), atol=ROUNDING)
 
 
 def test_in_goes_into_calls_and_out_comes_back() -> None:
@@ -136,7 +136,7 @@ def test_ticks_show_the_arm_on_its_way() -> None:
     debugger = load(corpus_text("p02"))
     lines(debugger, "next", 6)
     debugger.run("stage")
-    before = debugger.machine.tree.world("ARM_1")
+    before = debugger.machine.state.tree.world("ARM_1")
     debugger.run("stage")
     begun = debugger.time
     for count in range(1, 4):
@@ -147,8 +147,10 @@ def test_ticks_show_the_arm_on_its_way() -> None:
 
     from armwright.kinematics.forward import forward
 
-    np.testing.assert_allclose(debugger.view.tree.world("ARM_1"), cell.base @ forward(cell.arm, posture), atol=ROUNDING)
-    np.testing.assert_array_equal(debugger.machine.tree.world("ARM_1"), before)
+    np.testing.assert_allclose(
+        debugger.view.state.tree.world("ARM_1"), cell.base @ forward(cell.arm, posture), atol=ROUNDING
+    )
+    np.testing.assert_array_equal(debugger.machine.state.tree.world("ARM_1"), before)
     assert line(debugger) == 11
 
 
@@ -159,7 +161,7 @@ def test_what_hangs_on_an_arm_is_shown_moving() -> None:
     debugger.run("stage")
     for _ in range(200):
         debugger.run("tick")
-    tree = debugger.view.tree
+    tree = debugger.view.state.tree
 
     assert np.linalg.norm(tree.world("APF1")[:3, 3] - down(0.40, 0.15, 0.15)[:3, 3]) > 1e-3
     np.testing.assert_allclose(tree.world("APF1")[:3, 3] - tree.world("ARM_1")[:3, 3], (0, 0, 0.1), atol=1e-6)
@@ -209,10 +211,10 @@ def test_tick_back() -> None:
     places = []
     for _ in range(4):
         debugger.run("tick")
-        places.append(debugger.view.tree.world("ARM_1"))
+        places.append(debugger.view.state.tree.world("ARM_1"))
     for expected in places[-2::-1]:
         debugger.run("tick back")
-        np.testing.assert_array_equal(debugger.view.tree.world("ARM_1"), expected)
+        np.testing.assert_array_equal(debugger.view.state.tree.world("ARM_1"), expected)
 
 
 def test_reverse_finds_the_last_breakpoint() -> None:
@@ -353,9 +355,9 @@ def test_watched_frame_on_an_arm() -> None:
 
     assert stop.text == "apf1 begins to move with ARM_1"
     assert line(debugger) == 14
-    motion = debugger.machine.program.motion
+    motion = debugger.machine.state.program.motion
     assert motion is not None
-    assert 1 <= debugger.view.ticks - motion.begun.tick < 20
+    assert 1 <= debugger.view.state.ticks - motion.begun.tick < 20
     assert debugger.run("continue").reason == "end"
 
 
@@ -522,8 +524,8 @@ def test_an_error_on_the_way() -> None:
     assert stop.path == (0,)
     assert debugger.time == pytest.approx(0.3)
     assert line(debugger, (1,)) == 10
-    hand = debugger.view.tree.world("ARM_2")[:3, 3]
-    assert np.linalg.norm(hand - debugger.machine.tree.world("ARM_2")[:3, 3]) > 1e-3
+    hand = debugger.view.state.tree.world("ARM_2")[:3, 3]
+    assert np.linalg.norm(hand - debugger.machine.state.tree.world("ARM_2")[:3, 3]) > 1e-3
 
 
 # ---- looking and changing ------------------------------------------------------------------------------------------
@@ -660,7 +662,7 @@ def test_another_place() -> None:
     debugger.assign("OBJ2", "(1,0,0, 0,-1,0, 0,0,-1, 0.5,0.1,0.1)")
     debugger.run("continue")
 
-    np.testing.assert_allclose(debugger.machine.tree.world("ARM_1"), down(0.5, 0.1, 0.1), atol=1e-6)
+    np.testing.assert_allclose(debugger.machine.state.tree.world("ARM_1"), down(0.5, 0.1, 0.1), atol=1e-6)
 
 
 def test_values_that_cannot_be_given() -> None:

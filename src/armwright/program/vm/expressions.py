@@ -1,0 +1,81 @@
+"""Values of expressions: constants, operations, elements of arrays, measured forces."""
+
+from collections.abc import Mapping, Sequence
+
+from armwright.program.bytecode.instructions import Constant, Instruction, JumpTarget, Op
+from armwright.program.vm.machine import Handler, Machine
+from armwright.program.vm.operators import IN_UNITS, PLAIN, ValueFault
+from armwright.program.vm.process import Element, Process
+
+_AXES = {"X": 0, "Y": 1, "Z": 2}
+# An index this near to a whole number is that number.
+_WHOLE = 1e-9
+
+
+def _load(machine: Machine, process: Process, step: Instruction) -> None:
+    constant = step.operands[1]
+    assert isinstance(constant, Constant)  # noqa: S101 - the translator gives one
+    machine.write(process, step.operands[0], machine.constants[constant.index], step)
+
+
+def _copy(machine: Machine, process: Process, step: Instruction) -> None:
+    machine.write(process, step.operands[0], machine.read(process, step.operands[1], step), step)
+
+
+def _compute(machine: Machine, process: Process, step: Instruction) -> None:
+    given = [machine.read(process, operand, step) for operand in step.operands[1:]]
+    try:
+        value = PLAIN[step.op](*given) if step.op in PLAIN else IN_UNITS[step.op](*given, machine.code.units)
+    except ValueFault as fault:
+        raise machine.error(process, fault.code, fault.message, step.span, fault.label) from None
+    machine.write(process, step.operands[0], value, step)
+
+
+def _element(machine: Machine, process: Process, step: Instruction) -> None:
+    """Find an element; a value in passing becomes it, not what it holds."""
+    array = machine.name(process, step.operands[1])
+    sizes = machine.state.types[array].sizes
+    indices = []
+    for number, (operand, size) in enumerate(zip(step.operands[2:], sizes, strict=True), 1):
+        value = machine.number(process, operand, step)
+        index = round(value)
+        if abs(value - index) > _WHOLE or not 1 <= index <= size:
+            which = f"index {number}" if len(sizes) > 1 else "the index"
+            text = f"{which} of `{machine.spelled(array)}` is {value:g}, not a whole number from 1 to {size}"
+            raise machine.error(process, "E222", text, step.span, "no such element")
+        indices.append(index)
+    to = step.operands[0]
+    assert isinstance(to, str)  # noqa: S101 - the translator gives a value in passing
+    process.now.passing[to] = Element(f"{array}[{','.join(map(str, indices))}]")
+    process.now.wrote[to] = step.span
+
+
+def _force(machine: Machine, process: Process, step: Instruction) -> None:
+    arm = process.motion.arm if process.motion else process.last_arm
+    value = 0.0
+    if arm is not None:
+        value = float(machine.hardware.force(arm, machine.now)[_AXES[str(step.operands[1])]])
+    machine.write(process, step.operands[0], value, step)
+
+
+HANDLERS: Mapping[Op, Handler] = {
+    Op.LOADM: _load,
+    Op.LOADS: _load,
+    Op.COPY: _copy,
+    **dict.fromkeys((*PLAIN, *IN_UNITS), _compute),
+    Op.ELEM: _element,
+    Op.FORCE: _force,
+}
+
+
+def evaluate_instructions(machine: Machine, process: Process, steps: Sequence[Instruction], at: int = 0) -> None:
+    """Do instructions that only give values, up to RET or the last: those of a condition or an expression."""
+    while at < len(steps) and (step := steps[at]).op is not Op.RET:
+        at += 1
+        if step.op is Op.JZ:
+            # AND and OR jump forwards; nothing else in an expression jumps.
+            target = step.operands[1]
+            assert isinstance(target, JumpTarget)  # noqa: S101 - the translator lands them
+            at = at if machine.read(process, step.operands[0], step) else target.index
+        else:
+            HANDLERS[step.op](machine, process, step)

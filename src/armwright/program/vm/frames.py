@@ -1,0 +1,70 @@
+"""AFFIX and UNFIX."""
+
+from collections.abc import Mapping
+
+from armwright.cell.frames import WORLD
+from armwright.program.bytecode.instructions import Instruction, Op
+from armwright.program.language.diagnostic import Label
+from armwright.program.language.names import is_arm
+from armwright.program.vm.machine import Handler, Machine
+from armwright.program.vm.process import Process
+
+
+def _affix(machine: Machine, process: Process, step: Instruction) -> None:
+    operands = [operand for operand in step.operands if operand != "RIGIDLY"]
+    rigid = len(operands) < len(step.operands)
+    child, parent = machine.name(process, operands[0]), machine.name(process, operands[1])
+    spelled = machine.spelled
+    if is_arm(child) or child == WORLD:
+        text = "an arm cannot be affixed to a frame" if is_arm(child) else f"`{WORLD}` cannot be affixed"
+        raise machine.error(process, "E308" if is_arm(child) else "E309", text, step.span, "cannot hang on anything")
+    if is_arm(parent):
+        process.last_arm = parent
+    step_X = machine.pose(process, operands[2], step) if step.op is Op.AFFAT else None
+    machine.held(parent, step, process)
+    if step_X is None:
+        machine.held(child, step, process)
+    if machine.state.tree.would_ring(child, parent):
+        note = "frames form a tree; each hangs on one other and in the end on WORLD"
+        label = f"{spelled(child)} cannot hang on {'itself' if child == parent else spelled(parent)}"
+        chain = [
+            one
+            for one in (parent, *machine.state.tree.ancestors(parent))
+            if one != child and one in machine.state.written
+        ]
+        hung = [Label(machine.state.written[one], f"{spelled(one)} got its place here") for one in chain[:3]]
+        raise machine.error(
+            process, "E305", "this AFFIX would close a ring", step.span, label, secondary=hung, notes=[note]
+        )
+    machine.grow(machine.state.tree.affix(child, parent, step_X, rigid=rigid), child, step.span)
+    machine.effect(
+        process,
+        "AFFIX",
+        f"AFFIX {spelled(child)} -> {spelled(parent)}",
+        step.span,
+        data={"child": child, "parent": parent, "rigidly": rigid},
+    )
+
+
+def _unfix(machine: Machine, process: Process, step: Instruction) -> None:
+    child = machine.name(process, step.operands[0])
+    spelled = machine.spelled
+    if is_arm(child) or child == WORLD:
+        text = f"`{spelled(child)}` cannot be unfixed"
+        raise machine.error(
+            process, "E308" if is_arm(child) else "E309", text, step.span, "hangs on nothing that could be cut"
+        )
+    machine.held(child, step, process)
+    above = machine.state.tree.parent(child)
+    if len(step.operands) > 1 and (parent := machine.name(process, step.operands[1])) != above:
+        hangs = above is not None and above != WORLD
+        instead = f"write `UNFIX {spelled(child)} FROM {spelled(above or WORLD)}`" if hangs else "leave this UNFIX out"
+        text = f"`{spelled(child)}` is not affixed to `{spelled(parent)}`"
+        label = f"hangs on {spelled(above or WORLD)}"
+        where = [Label(machine.state.written[child], "here it got its place")] if child in machine.state.written else []
+        raise machine.error(process, "E306", text, step.span, label, secondary=where, helps=[instead])
+    machine.grow(machine.state.tree.unfix(child), child, step.span)
+    machine.effect(process, "UNFIX", f"UNFIX {spelled(child)}", step.span, data={"child": child, "parent": above})
+
+
+HANDLERS: Mapping[Op, Handler] = {Op.AFFIX: _affix, Op.AFFAT: _affix, Op.UNFIX: _unfix}
