@@ -83,7 +83,7 @@ def of_shape(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float
     return array
 
 
-def exactly(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float = _ANY) -> Array:
+def exact_shape(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float = _ANY) -> Array:
     """Return a read-only float64 copy of ``value``, which must have ``shape``; see ``floats``.
 
     Raises:
@@ -154,12 +154,12 @@ def one_core() -> AbstractContextManager[Any]:
     return limits
 
 
-def content(array: Array) -> tuple[tuple[int, ...], bytes]:
+def array_key(array: Array) -> tuple[tuple[int, ...], bytes]:
     """Return what arrays have in common when they are equal: fields are compared and hashed by it."""
     return array.shape, (array + 0.0).tobytes()  # -0.0 + 0.0 is 0.0
 
 
-def by_fields(value: Any) -> tuple[Callable[..., Any], tuple[type, Mapping[str, Any]]]:
+def reduce_by_fields(value: Any) -> tuple[Callable[..., Any], tuple[type, Mapping[str, Any]]]:
     """Take a value of an attrs class apart for ``copy`` and ``pickle``: its ``__reduce__``.
 
     NumPy makes every copy of a read-only array writable. Built anew from its fields, a value has its arrays read-only.

@@ -5,7 +5,7 @@ import numpy as np
 
 from armwright.accuracy.cycles import LOADS, checked_cycles, checked_parts
 from armwright.accuracy.trace import frozen_array, place_of, places_of
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 
@@ -29,7 +29,7 @@ class StaticCompliance:
     deflections: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def static_compliance(

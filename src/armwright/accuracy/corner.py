@@ -8,7 +8,7 @@ import numpy as np
 from armwright.accuracy.cycles import checked_cycles
 from armwright.accuracy.planes import Legs, legs_of
 from armwright.accuracy.trace import Trace, frozen_array, one_size
-from armwright.arrays import Array, by_fields, number
+from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # Of a leg that ends in another corner, so much belongs to the corner it comes from.
@@ -39,7 +39,7 @@ class CornerDeviation:
     place: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def corner_deviations(

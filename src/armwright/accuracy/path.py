@@ -9,7 +9,7 @@ from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma
 from armwright.accuracy.cycles import Kind, checked_cycles
 from armwright.accuracy.planes import ENDS, Legs, legs_of, middles, passages
 from armwright.accuracy.trace import Trace, frozen_array, one_size
-from armwright.arrays import Array, by_fields, number
+from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 # Planes across a path, and stretches over which speeds are taken.
@@ -48,7 +48,7 @@ class PathDeviation:
     mean_places: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -71,7 +71,7 @@ class PathVelocity:
     speeds: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def path_deviation(

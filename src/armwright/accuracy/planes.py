@@ -12,7 +12,7 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.trace import Trace, frozen_array, turned
-from armwright.arrays import Array, by_fields
+from armwright.arrays import Array, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # Where two legs meet at a larger turn than this [rad], there is a corner, and the planes do not turn gradually.
@@ -47,7 +47,7 @@ class Planes:
     angles: Array = attrs.field(converter=frozen_array)
     length: float
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
 from armwright.accuracy.cycles import Kind, checked_cycles
 from armwright.accuracy.trace import angles_of, frozen_array, place_of, places_of
-from armwright.arrays import Array, ArrayLike, by_fields, floats
+from armwright.arrays import Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import ShapeError
 
 
@@ -28,7 +28,7 @@ class PoseAccuracy:
     barycentre: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -51,7 +51,7 @@ class PoseRepeatability:
     barycentre: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def pose_accuracy(

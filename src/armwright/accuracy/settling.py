@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.accuracy.cycles import Kind, checked_cycles
 from armwright.accuracy.trace import Trace, frozen_array, one_size
-from armwright.arrays import Array, by_fields, number
+from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # The attained pose is the mean over this last part of a record, in which nothing may happen any more.
@@ -40,7 +40,7 @@ class Settling:
     band: float
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -61,7 +61,7 @@ class PosingTime:
     band: float
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def settling(runs: Sequence[Trace], band: float, *, few: bool = False) -> Settling:

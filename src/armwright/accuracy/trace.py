@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, read_only
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 # Three angles have names; a measurement may hold fewer.
@@ -118,7 +118,7 @@ class Trace:
             raise ShapeError(f"trace: {rows} places but {len(self.times)} times")
         angles_of(self.angles, rows, "trace: angles")
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     @property
     def size(self) -> int:

@@ -10,7 +10,7 @@ from armwright.accuracy.angles import mean_angles, wrapped
 from armwright.accuracy.cycles import DIRECTIONS, ROBOTS, Kind, checked_cycles, checked_parts
 from armwright.accuracy.pose import from_commanded, repeatability
 from armwright.accuracy.trace import angles_of, frozen_array, one_size, place_of, places_of
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 
@@ -32,7 +32,7 @@ class Variation:
     barycentres: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -59,7 +59,7 @@ class PoseDrift:
     repeatability: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def multidirectional_variation(

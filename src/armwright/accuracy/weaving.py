@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.accuracy.cycles import checked_cycles
 from armwright.accuracy.trace import Trace, frozen_array, one_size
-from armwright.arrays import Array, by_fields, number
+from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError
 
 # A swing turns round where it has come back by this part of the whole width: more than from the middle to a side.
@@ -36,7 +36,7 @@ class WeavingDeviation:
     frequencies: Array = attrs.field(converter=frozen_array)
     cycles: int
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, few: bool = False) -> WeavingDeviation:

@@ -18,7 +18,7 @@ import numpy as np
 
 from armwright.arm.tensors import ROUNDING, impossible_moments
 from armwright.arm.uncertainty import Uncertainty
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, content, exactly, number, read_only
+from armwright.arrays import LARGEST, Array, ArrayLike, array_key, exact_shape, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, counted, shown
 from armwright.spatial.poses import one_pose
 
@@ -35,11 +35,11 @@ UPRIGHT_GRAVITY = read_only(np.array((0.0, 0.0, -STANDARD_GRAVITY)))
 
 
 def _com(value: ArrayLike) -> Array:
-    return exactly(value, (3,), "com", LARGEST)
+    return exact_shape(value, (3,), "com", LARGEST)
 
 
 def _gravity(value: ArrayLike) -> Array:
-    return exactly(value, (3,), "gravity", LARGEST)
+    return exact_shape(value, (3,), "gravity", LARGEST)
 
 
 def _base(value: ArrayLike) -> Array:
@@ -55,11 +55,11 @@ def _fixed(value: ArrayLike | None) -> Array | None:
 
 
 def _content(value: Array | None) -> object:
-    return None if value is None else content(value)
+    return None if value is None else array_key(value)
 
 
 def _inertia(value: ArrayLike) -> Array:
-    tensor = exactly(value, (3, 3), "inertia", LARGEST)
+    tensor = exact_shape(value, (3, 3), "inertia", LARGEST)
     if not np.allclose(tensor, tensor.T, rtol=0, atol=ROUNDING * max(1.0, np.abs(tensor).max())):
         raise InvalidValueError(f"inertia: expected a symmetric tensor, got {tensor.tolist()}")
     return read_only((tensor + tensor.T) / 2)  # to the last bit, so that six numbers tell it
@@ -156,7 +156,7 @@ class Joint:
     limits: Limits = Limits()
     name: str = ""
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse a kind of joint that there is not, and geometry that is no number."""
@@ -223,13 +223,13 @@ class Link:
     """
 
     mass: float = 0.0
-    com: Array = attrs.field(factory=lambda: np.zeros(3), converter=_com, eq=content)
-    inertia: Array = attrs.field(factory=lambda: np.zeros((3, 3)), converter=_inertia, eq=content)
+    com: Array = attrs.field(factory=lambda: np.zeros(3), converter=_com, eq=array_key)
+    inertia: Array = attrs.field(factory=lambda: np.zeros((3, 3)), converter=_inertia, eq=array_key)
     complete: bool = attrs.field(default=True, eq=False)
     unknown: str = ""
     name: str = ""
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse a negative mass, and a tensor that no body has."""
@@ -327,9 +327,9 @@ class Arm:
         converter=_motors,
         validator=_same_length,
     )
-    base: Array = attrs.field(factory=lambda: np.eye(4), converter=_base, eq=content)
-    tool: Array = attrs.field(factory=lambda: np.eye(4), converter=_tool, eq=content)
-    gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_gravity, eq=content)
+    base: Array = attrs.field(factory=lambda: np.eye(4), converter=_base, eq=array_key)
+    tool: Array = attrs.field(factory=lambda: np.eye(4), converter=_tool, eq=array_key)
+    gravity: Array = attrs.field(factory=lambda: UPRIGHT_GRAVITY, converter=_gravity, eq=array_key)
     gravity_from: GravityFrom = attrs.field(default="standard", eq=False)
     reach: float = math.inf
     tool_speed: float = math.inf
@@ -338,7 +338,7 @@ class Arm:
     source: str = ""
     uncertainty: Uncertainty | None = None
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse an arm without joints, and a hand that goes nowhere."""

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, by_fields, content, floats, number, read_only
+from armwright.arrays import Array, ArrayLike, array_key, floats, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 # Covariances are written and read to the last bit; this part of the largest is rounding.
@@ -34,10 +34,10 @@ class Uncertainty:
     """
 
     errors: tuple[str, ...] = attrs.field(converter=_names)
-    covariance: Array = attrs.field(converter=_covariance, eq=content)
+    covariance: Array = attrs.field(converter=_covariance, eq=array_key)
     noise: float
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse what is no covariance of these errors."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.arm.gravity import in_world
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
-from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import ShapeError
 from armwright.kinematics.forward import forward
@@ -27,7 +27,7 @@ def _posture(value: ArrayLike) -> Array:
 
 
 def _gravity(value: ArrayLike) -> Array:
-    return exactly(value, (3,), "gravity", LARGEST)
+    return exact_shape(value, (3,), "gravity", LARGEST)
 
 
 def base_name(arm: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats
 from armwright.clearance.five_bar_parts import parts_of
 from armwright.clearance.linkage import Linkage, not_negative
 from armwright.clearance.placement import Vec2
@@ -41,14 +41,14 @@ _ROUNDING, _STRAIGHT = 1e-12, 1e-7
 
 
 def _lengths(value: ArrayLike) -> Array:
-    lengths = exactly(value, (2,), "lengths", LARGEST)
+    lengths = exact_shape(value, (2,), "lengths", LARGEST)
     for length in lengths:
         not_negative(length, "length of a link", zero=False)
     return lengths
 
 
 def _motors(value: ArrayLike) -> Array:
-    return exactly(value, (2, 2), "motors", LARGEST)
+    return exact_shape(value, (2, 2), "motors", LARGEST)
 
 
 @attrs.frozen(kw_only=True, eq=False)

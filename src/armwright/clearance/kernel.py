@@ -12,7 +12,7 @@ import attrs
 from armwright.clearance import event_location
 from armwright.clearance.equations import WORKS, Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.linkage import Linkage
-from armwright.tracing.emit import LANES, head, stretch
+from armwright.tracing.emit import LANES, head, kernel_body
 from armwright.tracing.scalar import Scalar
 
 Integrator: TypeAlias = Literal["rk4", "semi-implicit"]
@@ -208,7 +208,7 @@ class Layout:
 def emit_simulation(layout: Layout, integrator: Integrator) -> str:
     """Write the source of a simulation."""
     places = _places(layout)
-    body = stretch(layout.rates, places["inputs"])
+    body = kernel_body(layout.rates, places["inputs"])
     sizes = {**places, "lanes": LANES, "stages": 4 if integrator == "rk4" else 1}
     loop = f"for k in range({LANES}):\n" + textwrap.indent(body.lines, " " * 4)
     parts = {"functions": "", "arrays": "", "again": "", "body": textwrap.indent(loop, " " * 16)}

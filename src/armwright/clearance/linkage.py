@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 
 import attrs
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exactly, number
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, number
 from armwright.errors import InvalidValueError, UnknownNameError, one_of
 
 # The name of what stands still.
@@ -23,11 +23,11 @@ DriveKind: TypeAlias = Literal["effort", "motion"]
 
 
 def _pair(value: ArrayLike) -> Array:
-    return exactly(value, (2,), "point", LARGEST)
+    return exact_shape(value, (2,), "point", LARGEST)
 
 
 def _points(value: Mapping[str, ArrayLike]) -> dict[str, Array]:
-    return {name: exactly(point, (2,), f"point {name}", LARGEST) for name, point in value.items()}
+    return {name: exact_shape(point, (2,), f"point {name}", LARGEST) for name, point in value.items()}
 
 
 def _parts(value: Iterable[Any]) -> tuple[Any, ...]:

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 
 # The thesis' test paths: where they run [m], how fast [m/s], and how long they speed up [s].
@@ -43,7 +43,7 @@ PICK_AND_PLACE = "pick-and-place"
 
 
 def _nodes(value: ArrayLike) -> Array:
-    return exactly(value, (3, 2), "nodes", LARGEST)
+    return exact_shape(value, (3, 2), "nodes", LARGEST)
 
 
 @attrs.frozen(kw_only=True, eq=False)

@@ -65,7 +65,7 @@ def quantity_kernel(arm: Arm, name: str) -> Kernel:
     """
     emitted = emit_quantity(arm, name)
     plain, remark = _QUANTITIES[name].plain, partial(_ask_for_degrees, arm, emitted.inputs)
-    return Kernel(emitted=emitted, explain=partial(plain, arm), remark=remark)
+    return Kernel(emitted=emitted, raise_for_invalid=partial(plain, arm), remark=remark)
 
 
 def quantity_names() -> tuple[str, ...]:
@@ -132,7 +132,7 @@ def _pose(frame: tuple[Matrix, Vector]) -> Vector:
     return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
 
 
-def _nothing_to_explain(*_inputs: Any) -> None:
+def _always_valid(*_inputs: Any) -> None:
     """Raise nothing: the quantity has no conditions."""
 
 
@@ -151,7 +151,7 @@ class _Quantity(NamedTuple):
     inputs: Mapping[str, tuple[str | int, ...]]
     outputs: tuple[tuple[str | int, ...], ...]
     flags: tuple[int, ...] = ()
-    plain: Callable[..., object] = _nothing_to_explain
+    plain: Callable[..., object] = _always_valid
 
 
 def _size(arm: Arm, letter: str | int) -> int:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from armwright.arm.model import Arm, Joint, Motor
-from armwright.arrays import LARGEST, Array, ArrayLike, exactly
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, batch, stack_matrix
 from armwright.kinematics.forward import link_frames, link_transform, stack
 from armwright.tracing.scalar import Scalar, select
@@ -204,7 +204,7 @@ def inverse_dynamics(
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25).
     """
     lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
-    moved = exactly(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
+    moved = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
     efforts = newton_euler(arm, q_, qd_, qdd_, push, base_acceleration=moved)
     if drives:
         efforts = [
@@ -262,7 +262,7 @@ def link_forces(
         Luh, Walker & Paul (1980); TR-83-008 eq. (22)-(24).
     """
     lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
-    moved = exactly(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
+    moved = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
     found = joint_wrenches(arm, q_, qd_, qdd_, push, base_acceleration=moved)
     return LinkForces(
         stack_matrix([one.force for one in found], lead), stack_matrix([one.moment for one in found], lead)

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm, Link
-from armwright.arrays import Array, ArrayLike, by_fields, read_only
+from armwright.arrays import Array, ArrayLike, read_only, reduce_by_fields
 from armwright.dynamics.arguments import batch, stack_matrix
 from armwright.dynamics.lagrange_euler import (
     gravity_coefficients,
@@ -53,7 +53,7 @@ class Terms:
     load: Array = attrs.field(converter=read_only)
     outside: Array = attrs.field(converter=read_only)
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     @property
     def by_acceleration(self) -> Array:

@@ -5,7 +5,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import positions
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, number, of_shape, read_only
+from armwright.arrays import LARGEST, Array, ArrayLike, number, of_shape, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError
 from armwright.kinematics.jacobian import Axes, jacobian, known_axes, together
 from armwright.kinematics.manipulability import scaled_rows
@@ -27,7 +27,7 @@ class DampedRates:
     bound: Array = attrs.field(converter=read_only)
     smallest: Array = attrs.field(converter=read_only)
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 def damped_rates(

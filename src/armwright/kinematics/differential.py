@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, of_shape, read_only
+from armwright.arrays import LARGEST, Array, ArrayLike, of_shape, read_only, reduce_by_fields
 from armwright.errors import ArmwrightError, UnsupportedArmError, one_of
 from armwright.kinematics.forward import link_frames, per_joint, stack, tool_frame
 from armwright.kinematics.inverse.geometry import ClosedFormGeometry
@@ -75,7 +75,7 @@ class DifferentialInverse:
     factors: Array = attrs.field(converter=read_only)
     singular: npt.NDArray[np.bool_] = attrs.field(converter=read_only)
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def checked(self) -> Array:
         """Return the rates (..., 6), all of which make their twist.

@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, one_posture, positions
-from armwright.arrays import Array, ArrayLike, by_fields, number, read_only
+from armwright.arrays import Array, ArrayLike, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward import per_joint, stack
 from armwright.kinematics.inverse.geometry import ClosedFormGeometry, rotated_about_y
@@ -53,7 +53,7 @@ class Singularities:
     lost: Array = attrs.field(converter=read_only)
     idle: Array = attrs.field(converter=read_only)
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     @property
     def near(self) -> tuple[str, ...]:

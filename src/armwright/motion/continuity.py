@@ -3,7 +3,7 @@
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, Flags, by_fields, number, read_only
+from armwright.arrays import LARGEST, Array, Flags, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, shown
 from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.trajectory import Trajectory
@@ -30,7 +30,7 @@ class Continuity:
     counted: Flags = attrs.field(converter=read_only)
     tolerance: float
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     @property
     def order(self) -> int:

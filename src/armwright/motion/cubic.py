@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exactly, one_per_joint
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, one_per_joint
 from armwright.motion.knots import check_duration, limit_per_joint, one_way, timed_points, two_ends
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.scalar import Scalar
@@ -99,5 +99,5 @@ def cubic_through(times: ArrayLike, points: ArrayLike, rates: ArrayLike | None =
         m = np.zeros_like(q)
         m[1:-1] = np.where(slopes[:-1] * slopes[1:] > 0, (slopes[:-1] + slopes[1:]) / 2, 0.0)
     else:
-        m = exactly(rates, q.shape, "rates", LARGEST)
+        m = exact_shape(rates, q.shape, "rates", LARGEST)
     return Trajectory(times=t, coefficients=np.stack(hermite(q[:-1], m[:-1], q[1:], m[1:], h), axis=1))

@@ -8,7 +8,7 @@ from numbers import Integral
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, by_fields, floats, number, read_only
+from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import one_way
 from armwright.motion.polynomials import derivative, extremes, peaks, shifted
@@ -55,7 +55,7 @@ class Samples:
     qdd: Array = attrs.field(converter=read_only)
     jerk: Array = attrs.field(converter=read_only)
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -70,7 +70,7 @@ class Trajectory:
     times: Array = attrs.field(converter=_times)
     coefficients: Array = attrs.field(converter=_coefficients)
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse a number of segments that does not fit the times."""

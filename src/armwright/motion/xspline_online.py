@@ -16,7 +16,7 @@ from functools import cache
 
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, ArrayLike, exactly, floats, number, one_per_joint
+from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, number, one_per_joint
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.cubic import hermite
 from armwright.motion.knots import one_way
@@ -116,7 +116,7 @@ def xspline_kernel(joints: int) -> Kernel:
         {"state": width, "knot": joints, "step": 1},
         shapes=[(width,), (4, joints)],
     )
-    return Kernel(emitted=emitted, explain=_explain)
+    return Kernel(emitted=emitted, raise_for_invalid=_raise_for_invalid)
 
 
 def _advanced(knots: Triple, m_last: Scalar, steps: Pair) -> tuple[Scalar, tuple[Scalar, ...]]:
@@ -135,7 +135,7 @@ def _equation(state: Sequence[Scalar], knot: Sequence[Scalar], step: Sequence[Sc
     return Guarded([[*q, *knot, *rates, step[0]], rows], [h_last, step[0]])
 
 
-def _explain(state: Array, knot: Array, step: Array) -> None:  # noqa: ARG001 - called with all inputs
+def _raise_for_invalid(state: Array, knot: Array, step: Array) -> None:  # noqa: ARG001 - called with all inputs
     """Raise the error of steps that are none."""
     for steps, what in ((state[..., -1], "the last step"), (step[..., 0], "step")):
         wrong = steps[~(steps > 0)]
@@ -149,7 +149,7 @@ def _parts(state: ArrayLike) -> tuple[Array, Array, Array, float]:
     if array.ndim != 1 or len(array) < 4 or len(array) % 3 != 1:
         raise ShapeError(f"state: expected a planner, shape (3 n + 1,), got {array.shape}; see begin")
     n = len(array) // 3
-    q_last, q, m_last = exactly(array[:-1].reshape(3, n), (3, n), "state")
+    q_last, q, m_last = exact_shape(array[:-1].reshape(3, n), (3, n), "state")
     return q_last, q, m_last, _step(float(array[-1]), "the last step")
 
 

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array, by_fields, number, read_only
+from armwright.arrays import Array, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, shown
 
 
@@ -117,7 +117,7 @@ class Simulation:
     impact: Array = attrs.field(converter=read_only)
     events: tuple[Event, ...]
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     @property
     def energy(self) -> Array:

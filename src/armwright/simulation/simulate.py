@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
-from armwright.arrays import Array, ArrayLike, exactly, number, one_per_joint
+from armwright.arrays import Array, ArrayLike, exact_shape, number, one_per_joint
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.forward_dynamics import check_pivots, eliminated
 from armwright.dynamics.mass_matrix import mass_matrix
@@ -151,7 +151,7 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
     for brake in plant.brakes:
         if not 0 <= brake.joint < arm.n:
             raise InvalidValueError(f"brake: expected a joint from 0 to {arm.n - 1}, got {brake.joint}")
-    exactly(plant.controller(0.0, q, qd), (arm.n,), "efforts of the controller")
+    exact_shape(plant.controller(0.0, q, qd), (arm.n,), "efforts of the controller")
     check_pivots(arm, eliminated(arm, mass_matrix(arm, q)))
 
 

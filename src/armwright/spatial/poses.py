@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armwright.arrays import Array, ArrayLike, exactly, of_shape
+from armwright.arrays import Array, ArrayLike, exact_shape, of_shape
 from armwright.errors import InvalidValueError
 from armwright.spatial.rotations import orthonormality_error, rotation_from_vector, rotation_vector
 
@@ -17,7 +17,7 @@ def one_pose(value: ArrayLike, what: str = "pose") -> Array:
         ShapeError: it is not (4, 4).
         InvalidValueError: it has no rotation in it, or its last row is not 0 0 0 1.
     """
-    X = exactly(value, (4, 4), what)
+    X = exact_shape(value, (4, 4), what)
     if orthonormality_error(X[:3, :3]) > _ROUNDING or not np.array_equal(X[3], (0, 0, 0, 1)):
         raise InvalidValueError(f"{what}: expected a rotation, a place and the row 0 0 0 1, got {X.tolist()}")
     return X

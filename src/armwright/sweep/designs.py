@@ -11,7 +11,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, by_fields, content, floats
+from armwright.arrays import LARGEST, Array, array_key, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, shown
 
 KINDS = ("given", "full factorial", "latin hypercube", "sobol")
@@ -64,13 +64,13 @@ class Design:
     """
 
     names: tuple[str, ...] = attrs.field(converter=_names)
-    points: Array = attrs.field(converter=_points, eq=content)
+    points: Array = attrs.field(converter=_points, eq=array_key)
     units: Mapping[str, str] = attrs.field(factory=dict, hash=False)
     kind: str = "given"
     seed: int | None = attrs.field(default=None, converter=_seed)
     ranges: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, converter=_table, hash=False)
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
         """Refuse a column without a name, and what is told of a parameter that there is not."""

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array, by_fields, content, floats
+from armwright.arrays import Array, array_key, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError, shown
 from armwright.sweep.errors import SweepError
 
@@ -64,11 +64,11 @@ class Axis:
         description: what it is, in a line.
     """
 
-    values: Array = attrs.field(converter=_values, eq=content)
+    values: Array = attrs.field(converter=_values, eq=array_key)
     units: str = "1"
     description: str = ""
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
 
 class Task(Protocol):

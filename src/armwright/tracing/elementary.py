@@ -3,7 +3,7 @@
 The text of these functions goes into every emitted kernel that needs them. They use no branch that a compiler
 cannot turn into a choice between two values, and no call but ``fma``.
 
-Accuracy, against correctly rounded values (tests/tracing/test_elementary.py): sine and cosine within 2 ulp for
+Accuracy, against correctly rounded values (tests/tracing/test_kernel.py): sine and cosine within 2 ulp for
 |x| up to 1e5; beyond, the error grows as |x| · 1e-22 and reaches 1e-9 at 1e13; not meant beyond 1e15. Arc tangent
 within 2 ulp everywhere; its sign at y = -0.0 is that of +0.0.
 

@@ -1,7 +1,7 @@
 """From a graph to the source of a kernel: straight-line code, for one configuration and for many.
 
-Inputs and outputs are row-major at the door, one row per configuration. For many, blocks of ``LANES`` configurations
-are turned over so that each quantity lies in a row of its own; the loop over the lanes is what the compiler
+Inputs and outputs are passed row-major, one row per configuration. For many, blocks of ``LANES`` configurations are
+transposed so that each quantity lies in a row of its own; the loop over the lanes is what the compiler
 vectorises. Nothing is left to the compiler that would change a bit: no operation is reordered, and where a
 multiplication and an addition become one instruction is written down (``fuse``). So a configuration has the same bits
 alone, in any batch and inside other compiled code.
@@ -189,13 +189,13 @@ def emit(
     )
     code = Code(graph, flat, watched)
     operations = operation_count(graph, flat)
-    door = _Door(tuple(taken.values()), given, tuple(flags))
+    signature = ArraySignature(tuple(taken.values()), given, tuple(flags))
     top = head(sum(operations.values()))
     helpers = "".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations))
     return Emitted(
         title=title,
-        rows=top + helpers + _rows_source(code, door),
-        one=top + helpers + _one_source(code, door),
+        rows=top + helpers + _rows_source(code, signature),
+        one=top + helpers + _one_source(code, signature),
         inputs=taken,
         angles=frozenset(
             name for name, row in zip(taken, lists, strict=True) if turned.intersection(x.node for x in row)
@@ -213,8 +213,8 @@ def _turned(graph: Graph) -> list[int]:
 
 
 @attrs.frozen(kw_only=True)
-class Stretch:
-    """Straight-line code that other loops take in: for ``LANES`` configurations side by side.
+class KernelBody:
+    """The body of a kernel, straight-line code that other loops take in: for ``LANES`` configurations side by side.
 
     Attributes:
         lines: assignments for lane ``k``, that read ``x[row * LANES + k]`` and write ``y[row * LANES + k]``.
@@ -231,7 +231,7 @@ class Stretch:
     operations: dict[str, int]
 
 
-def stretch(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: int) -> Stretch:
+def kernel_body(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: int) -> KernelBody:
     """Trace an equation for a loop of the caller's.
 
     Args:
@@ -245,7 +245,7 @@ def stretch(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: int) -
     operations = operation_count(graph, outputs)
     load = [f"x[{row} * {LANES} + k]" for row in range(inputs)]
     store = [f"y[{row} * {LANES} + k] = {{}}" for row in range(len(outputs))]
-    return Stretch(
+    return KernelBody(
         lines=code.lines(load, store, watched=False),
         helpers="".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations)),
         inputs=inputs,
@@ -277,8 +277,8 @@ def _node(graph: Graph, x: Scalar) -> int:
     return x.node if isinstance(x, Traced) else graph.constant(float(x))
 
 
-class _Door(NamedTuple):
-    """What the arrays look like that a kernel takes and fills."""
+class ArraySignature(NamedTuple):
+    """The shapes of the arrays that a kernel takes and fills, and which outputs are truth values."""
 
     inputs: tuple[Shape, ...]
     outputs: tuple[Shape, ...]
@@ -286,6 +286,7 @@ class _Door(NamedTuple):
 
     @property
     def names(self) -> list[str]:
+        """The names of the arrays in emitted source."""
         return [*(f"in{i}" for i in range(len(self.inputs))), *(f"out{i}" for i in range(len(self.outputs)))]
 
     def types(self, *, rows: bool) -> str:
@@ -318,25 +319,27 @@ class _Door(NamedTuple):
             yield f"{place} = {{}} != 0" if is_flag else f"{place} = {{}}"
 
 
-def _rows_source(code: Code, door: _Door) -> str:
-    width_in = sum(map(math.prod, door.inputs))
-    width_out = sum(map(math.prod, door.outputs))
+def _rows_source(code: Code, signature: ArraySignature) -> str:
+    width_in = sum(map(math.prod, signature.inputs))
+    width_out = sum(map(math.prod, signature.outputs))
     body = code.lines(
         [f"x[{row} * {LANES} + k]" for row in range(width_in)],
         [f"y[{row} * {LANES} + k] = {{}}" for row in range(width_out)],
     )
-    load = [f"x[{row} * {LANES} + r] = {place}" for row, place in enumerate(door.places("in", "start + r, "))]
-    store = [statement.format(f"y[{row} * {LANES} + r]") for row, statement in enumerate(door.stores("start + r, "))]
+    load = [f"x[{row} * {LANES} + r] = {place}" for row, place in enumerate(signature.places("in", "start + r, "))]
+    store = [
+        statement.format(f"y[{row} * {LANES} + r]") for row, statement in enumerate(signature.stores("start + r, "))
+    ]
     return _ROWS.format(
-        signature=door.types(rows=True),
-        arguments=", ".join(door.names),
-        misfit=" or ".join(door.misfits(before=1)),
+        signature=signature.types(rows=True),
+        arguments=", ".join(signature.names),
+        misfit=" or ".join(signature.misfits(before=1)),
         in_size=width_in * LANES,
         out_size=width_out * LANES,
         lanes=LANES,
-        load=_moves(load, door.inputs),
+        load=_moves(load, signature.inputs),
         body=textwrap.indent(body, " " * 12),
-        store=_moves(store, door.outputs),
+        store=_moves(store, signature.outputs),
     )
 
 
@@ -350,11 +353,11 @@ def _moves(lines: Sequence[str], shapes: Sequence[Shape]) -> str:
     return "\n".join(text)
 
 
-def _one_source(code: Code, door: _Door) -> str:
-    body = code.lines(list(door.places("in")), list(door.stores()))
+def _one_source(code: Code, signature: ArraySignature) -> str:
+    body = code.lines(list(signature.places("in")), list(signature.stores()))
     return _ONE.format(
-        signature=door.types(rows=False),
-        arguments=", ".join(door.names),
-        misfit=" or ".join(door.misfits()),
+        signature=signature.types(rows=False),
+        arguments=", ".join(signature.names),
+        misfit=" or ".join(signature.misfits()),
         body=textwrap.indent(body, " " * 4),
     )

@@ -64,12 +64,12 @@ class Kernel:
 
     Attributes:
         emitted: its source, and the shapes of its inputs and outputs.
-        explain: raises the error that belongs to inputs for which the conditions of the equation do not hold.
+        raise_for_invalid: raises the error that belongs to inputs for which the conditions of the equation do not hold.
         remark: called with inputs that are unusual, and with how many calls up from it the caller stands.
     """
 
     emitted: Emitted
-    explain: Callable[..., object] | None = None
+    raise_for_invalid: Callable[..., object] | None = None
     remark: Callable[[Sequence[Array], int], object] | None = None
 
     @cached_property
@@ -165,8 +165,8 @@ class Kernel:
             for name, array in zip(self.emitted.inputs, arrays, strict=True):
                 floats(array, name, LARGEST_ANGLE if name in self.emitted.angles else LARGEST)
             # Many inputs just below what is allowed are suspected without reason.
-            if self.explain is not None:
-                self.explain(*arrays)
+            if self.raise_for_invalid is not None:
+                self.raise_for_invalid(*arrays)
         if status & UNUSUAL and self.remark is not None:
             self.remark(arrays, 2)
         return results[0] if len(results) == 1 else tuple(results)

@@ -42,7 +42,7 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
     return math.atan2(y, x)
 
 
-def whole(x: Scalar) -> Scalar:
+def round_half_even(x: Scalar) -> Scalar:
     """Return the whole number nearest to ``x``, as a float; the even one of two."""
     if is_traced(x):
         return traced("round", x)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from armwright.arm.model import Arm
 from armwright.kinematics.inverse.branch_angles import branch_angles
 from armwright.kinematics.inverse.geometry import ClosedFormGeometry, Sign
-from armwright.tracing.scalar import Scalar, select, whole
+from armwright.tracing.scalar import Scalar, round_half_even, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product, subtract, transpose
 
 _SIGNS: tuple[Sign, Sign] = (1, -1)
@@ -106,6 +106,6 @@ def merged(solutions: Branches) -> tuple[list[Vector], list[Scalar]]:
 def _near(arm: Arm, q: Vector, near: Sequence[Scalar]) -> Vector:
     """Turn angles by whole turns to within half a turn of ``near``, whatever the limits."""
     return [
-        x + _TURN * whole((x_near - x) * (1 / _TURN)) if joint.revolute else x
+        x + _TURN * round_half_even((x_near - x) * (1 / _TURN)) if joint.revolute else x
         for joint, x, x_near in zip(arm.joints, q, near, strict=True)
     ]

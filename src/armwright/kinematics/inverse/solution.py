@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import attrs
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, ArrayLike, by_fields, content, joint_array, read_only
+from armwright.arrays import Array, ArrayLike, array_key, joint_array, read_only, reduce_by_fields
 from armwright.errors import ArmwrightError
 
 # A position this close to its limit, relative to the range of the joint, is at the limit and not beyond it.
@@ -75,14 +75,14 @@ class Branch:
         rotation_error: angle of the hand from the asked orientation [rad].
     """
 
-    q: Array = attrs.field(converter=read_only, eq=content)
+    q: Array = attrs.field(converter=read_only, eq=array_key)
     label: str
     violations: tuple[Violation, ...] = ()
     free: tuple[int, ...] = ()
     position_error: float = 0.0
     rotation_error: float = 0.0
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     @property
     def allowed(self) -> bool:
@@ -108,10 +108,10 @@ class InverseSolution:
     outcome: Outcome
     branches: tuple[Branch, ...]
     distance: float
-    nearest_pose: Array = attrs.field(converter=read_only, eq=content)
+    nearest_pose: Array = attrs.field(converter=read_only, eq=array_key)
     turn: float = 0.0
 
-    __reduce__ = by_fields
+    __reduce__ = reduce_by_fields
 
     def __iter__(self) -> Iterator[Branch]:
         """Walk through the branches, nearest first."""
