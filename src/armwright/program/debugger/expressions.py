@@ -12,7 +12,6 @@ from armwright.program.debugger.snapshot import Frame
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source
-from armwright.program.language.words import Standard
 from armwright.program.semantics import type_check
 from armwright.program.semantics.expression_types import FITTING, OF_KIND, ExpressionType, is_what
 from armwright.program.semantics.scopes import Names
@@ -69,7 +68,7 @@ def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
     scanned = scan(source, text)
     _refuse(scanned.found)
     named = [attrs.evolve(one, kind=TokenKind.NAME) if one.key in types else one for one in scanned.tokens]
-    tokens = Tokens(source, named, Standard.RLO_2, {})
+    tokens = Tokens(source, named, {})
     try:
         node = expression(tokens)
     except LostError:

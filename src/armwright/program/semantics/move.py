@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.units import HIGHEST_SPEED, LOWEST_SPEED, Dimension
-from armwright.program.language.words import Standard
 from armwright.program.semantics.context import Check, Context
 from armwright.program.semantics.expression_types import ExpressionType, written
 from armwright.program.semantics.quantities import in_range, measure
@@ -66,12 +65,7 @@ def move(context: Context, node: tree.Move) -> None:
 
 
 def _place(names: Names, node: tree.Expression, code: str, what: str, move: tree.Move | None = None) -> None:
-    """Check a frame to come to; an arm as one is an expression of RLO-2."""
-    if isinstance(node, tree.ArmName) and names.std is Standard.RLO_83:
-        names.found.say(
-            "E214", f"`{node.text}` as a place belongs to RLO-2", node.span, "RLO-83 takes the name of a FRAME here"
-        )
-        return
+    """Check a frame to come to."""
 
     def helps(found: ExpressionType) -> str:
         if move is None or found is not ExpressionType.TRANS:

@@ -5,8 +5,8 @@ from armwright.program.language.diagnostic import Fix
 from armwright.program.language.source import Span
 from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import expression, listed, mobile, number, reserved_as_name, values, variable
+from armwright.program.syntax.frames import equals
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.operands import equals
 from armwright.program.syntax.statement_list import (
     ASSIGNING,
     close,

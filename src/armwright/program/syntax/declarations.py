@@ -4,11 +4,9 @@ import math
 
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix
-from armwright.program.language.words import LATER_TYPES
-from armwright.program.syntax import rlo83, tree
+from armwright.program.syntax import tree
 from armwright.program.syntax.expressions import listed, number
 from armwright.program.syntax.lexer import TokenKind
-from armwright.program.syntax.operands import check_length
 from armwright.program.syntax.token_stream import LostError, Tokens, shown
 
 
@@ -63,7 +61,7 @@ def declarations(tokens: Tokens) -> list[tree.Declaration]:
 
 
 def _goes_on(tokens: Tokens) -> bool:
-    """Whether one more declaration follows, and not BEGIN, a statement or a header of RLO-2."""
+    """Whether one more declaration follows, and not BEGIN, a statement or another header."""
     token, after = tokens.now, tokens.ahead()
     if token.kind is TokenKind.KEYWORD:
         return _reserved(tokens)
@@ -71,9 +69,7 @@ def _goes_on(tokens: Tokens) -> bool:
         return False
     if after.key in (",", ":"):
         return True
-    if tokens.later:
-        return not closest(token.text, ["BEGIN", *tokens.words.headers, *tokens.words.statements])
-    return not rlo83.starts_header(tokens) and not closest(token.text, ["BEGIN", *tokens.words.statements])
+    return not closest(token.text, ["BEGIN", *tokens.words.headers, *tokens.words.statements])
 
 
 # decl = name { "," name } ":" type ";" ;
@@ -120,7 +116,7 @@ def _declared(tokens: Tokens) -> tree.Name | None:
     if token.kind is TokenKind.NAME:
         tokens.take()
         name = tree.Name(token.span, token.text, token.key)
-        check_length(tokens, name)
+        tokens.check_length(name)
         tokens.declared.add(name.key)
         return name
     if token.kind is TokenKind.ARM:
@@ -136,8 +132,7 @@ def _declared(tokens: Tokens) -> tree.Name | None:
     return tokens.lost("expected a name", f"found {shown(token)}")
 
 
-# type = "SCALAR" | "TRANS" | "FRAME" ;                                                           (* RLO-83 *)
-# type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;   (* RLO-2 *)
+# type = [ "ARRAY" "[" number { "," number } "]" "OF" ] ( "SCALAR" | "TRANS" | "FRAME" | "EVENT" ) ;
 def type_name(tokens: Tokens) -> tree.TypeName:
     """Read a type.
 
@@ -147,13 +142,11 @@ def type_name(tokens: Tokens) -> tree.TypeName:
     start = tokens.now
     sizes = _sizes(tokens) if tokens.accept("ARRAY") else ()
     token = tokens.now
-    types = tokens.words.types
-    expected = f"expected {', '.join(types[:-1])} or {types[-1]}"
+    types, offered = tokens.words.types, tokens.offered.types
+    expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
     if tokens.accept(*types):
         span = tokens.since(start)
         return tree.TypeName(span, tokens.source.slice(span), token.key, sizes)
-    if tokens.sees_word(*LATER_TYPES):
-        return rlo83.type_name(tokens)
     if token.kind is not TokenKind.NAME:
         tokens.lost("expected a type after `OF`" if sizes else "expected a type after `:`", expected)
     near = closest(token.text, types)

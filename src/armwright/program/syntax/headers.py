@@ -5,11 +5,10 @@ from collections.abc import Callable, Mapping
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, Label
 from armwright.program.language.source import Span
-from armwright.program.syntax import rlo83, tree
+from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import block
 from armwright.program.syntax.declarations import declarations, names_of, passed_over, type_name, var_part
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.operands import check_length
 from armwright.program.syntax.token_stream import LostError, Tokens, shown
 
 # What other languages call a procedure.
@@ -27,8 +26,6 @@ def head(tokens: Tokens) -> list[tree.Header]:
         token, after = tokens.now, tokens.ahead()
         if token.kind is TokenKind.KEYWORD and token.key in tokens.words.headers:
             found += header(tokens)
-        elif not tokens.later and rlo83.starts_header(tokens):
-            rlo83.header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             gap = Span(token.start, token.start)
             tokens.found.say(
@@ -63,11 +60,10 @@ def header(tokens: Tokens) -> list[tree.Header]:
 
 
 def _semicolons(tokens: Tokens) -> None:
-    """Pass over each ``;`` in front of BEGIN, where RLO-2 has none to spare."""
+    """Pass over each ``;`` in front of BEGIN, where there is none to spare."""
     while token := tokens.accept(";"):
-        if tokens.later:
-            fix = Fix(token.span, "")
-            tokens.found.say("E117", "`;` does not belong here", token.span, "leave it out", fixes=(fix,))
+        fix = Fix(token.span, "")
+        tokens.found.say("E117", "`;` does not belong here", token.span, "leave it out", fixes=(fix,))
         while tokens.accept(";"):
             pass
 
@@ -77,8 +73,7 @@ def _misspelt_header(tokens: Tokens) -> str | None:
     token, after = tokens.now, tokens.ahead()
     if token.kind is not TokenKind.NAME or after.kind not in (TokenKind.NAME, TokenKind.STRING):
         return None
-    elsewhere = token.key in _PROCEDURES and tokens.later
-    near = "PROCEDURE" if elsewhere else closest(token.text, (*tokens.words.headers, "BEGIN"))
+    near = "PROCEDURE" if token.key in _PROCEDURES else closest(token.text, (*tokens.words.headers, "BEGIN"))
     return near if near != "BEGIN" and (after.kind is TokenKind.NAME or near == "IMPORT") else None
 
 
@@ -195,7 +190,7 @@ def _own_name(tokens: Tokens) -> tree.Name:
         tokens.lost("expected the name of the procedure", f"found {shown(token)}")
     tokens.take()
     name = tree.Name(token.span, token.text, token.key)
-    check_length(tokens, name)
+    tokens.check_length(name)
     return name
 
 

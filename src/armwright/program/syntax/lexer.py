@@ -72,27 +72,22 @@ class Scanned:
 _BLANKS = " \t\r\n\f\v"
 _DIGITS = r"[0-9]+ (?:\.[0-9]+)? (?:[Ee][+-]?[0-9]+)?"
 _UNIT = "(?:" + "|".join("".join(f"[{letter}{letter.lower()}]" for letter in unit) for unit in UNITS) + ")"
-_NUMBERS = {Standard.RLO_83: _DIGITS, Standard.RLO_2: f"{_DIGITS} {_UNIT}?"}
-# In RLO-2 what other languages write for = <> AND OR is read whole, so that it can be called by its name.
-_FOREIGN_SIGNS = {Standard.RLO_83: "", Standard.RLO_2: r"| == | != | && | \|\| | =< | =>"}
-_PATTERNS = {
-    standard: re.compile(
-        rf"""
-        [{_BLANKS}]*+ (?:
-          ( [^\W\d_] \w* )                                                          # a word
-        | ( := | <= | >= | <> {_FOREIGN_SIGNS[standard]} | [;,)=:\[\]+*<>-] | \.(?![0-9]) | \((?!\*) | /(?![/*]) )
-        | ( {_NUMBERS[standard]} (?![\w.]) )
-        | ( \{{ [^}}]*+ \}} | //[^\r\n]* )                                          # a comment
-        | ( " [^"\r\n]* "? )
-        | ( \.?[0-9] (?: [\w.] | (?<=[Ee])[+-](?=[0-9]) )* )                        # like a number
-        | ( \{{ | \(\* | /\* )                                                      # a comment that is none
-        | ( . )
-        )
-        """,
-        re.VERBOSE | re.DOTALL,
+# What other languages write for = <> AND OR is read whole, so that it can be called by its name.
+_PATTERN = re.compile(
+    rf"""
+    [{_BLANKS}]*+ (?:
+      ( [^\W\d_] \w* )                                                              # a word
+    | ( := | <= | >= | <> | == | != | && | \|\| | =< | => | [;,)=:\[\]+*<>-] | \.(?![0-9]) | \((?!\*) | /(?![/*]) )
+    | ( {_DIGITS} {_UNIT}? (?![\w.]) )
+    | ( \{{ [^}}]*+ \}} | //[^\r\n]* )                                              # a comment
+    | ( " [^"\r\n]* "? )
+    | ( \.?[0-9] (?: [\w.] | (?<=[Ee])[+-](?=[0-9]) )* )                            # like a number
+    | ( \{{ | \(\* | /\* )                                                          # a comment that is none
+    | ( . )
     )
-    for standard in Standard
-}
+    """,
+    re.VERBOSE | re.DOTALL,
+)
 _WORD, _SYMBOL, _NUMBER, _COMMENT, _STRING, _ODD_NUMBER, _OPEN, _STRAY = range(1, 9)
 
 _ARM = re.compile(r"ARM[-_]([0-9]+)(?!\w)", re.IGNORECASE)
@@ -118,6 +113,7 @@ LOOK_ALIKES = {0xFF01 + i: chr(0x21 + i) for i in range(94) if chr(0x21 + i) not
     for other in others
 }
 _HINTS = {
+    **dict.fromkeys("'\u201c\u201d", 'a text stands between two `"`'),
     "!": "a comment is written { ... } or // ...",
     "#": "a comment is written { ... } or // ...",
     "}": "no comment is open here",
@@ -132,7 +128,6 @@ _NONSENSE = re.compile(
     rf"""[^\w\s;,()=:\[\]+*<>./{{"'`#!&|\u2018\u201c\u201d\u201e\u00ab\uff02{"".join(map(chr, LOOK_ALIKES))}-]+"""
 )
 _COMMENT_ELSEWHERE = re.compile(r"[#!](?=[ \t#!])[^\r\n]*")
-_QUOTES = {Standard.RLO_83: "RLO has no quotation marks", Standard.RLO_2: 'a text stands between two `"`'}
 
 
 def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> Scanned:
@@ -141,7 +136,7 @@ def scan(source: Source, text: str, standard: Standard = Standard.RLO_2) -> Scan
     Args:
         source: the program as written.
         text: the same, as long, with line numbers blanked out.
-        standard: which words are reserved, and whether there are texts and units.
+        standard: which words are reserved.
     """
     return _Scanner(source, text, standard).run()
 
@@ -154,7 +149,6 @@ class _Scanner:
         self._text = text if text.isascii() else text.translate(LOOK_ALIKES)
         # A look-alike inside a comment is nobody's business, so they are looked for token by token.
         self._foreign = not text.isascii()
-        self._standard = standard
         self._reserved = VOCABULARIES[standard].reserved
         self._most = limit("words")
         self._unclosed = False
@@ -178,7 +172,7 @@ class _Scanner:
         end = len(self._text)
         self._tokens.append(Token(TokenKind.END, "", "", end, end, damaged=self._unclosed))
         for character, spans in self._strays.items():
-            self._found.append(_stray(character, spans, max(len(spans), self._counts[character]), self._standard))
+            self._found.append(_stray(character, spans, max(len(spans), self._counts[character])))
         self._hush()
         return Scanned(tokens=tuple(self._tokens), comments=tuple(self._comments), found=tuple(self._found))
 
@@ -186,7 +180,7 @@ class _Scanner:
         """Read tokens one behind the other; return where the text goes on behind one that needs a closer look."""
         known, tokens, foreign, most = self._known, self._tokens, self._foreign, self._most
         add = tokens.append
-        for match in _PATTERNS[self._standard].finditer(self._text, position, last):
+        for match in _PATTERN.finditer(self._text, position, last):
             what = match.lastindex or _STRAY
             word = match[what]
             start, end = match.span(what)
@@ -194,7 +188,7 @@ class _Scanner:
                 return self._too_long(start, end, last)
             if foreign:
                 # Of a comment only the blanks in front, of a text only its marks.
-                inside = what == _COMMENT or (what == _STRING and self._standard is Standard.RLO_2)
+                inside = what in (_COMMENT, _STRING)
                 self._look_alikes(match.start(), start + (what == _STRING) if inside else end)
             if (plain := known.get(word)) is not None:
                 add(Token(plain[0], word, plain[1], start, end))
@@ -273,8 +267,6 @@ class _Scanner:
 
     def _string(self, start: int, end: int) -> Token:
         written = self._written[start:end]
-        if self._standard is Standard.RLO_83:
-            return Token(TokenKind.STRING, self._text[start:end], self._text[start:end], start, end)
         if len(written) > 1 and self._text[end - 1] == '"':
             return Token(TokenKind.STRING, written, written, start, end)
         match = _AFTER_TEXT.search(self._text, start + 1, end)
@@ -314,7 +306,7 @@ class _Scanner:
         if run := _NONSENSE.match(self._written, start):
             self._count(run[0], start)
             return run.end()
-        text = _TEXT_ELSEWHERE.match(self._written, start) if self._standard is Standard.RLO_2 else None
+        text = _TEXT_ELSEWHERE.match(self._written, start)
         if text is None:
             character = self._written[start]
             if ord(character) in LOOK_ALIKES:
@@ -372,13 +364,13 @@ def _is_number(word: str) -> bool:
     return "_" not in word
 
 
-def _stray(character: str, spans: list[Span], count: int, standard: Standard) -> Diagnostic:
+def _stray(character: str, spans: list[Span], count: int) -> Diagnostic:
     """Say once what a character is that does not belong to the language, and in how many places it stands."""
     meant = LOOK_ALIKES.get(ord(character))
     shown = f"`{character}`" if character.isprintable() else f"U+{ord(character):04X}"
     more = f"it stands in {count} places" if count > 1 else ""
     name = "a blank" if meant == " " else f"`{meant}`"
-    hint = _QUOTES[standard] if character in "'\u201c\u201d" else _HINTS.get(character, "has no meaning here")
+    hint = _HINTS.get(character, "has no meaning here")
     return Diagnostic(
         code="E101",
         message=f"{shown} is not a character of RLO" + ("" if character.isprintable() else " programs"),

@@ -7,17 +7,14 @@ from collections.abc import Callable
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix
 from armwright.program.language.source import Span
-from armwright.program.language.words import LATER_WITH
-from armwright.program.syntax import rlo83, tree
+from armwright.program.syntax import tree
 from armwright.program.syntax.control_flow import part
-from armwright.program.syntax.expressions import expression, listed
+from armwright.program.syntax.expressions import expression, listed, mobile
+from armwright.program.syntax.frames import equals
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.operands import equals, mobile, operand, parenthesised, signed, value
 from armwright.program.syntax.statement_list import nested
 from armwright.program.syntax.token_stream import Tokens, shown
 
-_FRAME = "the name of a FRAME"
-_SPEED = "a number or the name of a SCALAR"
 _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
 _VALUES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
     "APPROACH": tree.Approach,
@@ -28,14 +25,13 @@ _VALUES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
 }
 
 
-# move = "MOVE" mobile "TO" name { [","] clause } ;            (* RLO-83 *)
-# move = "MOVE" mobile "TO" expr { [","] clause } ;            (* RLO-2 *)
+# move = "MOVE" mobile "TO" expr { [","] clause } ;
 def move(tokens: Tokens) -> tree.Move:
     """Read one MOVE."""
     start = tokens.take()
     moved = mobile(tokens, "the name of a FRAME or an arm", "after MOVE")
     tokens.expect("TO", "after what is moved")
-    goal = value(tokens, "a place" if tokens.later else _FRAME, "after TO")
+    goal = expression(tokens, "a place", "after TO")
     clauses: list[tree.Clause] = []
     while tokens.now.key != ";":
         comma = tokens.accept(",")
@@ -56,32 +52,23 @@ def _starts_clause(tokens: Tokens) -> bool:
         return token.key in words.clauses
     if token.kind is not TokenKind.NAME:
         return False
-    if after.key in ("=", ":=") or (rlo83.starts_statement(tokens) if not tokens.later else after.key in ("(", "[")):
+    if after.key in ("=", ":=", "(", "["):
         # WITH may be missing in front of a misspelt word: `, SPED = 5`.
-        comma = tokens.before.key == "," and tokens.later
-        return (comma and closest(token.text, words.with_clauses) is not None) or (
-            token.key == "ON" and not tokens.later
-        )
-    if tokens.later and token.key in tokens.declared and tokens.before.key != ",":
+        return tokens.before.key == "," and closest(token.text, words.with_clauses) is not None
+    if token.key in tokens.declared and tokens.before.key != ",":
         return False
-    if closest(token.text, words.clauses) or token.key == "ON":
+    if closest(token.text, words.clauses):
         return True
-    ends = (*words.statements, *words.closing) if tokens.later else words.statements
-    return tokens.same_line() and not closest(token.text, ends)
+    return tokens.same_line() and not closest(token.text, (*words.statements, *words.closing))
 
 
 # clause = "DIRECTLY" | "STRAIGHTLY"
-#        | "VIA" "(" name { "," name } ")"
-#        | "WITH" ( "APPROACH" | "DEPARTURE" ) "=" name
-#        | "WITH" "SPEED" "=" ( number | name ) ;                                               (* RLO-83 *)
-# In RLO-2 each name may be any expression, and there are more:
-# clause = ... | "WITH" ( "BLEND" | "DURATION" ) "=" expr | "ON" expr "DO" action ;
+#        | "VIA" "(" expr { "," expr } ")"
+#        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
+#        | "ON" expr "DO" action ;
 def _clause(tokens: Tokens) -> tree.Clause | None:
     """Read one clause; None when it has been reported and passed over."""
     token = tokens.now
-    if tokens.sees_word("ON"):
-        rlo83.guard(tokens)
-        return None
     if token.kind is TokenKind.NAME:
         if not _meant(tokens, token):
             _pass_over(tokens)
@@ -119,7 +106,7 @@ def _meant(tokens: Tokens, token: Token) -> bool:
         helps=(
             f"did you mean `{near}`?"
             if near
-            else f"clauses are {', '.join((*tokens.words.plain_clauses, 'WITH ...'))}",
+            else f"clauses are {', '.join((*tokens.offered.plain_clauses, 'WITH ...'))}",
         ),
     )
     if near:
@@ -133,11 +120,7 @@ def _plain(tokens: Tokens, start: Token, key: str) -> tree.Clause | None:
     if key == "STRAIGHTLY":
         return tree.Straightly(start.span)
     if key == "VIA":
-        points: tuple[tree.Expression, ...]
-        if tokens.later:
-            points = listed(tokens, expression, "a place", "after VIA")
-        else:
-            points = parenthesised(tokens, _FRAME, "after VIA")
+        points = listed(tokens, expression, "a place", "after VIA")
         return tree.Via(tokens.since(start), points)
     return None
 
@@ -146,7 +129,8 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
     """Read what follows WITH."""
     token = tokens.now
     plain, with_words = tokens.words.plain_clauses, tokens.words.with_clauses
-    expected = f"expected {', '.join(with_words[:-1])} or {with_words[-1]}"
+    offered = tokens.offered.with_clauses
+    expected = f"expected {', '.join(offered[:-1])} or {offered[-1]}"
     if tokens.sees(*plain):
         tokens.found.say(
             "E116",
@@ -159,10 +143,6 @@ def _with(tokens: Tokens, start: Token) -> tree.Clause | None:
         tokens.take()
         return _plain(tokens, token, token.key)
     key: str | None = token.key if tokens.sees(*with_words) else None
-    if tokens.sees_word(*LATER_WITH):
-        rlo83.report(tokens, f"WITH {token.key}", token.span, "RLO-83 has APPROACH, DEPARTURE and SPEED")
-        _pass_over(tokens)
-        return None
     if key is None and token.kind is TokenKind.NAME:
         key = closest(token.text, with_words)
         tokens.found.say(
@@ -186,13 +166,7 @@ def _assigned(tokens: Tokens, start: Token, key: str) -> tree.Clause:
         tokens.take()
     else:
         equals(tokens, f"`WITH {key}`", f"WITH {key}")
-    found: tree.Expression
-    if tokens.later:
-        found = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a place", f"after {key} =")
-    elif key == "SPEED":
-        found = _speed(tokens)
-    else:
-        found = operand(tokens, _FRAME, f"after {key} =")
+    found = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a place", f"after {key} =")
     return _VALUES[key](tokens.since(start), found)
 
 
@@ -218,17 +192,6 @@ def _guard(tokens: Tokens) -> tree.On:
             fixes=(Fix(opening, "BEGIN "), Fix(closing, " END")) if certain else (),
         )
     return tree.On(tokens.since(start), head, condition, action)
-
-
-def _speed(tokens: Tokens) -> tree.Number | tree.Mobile:
-    signs = tokens.sees("-", "+")
-    number = tokens.ahead() if signs else tokens.now
-    behind = tokens.ahead(2 if signs else 1)
-    if number.kind is not TokenKind.NUMBER:
-        return operand(tokens, _SPEED, "after SPEED =")
-    if behind.kind is TokenKind.SYMBOL and behind.key in rlo83.OPERATORS:
-        return rlo83.expression(tokens, _SPEED)
-    return signed(tokens)
 
 
 def _pass_over(tokens: Tokens) -> None:

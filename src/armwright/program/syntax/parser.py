@@ -4,23 +4,21 @@ What is missing and obvious is put in, what is misspelt is replaced, and what ma
 next statement; each is reported once.
 """
 
-# ruff: noqa: ERA001 - each rule of the grammar stands above its function
-
 from collections.abc import Collection, Mapping, Sequence
 
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
-from armwright.program.syntax import control_flow, devices, frames, output, tree
+from armwright.program.syntax import control_flow, devices, frames, output, rlo83, tree
 from armwright.program.syntax.headers import head, late
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.move import move
-from armwright.program.syntax.split_names import joined
+from armwright.program.syntax.split_names import declared_names, joined
 from armwright.program.syntax.statement_list import statements
 from armwright.program.syntax.token_stream import Rule, Tokens
 
-# statement = init | affix | unfix | open | grasp | operate | read | move ;
-_RULES_83: Mapping[str, Rule] = {
+# statement = assign | affix | ... | move | block | "IF" ... | "WHILE" ... | "REPEAT" ... | ... | name "(" ... ")" ;
+_RULES: Mapping[str, Rule] = {
     "=": frames.assign,
     "AFFIX": frames.affix,
     "UNFIX": frames.unfix,
@@ -29,11 +27,6 @@ _RULES_83: Mapping[str, Rule] = {
     "OPERATE": devices.operate,
     "READ": devices.read,
     "MOVE": move,
-    "VAR": late,  # reported: it belongs in front of BEGIN
-}
-# statement = assign | affix | ... | move | block | "IF" ... | "WHILE" ... | "REPEAT" ... | ... | name "(" ... ")" ;
-_RULES_2: Mapping[str, Rule] = {
-    **_RULES_83,
     "(": control_flow.call,
     "BEGIN": control_flow.block,
     "IF": control_flow.if_,
@@ -49,11 +42,9 @@ _RULES_2: Mapping[str, Rule] = {
     "RETRY": control_flow.retry,
     "HALT": control_flow.halt,
     "PRINT": output.printing,
-    "IMPORT": late,
-    "UNITS": late,
-    "PROCEDURE": late,
+    # Reported: these belong in front of BEGIN.
+    **dict.fromkeys(("VAR", "IMPORT", "UNITS", "PROCEDURE"), late),
 }
-_RULES = {Standard.RLO_83: _RULES_83, Standard.RLO_2: _RULES_2}
 
 
 def parse(
@@ -69,16 +60,21 @@ def parse(
     Args:
         source: the text, for messages.
         tokens: of the text, the last being its end.
-        standard: the language; the tokens are of the same.
+        standard: the language; the tokens are of the same. All programs are read as RLO-2; what in one of RLO-83
+            belongs to RLO-2 is named and passed over.
         declared: names of variables that were declared before this text.
         procedures: names of procedures that were.
     """
     tokens, torn = joined(source, tokens, declared)
-    cursor = Tokens(source, tokens, standard, _RULES[standard])
-    cursor.found += torn
+    if standard is Standard.RLO_83:
+        tokens = rlo83.reserve(tokens, {*declared, *declared_names(tokens)})
+    cursor = Tokens(source, tokens, _RULES, standard)
     cursor.declared.update(declared)
     cursor.procedures.update(procedures)
-    return program(cursor), cursor.found
+    found, slips = program(cursor), cursor.found
+    if standard is Standard.RLO_83:
+        found, slips = rlo83.conform(found, slips, source, cursor.tokens)
+    return found, [*torn, *slips]
 
 
 # program = { header } block "." ;

@@ -1,154 +1,323 @@
-"""What belongs to RLO-2: recognised, named once, and passed over, so that the rest of the program is still judged."""
+"""Conformance to RLO-83: what a program has that the report did not have, as ``gcc -std=c89 -pedantic`` finds it in C.
 
-from armwright.program.language.source import Span
-from armwright.program.language.words import CLOSING, LATER_HEADERS, LATER_STATEMENTS, LATER_TYPES, OPENING
+The parser reads RLO-2. Here each part of the tree that belongs to RLO-2 is named once (E214) and becomes a poison, so
+that the rest of the program is still judged; nothing is said of what is inside a statement that is no RLO-83 at all.
+"""
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Collection, Sequence
+from typing import Any
+
+import attrs
+
+from armwright.program.language.diagnostic import Diagnostic, Findings, Fix
+from armwright.program.language.source import Source, Span
+from armwright.program.language.words import LATER_HEADERS, LATER_STATEMENTS, LATER_TYPES, is_later
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.token_stream import Tokens
 
-OPERATORS = ("+", "-", "*", "/", "<", "<=", "<>", ">=", ">")
-_WORD_OPERATORS = ("AND", "OR", "NOT")
-_OPERANDS = (TokenKind.NAME, TokenKind.ARM, TokenKind.NUMBER, TokenKind.STRING)
+_FRAME = "the name of a FRAME"
+_MOVED = "the name of a FRAME or an arm"
+_ARM = "an arm such as ARM_1"
 _LONGEST_SHOWN = 16
+# In front of a word of RLO-2 that stands where only a name can, and behind one that gets a value or is declared.
+_BEFORE_NAMES = frozenset(
+    (*("MOVE", "AFFIX", "UNFIX", "TO", "FROM", "AT", "OPERATE", "=", ":=", "(", "[", ","), *"+-*/<>", "<=", ">=", "<>")
+)
+_BEHIND_NAMES = frozenset(("=", ":="))
+# These stand there too, and are no names.
+_NEVER_NAMES = frozenset(("NOT", "ON", "PRIORITY"))
 
 
-def report(tokens: Tokens, what: str, span: Span, instead: str, *helps: str) -> None:
-    """Say that something belongs to RLO-2, and what RLO-83 has instead."""
-    tokens.found.say("E214", f"{what} belongs to RLO-2", span, instead, helps=helps)
+def reserve(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Token]:
+    """Take words of RLO-2 for reserved, but where they are the names that RLO-83 lets them be.
+
+    Args:
+        tokens: of a program of RLO-83.
+        declared: all names that are declared in it or before it.
+    """
+    found = list(tokens)
+    for at, token in enumerate(tokens):
+        if token.kind is not TokenKind.NAME or token.key in declared or not is_later(token.key):
+            continue
+        named = at > 0 and tokens[at - 1].key in _BEFORE_NAMES and token.key not in _NEVER_NAMES
+        if not named and tokens[at + 1].key not in _BEHIND_NAMES:
+            found[at] = attrs.evolve(token, kind=TokenKind.KEYWORD)
+    return found
 
 
-def expression(tokens: Tokens, wants: str) -> tree.Poison:
-    """Pass over an expression where RLO-83 takes ``wants``."""
-    start = tokens.now
-    names = _operands(tokens)
-    span = tokens.since(start)
-    report(tokens, _called(tokens, start, span), span, f"RLO-83 takes {wants} here")
-    return tree.Poison(span, names)
+def conform(
+    program: tree.Program, slips: Sequence[Diagnostic], source: Source, tokens: Sequence[Token]
+) -> tuple[tree.Program, Findings]:
+    """Name what a program has that belongs to RLO-2.
+
+    Args:
+        program: as the parser has read it.
+        slips: what the parser has found wrong.
+        source: the text.
+        tokens: of the text, as the parser has read them.
+
+    Returns:
+        The program with a poison in the place of each part that belongs to RLO-2, and what is wrong with both.
+    """
+    visitor = _Visitor(source, tokens, program)
+    headers = tuple(one for header in program.headers if (one := visitor.header(header)) is not None)
+    statements = tuple(visitor.statement(one) for one in program.statements)
+    found = Findings()
+    found += [one for one in slips if not visitor.is_inside(one.span)]
+    found += visitor.found
+    return attrs.evolve(program, headers=headers, statements=statements), found
 
 
-def starts_header(tokens: Tokens) -> bool:
-    """Whether a part of an RLO-2 program stands where declarations or BEGIN should."""
-    return tokens.sees_word(*LATER_HEADERS) and tokens.ahead().key not in (",", ":")
+class _Visitor:
+    """Goes through a program, and remembers which stretches of it are no RLO-83 at all."""
 
+    def __init__(self, source: Source, tokens: Sequence[Token], program: tree.Program) -> None:
+        self.found = Findings()
+        self._source, self._tokens = source, tokens
+        self._starts = [token.start for token in tokens]
+        self._declared = {name.key for declaration in program.declarations for name in declaration.names}
+        self._passed_over: list[Span] = []
+        self._visits: dict[type, Callable[[Any], tree.Statement]] = {
+            tree.Poison: lambda node: node,
+            tree.Assign: self._assign,
+            tree.Affix: self._affix,
+            tree.Unfix: self._unfix,
+            tree.Open: self._open,
+            tree.Grasp: self._grasp,
+            tree.Operate: self._operate,
+            tree.ReadVisions: self._read_visions,
+            tree.ReadSystem: self._read_system,
+            tree.Move: self._move,
+            tree.Call: self._call,
+        }
 
-def header(tokens: Tokens) -> None:
-    """Pass over IMPORT, UNITS or a PROCEDURE."""
-    word = tokens.take()
-    report(tokens, f"{word.key}", word.span, LATER_HEADERS[word.key])
-    while not tokens.done and not tokens.sees(";", "BEGIN"):
-        tokens.take()
-    if word.key == "PROCEDURE":
-        # Its own VAR part lies between its head and its body.
-        while not tokens.done and not tokens.sees("BEGIN"):
-            tokens.take()
-        _body(tokens)
-    tokens.accept(";")
+    def is_inside(self, span: Span) -> bool:
+        """Whether something stands in a stretch that has been passed over, behind its first word."""
+        at = bisect_left(self._passed_over, span.start, key=lambda one: one.start) - 1
+        return at >= 0 and span.start <= self._passed_over[at].end
 
+    def _report(self, what: str, span: Span, instead: str) -> None:
+        self.found.say("E214", f"{what} belongs to RLO-2", span, instead)
 
-def statement(tokens: Tokens) -> tree.Poison:
-    """Pass over a statement of RLO-2 with everything inside it."""
-    word = tokens.now
-    if word.key == "BEGIN":
-        report(tokens, "a block inside a program", word.span, "RLO-83 has one BEGIN and one END")
-    elif word.key in LATER_STATEMENTS:
-        report(tokens, word.key, word.span, LATER_STATEMENTS[word.key])
-    elif tokens.ahead().key == "[":
-        report(tokens, "indexing", tokens.ahead().span, "RLO-83 has no arrays")
-    else:
-        report(tokens, f"the call of `{word.text}`", word.span, "RLO-83 has no procedures")
-    return tree.Poison(word.span, _body(tokens))
+    # ---- tokens, where the tree forgets
 
+    def _at(self, span: Span) -> int:
+        """Return the number of the token with which a part of the tree begins, behind those that nobody has written."""
+        return bisect_right(self._starts, span.start) - 1
 
-def starts_statement(tokens: Tokens) -> bool:
-    """Whether a statement of RLO-2 stands here. Its words are no keywords: ``wait = 5`` sets a scalar."""
-    token, after = tokens.now, tokens.ahead()
-    if token.kind is TokenKind.KEYWORD:
-        return token.key == "BEGIN"
-    if token.kind is not TokenKind.NAME or after.key in ("=", ":="):
-        return False
-    return token.key in LATER_STATEMENTS or after.key in ("(", "[")
+    def _word(self, span: Span) -> Token:
+        """Return the first token of a part of the tree."""
+        return self._tokens[self._at(span)]
 
+    def _last_word(self, span: Span) -> Token:
+        """Return the last token of a part of the tree."""
+        return self._tokens[bisect_right(self._starts, span.end - 1) - 1]
 
-def type_name(tokens: Tokens) -> tree.TypeName:
-    """Pass over a type of RLO-2, up to the end of the declaration."""
-    word = tokens.take()
-    report(tokens, word.key, word.span, LATER_TYPES[word.key])
-    if word.key == "ARRAY":
-        while not tokens.done and not tokens.sees(";", "VAR", "BEGIN", "END"):
-            tokens.take()
-    return tree.TypeName(tokens.since(word), word.text, None)
+    def _names(self, span: Span) -> frozenset[str]:
+        tokens = self._tokens[self._at(span) : bisect_left(self._starts, span.end)]
+        return frozenset(one.key for one in tokens if one.kind in (TokenKind.NAME, TokenKind.ARM))
 
+    def _with_parentheses(self, span: Span) -> Span:
+        """Return where an expression stands with the parentheses around it, which are not those of a list."""
+        first, end = self._at(span), bisect_left(self._starts, span.end)
+        while (
+            self._tokens[first - 1].key == "("
+            and self._tokens[end].key == ")"
+            and self._tokens[first - 2].key != "VIA"
+            and self._tokens[first - 2].kind is not TokenKind.NAME
+        ):
+            first, end = first - 1, end + 1
+        return Span(self._tokens[first].start, self._tokens[end - 1].end)
 
-def trailing(tokens: Tokens, what: str, instead: str, *words: str) -> None:
-    """Pass over one word that RLO-2 allows behind a statement."""
-    if word := tokens.accept_word(*words):
-        report(tokens, f"{what} {word.key}", word.span, instead)
+    # ---- in front of BEGIN
 
+    def header(self, node: tree.Header) -> tree.Header | None:
+        """Return a part in front of BEGIN as far as it is of RLO-83; None for one that is not."""
+        if isinstance(node, tree.Declaration):
+            return attrs.evolve(node, type=self._type(node.type))
+        word = self._word(node.span)
+        self._report(word.key, word.span, LATER_HEADERS[word.key])
+        self._passed_over.append(node.span)
+        return None
 
-def guard(tokens: Tokens) -> tree.Poison:
-    """Pass over ``ON condition DO action`` in a MOVE, up to the next clause."""
-    word = tokens.now
-    report(tokens, "ON ... DO", word.span, "RLO-83 has no guarded motions")
-    return tree.Poison(word.span, _body(tokens, stop=","))
+    def _type(self, node: tree.TypeName) -> tree.TypeName:
+        word = self._word(node.span)
+        if word.key not in LATER_TYPES:
+            return node
+        self._report(word.key, word.span, LATER_TYPES[word.key])
+        self._passed_over.append(node.span)
+        return attrs.evolve(node, key=None, sizes=())
 
+    # ---- statements
 
-def _body(tokens: Tokens, stop: str = ";") -> frozenset[str]:
-    """Pass over tokens up to ``;`` (or ``stop``) or END, with every block on the way; return the names in them."""
-    names = set()
-    depth = brackets = 0
-    while not tokens.done:
-        token = tokens.now
-        last_end = token.key == "END" and tokens.ahead().key == "."
-        if last_end or (depth == 0 and (tokens.sees(";", "END") or (brackets <= 0 and tokens.sees(stop)))):
-            break
-        depth += _step(token)
-        brackets += (token.key in ("(", "[")) - (token.key in (")", "]"))
-        if token.kind in (TokenKind.NAME, TokenKind.ARM):
-            names.add(token.key)
-        tokens.take()
-    return frozenset(names)
+    def statement(self, node: tree.Statement) -> tree.Statement:
+        """Return a statement as far as it is of RLO-83."""
+        if (visit := self._visits.get(type(node))) is not None:
+            return visit(node)
+        word = self._word(node.span)
+        if isinstance(node, tree.Block):
+            return self._none(node, "a block inside a program", word.span, "RLO-83 has one BEGIN and one END")
+        return self._none(node, word.key, word.span, LATER_STATEMENTS[word.key])
 
+    def _none(self, node: tree.Statement, what: str, span: Span, instead: str) -> tree.Poison:
+        """Pass over a statement that RLO-83 does not have."""
+        self._report(what, span, instead)
+        self._passed_over.append(node.span)
+        return tree.Poison(self._word(node.span).span, self._names(node.span))
 
-def _step(token: Token) -> int:
-    """Return by how much a token changes the depth of nested statements."""
-    if token.kind not in (TokenKind.NAME, TokenKind.KEYWORD):
-        return 0
-    return (token.key in OPENING) - (token.key in CLOSING)
+    def _call(self, node: tree.Call) -> tree.Statement:
+        name = node.name
+        if name.key not in self._declared:
+            return self._none(node, f"the call of `{name.text}`", name.span, "RLO-83 has no procedures")
+        bracket = self._tokens[self._at(name.span) + 1]
+        self.found.say(
+            "E109",
+            f"`{name.text}` needs `=` before its value",
+            bracket.span,
+            "expected `=` before this",
+            helps=(f"write `{name.text} = (...`",),
+            fixes=(Fix(Span(bracket.start, bracket.start), "= "),),
+        )
+        value = tree.Matrix(Span(bracket.start, node.span.end), node.arguments)
+        return self._assign(tree.Assign(node.span, name, value))
 
+    def _grasp(self, node: tree.Grasp) -> tree.Grasp:
+        if node.arm is not None:
+            self._report("GRASP with an arm", node.arm.span, "RLO-83 closes the hand of the arm named last")
+        return node
 
-def _operands(tokens: Tokens) -> frozenset[str]:
-    """Pass over one expression, as far as it makes sense; return the names in it."""
-    names = set()
-    depth = 0
-    operand_due = True
-    while not tokens.done and tokens.now.kind is not TokenKind.KEYWORD:
-        token = tokens.now
-        if token.kind in _OPERANDS:
-            if token.key in _WORD_OPERATORS:
-                operand_due = True
-            elif operand_due:
-                operand_due = False
-                names.add(token.key)
-            else:
-                break
-        elif token.key in ("(", "["):
-            depth, operand_due = depth + 1, True
-        elif token.key in (")", "]") and depth:
-            depth, operand_due = depth - 1, False
-        elif token.key in OPERATORS or (depth and token.key in (",", "=")):
-            operand_due = True
-        else:
-            break
-        tokens.take()
-    return frozenset(names)
+    def _operate(self, node: tree.Operate) -> tree.Operate:
+        self._tail(node.span, "OPERATE ...", "RLO-83 only starts a device; it stops at the end", "ON", "OFF")
+        return attrs.evolve(node, device=self._operand(node.device, "the name of a device"), on=True)
 
+    def _read_system(self, node: tree.ReadSystem) -> tree.ReadSystem:
+        return attrs.evolve(node, arm=self._operand(node.arm, _ARM))
 
-def _called(tokens: Tokens, start: Token, span: Span) -> str:
-    """Return how an expression is called in a message."""
-    text = tokens.source.slice(span)
-    if span == start.span and start.kind is not TokenKind.STRING:
-        return f"`{text}` as a value"
-    if len(text) <= _LONGEST_SHOWN and text.isprintable():
-        return f"`{text}`"
-    inner = tokens.source.text[start.end :].lstrip(" \t")
-    return f"`{start.text}(...)`" if start.kind is TokenKind.NAME and inner.startswith("(") else "this expression"
+    def _tail(self, span: Span, what: str, instead: str, *words: str) -> None:
+        """Name a word that RLO-2 allows at the end of a statement."""
+        last = self._last_word(span)
+        if last.kind is TokenKind.KEYWORD and last.key in words:
+            self._report(f"{what} {last.key}", last.span, instead)
+
+    def _assign(self, node: tree.Assign) -> tree.Statement:
+        if isinstance(node.target, tree.Index):
+            bracket = self._tokens[self._at(node.target.span) + 1]
+            return self._none(node, "indexing", bracket.span, "RLO-83 has no arrays")
+        value = node.value
+        numbers = value.items if isinstance(value, tree.Matrix) else (value,)
+        if all(isinstance(one, tree.Number | tree.Poison) for one in numbers) and not self._grouped(value):
+            bare = tuple(map(self._without_unit, numbers))
+            known = attrs.evolve(value, items=bare) if isinstance(value, tree.Matrix) else bare[0]
+            return attrs.evolve(node, value=known)
+        return attrs.evolve(node, value=self._poison(value, "a number or twelve numbers in `( )`"))
+
+    def _grouped(self, value: tree.Expression) -> bool:
+        """Whether parentheses stand around a value, or around a single number of a matrix."""
+        tokens = self._tokens[self._at(value.span) - 1 : bisect_left(self._starts, value.span.end) + 1]
+        opening = sum(one.key == "(" for one in tokens)
+        return opening > isinstance(value, tree.Matrix)
+
+    def _without_unit(self, node: tree.Expression) -> tree.Expression:
+        """Return a number; one with a unit is no longer known."""
+        if not isinstance(node, tree.Number) or node.unit is None:
+            return node
+        number = self._last_word(node.span)
+        unit = number.text[len(number.key) :]
+        self._report(f"the unit `{unit}`", number.span, "RLO-83 counts in metres and takes bare numbers")
+        return attrs.evolve(node, value=math.nan, unit=None)
+
+    def _affix(self, node: tree.Affix) -> tree.Affix:
+        instead = "in RLO-83 a frame follows its parent, never the other way"
+        self._tail(node.span, "AFFIX ...", instead, "RIGIDLY", "NONRIGIDLY")
+        child, parent = self._operand(node.child, _FRAME), self._operand(node.parent, _MOVED)
+        step = None if node.at is None else self._operand(node.at, "the name of a TRANS")
+        return attrs.evolve(node, child=child, parent=parent, at=step, rigid=False)
+
+    def _unfix(self, node: tree.Unfix) -> tree.Unfix:
+        child = self._operand(node.child, _FRAME)
+        if node.parent is None:
+            gap = Span(node.span.end, node.span.end)
+            self._report("UNFIX without FROM", gap, "RLO-83 names the frame it hangs on: `FROM ...`")
+            return attrs.evolve(node, child=child)
+        return attrs.evolve(node, child=child, parent=self._operand(node.parent, _MOVED))
+
+    def _open(self, node: tree.Open) -> tree.Open:
+        if node.width is not None:
+            word = self._tokens[bisect_left(self._starts, node.arm.span.end)]
+            self._report("OPEN ... TO", word.span, "RLO-83 opens the fingers wholly")
+        return attrs.evolve(node, arm=self._operand(node.arm, _ARM), width=None)
+
+    def _read_visions(self, node: tree.ReadVisions) -> tree.ReadVisions:
+        first, *others = node.targets or (tree.Poison(node.span),)
+        if not others:
+            return attrs.evolve(node, targets=tuple(self._operand(one, _FRAME) for one in node.targets))
+        rest = Span(others[0].span.start, others[-1].span.end)
+        self._report("reading several frames at once", rest, "RLO-83 reads one frame at a time")
+        return attrs.evolve(node, targets=(tree.Poison(rest, self._names(first.span.to(rest))),))
+
+    # ---- MOVE
+
+    def _move(self, node: tree.Move) -> tree.Move:
+        moved, goal = self._operand(node.moved, _MOVED), self._goal(node.goal)
+        clauses = tuple(one for clause in node.clauses if (one := self._clause(clause)) is not None)
+        return attrs.evolve(node, moved=moved, goal=goal, clauses=clauses)
+
+    def _clause(self, node: tree.Clause) -> tree.Clause | None:
+        """Return a clause as far as it is of RLO-83; None for one that is not."""
+        match node:
+            case tree.On():
+                self._report("ON ... DO", self._word(node.span).span, "RLO-83 has no guarded motions")
+            case tree.Blend() | tree.Duration():
+                at = self._at(node.span)
+                word = self._tokens[at + (self._tokens[at].key == "WITH")]
+                self._report(f"WITH {word.key}", word.span, "RLO-83 has APPROACH, DEPARTURE and SPEED")
+            case tree.Via(points=points):
+                return attrs.evolve(node, points=tuple(map(self._goal, points)))
+            case tree.Approach(point=point) | tree.Departure(point=point):
+                return attrs.evolve(node, point=self._goal(point))
+            case tree.Speed(value=tree.Number() as number):
+                return attrs.evolve(node, value=self._without_unit(number))
+            case tree.Speed(value=value):
+                return attrs.evolve(node, value=self._operand(value, "a number or the name of a SCALAR"))
+            case _:
+                return node
+        self._passed_over.append(node.span)
+        return None
+
+    def _goal(self, node: tree.Expression) -> tree.Expression:
+        """Return the name of a frame to come to."""
+        if isinstance(node, tree.ArmName):
+            self._report(f"`{node.text}` as a place", node.span, f"RLO-83 takes {_FRAME} here")
+            return self._silent(node.span)
+        return self._operand(node, _FRAME)
+
+    # ---- expressions
+
+    def _operand(self, node: tree.Expression, wants: str) -> tree.Name | tree.ArmName | tree.Poison:
+        """Return a name or an arm; a poison in the place of any other expression."""
+        if isinstance(node, tree.Name | tree.ArmName) and self._with_parentheses(node.span) == node.span:
+            return node
+        return self._poison(node, wants)
+
+    def _poison(self, node: tree.Expression, wants: str) -> tree.Poison:
+        if isinstance(node, tree.Poison):
+            return node
+        span = self._with_parentheses(node.span)
+        self._report(self._called(span), span, f"RLO-83 takes {wants} here")
+        return self._silent(span)
+
+    def _silent(self, span: Span) -> tree.Poison:
+        self._passed_over.append(span)
+        return tree.Poison(span, self._names(span))
+
+    def _called(self, span: Span) -> str:
+        """Return how an expression is called in a message."""
+        text, start = self._source.slice(span), self._word(span)
+        if span == start.span:
+            return f"`{text}` as a value"
+        if len(text) <= _LONGEST_SHOWN and text.isprintable():
+            return f"`{text}`"
+        is_call = start.kind is TokenKind.NAME and self._tokens[self._at(span) + 1].key == "("
+        return f"`{start.text}(...)`" if is_call else "this expression"

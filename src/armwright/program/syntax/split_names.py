@@ -65,6 +65,11 @@ def _is_pair(source: Source, tokens: Sequence[Token], at: int) -> bool:
     return whole and not source.text[first.end : number.start].strip(_BLANKS)
 
 
+def declared_names(tokens: Sequence[Token]) -> set[str]:
+    """Return all names that are declared anywhere in a text."""
+    return _declarations(tokens, frozenset())[1]
+
+
 def _declarations(tokens: Sequence[Token], pairs: frozenset[int]) -> tuple[set[int], set[str]]:
     """Return which pairs stand where names are declared, and all names that are declared anywhere in the text."""
     inside: set[int] = set()
@@ -76,7 +81,7 @@ def _declarations(tokens: Sequence[Token], pairs: frozenset[int]) -> tuple[set[i
             declaring = token.key in ("VAR", "PROCEDURE") or (
                 declaring and token.key not in ("BEGIN", "IMPORT", "UNITS")
             )
-        elif declaring and token.key in (",", ":"):
+        elif declaring and token.key in (",", ":") and tokens[at - 2].key not in (":", "OF"):
             if at - 1 in pairs:
                 inside.add(at - 1)
                 names.add(f"{tokens[at - 2].key}{tokens[at - 1].key}")

@@ -6,8 +6,8 @@ from typing import NoReturn, TypeVar
 from armwright.errors import closest
 from armwright.program.language.diagnostic import Fix, Label
 from armwright.program.language.source import Span
-from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, LATER_STATEMENTS, OPENING
-from armwright.program.syntax import rlo83, tree
+from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, OPENING
+from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.token_stream import DEEPEST, LostError, Tokens, TooDeepError, shown
 
@@ -97,16 +97,12 @@ def _misspelt_end(tokens: Tokens) -> bool:
     token, after = tokens.now, tokens.ahead()
     if after.key in (*ASSIGNING, "(", "[") or token.key in ABSENT or _is_known(tokens, token):
         return False
-    if after.key == ".":
-        near = closest(token.text, ("END",))
-    elif tokens.later:
-        near = closest(token.text, (*tokens.waiting[-1], *tokens.words.statements))
-        near = near if near in tokens.waiting[-1] else None
-    else:
+    wanted = ("END",) if after.key == "." else tokens.waiting[-1]
+    near = closest(token.text, wanted if after.key == "." else (*wanted, *tokens.words.statements))
+    if near not in wanted:
         return False
-    if near:
-        misspelt(tokens, near)
-    return near is not None
+    misspelt(tokens, near)
+    return True
 
 
 def misspelt(tokens: Tokens, near: str) -> None:
@@ -125,7 +121,7 @@ def statement(tokens: Tokens) -> tree.Statement:
     """
     token = tokens.now
     if token.kind is _KEYWORD and token.key in tokens.rules:
-        if tokens.later and tokens.ahead().key in ASSIGNING:
+        if tokens.ahead().key in ASSIGNING:
             return _reserved(tokens)
         tokens.depth += 1
         tokens.statement_depth = tokens.depth
@@ -139,30 +135,24 @@ def statement(tokens: Tokens) -> tree.Statement:
         return tokens.rules["="](tokens)
     if token.kind is _NAME:
         return _named(tokens, after)
-    if not tokens.later and rlo83.starts_statement(tokens):
-        return rlo83.statement(tokens)
     return _no_statement(tokens)
 
 
 def _named(tokens: Tokens, after: Token) -> tree.Statement:
     """Read a statement that begins with a name."""
     token = tokens.now
-    if after.key in ASSIGNING or (tokens.later and after.key == "["):
+    if after.key in ASSIGNING or after.key == "[":
         return tokens.rules["="](tokens)
-    if tokens.later and after.key == "(" and tokens.ahead(2).kind is not TokenKind.STRING:
+    if after.key == "(" and tokens.ahead(2).kind is not TokenKind.STRING:
         return tokens.rules["("](tokens)
-    known = token.key in tokens.declared or token.key in tokens.procedures
-    if not tokens.later and token.key in LATER_STATEMENTS and not known:
-        return rlo83.statement(tokens)
-    elsewhere = tokens.later and not known and (token.key in ELSEWHERE or token.key in ABSENT)
-    near = None if elsewhere or (known and tokens.later) else closest(token.text, tokens.words.statements)
+    known = _is_known(tokens, token)
+    elsewhere = not known and (token.key in ELSEWHERE or token.key in ABSENT)
+    near = None if elsewhere or known else closest(token.text, tokens.words.statements)
     # In front of a number or a matrix only the sign of equality is missing.
     number = tokens.ahead(2) if after.key in ("(", "-") else after
     valued = number.kind is _NUMBER or (number.key == "-" and number is not after)
-    if valued and not elsewhere and not (near and tokens.later):
+    if valued and not elsewhere and not near:
         return tokens.rules["="](tokens)
-    if not tokens.later and rlo83.starts_statement(tokens):
-        return rlo83.statement(tokens)
     if number.kind is TokenKind.STRING and number is not after:
         near = "PRINT"
     if near:
@@ -189,18 +179,17 @@ def _no_statement(tokens: Tokens) -> tree.Statement:
         text, label = f"unknown statement `{token.text}`", "not a statement"
     else:
         text, label = f"{shown(token)} does not start a statement", "expected a statement"
-    if tokens.later and token.key in tokens.procedures:
+    if token.key in tokens.procedures:
         tokens.take()
         tokens.insert("()", "behind the name of a procedure")
         return tree.Call(token.span, tree.Name(token.span, token.text, token.key), ())
     if _is_known(tokens, token):
         _value_missing(tokens)
-    helps: tuple[str, ...] = (f"statements begin with {', '.join(tokens.words.statements)}, or with a name and `=`",)
-    if tokens.later and token.key in ELSEWHERE:
+    if token.key in ELSEWHERE:
         helps = (f"did you mean `{ELSEWHERE[token.key]}`?",)
-    elif tokens.later and token.key in ABSENT:
+    elif token.key in ABSENT:
         helps = (ABSENT[token.key],)
-    elif tokens.later:
+    else:
         helps = ("statements begin with a word such as MOVE, AFFIX or IF, with a name and `=`, or with a name and `(`",)
     notes = ("line numbers count only in a text whose first line has one",) if token.kind is _NUMBER else ()
     tokens.found.say("E105", text, token.span, label, helps=helps, notes=notes)
@@ -300,7 +289,7 @@ def _separator(tokens: Tokens) -> None:
             fixes=(Fix(gap, ";"),),
         )
         return
-    helps = (ABSENT[token.key],) if tokens.later and token.key in ABSENT else ()
+    helps = (ABSENT[token.key],) if token.key in ABSENT else ()
     tokens.lost(f"{shown(token)} does not belong here", "expected `;`", code="E117", helps=helps)
 
 
@@ -312,17 +301,15 @@ def _starts_statement(tokens: Tokens) -> bool:
         return False
     if after.key in ASSIGNING or not tokens.same_line():
         return True
-    if after.key in ("(", "[") and tokens.later:
+    if after.key in ("(", "["):
         return after.key == "[" or token.key in tokens.procedures
-    if not tokens.later and rlo83.starts_statement(tokens):
-        return True
     wrong = token.kind is _NAME and not _is_known(tokens, token)
     return wrong and closest(token.text, tokens.words.statements) is not None
 
 
 def _is_known(tokens: Tokens, token: Token) -> bool:
-    """Whether a name has been declared in RLO-2, so that it is no misspelt word."""
-    return tokens.later and (token.key in tokens.declared or token.key in tokens.procedures)
+    """Whether a name has been declared, so that it is no misspelt word."""
+    return token.key in tokens.declared or token.key in tokens.procedures
 
 
 def next_statement(tokens: Tokens) -> None:

@@ -30,8 +30,10 @@ class Tokens:
 
     Attributes:
         source: the text.
-        later: whether the program is in RLO-2.
-        words: those of its language.
+        tokens: its tokens, those that were misspelt replaced by what was meant.
+        standard: the language that the program is to be in; all of them are read as RLO-2.
+        words: those of RLO-2.
+        offered: those of its own language, for messages.
         rules: how to read each statement, by the word that starts it, or the sign behind the name that does.
         found: what is wrong.
         at: how many tokens have been read.
@@ -51,18 +53,22 @@ class Tokens:
     """
 
     def __init__(
-        self, source: Source, tokens: Sequence[Token], standard: Standard, rules: "Mapping[str, Rule]"
+        self,
+        source: Source,
+        tokens: Sequence[Token],
+        rules: "Mapping[str, Rule]",
+        standard: Standard = Standard.RLO_2,
     ) -> None:
         """Start at the first token; the last must be the end of the text."""
         self.source = source
-        self.later = standard is Standard.RLO_2
-        self.words = VOCABULARIES[standard]
+        self.standard = standard
+        self.words, self.offered = VOCABULARIES[Standard.RLO_2], VOCABULARIES[standard]
         self.rules = rules
         self.found = Findings()
         self.at = 0
-        self._tokens = list(tokens)
+        self.tokens = list(tokens)
         self._last = len(tokens) - 1
-        self.now = self.before = self._tokens[0]
+        self.now = self.before = self.tokens[0]
         self.depth = self.statement_depth = self.height = 0
         self.waiting: list[tuple[str, ...]] = []
         self.deep = -1
@@ -82,7 +88,7 @@ class Tokens:
     def ahead(self, steps: int = 1) -> Token:
         """Return a token further on or, with less than no steps, back; behind the end it is always the end."""
         at = self.at + steps
-        return self._tokens[at] if at < self._last else self._tokens[-1]
+        return self.tokens[at] if at < self._last else self.tokens[-1]
 
     @property
     def done(self) -> bool:
@@ -95,14 +101,14 @@ class Tokens:
         if self.at < self._last:
             self.at += 1
             self.before = token
-            self.now = self._tokens[self.at]
+            self.now = self.tokens[self.at]
         return token
 
     def back(self, at: int) -> None:
         """Return to where ``at`` tokens had been read."""
         self.at = at
-        self.now = self._tokens[at]
-        self.before = self._tokens[max(0, at - 1)]
+        self.now = self.tokens[at]
+        self.before = self.tokens[max(0, at - 1)]
 
     def back_to(self, offset: int) -> None:
         """Return to the token that begins at a character."""
@@ -133,26 +139,26 @@ class Tokens:
         """Put the keyword that was meant in the place of the next token, which has been reported."""
         token = self.now
         self.now = Token(_KEYWORD, token.text, key, token.start, token.end, damaged=True)
-        self._tokens[self.at] = self.now
+        self.tokens[self.at] = self.now
 
     def replace_by_name(self) -> None:
         """Take the next token, which has been reported, for a name."""
         token = self.now
         self.now = Token(_NAME, token.text, token.key, token.start, token.end, damaged=True)
-        self._tokens[self.at] = self.now
+        self.tokens[self.at] = self.now
 
     def begin(self) -> int:
         """Return where the next BEGIN stands; -1 if there is none."""
         if self._next_begin < self.at:
             rest = range(max(self.at, self._next_begin), self._last)
-            here = (at for at in rest if self._tokens[at].key == "BEGIN")
+            here = (at for at in rest if self.tokens[at].key == "BEGIN")
             self._next_begin = next(here, self._last)
         return self._next_begin if self._next_begin < self._last else -1
 
     def more_ends(self) -> bool:
         """Whether more ENDs follow than the statements around this place and those further on wait for."""
         if self._to_close is None:
-            steps = [(token.key == "END") - (token.key in ("BEGIN", "TRY")) for token in reversed(self._tokens)]
+            steps = [(token.key == "END") - (token.key in ("BEGIN", "TRY")) for token in reversed(self.tokens)]
             self._to_close = list(accumulate(steps))[::-1]
         waiting = sum("END" in words or "RECOVER" in words for words in self.waiting)
         return self._to_close[self.at] > waiting
@@ -293,9 +299,21 @@ class Tokens:
         token, after = self.now, self.ahead()
         if token.kind is not _NAME or not key[0].isalpha() or after.key in ("=", ":=", "(", "["):
             return False
-        if self.later and closest(token.text, (key,)):
+        if closest(token.text, (key,)):
             return True
         return after.kind in (_NAME, TokenKind.ARM) and self.same_line()
+
+    def check_length(self, name: tree.Name) -> None:
+        """Refuse a name that is too long."""
+        longest = self.offered.longest_name
+        if len(name.text) > longest:
+            self.found.say(
+                "E103",
+                f"the name `{name.text}` is longer than {longest} characters",
+                name.span,
+                f"{len(name.text)} characters",
+                notes=(f"names of {self.offered.name} have 1 to {longest} characters",),
+            )
 
     def refuse_reserved(self) -> None:
         """Say once of the word that stands here that it cannot be a name."""
@@ -307,7 +325,11 @@ class Tokens:
         # Only what looks alike: T0 for TO.
         if near := closest(token.text, self.declared, limit=0):
             helps = (f"did you mean `{near}`?",)
-        elif self.later and is_later(token.key):
+        elif is_later(token.key):
+            if self.standard is Standard.RLO_83:
+                text = f"`{token.text}` as a word belongs to RLO-2"
+                self.found.say("E214", text, token.span, "in RLO-83 it may be a name, and is declared nowhere")
+                return
             helps = (f"take another name; a program of RLO-83 that uses `{token.text}` is translated with `--std=83`",)
         text = f"`{token.text}` is a reserved word and cannot be a name"
         self.found.say("E107", text, token.span, "a word of the language", helps=helps)
