@@ -2,9 +2,9 @@
 
 from armwright.errors import ExitStatus, InvalidValueError
 from armwright.program.api import no_collection
+from armwright.program.formatter.layout import rows_of
 from armwright.program.formatter.line_breaks import lines_of
 from armwright.program.formatter.pieces import pieces_of
-from armwright.program.formatter.rows import rows_of
 from armwright.program.formatter.spacing import set_blanks
 from armwright.program.language.diagnostic import Diagnostic, in_order
 from armwright.program.language.source import Source
@@ -70,7 +70,7 @@ def _lines(source: Source, std: Standard, width: int) -> list[str]:
         raise UnformattableError(source, wrong[0])
     pieces = pieces_of(text, scanned, program)
     set_blanks(pieces)
-    return lines_of(rows_of(pieces, width), width)
+    return lines_of(rows_of(program, pieces, width), width)
 
 
 def _numbered(lines: list[str], step: int) -> list[str]:

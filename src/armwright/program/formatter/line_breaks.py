@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
+from armwright.program.formatter.layout import CLAUSE, LEVEL, Row, length
 from armwright.program.formatter.pieces import Comment, Piece
-from armwright.program.formatter.rows import CLAUSE, LEVEL, Row, length
 
 # In front of a comment behind a statement.
 _BEFORE_COMMENT = "  "

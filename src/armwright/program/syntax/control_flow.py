@@ -256,8 +256,8 @@ def cobegin(tokens: Tokens) -> tree.Cobegin:
     tokens.waiting.pop()
     if not found and tokens.sees("COEND"):
         tokens.say_once("E126", "COBEGIN has no branches", tokens.now.span, "expected `BEGIN ... END`")
-    close(tokens, "COEND", start)
-    return tree.Cobegin(tokens.since(start), tuple(found))
+    end = close(tokens, "COEND", start)
+    return tree.Cobegin(tokens.since(start), tuple(found), end or tokens.gap())
 
 
 # branch = [ "PRIORITY" number ":" ] block ;
@@ -347,12 +347,14 @@ def try_(tokens: Tokens) -> tree.Try:
     start = tokens.take()
     body = statements(tokens, "RECOVER")
     recovery: tuple[tree.Statement, ...] = ()
-    if close(tokens, "RECOVER", start):
+    recover, end = close(tokens, "RECOVER", start), None
+    if recover:
         recovery = statements(tokens, "END")
-        close(tokens, "END", start)
+        end = close(tokens, "END", start)
     elif tokens.sees("END") and tokens.ahead().key != ".":
         tokens.take()
-    return tree.Try(tokens.since(start), body, recovery)
+    gap = tokens.gap()
+    return tree.Try(tokens.since(start), body, recover or gap, recovery, end or gap)
 
 
 # "RETRY"

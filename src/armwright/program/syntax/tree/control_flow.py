@@ -91,10 +91,11 @@ class Branch:
 
 @attrs.frozen
 class Cobegin:
-    """``COBEGIN branches COEND``."""
+    """``COBEGIN branches COEND``; ``end`` is its COEND."""
 
     span: Span
     branches: tuple[Branch, ...]
+    end: Span
 
 
 @attrs.frozen
@@ -133,11 +134,13 @@ class Lock:
 
 @attrs.frozen
 class Try:
-    """``TRY statements RECOVER statements END``."""
+    """``TRY statements RECOVER statements END``; ``recover`` and ``end`` are its words, or where they are missing."""
 
     span: Span
     body: tuple["Statement", ...]
+    recover: Span
     recovery: tuple["Statement", ...]
+    end: Span
 
 
 @attrs.frozen
