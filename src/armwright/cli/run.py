@@ -82,7 +82,6 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
     from armwright.cli.results import warn_of_stray
-    from armwright.errors import FileFormatError
     from armwright.program.vm.interpreter import Limits, RunError
     from armwright.report.files import Origin
 
@@ -98,11 +97,6 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         if stopped.recording is None:
             raise
         error, recording = stopped, stopped.recording()
-    except (AssertionError, LookupError, TypeError, ValueError) as wrong:
-        if program.suffix != CODE_SUFFIX:
-            raise
-        text = "its instructions do not fit together: no program is translated to such code"
-        raise FileFormatError(program, None, "", text) from wrong
     options = {
         "servo_ms": place.period * 1e3,
         "deviation_mm": place.deviation * 1e3,

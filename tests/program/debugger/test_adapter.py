@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from program.debugging.client import Client
 
 from armwright.program.bytecode.assembler import assembly
+from program.debugger.client import Client
 from program.running import CORPUS, cell_of, code_of
 
 P02, P08 = CORPUS / "p02.rlo", CORPUS / "p08.rlo"

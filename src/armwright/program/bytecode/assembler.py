@@ -23,6 +23,8 @@ from armwright.program.bytecode.instructions import (
     ProcedureCode,
     Text,
 )
+from armwright.program.bytecode.verifier import CodeError
+from armwright.program.bytecode.verify import verify
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.source import Source, Span
 from armwright.program.language.units import DECLARABLE, UnitSystem, dimension
@@ -288,9 +290,11 @@ class _Reader:
             source=source,
         )
         numbers = [number for number, *_ in self._steps]
-        for at, fault in faults(code):
-            self._number = numbers[at] if at < len(numbers) else len(numbers)
-            self._fail(fault)
+        try:
+            verify(code)
+        except CodeError as error:
+            self._number = numbers[error.instruction]
+            self._fail(error.fault)
         return code
 
     def _type(self, text: str) -> VariableType:
@@ -328,82 +332,3 @@ class _Reader:
     def _fail(self, message: str, near: str | None = None) -> NoReturn:
         hint = f"; did you mean {near!r}?" if near else ""
         raise FileFormatError(self._file, self._number, "", f"{message}{hint}")
-
-
-# What each operation takes: n a name or element, v a value, k a constant, p a place, t text or value, x a word; in
-# brackets what may be left out, + for any number more of the last.
-_TAKES: Mapping[str, str] = {
-    "LOADM LOADS": "nk",
-    "COPY NEG INV NOT ROTX ROTY ROTZ": "nv",
-    "MUL DIV ADD SUB LT LE EQ NE GE GT DIST": "nvv",
-    "XYZ": "nvvv",
-    "MATX": "nvvvvvvvvvvvv",
-    "FORCE": "nx",
-    "ELEM": "nxv+",
-    "AFFIX": "nn(x)",
-    "AFFAT": "nnv(x)",
-    "UNFIX": "n(n)",
-    "OPEN": "x(v)",
-    "GRASP": "(x)",
-    "OPER": "xx",
-    "READV": "n",
-    "READS": "x",
-    "MVBEG": "nv",
-    "MVVIA": "v+",
-    "MVAPP MVDEP MVSPD MVBLD MVDUR": "v",
-    "MVON": "pnp",
-    "MVDIR MVSTR MVEND MVHLT RET JOIN QUIT ENDR RETRY HALT STOP": "",
-    "JMP TRY ENDT": "p",
-    "JZ": "vp",
-    "FOR": "nvvvvp",
-    "CALL": "x(v+)",
-    "FORK": "p(v)",
-    "SIG WAIT": "n",
-    "PAUSE": "v",
-    "LOCK UNLK": "n+",
-    "PRINT": "t+",
-}
-TAKES: Mapping[Op, str] = {Op[name]: takes for names, takes in _TAKES.items() for name in names.split()}
-_PATTERNS = {
-    op: re.compile(
-        takes.replace("(", "(?:")
-        .replace(")", ")?")
-        .replace("n", "[wq]")
-        .replace("v", "[wqd]")
-        .replace("x", "w")
-        .replace("t", "[wqds]")
-    )
-    for op, takes in TAKES.items()
-}
-
-
-def _letter(operand: Operand) -> str:
-    match operand:
-        case str():
-            return "q" if operand.startswith("%") else "w"
-        case Constant():
-            return "k"
-        case JumpTarget():
-            return "p"
-        case Text():
-            return "s"
-        case _:
-            return "d"
-
-
-def faults(code: Code) -> Iterator[tuple[int, str]]:
-    """Say what would keep code from being run, with the number of the instruction."""
-    last = len(code.instructions)
-    for at, step in enumerate(code.instructions):
-        if not _PATTERNS[step.op].fullmatch("".join(map(_letter, step.operands))):
-            yield at, f"{step.op} does not take these operands"
-        for operand in step.operands:
-            if isinstance(operand, JumpTarget) and not 0 <= operand.index < last:
-                yield at, f"there is no instruction @{operand.index:04d}"
-            if isinstance(operand, Constant) and operand.index >= len(code.constants):
-                yield at, f"there is no constant c{operand.index}"
-    for name, procedure in code.procedures.items():
-        if procedure.start >= last:
-            yield last, f"procedure {name} begins behind the last instruction"
-    if code.instructions[-1].op not in (Op.STOP, Op.RET, Op.QUIT, Op.JMP, Op.HALT):
-        yield last - 1, "the code runs on behind its last instruction"

@@ -14,6 +14,7 @@ from armwright.arm.model import Arm
 from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell
 from armwright.program.bytecode.instructions import Code, Op
+from armwright.program.bytecode.verify import verify
 from armwright.program.language.diagnostic import Diagnostic, Severity
 from armwright.program.vm import control_flow, devices, expressions, frames, move, output
 from armwright.program.vm.contact import too_deep
@@ -51,7 +52,7 @@ def interpret(
     """Run a program in a cell.
 
     Args:
-        code: translated without errors against this cell.
+        code: of a program without errors.
         cell: arms, frames, servo period and deviation.
         hardware: the cell at work, simulated or real.
         progress: told before each statement.
@@ -61,10 +62,12 @@ def interpret(
         All that happened, tick by tick.
 
     Raises:
+        CodeError: the code cannot be interpreted; code of a program can.
         RunError: a goal is out of reach, a joint would pass its limits, the camera found nothing, a device is
             missing, a value is missing or out of range, processes wait for one another, or a limit of the run is
             passed, and no TRY was around it. The arms are at rest and the devices off then, as at the end.
     """
+    verify(code)
     machine = Machine(code, cell, hardware, limits)
     run(machine, progress)
     return machine.recording()

@@ -1,0 +1,274 @@
+"""Following intermediate code: what is certain in front of each instruction, on every way there."""
+
+import enum
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
+
+import attrs
+
+from armwright.errors import ArmwrightError
+from armwright.program.bytecode.instructions import Code, JumpTarget, Op, Operand
+from armwright.program.language.kinds import VariableKind, VariableType
+from armwright.program.language.names import is_arm
+
+
+class CodeError(ArmwrightError, ValueError):
+    """Intermediate code cannot be interpreted.
+
+    Attributes:
+        instruction: the number of the instruction.
+        fault: what is wrong with it.
+    """
+
+    def __init__(self, instruction: int, fault: str) -> None:
+        """Keep what is wrong."""
+        self.instruction, self.fault = instruction, fault
+        super().__init__(f"instruction {instruction:04d}: {fault}")
+
+
+class Value(enum.Enum):
+    """What a value is while a program runs."""
+
+    NUMBER = "a number"
+    TRUTH = "a truth value"
+    POSE = "a place or a step"
+
+
+@attrs.frozen
+class Element:
+    """What a value in passing names: an element of an array."""
+
+    kind: VariableKind
+
+
+ValueType: TypeAlias = Value | Element
+OF_KIND: Mapping[VariableKind, Value] = {
+    VariableKind.SCALAR: Value.NUMBER,
+    VariableKind.TRANS: Value.POSE,
+    VariableKind.FRAME: Value.POSE,
+}
+_FRAME = VariableType(VariableKind.FRAME)
+
+
+class Routine(enum.Enum):
+    """What a stretch of code is a part of."""
+
+    PROGRAM = "the program"
+    PROCEDURE = "a procedure"
+    BRANCH = "a branch"
+    CONDITION = "a condition"
+    ACTION = "an action"
+
+
+@attrs.frozen
+class State:
+    """What is certain in front of an instruction.
+
+    Attributes:
+        written: a bit for each value in passing.
+        locks: the operands of the LOCKs it is in.
+        attempts: the TRYs it is in.
+    """
+
+    written: int = 0
+    locks: tuple[tuple[Operand, ...], ...] = ()
+    attempts: tuple["Attempt", ...] = ()
+
+
+@attrs.frozen
+class Attempt:
+    """A TRY: its instruction, whether its RECOVER part is meant, and the LOCKs around it."""
+
+    start: int
+    recovering: bool
+    locks: tuple[tuple[Operand, ...], ...]
+
+
+@attrs.frozen
+class Entry:
+    """Where a routine begins.
+
+    Attributes:
+        at: its first instruction.
+        routine: what it is.
+        types: its own names; ``None`` for those of the program alone.
+        state: in front of the first instruction.
+        truth: the value in passing that a condition leaves.
+        begun: the instruction that begins it.
+    """
+
+    at: int
+    routine: Routine
+    types: Mapping[str, VariableType]
+    state: State = State()
+    truth: str = ""
+    begun: int = -1
+
+
+@attrs.frozen
+class Flow:
+    """What an instruction does to the flow.
+
+    Attributes:
+        state: behind it.
+        target: where else it leads, and in which state.
+        falls: whether it leads on to the next instruction.
+    """
+
+    state: State
+    target: tuple[int, State] | None = None
+    falls: bool = True
+
+
+class Verifier:
+    """Follows code.
+
+    Attributes:
+        code: the code.
+        at: the instruction.
+        entry: where its routine begins.
+    """
+
+    def __init__(self, code: Code, rule: "Callable[[Verifier, State], Flow]") -> None:
+        """Stand in front of the first instruction.
+
+        Args:
+            code: whose operands have the sorts that their operations take, and whose jumps lead to instructions.
+            rule: checks the instruction, and says what it does to the flow.
+        """
+        self.code, self._rule = code, rule
+        self.at, self.entry = 0, Entry(0, Routine.PROGRAM, {})
+        self._entries = [self.entry]
+        self._entries += [Entry(one.start, Routine.PROCEDURE, one.types) for one in code.procedures.values()]
+        self._owners: dict[int, Entry] = {}
+        self._known: dict[int, State] = {}
+        self._types: dict[str, ValueType] = {}
+        self._bits: dict[str, int] = {}
+        jumps = {
+            operand.index for step in code.instructions for operand in step.operands if isinstance(operand, JumpTarget)
+        }
+        self._merges = jumps | {number for number, step in enumerate(code.instructions) if step.op is Op.TRY}
+
+    @property
+    def op(self) -> Op:
+        """The operation of the instruction."""
+        return self.code.instructions[self.at].op
+
+    @property
+    def operands(self) -> tuple[Operand, ...]:
+        """The operands of the instruction."""
+        return self.code.instructions[self.at].operands
+
+    def follow(self) -> None:
+        """Follow every routine, until nothing new is learnt of any instruction.
+
+        Raises:
+            CodeError: an instruction cannot be interpreted.
+        """
+        while self._entries:
+            self.entry = self._entries.pop()
+            waiting = [(self.entry.at, self.entry.state)]
+            while waiting:
+                waiting += self._follow_on(*waiting.pop())
+
+    def _follow_on(self, number: int, state: State) -> list[tuple[int, State]]:
+        """Follow one stretch to its end; return where else it leads."""
+        targets: list[tuple[int, State]] = []
+        while True:
+            self.at = number
+            owner = self._owners.setdefault(number, self.entry)
+            if (owner.at, owner.routine, owner.begun) != (self.entry.at, self.entry.routine, self.entry.begun):
+                raise self.wrong(f"{self.entry.routine.value} comes to an instruction that is a part of another")
+            if number in self._merges or number == self.entry.at:
+                merged = self._merged(self._known.get(number), state)
+                if merged == self._known.get(number):
+                    return targets
+                self._known[number] = state = merged
+            flow = self._rule(self, state)
+            targets += [] if flow.target is None else [flow.target]
+            if not flow.falls:
+                return targets
+            state, number = flow.state, number + 1
+            if number == len(self.code.instructions):
+                raise self.wrong("the code runs on behind its last instruction")
+
+    def _merged(self, old: State | None, new: State) -> State:
+        if old is None:
+            return new
+        if (old.attempts, old.locks) != (new.attempts, new.locks):
+            raise self.wrong("one way here is inside of a TRY or a LOCK in which another is not")
+        return attrs.evolve(new, written=old.written & new.written)
+
+    def begin(self, target: Operand, routine: Routine, state: State, truth: str = "") -> None:
+        """Follow a routine that the instruction begins, with the values in passing that are known here."""
+        inside = attrs.evolve(state, attempts=(), locks=())
+        self._entries.append(Entry(index_of(target), routine, self.entry.types, inside, truth, self.at))
+
+    def wrong(self, fault: str) -> CodeError:
+        """Return the error of the instruction."""
+        return CodeError(self.at, fault)
+
+    def declared(self, name: str) -> VariableType | None:
+        """Return what a declared name holds; None where it is not declared."""
+        return self.entry.types.get(name) or self.code.types.get(name)
+
+    def type_of(self, state: State, operand: Operand) -> VariableType:
+        """Return what a name or an element holds; a name that is not declared is that of a frame of the cell."""
+        if not isinstance(operand, str):
+            raise self.wrong(f"{operand} is no name")
+        if operand.startswith("%"):
+            kept = self._passing(state, operand)
+            if not isinstance(kept, Element):
+                raise self.wrong(f"{operand} is {kept.value}, and names nothing")
+            return VariableType(kept.kind)
+        return VariableType(VariableKind.FRAME) if is_arm(operand) else self.declared(operand) or _FRAME
+
+    def need_name(self, state: State, operand: Operand, kind: VariableKind) -> None:
+        """See to it that an operand names a variable of a kind."""
+        if self.type_of(state, operand) != VariableType(kind):
+            raise self.wrong(f"{self.op} takes the name of a variable of kind {kind}, not {operand}")
+
+    def value(self, state: State, operand: Operand) -> Value:
+        """Return what the value of an operand is."""
+        if not isinstance(operand, str):
+            return Value.NUMBER
+        if operand.startswith("%") and isinstance(kept := self._passing(state, operand), Value):
+            return kept
+        kind = self.type_of(state, operand)
+        if kind.sizes or kind.kind not in OF_KIND:
+            raise self.wrong(f"{operand} is {kind} and has no value")
+        return OF_KIND[kind.kind]
+
+    def need(self, state: State, operand: Operand, *wanted: Value) -> None:
+        """See to it that an operand has a value of a sort."""
+        value = self.value(state, operand)
+        if value not in wanted:
+            raise self.wrong(f"{self.op} takes {wanted[0].value}, and {operand} is {value.value}")
+
+    def _passing(self, state: State, name: str) -> ValueType:
+        bit = self._bits.get(name)
+        if bit is None or not state.written >> bit & 1:
+            raise self.wrong(f"{name} is read before it is written")
+        return self._types[name]
+
+    def write(self, state: State, to: Operand, value: Value) -> State:
+        """Write a value to a variable, to the element that a value in passing names, or to a value in passing."""
+        name = str(to)
+        if name.startswith("%") and not isinstance(self._types.get(name), Element):
+            return self.define(state, name, value)
+        kind = self.type_of(state, name)
+        if kind.sizes or OF_KIND.get(kind.kind) is not value:
+            raise self.wrong(f"{name} is {kind}, and is given {value.value}")
+        return state
+
+    def define(self, state: State, name: str, kind: ValueType) -> State:
+        """Write a value in passing."""
+        if self._types.setdefault(name, kind) != kind:
+            raise self.wrong(f"{name} is two different things")
+        return attrs.evolve(state, written=state.written | 1 << self._bits.setdefault(name, len(self._bits)))
+
+
+def index_of(operand: Operand) -> int:
+    """Return the number of the instruction that a jump leads to."""
+    assert isinstance(operand, JumpTarget)  # noqa: S101 - the sorts of operands have been checked
+    return operand.index
