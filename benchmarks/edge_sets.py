@@ -7,11 +7,11 @@ from scipy.optimize import brentq
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Limits
 from armwright.arrays import Array
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry
-from armwright.kinematics.inverse.recognise import closed_form_geometry
-from armwright.kinematics.jacobian import jacobian
-from armwright.kinematics.singularities import determinant_factors, factor_names
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
+from armwright.kinematics.jacobians import jacobian
+from armwright.kinematics.singularity_analysis import determinant_factors, factor_names
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 

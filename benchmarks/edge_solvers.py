@@ -12,9 +12,9 @@ from roboticstoolbox.models.DH import Puma560
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solution import Outcome
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solution import Outcome
+from armwright.kinematics.inverse_kinematics.solve import inverse
 
 # Two models that put the hand this near to each other at random postures are one [m] and entries of a rotation.
 _SAME_MODEL = 1e-12

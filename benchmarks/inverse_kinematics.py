@@ -8,7 +8,7 @@ from eaik.IK_DH import DhRobot
 
 from armwright.arm.load import load_arm
 from armwright.compiled.arm import compile_arm
-from armwright.kinematics.forward import link_poses
+from armwright.kinematics.forward_kinematics import link_poses
 
 ROWS = 200_000
 FEW = 5_000

@@ -9,7 +9,7 @@ import roboticstoolbox as rtb
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.compiled.arm import compile_arm
-from armwright.kinematics.forward import link_poses
+from armwright.kinematics.forward_kinematics import link_poses
 from oracles.with_pinocchio import pinocchio_model
 
 ROWS = 200_000

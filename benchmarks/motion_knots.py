@@ -10,8 +10,8 @@ import ruckig
 from numba import njit
 from scipy.interpolate import CubicSpline
 
-from armwright.motion.xspline import xspline
 from armwright.motion.xspline_online import begin, xspline_kernel
+from armwright.motion.xspline_path import xspline
 
 JOINTS = 6
 STEP = 0.02  # between knots [s]

@@ -11,7 +11,7 @@ from spatialmath import SE3
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.straight import straight_line
 from kinematics import toolbox_robot
 

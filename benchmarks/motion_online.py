@@ -11,7 +11,7 @@ from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.motion.joint_path import through_knots
 from armwright.motion.online import JERK_TIME, retarget
-from armwright.motion.time_optimal import time_optimal
+from armwright.motion.time_optimal_path import time_optimal
 from armwright.motion.trajectory import Trajectory
 
 ARM = load_arm("puma560")

@@ -7,7 +7,7 @@ import numpy as np
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.moves import cartesian_move
 from armwright.spatial.rotations import rotation_from_vector
 from kinematics import toolbox_robot

@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 import armwright
+from armwright.dynamics.accelerations import toacc
 from armwright.dynamics.bejczy import bejczy_efforts
 from armwright.dynamics.energy import kinetic_energy, potential_energy
-from armwright.dynamics.forward_dynamics import toacc
 from armwright.dynamics.lagrange_euler import coriolis_matrix, coriolis_tensor
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
 from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.differential import differential_inverse
-from armwright.kinematics.jacobian import jacobian_rate, tool_twist
-from armwright.kinematics.manipulability import manipulability
-from armwright.kinematics.singularities import singularity_factors
+from armwright.kinematics.jacobians import jacobian_rate, tool_twist
+from armwright.kinematics.manipulability_index import manipulability
+from armwright.kinematics.singularity_analysis import singularity_factors
 from armwright.simulation.controllers import computed_torque, pd, standing
 
 PUMA = armwright.load_arm("puma560-seed")

@@ -16,7 +16,7 @@ from armwright.clearance.settings import Settings
 from armwright.compiled.arm import compile_arm
 from armwright.compiled.quantities import emit_quantity
 from armwright.errors import InvalidValueError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.tracing.emit import emit
 from armwright.tracing.kernel import Kernel
 from cli_calls import armwright

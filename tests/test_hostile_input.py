@@ -10,9 +10,9 @@ import pytest
 
 import armwright
 from armwright.arm.model import Arm, Joint, Limits, Link, Motor
+from armwright.dynamics.accelerations import toacc
 from armwright.dynamics.bejczy import bejczy_efforts, fitted
 from armwright.dynamics.energy import kinetic_energy
-from armwright.dynamics.forward_dynamics import toacc
 from armwright.errors import (
     ArmwrightError,
     InvalidValueError,
@@ -23,9 +23,9 @@ from armwright.errors import (
 )
 from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.differential import differential_inverse
-from armwright.kinematics.jacobian import jacobian_rate, tool_twist
-from armwright.kinematics.manipulability import manipulability
-from armwright.kinematics.singularities import singularity_factors
+from armwright.kinematics.jacobians import jacobian_rate, tool_twist
+from armwright.kinematics.manipulability_index import manipulability
+from armwright.kinematics.singularity_analysis import singularity_factors
 from armwright.simulation.controllers import gravity_compensation, pd, standing
 from armwright.simulation.integrators import Adaptive, Gill
 from armwright.simulation.result import Brake, Status

@@ -19,7 +19,7 @@ from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import Simulation as Rattling
 from armwright.clearance.simulation import simulate as simulate_play
-from armwright.kinematics.inverse.solution import Branch
+from armwright.kinematics.inverse_kinematics.solution import Branch
 from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.report.calibrated import calibrated
 from armwright.report.calibrated_files import distances_figure

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.accuracy.assess import Assessment, assess
+from armwright.accuracy.assessment import Assessment, assess
 from armwright.accuracy.measurement_file import AnyTest, PathTest, PoseTest, read_measurements
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
 from armwright.files.limits import raised

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from armwright.accuracy.corner import corner_deviations
 from armwright.accuracy.path import path_deviation, path_velocity
-from armwright.accuracy.settling import posing_time, settling
+from armwright.accuracy.settling_time import posing_time, settling
 from armwright.accuracy.trace import Trace
 from armwright.accuracy.weaving import weaving_deviation
 from armwright.errors import InvalidValueError, ShapeError, TooFewError

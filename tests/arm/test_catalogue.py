@@ -10,9 +10,9 @@ from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm
 from armwright.arrays import Array
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.inverse.solution import Outcome
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.forward_kinematics import forward, link_poses
+from armwright.kinematics.inverse_kinematics.solution import Outcome
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.spatial.poses import pose
 from oracles.arms import random_postures
 from samples import Sample

@@ -11,7 +11,7 @@ from armwright.arm.dh import about_com, carry, from_modified, to_modified, turn,
 from armwright.arm.load import read_arm
 from armwright.arm.model import Arm, Link
 from armwright.arrays import Array
-from armwright.kinematics.forward import link_poses
+from armwright.kinematics.forward_kinematics import link_poses
 from armwright.spatial.poses import inverse
 from oracles.arms import random_arm, random_link, random_pose, random_postures
 

@@ -14,7 +14,7 @@ import pytest
 
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Link, Motor, exact_cosine, exact_sine
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from oracles.arms import random_arm
 

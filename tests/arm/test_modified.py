@@ -10,7 +10,7 @@ import pytest
 from armwright.arm.dh import from_modified
 from armwright.arm.model import Arm, Joint, Link
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from oracles.arms import random_arm
 
 # Products of a dozen transforms with lengths of some metres.

@@ -11,7 +11,7 @@ from armwright.arm.load import load_arm, read_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 
 # Products of a dozen transforms with lengths of some metres.
 ROUNDING = 1e-12

@@ -16,14 +16,14 @@ from armwright.arm.write import toml_text
 from armwright.arrays import Array
 from armwright.calibration.chain import chain_of
 from armwright.compiled.quantities import emit_quantity
+from armwright.dynamics.accelerations import forward_dynamics
 from armwright.dynamics.energy import kinetic_energy
-from armwright.dynamics.forward_dynamics import forward_dynamics
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.lagrange_euler import lagrange_euler
-from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.shares import coriolis_efforts
-from armwright.kinematics.forward import forward
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.jacobians import jacobian
 from oracles.urdf import KINDS, RELATIONS, Oracle, joint, oracle, random_body, random_origin, random_urdf
 from samples import Sample
 

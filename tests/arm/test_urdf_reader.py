@@ -14,16 +14,16 @@ from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
 from armwright.arm.write import toml_text
 from armwright.cell.reader import read_cell
 from armwright.compiled.arm import compile_arm
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.simulation.controllers import gravity_compensation
-from armwright.simulation.simulate import simulate
+from armwright.simulation.time_stepping import simulate
 from urdf_texts import ARM_WITH_GRIPPER, LIMIT, MASS, joint, link, one, robot
 
 ROUNDING = 1e-12

@@ -15,11 +15,11 @@ from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Limits, Motor
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arm.urdf.reader import load_urdf
 from armwright.arm.urdf.writer import lost_in_urdf, urdf_text
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.recognise import find_geometry
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from oracles.arms import random_arm, squared
 from oracles.urdf import oracle
 

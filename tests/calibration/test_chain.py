@@ -9,7 +9,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.calibration.chain import Chain, chain_of
 from armwright.errors import ShapeError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from calibration.simulated import postures, random_arm, random_errors, random_pose
 
 # Some thirty turns and shifts, each rounded.

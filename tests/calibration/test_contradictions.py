@@ -7,7 +7,7 @@ from armwright.calibration.contradictions import contradictions
 from armwright.calibration.cross_validation import cross_validate, workspace_regions
 from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.readings import readings
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 
 
 def postures(rng: np.random.Generator, count: int) -> np.ndarray:

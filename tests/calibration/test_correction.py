@@ -20,7 +20,7 @@ from armwright.calibration.fitting import Calibration, calibrate_points
 from armwright.calibration.readings import readings
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector
 from calibration.simulated import postures, random_arm, random_errors, random_pose, seen

@@ -15,7 +15,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.calibration.chain import chain_of
 from armwright.calibration.fitting import calibrate_points
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import pose
 from calibration.simulated import postures, random_errors, seen
 

@@ -15,7 +15,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.measurements import Measurements, read_measurements
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import pose
 
 FOLDER = Path(os.environ.get("ARMWRIGHT_DATA", Path(__file__).parents[3] / "shared" / "data"))

@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.cell.model import Cell, CellArm
 from armwright.cell.simulator import Simulator
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program import Source, known_cell
 from armwright.program import compile as compile_program
 from armwright.program.vm.interpreter import interpret

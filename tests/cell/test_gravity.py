@@ -21,14 +21,14 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.compiled.quantities import emit_quantity
 from armwright.dynamics.energy import potential_energy
+from armwright.dynamics.equation_of_motion import terms
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.dynamics.shares import gravity_efforts
-from armwright.dynamics.terms import terms
 from armwright.errors import FileFormatError, GravityWarning, InvalidValueError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.efforts import effort_peaks, lasting_efforts, slowing_for_efforts
-from armwright.motion.quintic import point_to_point
+from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.solver import solver_of
 from armwright.motion.straight import straight_line
 from armwright.program import Source, known_cell
@@ -36,7 +36,7 @@ from armwright.program import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.interpreter import warnings as warnings_of
 from armwright.program.vm.recording import Recording
-from armwright.simulation.simulate import simulate
+from armwright.simulation.time_stepping import simulate
 from armwright.spatial.poses import pose
 from oracles.with_pinocchio import pinocchio_model, with_load, with_rotors
 from samples import Sample

@@ -15,7 +15,7 @@ from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell, base_name
 from armwright.cell.reader import read_cell
 from armwright.errors import FileFormatError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program import Source, known_cell
 from armwright.program import compile as compile_program
 

@@ -11,8 +11,8 @@ from armwright.cell.model import Cell, CellArm
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.errors import ShapeError
-from armwright.kinematics.forward import forward
-from armwright.motion.quintic import quintic
+from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.quintic_polynomials import quintic
 from armwright.motion.trajectory import hold
 from armwright.spatial.poses import pose
 

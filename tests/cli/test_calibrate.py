@@ -8,7 +8,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.calibration.chain import chain_of
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from cli_calls import armwright
 
 ARM = "puma560"

@@ -8,7 +8,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.urdf.reader import load_urdf
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from cli_calls import armwright
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "seven_joints.urdf"

@@ -12,9 +12,9 @@ from armwright.arm.load import load_arm, read_load
 from armwright.arm.model import Link
 from armwright.cli.app import main
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.errors import FileFormatError
-from armwright.simulation.simulate import simulate
+from armwright.simulation.time_stepping import simulate
 from cli_calls import armwright
 
 Q = "10,20,30,40,50,60"

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
+from armwright.dynamics.equation_of_motion import terms
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.dynamics.terms import terms
-from armwright.kinematics.forward import forward
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.jacobians import jacobian
 from cli_calls import armwright
 
 Q_DEG = "10,20,30,40,50,60"

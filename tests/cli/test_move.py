@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.arm.load import load_arm
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from cli_calls import armwright
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -14,9 +14,9 @@ from armwright.arrays import LARGEST
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import ArmwrightError, InvalidValueError, ShapeError, UnitWarning
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.wrapping import equivalent_configurations
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
+from armwright.kinematics.jacobians import jacobian
 from samples import Sample
 
 PUMA = load_arm("puma560")

@@ -16,13 +16,13 @@ from armwright.arm.model import Arm, Joint, Link
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.compiled.quantities import emit_quantity, quantity_names
-from armwright.dynamics.forward_dynamics import forward_dynamics
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.accelerations import forward_dynamics
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
-from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.inverse.solve import inverse, inverse_branches
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward, link_poses
+from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
+from armwright.kinematics.jacobians import jacobian
 from oracles.arms import random_arm, random_postures
 from samples import WHOLE, Sample
 

@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.dynamics.bejczy import PRINTED, Coefficients, bejczy_efforts, bejczy_gravity, bejczy_inertias, fitted
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import ShapeError, UnsupportedArmError
 from oracles.arms import random_postures

@@ -7,11 +7,11 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.bodies import body_of
 from armwright.dynamics.energy import kinetic_energy, potential_energy
-from armwright.dynamics.mass_matrix import mass_matrix
-from armwright.dynamics.payload import payload
+from armwright.dynamics.inertia_matrix import mass_matrix
+from armwright.dynamics.payloads import payload
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from oracles.arms import random_arm
 
 LOAD = 1.8  # kg

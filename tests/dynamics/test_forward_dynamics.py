@@ -7,9 +7,9 @@ import pytest
 
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
+from armwright.dynamics.accelerations import forward_dynamics, toacc, unit_accelerations
 from armwright.dynamics.articulated_body import articulated_body
-from armwright.dynamics.forward_dynamics import forward_dynamics, toacc, unit_accelerations
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import UnsupportedArmError
 from oracles.arms import random_arm

@@ -5,6 +5,7 @@ import pytest
 
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint, Link
+from armwright.dynamics.inertia_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.lagrange_euler import (
     coriolis_matrix,
     coriolis_tensor,
@@ -13,10 +14,9 @@ from armwright.dynamics.lagrange_euler import (
     pose_derivatives,
     pseudo_inertia,
 )
-from armwright.dynamics.mass_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import coriolis_efforts
-from armwright.kinematics.forward import link_poses
+from armwright.kinematics.forward_kinematics import link_poses
 from oracles.arms import random_arm, random_link
 
 AGREEMENT = 1e-10  # relative to the largest number

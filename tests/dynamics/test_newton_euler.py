@@ -9,7 +9,7 @@ from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import ShapeError
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.jacobians import jacobian
 from oracles.arms import random_arm
 from oracles.with_pinocchio import pinocchio_model
 

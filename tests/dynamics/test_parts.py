@@ -6,10 +6,10 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.lagrange_euler import coriolis_matrix, coriolis_tensor, pose_derivative_matrices
-from armwright.dynamics.mass_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics, link_forces
-from armwright.kinematics.forward import link_poses
+from armwright.kinematics.forward_kinematics import link_poses
 from oracles.arms import random_arm
 from oracles.with_pinocchio import pinocchio_model
 

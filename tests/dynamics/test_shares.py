@@ -7,7 +7,7 @@ import pytest
 
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
-from armwright.dynamics.mass_matrix import composite_rigid_body, mass_matrix
+from armwright.dynamics.inertia_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
 from armwright.errors import ShapeError

@@ -6,11 +6,11 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import STANDARD_GRAVITY, Arm, Joint, Link, Motor
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.equation_of_motion import Terms, terms
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
-from armwright.dynamics.terms import Terms, terms
 from armwright.errors import ShapeError
 from oracles.arms import random_arm, random_link
 

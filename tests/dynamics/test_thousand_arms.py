@@ -8,17 +8,17 @@ import pinocchio as pin
 import pytest
 
 from armwright.arrays import Array
+from armwright.dynamics.accelerations import forward_dynamics, toacc, unit_accelerations
 from armwright.dynamics.energy import kinetic_energy, potential_energy
-from armwright.dynamics.forward_dynamics import forward_dynamics, toacc, unit_accelerations
+from armwright.dynamics.equation_of_motion import Terms, terms
+from armwright.dynamics.inertia_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.lagrange_euler import (
     coriolis_matrix,
     lagrange_euler,
 )
-from armwright.dynamics.mass_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
-from armwright.dynamics.terms import Terms, terms
 from oracles.thousand import AGREEMENT, Case, deviation, largest_deviation, thousand_arms
 from oracles.with_pinocchio import pushed
 

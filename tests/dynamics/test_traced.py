@@ -9,8 +9,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.dynamics.articulated_body import articulated_body
 from armwright.dynamics.energy import height_energy, motion_energy
+from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.lagrange_euler import lagrange_euler
-from armwright.dynamics.mass_matrix import composite_rigid_body
 from armwright.dynamics.newton_euler import newton_euler
 from armwright.dynamics.shares import gravity_shares, speed_shares
 from armwright.tracing.graph import Graph, Traced, evaluate, operation_count

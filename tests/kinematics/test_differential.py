@@ -16,10 +16,10 @@ from armwright.kinematics.differential import (
     rates_by_derivative,
     wrist_motion,
 )
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.jacobians import jacobian
 from armwright.tracing.graph import Graph, evaluate
 from armwright.tracing.scalar import Scalar
 from oracles.arms import random_pose, random_postures

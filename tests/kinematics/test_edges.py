@@ -10,11 +10,11 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Limits
 from armwright.arrays import Array
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solution import InverseSolution, Outcome
-from armwright.kinematics.inverse.solve import inverse, inverse_branches
-from armwright.kinematics.jacobian import jacobian
-from armwright.kinematics.singularities import singularity_factors
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solution import InverseSolution, Outcome
+from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
+from armwright.kinematics.jacobians import jacobian
+from armwright.kinematics.singularity_analysis import singularity_factors
 from armwright.spatial.poses import pose
 from oracles.arms import random_postures
 from oracles.with_pinocchio import pinocchio_model

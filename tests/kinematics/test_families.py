@@ -10,13 +10,13 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.forward import forward, link_poses, per_joint, stack
-from armwright.kinematics.inverse.branch_angles import branch_angles
-from armwright.kinematics.inverse.branches import branches, single_branch
-from armwright.kinematics.inverse.recognise import closed_form_geometry, find_geometry
-from armwright.kinematics.inverse.solution import Outcome
-from armwright.kinematics.inverse.solve import BRANCHES, inverse, inverse_branches
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward, link_poses, per_joint, stack
+from armwright.kinematics.inverse_kinematics.branch_angles import branch_angles
+from armwright.kinematics.inverse_kinematics.branches import branches, single_branch
+from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry, find_geometry
+from armwright.kinematics.inverse_kinematics.solution import Outcome
+from armwright.kinematics.inverse_kinematics.solve import BRANCHES, inverse, inverse_branches
+from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import pose
 from armwright.tracing.graph import Graph, evaluate
 from oracles.arms import random_arm, random_pose, random_postures

@@ -7,9 +7,9 @@ import pytest
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward, link_poses
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import nearest_rotation
 from oracles.arms import random_postures

@@ -8,12 +8,12 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.inverse.solution import NoSolutionError, Outcome
-from armwright.kinematics.inverse.solve import inverse, inverse_branches
-from armwright.kinematics.inverse.wrapping import equivalent_configurations
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Outcome
+from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
+from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
+from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import pose
 from oracles.arms import random_postures
 
@@ -110,7 +110,7 @@ def test_labels_say_how_the_arm_stands() -> None:
 
 
 def forward_of(arm: object, q: Array, frame: int) -> Array:
-    from armwright.kinematics.forward import link_poses
+    from armwright.kinematics.forward_kinematics import link_poses
 
     return link_poses(arm, q)[frame, :3, 3]  # type: ignore[arg-type]
 

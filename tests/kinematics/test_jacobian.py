@@ -7,9 +7,9 @@ import pytest
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.jacobian import Axes, jacobian, jacobian_rate, tool_twist
-from armwright.kinematics.manipulability import manipulability
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.jacobians import Axes, jacobian, jacobian_rate, tool_twist
+from armwright.kinematics.manipulability_index import manipulability
 from oracles.arms import random_arm, random_postures
 from oracles.with_pinocchio import pinocchio_model
 

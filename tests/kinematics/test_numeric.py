@@ -7,14 +7,14 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.errors import InvalidValueError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.numeric import numeric_inverse
-from armwright.kinematics.inverse.ranking import POSE_TOLERANCE
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.inverse.solution import NoSolutionError, Outcome
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.inverse.wrapping import mid_range
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
+from armwright.kinematics.inverse_kinematics.ranking import POSE_TOLERANCE
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Outcome
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.inverse_kinematics.wrapping import mid_range
+from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import pose
 from oracles.arms import random_arm, random_postures
 from samples import Sample

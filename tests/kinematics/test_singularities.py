@@ -10,9 +10,9 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
 from armwright.kinematics.damping import damped_rates
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.jacobian import jacobian, tool_twist
-from armwright.kinematics.singularities import singularities, singularity_factors
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.jacobians import jacobian, tool_twist
+from armwright.kinematics.singularity_analysis import singularities, singularity_factors
 from oracles.arms import random_arm, random_pose, random_postures
 
 ROUNDING = 1e-10

@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 
 from armwright.arrays import Array
-from armwright.kinematics.forward import forward, link_poses
-from armwright.kinematics.jacobian import Axes, jacobian, jacobian_rate, tool_twist
+from armwright.kinematics.forward_kinematics import forward, link_poses
+from armwright.kinematics.jacobians import Axes, jacobian, jacobian_rate, tool_twist
 from oracles.thousand import AGREEMENT, Case, deviation, largest_deviation, thousand_arms
 
 pytestmark = pytest.mark.proof

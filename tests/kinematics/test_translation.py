@@ -4,7 +4,7 @@ import numpy as np
 
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 
 # The table of roboticstoolbox.models.DH.Puma560, as its source has it: d [m], a [m], alpha [rad].
 HEIGHT = 0.672

@@ -9,8 +9,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.differential import SingularPostureError
-from armwright.kinematics.forward import link_poses
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import link_poses
+from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.wrist_partitioned import wrist_partitioned_inverse, wrist_partitioned_jacobian
 from oracles.arms import random_pose
 

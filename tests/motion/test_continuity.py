@@ -5,11 +5,11 @@ import pytest
 
 from armwright.errors import InvalidValueError, KindError
 from armwright.motion.blends import blended
-from armwright.motion.continuity import continuity
-from armwright.motion.cubic import cubic
-from armwright.motion.quintic import quintic
+from armwright.motion.continuity_report import continuity
+from armwright.motion.cubic_polynomials import cubic
+from armwright.motion.quintic_polynomials import quintic
 from armwright.motion.trajectory import Trajectory, hold, join
-from armwright.motion.trapezoid import trapezoid
+from armwright.motion.trapezoidal_profile import trapezoid
 
 
 def test_a_quintic_against_rest() -> None:

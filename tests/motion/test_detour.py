@@ -9,9 +9,9 @@ from armwright.arrays import Array
 from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import UnknownNameError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.jacobians import jacobian
 from armwright.motion.detour import line_or_detour
 from armwright.motion.follow import PathError
 from armwright.motion.straight import straight_line

@@ -10,9 +10,9 @@ from armwright.compiled.arm import compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.motion.efforts import _largest_part, _Shares, effort_peaks, slowing_for_efforts
-from armwright.motion.quintic import PEAK_ACCELERATION, quintic
+from armwright.motion.quintic_polynomials import PEAK_ACCELERATION, quintic
 from armwright.motion.trajectory import Trajectory, hold
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 
 PUMA = load_arm("puma560-seed")
 # Looks are so close that a peak between them is missed by no more than this part of it.

@@ -8,16 +8,16 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import slower
 from armwright.motion.detour import line_or_detour
 from armwright.motion.follow import PathError
 from armwright.motion.plan import Obstacle
-from armwright.motion.quintic import point_to_point
+from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.stops import at_speed
 from armwright.motion.straight import straight_line
-from armwright.motion.time_optimal import time_optimal
+from armwright.motion.time_optimal_path import time_optimal
 from armwright.program.vm.move_diagnostics import stopped
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import rotation_from_vector

@@ -13,13 +13,13 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.errors import InvalidValueError, KindError, RotationWarning, ShapeError, UnknownNameError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion import detour
 from armwright.motion.blends import blended
-from armwright.motion.continuity import continuity
+from armwright.motion.continuity_report import continuity
 from armwright.motion.follow import PathError
-from armwright.motion.limit_use import limit_use, slowing_for_limits
+from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import cartesian_move, exact_poses, joint_move, stopping_move
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import angle_between, rotation_from_vector

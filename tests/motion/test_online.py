@@ -13,7 +13,7 @@ from armwright.arrays import Array
 from armwright.errors import ArmwrightError, InvalidValueError, KindError, MissingExtraError, ShapeError
 from armwright.motion.online import JERK_TIME, OnlineError, replace_goal, retarget
 from armwright.motion.polynomials import derivative, evaluate
-from armwright.motion.quintic import point_to_point, quintic
+from armwright.motion.quintic_polynomials import point_to_point, quintic
 from armwright.motion.trajectory import Trajectory, join
 from samples import Sample
 

@@ -8,8 +8,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.follow import TURN_PER_METRE, PathError, follow
 from armwright.motion.path import Path, closest_to_axis, place_knots, report_speed, report_step
 from armwright.motion.plan import Manner, StageError, StageGoal, plan

@@ -7,9 +7,9 @@ from hypothesis import given
 from scipy.interpolate import CubicHermiteSpline
 
 from armwright.errors import InvalidValueError, KindError, ShapeError
-from armwright.motion.continuity import continuity
-from armwright.motion.cubic import cubic, cubic_through, shortest_cubic
-from armwright.motion.trapezoid import shortest_trapezoid, trapezoid
+from armwright.motion.continuity_report import continuity
+from armwright.motion.cubic_polynomials import cubic, cubic_through, shortest_cubic
+from armwright.motion.trapezoidal_profile import shortest_trapezoid, trapezoid
 
 ROUNDING = 1e-12
 # Limits may be passed by this part of them: rounding.

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, KindError, ShapeError, UnknownNameError
 from armwright.motion.blends import Ends, blend_timing, blended, via_deviations, via_distances
-from armwright.motion.continuity import continuity
+from armwright.motion.continuity_report import continuity
 from armwright.motion.trajectory import Trajectory
 
 # To what the formulas of the course and ours agree, of numbers of size 100.

@@ -9,7 +9,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.errors import InvalidValueError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.follow import PathError
 from armwright.motion.moves import cartesian_move
 from armwright.motion.plan import Manner, StageGoal, plan

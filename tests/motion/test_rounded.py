@@ -5,8 +5,8 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.errors import InvalidValueError
-from armwright.kinematics.forward import forward
-from armwright.motion.continuity import continuity
+from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.continuity_report import continuity
 from armwright.motion.follow import PathError
 from armwright.motion.path import Path
 from armwright.motion.rounded import Rounded, rounded_move
@@ -18,7 +18,7 @@ DEVIATION = 1e-4
 
 
 def start() -> np.ndarray:
-    from armwright.kinematics.inverse.solve import inverse
+    from armwright.kinematics.inverse_kinematics.solve import inverse
 
     return inverse(ARM, pose(DOWN, (0.45, 0.0, 0.25))).best.q
 

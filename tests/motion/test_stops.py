@@ -13,10 +13,10 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.jacobian import jacobian
-from armwright.kinematics.singularities import singularities, singularity_factors
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.jacobians import jacobian
+from armwright.kinematics.singularity_analysis import singularities, singularity_factors
 from armwright.motion.chain import Room, chain, step_by_step
 from armwright.motion.follow import TURN_PER_METRE, PathError, follow
 from armwright.motion.path import Path

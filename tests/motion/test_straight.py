@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, KindError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.follow import PathError
 from armwright.motion.straight import CertifiedLine, straight_line
 from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector

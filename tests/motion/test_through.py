@@ -7,7 +7,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.errors import ShapeError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.follow import PathError
 from armwright.motion.through import through_frames
 from armwright.spatial.poses import pose

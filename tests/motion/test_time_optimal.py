@@ -22,10 +22,10 @@ from armwright.errors import (
     UnknownNameError,
 )
 from armwright.motion.joint_path import through_knots
-from armwright.motion.quintic import quintic
-from armwright.motion.time_optimal import time_optimal
+from armwright.motion.quintic_polynomials import quintic
+from armwright.motion.time_optimal_path import time_optimal
 from armwright.motion.trajectory import Trajectory, hold, join
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 
 PUMA = load_arm("puma560-seed")
 SPEED, ACCELERATION, EFFORT = (PUMA.limit(name) for name in ("speed", "acceleration", "effort"))

@@ -10,9 +10,9 @@ from scipy.interpolate import PPoly
 
 from armwright.arm.load import load_arm
 from armwright.errors import InvalidValueError, KindError, ShapeError
-from armwright.motion.quintic import point_to_point, quintic
+from armwright.motion.quintic_polynomials import point_to_point, quintic
 from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 
 ROUNDING = 1e-12
 

@@ -11,10 +11,10 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import IncapableArmError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.chain import chain
-from armwright.motion.continuity import continuity
+from armwright.motion.continuity_report import continuity
 from armwright.motion.efforts import slowing_for_efforts
 from armwright.motion.plan import Manner, Stage, StageError, StageGoal, plan
 from armwright.motion.solver import solver_of

@@ -10,8 +10,8 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.motion.continuity import continuity
-from armwright.motion.xspline import xspline, xspline_along, xspline_rates
+from armwright.motion.continuity_report import continuity
+from armwright.motion.xspline_path import xspline, xspline_along, xspline_rates
 
 ROUNDING = 1e-12
 

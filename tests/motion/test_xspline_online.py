@@ -7,8 +7,8 @@ from numba import njit
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, KindError, ShapeError
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline import xspline
 from armwright.motion.xspline_online import begin, finish, push, xspline_kernel
+from armwright.motion.xspline_path import xspline
 
 # Fused operations round once where plain ones round twice.
 ROUNDING = 1e-11

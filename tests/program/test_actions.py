@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from program.running import EXACT, cell_of, down, expect, failure, printed, run
 
 F, G = down(0.45, 0.15, 0.06), down(0.45, -0.15, 0.06)

@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.cell.model import Around, Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion import detour
 from armwright.motion.path import report_speed
 from armwright.program import compile as compile_program

@@ -11,7 +11,7 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program import compile as compile_program
 from armwright.program import known_cell
 from armwright.program.language.source import Source

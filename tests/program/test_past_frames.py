@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.simulator import Simulator
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.follow import follow
 from armwright.motion.path import Path
 from armwright.motion.trajectory import whole_ticks

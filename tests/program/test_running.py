@@ -10,7 +10,7 @@ import pytest
 from armwright.arm.model import Joint
 from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program.vm.interpreter import Limits
 from program.running import EXACT, cell_of, down, expect, failure, printed, run
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armwright.accuracy.assess import Assessment, assess
+from armwright.accuracy.assessment import Assessment, assess
 from armwright.accuracy.measurement_file import read_measurements
 from armwright.report.accuracy_figures import drawings
 from armwright.report.accuracy_page import accuracy_page, notes_of, shown_measure

@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Link, Motor
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.simulation.controllers import (
@@ -18,7 +18,7 @@ from armwright.simulation.controllers import (
     standing,
 )
 from armwright.simulation.integrators import Adaptive, Gill
-from armwright.simulation.simulate import simulate
+from armwright.simulation.time_stepping import simulate
 from oracles.arms import random_arm
 
 

@@ -6,7 +6,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arrays import Array
 from armwright.errors import UnknownNameError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.blends import via_distances
 from armwright.study import puma_moves
 from armwright.study.puma_moves import (

@@ -12,9 +12,9 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.dynamics.newton_euler import inverse_dynamics, newton_euler
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.kinematics.inverse.geometry import first_three
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.inverse.solve import BRANCHES
+from armwright.kinematics.inverse_kinematics.geometry import first_three
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.solve import BRANCHES
 from armwright.tracing.emit import LANES, emit
 from armwright.tracing.kernel import CalledOff, Kernel, on_cores_for_long
 from armwright.tracing.scalar import atan2, cos, sin

@@ -13,7 +13,7 @@ from armwright.accuracy.distance import DistanceAccuracy, DistanceRepeatability
 from armwright.accuracy.measurement_file import AnyTest, PoseTest
 from armwright.accuracy.path import PathDeviation, PathVelocity
 from armwright.accuracy.pose import PoseAccuracy, PoseRepeatability
-from armwright.accuracy.settling import PosingTime, Settling
+from armwright.accuracy.settling_time import PosingTime, Settling
 from armwright.accuracy.variation import PoseDrift, Variation
 from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array

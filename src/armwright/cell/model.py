@@ -11,7 +11,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import ShapeError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import one_pose
 
 # A path that turns its corners without a stop has to round them, and it is gross motion.

@@ -20,8 +20,8 @@ from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
 from armwright.files.limits import beyond, limit
 from armwright.files.reading import regular
-from armwright.kinematics.inverse.solution import violations
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse_kinematics.solution import violations
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.spatial.poses import from_noap, pose
 from armwright.spatial.poses import inverse as inverse_pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error

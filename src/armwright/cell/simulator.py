@@ -9,7 +9,7 @@ from armwright.arrays import Array
 from armwright.cell.hardware import DeviceError, Press
 from armwright.cell.model import Cell
 from armwright.errors import closest
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 
 # A trajectory must begin where the arm is; this is rounding [rad] or [m].

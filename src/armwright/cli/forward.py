@@ -21,7 +21,7 @@ def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Js
     import json
 
     from armwright.arm.load import load_arm
-    from armwright.kinematics.forward import forward as tool_pose
+    from armwright.kinematics.forward_kinematics import forward as tool_pose
     from armwright.spatial.poses import to_noap
 
     model = load_arm(arm)
@@ -52,7 +52,7 @@ def jacobian(
     import json
 
     from armwright.arm.load import load_arm
-    from armwright.kinematics.jacobian import jacobian as tool_jacobian
+    from armwright.kinematics.jacobians import jacobian as tool_jacobian
 
     model = load_arm(arm)
     if frame not in ("base", "tool"):

@@ -36,7 +36,7 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
-    from armwright.kinematics.inverse.solve import inverse as postures
+    from armwright.kinematics.inverse_kinematics.solve import inverse as postures
 
     model = load_arm(arm)
     X = _pose(xyz, rpy, noap)
@@ -86,8 +86,8 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
 
 def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
     """Say that a place out of reach would be in reach in the other unit, if it would."""
-    from armwright.kinematics.inverse.solution import Outcome
-    from armwright.kinematics.inverse.solve import inverse as postures
+    from armwright.kinematics.inverse_kinematics.solution import Outcome
+    from armwright.kinematics.inverse_kinematics.solve import inverse as postures
 
     other = X.copy()
     other[:3, 3] *= 1e-3 if metres else 1e3

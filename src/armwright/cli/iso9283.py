@@ -15,7 +15,7 @@ from armwright.errors import CheckFailedError, TooFewError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from armwright.accuracy.assess import Assessment
+    from armwright.accuracy.assessment import Assessment
     from armwright.accuracy.characteristics import Measure
 
 
@@ -82,7 +82,7 @@ def _assessed(
     files: list[Path], *, few: bool, band_mm: float | None, corners_mm: float, limits: list[str]
 ) -> "Assessment":
     """Read the files and work out all measures."""
-    from armwright.accuracy.assess import assess
+    from armwright.accuracy.assessment import assess
     from armwright.accuracy.measurement_file import read_measurements
     from armwright.cli.results import warn_of_stray
 

@@ -94,7 +94,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     **Example:** `armwright move joint puma560 examples/puma_poses.toml -o out/joint`
     """
     from armwright.motion.certificate import slower
-    from armwright.motion.limit_use import limit_use, slowing_for_limits
+    from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 
     _check_options(kind, orientation=orientation, deviation_mm=deviation_mm, around=around, servo_ms=servo_ms)
     planned, file = _planned(
@@ -198,7 +198,7 @@ def _moved(planned: "Move", file: "PosesFile", poses: Path, period: float, notes
 
 def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: bool) -> dict[str, Any]:
     """Return the files of a move by name."""
-    from armwright.kinematics.forward import forward
+    from armwright.kinematics.forward_kinematics import forward
     from armwright.report import move_figures
     from armwright.report.motion_table import motion_csv
     from armwright.report.moved import move_page

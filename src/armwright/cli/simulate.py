@@ -54,11 +54,11 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
     from armwright.cli.load import load_in_hand
-    from armwright.dynamics.payload import payload
+    from armwright.dynamics.payloads import payload
     from armwright.report.motion_table import motion_csv
     from armwright.simulation.controllers import gravity_compensation, no_effort
     from armwright.simulation.integrators import Adaptive, Gill
-    from armwright.simulation.simulate import simulate as run
+    from armwright.simulation.time_stepping import simulate as run
 
     model = load_arm(arm)
     if load is not None:

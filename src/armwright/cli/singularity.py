@@ -24,7 +24,7 @@ def singularity(
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
-    from armwright.kinematics.singularities import singularities
+    from armwright.kinematics.singularity_analysis import singularities
 
     model = load_arm(arm)
     found = singularities(model, joint_values(model, posture, "-q"))

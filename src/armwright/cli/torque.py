@@ -11,7 +11,7 @@ from armwright.cli.options import ArmName, Json
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.arrays import Array
-    from armwright.dynamics.terms import Terms
+    from armwright.dynamics.equation_of_motion import Terms
 
 # Rows of a file that are worked out at once: many, as that takes no longer than one, but not all of a long file.
 _BLOCK = 1000
@@ -50,7 +50,7 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.arm.model import Link
     from armwright.cli.load import load_in_hand
     from armwright.cli.numbers import numbers
-    from armwright.dynamics.terms import terms
+    from armwright.dynamics.equation_of_motion import terms
 
     model = load_arm(arm)
     held = Link() if load is None else load_in_hand(load)

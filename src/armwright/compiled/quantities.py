@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 from armwright.arm.model import Arm
 from armwright.arm.positions import admitted, ask_for_degrees
 from armwright.arrays import Array
+from armwright.dynamics.accelerations import NEGLIGIBLE, forward_dynamics, less_friction
 from armwright.dynamics.arguments import weighed
 from armwright.dynamics.articulated_body import articulated_body
-from armwright.dynamics.forward_dynamics import NEGLIGIBLE, forward_dynamics, less_friction
-from armwright.dynamics.mass_matrix import composite_rigid_body
+from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.newton_euler import drive_effort, newton_euler
 from armwright.errors import UnknownNameError
-from armwright.kinematics.forward import link_frames, tool_frame
-from armwright.kinematics.inverse.branches import branches, merged
-from armwright.kinematics.inverse.recognise import closed_form_geometry
-from armwright.kinematics.jacobian import frame_columns
+from armwright.kinematics.forward_kinematics import link_frames, tool_frame
+from armwright.kinematics.inverse_kinematics.branches import branches, merged
+from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
+from armwright.kinematics.jacobians import frame_columns
 from armwright.tracing.emit import Emitted, Guarded, emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar

@@ -9,7 +9,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
 from armwright.arrays import LARGEST, Array, ArrayLike, joint_array, of_shape
 from armwright.errors import ShapeError, UnsupportedArmError
-from armwright.kinematics.forward import per_joint, stack
+from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.tracing.scalar import Scalar
 
 NO_WRENCH = (0.0,) * 6

@@ -13,7 +13,7 @@ from armwright.arm.model import Arm, Joint, Link
 from armwright.dynamics.arguments import NO_WRENCH
 from armwright.dynamics.bodies import body_of
 from armwright.dynamics.newton_euler import felt_acceleration, reaction_at_hand
-from armwright.kinematics.forward import link_transform
+from armwright.kinematics.forward_kinematics import link_transform
 from armwright.tracing.scalar import Scalar, reciprocal
 from armwright.tracing.vectors import (
     Matrix,

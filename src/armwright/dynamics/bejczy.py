@@ -14,11 +14,11 @@ from armwright.arm.model import STANDARD_GRAVITY, Arm
 from armwright.arm.positions import known_arm, positions
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.dynamics.bodies import body_of, shifted
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import ShapeError, UnsupportedArmError
-from armwright.kinematics.forward import per_joint, stack
-from armwright.kinematics.jacobian import together
+from armwright.kinematics.forward_kinematics import per_joint, stack
+from armwright.kinematics.jacobians import together
 from armwright.tracing.scalar import Scalar, cos, sin
 
 _KINDS = [True, True, False, True, True, True]  # which joints of a Stanford arm turn

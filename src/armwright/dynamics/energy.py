@@ -8,7 +8,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch
 from armwright.dynamics.newton_euler import lever_of
-from armwright.kinematics.forward import link_frames, link_transform
+from armwright.kinematics.forward_kinematics import link_frames, link_transform
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Vector, add, apply, cross, dot, transpose
 

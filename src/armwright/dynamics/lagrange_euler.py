@@ -20,7 +20,7 @@ from armwright.arm.model import Arm, Joint, Link
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
-from armwright.kinematics.forward import link_transform, per_joint, stack
+from armwright.kinematics.forward_kinematics import link_transform, per_joint, stack
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, add, apply, dot, product
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from armwright.arm.model import Arm, Joint, Motor
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape
 from armwright.dynamics.arguments import NO_WRENCH, batch, stack_matrix
-from armwright.kinematics.forward import link_frames, link_transform, stack
+from armwright.kinematics.forward_kinematics import link_frames, link_transform, stack
 from armwright.tracing.scalar import Scalar, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, scale, subtract, transpose
 

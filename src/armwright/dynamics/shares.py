@@ -6,7 +6,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch
 from armwright.dynamics.newton_euler import newton_euler
-from armwright.kinematics.forward import stack
+from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
 
 

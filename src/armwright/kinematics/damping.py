@@ -7,8 +7,8 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import positions
 from armwright.arrays import LARGEST, Array, ArrayLike, number, of_shape, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError
-from armwright.kinematics.jacobian import Axes, jacobian, known_axes, together
-from armwright.kinematics.manipulability import scaled_rows
+from armwright.kinematics.jacobians import Axes, jacobian, known_axes, together
+from armwright.kinematics.manipulability_index import scaled_rows
 
 
 @attrs.frozen(kw_only=True, eq=False)

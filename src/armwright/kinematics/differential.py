@@ -15,11 +15,11 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
 from armwright.arrays import LARGEST, Array, ArrayLike, of_shape, read_only, reduce_by_fields
 from armwright.errors import ArmwrightError, UnsupportedArmError, one_of
-from armwright.kinematics.forward import link_frames, per_joint, stack, tool_frame
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.jacobian import Axes, known_axes, together
-from armwright.kinematics.singularities import determinant_factors
+from armwright.kinematics.forward_kinematics import link_frames, per_joint, stack, tool_frame
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.jacobians import Axes, known_axes, together
+from armwright.kinematics.singularity_analysis import determinant_factors
 from armwright.tracing.scalar import Scalar, cos, select, sin
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, product, subtract, transpose
 

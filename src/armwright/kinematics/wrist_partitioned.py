@@ -13,9 +13,9 @@ from armwright.arm.positions import known_arm, positions
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.differential import SINGULAR_FACTOR, SingularPostureError
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.singularities import determinant_factors
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.singularity_analysis import determinant_factors
 
 _FACTORS = ("shoulder", "elbow", "wrist")
 

@@ -12,16 +12,16 @@ from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damping import damped_rates
-from armwright.kinematics.inverse.ranking import exact_pose
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.inverse.wrapping import equivalent_configurations, joint_distance
+from armwright.kinematics.inverse_kinematics.ranking import exact_pose
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, joint_distance
 from armwright.motion.deviation import Spline, Ways, deviation_of
 from armwright.motion.follow import TURN_PER_METRE, PathError
-from armwright.motion.limit_use import slowing_for_limits
+from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.straight import CertifiedLine, Line, at_place, certified, straight_line, timed_line
 from armwright.motion.trajectory import Trajectory, join
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
 By: TypeAlias = Literal["via", "damped"]

@@ -8,8 +8,8 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import ArmwrightError
-from armwright.kinematics.inverse.solution import Outcome, violations
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse_kinematics.solution import Outcome, violations
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import LimitName, checked_deviation, slower
 from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of
@@ -28,7 +28,7 @@ from armwright.motion.stops import (
     nearest_singularity,
 )
 from armwright.motion.trajectory import Trajectory, hold
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 from armwright.spatial.rotations import rotation_vector
 
 # The rule's knots are halved at most this often before the path is given up: 1/64 of the rule's step.

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse.solution import Violation, violations
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.inverse.wrapping import joint_distance
+from armwright.kinematics.inverse_kinematics.solution import Violation, violations
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.inverse_kinematics.wrapping import joint_distance
 from armwright.motion.blends import Ends
 from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import HandBounds, cubic_peaks, half_sines, hand_bounds
@@ -32,7 +32,7 @@ from armwright.motion.stops import (
     nearest_singularity,
 )
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline import smooth_weight, xspline
+from armwright.motion.xspline_path import smooth_weight, xspline
 
 Counts: TypeAlias = npt.NDArray[np.intp]
 

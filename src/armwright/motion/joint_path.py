@@ -12,7 +12,7 @@ from armwright.arrays import Array
 from armwright.errors import InvalidValueError
 from armwright.motion.polynomials import derivative, evaluate, shifted
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 
 # Speeds that differ by this part of the largest one of the path are the same; what is slower stands.
 _SAME = 1e-8

@@ -10,9 +10,9 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
-from armwright.kinematics.inverse.ranking import typed_poses
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.inverse.wrapping import mid_range
+from armwright.kinematics.inverse_kinematics.ranking import typed_poses
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
 from armwright.motion.certificate import Certificate, LimitName, checked_deviation
 from armwright.motion.detour import By, Detour, line_or_detour
@@ -20,7 +20,7 @@ from armwright.motion.efforts import effort_peaks
 from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.follow_hand import carry
 from armwright.motion.hand_path import HandPath, Orientation, hand_path
-from armwright.motion.limit_use import slowing_for_limits
+from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.postures import postures_at, postures_through
 from armwright.motion.solver import AnyArm, solver_of

@@ -15,7 +15,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, one_per_joint
 from armwright.errors import ArmwrightError, InvalidValueError, MissingExtraError
-from armwright.kinematics.inverse.solution import violations
+from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.efforts import checked
 from armwright.motion.trajectory import Trajectory, hold, join
 

@@ -11,7 +11,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, of_shape
 from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.certificate import checked_deviation
-from armwright.motion.quintic import TOP_SPEED, check_speed
+from armwright.motion.quintic_polynomials import TOP_SPEED, check_speed
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
 

@@ -9,14 +9,14 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.inverse.wrapping import equivalent_configurations, joint_distance
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, joint_distance
 from armwright.motion.certificate import slower
 from armwright.motion.detour import By, Detour, line_or_detour
 from armwright.motion.follow import PathError, follow
 from armwright.motion.path import Path
-from armwright.motion.quintic import point_to_point
+from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.rounded import rounded_move
 from armwright.motion.stops import Cause, cause_of
 from armwright.motion.trajectory import Trajectory, whole_ticks

@@ -7,8 +7,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.inverse.wrapping import equivalent_configurations
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
 from armwright.motion.follow import PathError
 from armwright.motion.stops import cause_of
 

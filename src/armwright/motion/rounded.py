@@ -31,7 +31,7 @@ from armwright.motion.solver import solver_of
 from armwright.motion.stops import SLOWEST
 from armwright.motion.timing_law import Timed, timed
 from armwright.motion.trajectory import Trajectory, hold, join
-from armwright.motion.trapezoid import shortest_trapezoid
+from armwright.motion.trapezoidal_profile import shortest_trapezoid
 from armwright.spatial.rotations import rotation_vector
 
 # The joints keep the hand so many times nearer to the rounded path than to a single line: a line may be off by its

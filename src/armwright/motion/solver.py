@@ -9,9 +9,9 @@ from armwright.arm.positions import known_arm
 from armwright.arrays import Array
 from armwright.compiled.arm import CompiledArm
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.inverse.solve import inverse_branches
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.solve import inverse_branches
 
 AnyArm: TypeAlias = Arm | CompiledArm
 

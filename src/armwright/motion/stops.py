@@ -6,10 +6,10 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
-from armwright.kinematics.inverse.solution import InverseSolution, Outcome, violations
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.jacobian import jacobian
-from armwright.kinematics.singularities import singularities
+from armwright.kinematics.inverse_kinematics.solution import InverseSolution, Outcome, violations
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.jacobians import jacobian
+from armwright.kinematics.singularity_analysis import singularities
 from armwright.motion.chain import Room, Step, missed, on_one_branch, step_by_step
 from armwright.motion.solver import Solver
 

@@ -10,16 +10,16 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, number
 from armwright.errors import IncapableArmError, InvalidValueError
-from armwright.kinematics.inverse.ranking import exact_pose
-from armwright.kinematics.inverse.solution import Outcome, violations
-from armwright.kinematics.inverse.solve import inverse
+from armwright.kinematics.inverse_kinematics.ranking import exact_pose
+from armwright.kinematics.inverse_kinematics.solution import Outcome, violations
+from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import CLOSEST, Certificate, LimitName, checked_deviation, slowing
 from armwright.motion.chain import Room, beside, chain
 from armwright.motion.deviation import Deviation, Spline, Ways, deviation_of, turned, turning_points
 from armwright.motion.efforts import effort_peaks, slowing_for_efforts
 from armwright.motion.follow import TURN_PER_METRE, PathError
 from armwright.motion.path import NEGLIGIBLE, TURN_RADIUS, report_speed, report_step
-from armwright.motion.quintic import check_speed
+from armwright.motion.quintic_polynomials import check_speed
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.stops import (
     SLOWEST,
@@ -32,7 +32,7 @@ from armwright.motion.stops import (
     nearest_singularity,
 )
 from armwright.motion.trajectory import Trajectory, hold, whole_ticks
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 from armwright.spatial.rotations import rotation_vector
 
 # Part of the time in which the hand gathers speed, and again in which it loses it.

@@ -5,7 +5,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import ArrayLike
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.follow import Followed, follow
 from armwright.motion.moves import exact_poses
 from armwright.motion.path import Path

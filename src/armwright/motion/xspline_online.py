@@ -18,9 +18,9 @@ import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats, number, one_per_joint
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
-from armwright.motion.cubic import hermite
+from armwright.motion.cubic_polynomials import hermite
 from armwright.motion.knots import one_way
-from armwright.motion.xspline import Pair, Triple, rate_of_knot
+from armwright.motion.xspline_path import Pair, Triple, rate_of_knot
 from armwright.tracing.emit import Guarded, emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import Scalar

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armwright.accuracy.assess import Assessment
+from armwright.accuracy.assessment import Assessment
 from armwright.accuracy.compliance import StaticCompliance
 from armwright.accuracy.corner import CornerDeviation
 from armwright.accuracy.measurement_file import PathTest, PoseTest
 from armwright.accuracy.path import PathDeviation, PathVelocity
 from armwright.accuracy.pose import PoseRepeatability
-from armwright.accuracy.settling import PosingTime, Settling, attained_place
+from armwright.accuracy.settling_time import PosingTime, Settling, attained_place
 from armwright.accuracy.variation import PoseDrift, Variation
 from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array

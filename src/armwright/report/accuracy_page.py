@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armwright.accuracy.assess import Assessment
+from armwright.accuracy.assessment import Assessment
 from armwright.accuracy.characteristics import Measure
 from armwright.report.figures import Drawing
 from armwright.report.plain_page import Table, plain_page

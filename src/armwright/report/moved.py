@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.forward import forward, link_poses
+from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.motion.moves import Move
 from armwright.motion.poses_file import PosesFile
 from armwright.motion.trajectory import Samples

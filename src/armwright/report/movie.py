@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.forward import link_poses
+from armwright.kinematics.forward_kinematics import link_poses
 from armwright.motion.moves import Move
 from armwright.report.figures import equal_scales
 from armwright.report.sticks import skeleton_of

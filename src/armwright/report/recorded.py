@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.cell.model import Cell, CellArm, base_name
-from armwright.kinematics.forward import link_poses
+from armwright.kinematics.forward_kinematics import link_poses
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line

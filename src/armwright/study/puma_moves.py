@@ -14,19 +14,19 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import UnknownNameError
-from armwright.kinematics.forward import forward
-from armwright.kinematics.inverse.solve import inverse
-from armwright.kinematics.inverse.wrapping import mid_range
+from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.solve import inverse
+from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.motion.blends import blended, via_deviations
 from armwright.motion.chain import chain
 from armwright.motion.detour import By
 from armwright.motion.follow import PathError
 from armwright.motion.hand_path import HandPath, hand_path, zyz_angles
-from armwright.motion.limit_use import limit_use, slowing_for_limits
+from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import along, stopping_move
 from armwright.motion.solver import solver_of
 from armwright.motion.trajectory import Trajectory
-from armwright.motion.xspline import xspline
+from armwright.motion.xspline_path import xspline
 from armwright.spatial.euler import matlab_zyz
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import angle_between, nearest_rotation

@@ -16,11 +16,11 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.dynamics.bejczy import PRINTED, Coefficients, bejczy_efforts, fitted
 from armwright.dynamics.bodies import body_of
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.errors import UnknownNameError
-from armwright.motion.quintic import quintic
+from armwright.motion.quintic_polynomials import quintic
 
 Verdict: TypeAlias = Literal["agrees", "near", "wrong"]
 

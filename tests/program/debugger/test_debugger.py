@@ -145,7 +145,7 @@ def test_ticks_show_the_arm_on_its_way() -> None:
     posture = debugger.machine.hardware.posture("ARM_1", debugger.time)
     cell = debugger.machine.cell.arms["ARM_1"]
 
-    from armwright.kinematics.forward import forward
+    from armwright.kinematics.forward_kinematics import forward
 
     np.testing.assert_allclose(
         debugger.view.state.tree.world("ARM_1"), cell.base @ forward(cell.arm, posture), atol=ROUNDING

@@ -5,7 +5,7 @@ import copy
 import attrs
 
 from armwright.cell.model import base_name
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program.debugger.history import Path
 from armwright.program.debugger.statements import Statements
 from armwright.program.language.names import is_arm

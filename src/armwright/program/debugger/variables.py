@@ -9,7 +9,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.cell.model import base_name
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program.debugger.snapshot import Frame
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.vm.machine import Machine

@@ -13,7 +13,7 @@ from armwright.cell.hardware import Hardware
 from armwright.cell.model import Cell, base_name
 from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.program.bytecode.instructions import Code, Instruction, Operand
 from armwright.program.language.diagnostic import Diagnostic, Label
 from armwright.program.language.kinds import VariableKind, VariableType

@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.model import base_name
 from armwright.errors import IncapableArmError
-from armwright.kinematics.forward import forward
+from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
 from armwright.motion.trajectory import hold, slowed_together, whole_ticks
 from armwright.program.bytecode.instructions import Instruction, MotionKind, Op, StagePlan, stages_of, stages_text

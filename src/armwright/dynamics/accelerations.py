@@ -11,7 +11,7 @@ from armwright.dynamics.arguments import batch, stack_matrix
 from armwright.dynamics.articulated_body import Pivot, articulated_body
 from armwright.dynamics.newton_euler import dry_friction, newton_euler
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.forward import stack
+from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
 
 # An inertia this small beside its likes is what rounding has left of zero.

@@ -9,11 +9,11 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, one_posture, positions
 from armwright.arrays import Array, ArrayLike, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, UnsupportedArmError
-from armwright.kinematics.forward import per_joint, stack
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry, rotated_about_y
-from armwright.kinematics.inverse.recognise import find_geometry
-from armwright.kinematics.jacobian import jacobian
-from armwright.kinematics.manipulability import scaled_rows
+from armwright.kinematics.forward_kinematics import per_joint, stack
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, rotated_about_y
+from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.jacobians import jacobian
+from armwright.kinematics.manipulability_index import scaled_rows
 from armwright.tracing.scalar import Scalar, cos, sin
 from armwright.tracing.vectors import Vector
 

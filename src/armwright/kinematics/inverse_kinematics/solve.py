@@ -8,16 +8,16 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, one_posture, positions
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import ShapeError
-from armwright.kinematics.forward import per_joint, stack
-from armwright.kinematics.inverse.branches import BRANCHES, Branches, branches, merged, single_branch
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry, Sign, rotated_about_y
-from armwright.kinematics.inverse.numeric import numeric_inverse
-from armwright.kinematics.inverse.ranking import POSE_TOLERANCE, Candidate, exact_pose, rank, typed_poses
-from armwright.kinematics.inverse.reach import nearest_wrist_centre
-from armwright.kinematics.inverse.recognise import closed_form_geometry, find_geometry
-from armwright.kinematics.inverse.self_motion import counter_rotate_within_limits, search_within_limits
-from armwright.kinematics.inverse.solution import InverseSolution, violations
-from armwright.kinematics.inverse.wrapping import mid_range, nearest_equivalent
+from armwright.kinematics.forward_kinematics import per_joint, stack
+from armwright.kinematics.inverse_kinematics.branches import BRANCHES, Branches, branches, merged, single_branch
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign, rotated_about_y
+from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
+from armwright.kinematics.inverse_kinematics.ranking import POSE_TOLERANCE, Candidate, exact_pose, rank, typed_poses
+from armwright.kinematics.inverse_kinematics.reach import nearest_wrist_centre
+from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry, find_geometry
+from armwright.kinematics.inverse_kinematics.self_motion import counter_rotate_within_limits, search_within_limits
+from armwright.kinematics.inverse_kinematics.solution import InverseSolution, violations
+from armwright.kinematics.inverse_kinematics.wrapping import mid_range, nearest_equivalent
 from armwright.tracing.scalar import select
 
 # Joint positions closer than this are the same configuration.

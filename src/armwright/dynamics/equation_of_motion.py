@@ -13,9 +13,9 @@ from armwright.dynamics.lagrange_euler import (
     speed_coefficients,
 )
 from armwright.dynamics.newton_euler import dry_friction, newton_euler
-from armwright.dynamics.payload import payload
+from armwright.dynamics.payloads import payload
 from armwright.errors import KindError, shown
-from armwright.kinematics.forward import stack
+from armwright.kinematics.forward_kinematics import stack
 
 _NO_LOAD = Link()
 

@@ -17,9 +17,9 @@ import numpy.typing as npt
 from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, exact_shape, number, one_per_joint
+from armwright.dynamics.accelerations import check_pivots, eliminated
 from armwright.dynamics.energy import kinetic_energy, potential_energy
-from armwright.dynamics.forward_dynamics import check_pivots, eliminated
-from armwright.dynamics.mass_matrix import mass_matrix
+from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.simulation.controllers import Controller, no_effort
 from armwright.simulation.integrators import Gill, Integrator, Slope, Step, first_crossing

@@ -6,7 +6,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array
-from armwright.kinematics.inverse.solution import violations
+from armwright.kinematics.inverse_kinematics.solution import violations
 
 _TURN = 2 * math.pi
 # An angle this far beyond a limit is on it [rad].

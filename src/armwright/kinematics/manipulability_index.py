@@ -8,7 +8,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import positions
 from armwright.arrays import LARGEST, Array, ArrayLike, number
 from armwright.errors import InvalidValueError, one_of
-from armwright.kinematics.jacobian import jacobian
+from armwright.kinematics.jacobians import jacobian
 
 Measure: TypeAlias = Literal["yoshikawa", "smallest", "inverse-condition"]
 Motion: TypeAlias = Literal["all", "linear", "angular"]

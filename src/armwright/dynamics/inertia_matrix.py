@@ -6,7 +6,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike
 from armwright.dynamics.arguments import batch, stack_matrix
 from armwright.dynamics.bodies import NOTHING, body_of, seen_from_before, welded
-from armwright.kinematics.forward import link_transform
+from armwright.kinematics.forward_kinematics import link_transform
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross
 

@@ -9,8 +9,8 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.inverse.axes import SAME, Axes, joint_axes, meeting, parallel, perpendicular
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry, Family, rotated_about_y
+from armwright.kinematics.inverse_kinematics.axes import SAME, Axes, joint_axes, meeting, parallel, perpendicular
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Family, rotated_about_y
 from armwright.spatial.poses import pose
 from armwright.spatial.rotations import nearest_rotation
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from armwright.arm.model import Arm
-from armwright.kinematics.inverse.branch_angles import branch_angles
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry, Sign
+from armwright.kinematics.inverse_kinematics.branch_angles import branch_angles
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign
 from armwright.tracing.scalar import Scalar, round_half_even, select
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product, subtract, transpose
 

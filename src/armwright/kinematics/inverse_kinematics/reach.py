@@ -6,9 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.kinematics.forward import per_joint
-from armwright.kinematics.inverse.branch_angles import BranchAngles, branch_angles
-from armwright.kinematics.inverse.geometry import ClosedFormGeometry, Sign, rotated_about_y
+from armwright.kinematics.forward_kinematics import per_joint
+from armwright.kinematics.inverse_kinematics.branch_angles import BranchAngles, branch_angles
+from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign, rotated_about_y
 
 # Angles of joint 1 looked at for the nearest place, and how often the neighbourhood of the best is looked at again,
 # each time twenty times closer: below 1e-8 rad the distance, flat at its least, has no digit left to tell.

@@ -12,7 +12,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import IncapableArmError, InvalidValueError, KindError, ShapeError, one_of, shown
-from armwright.kinematics.inverse.solution import violations
+from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.motion.certificate import LIMITS, LimitName
 from armwright.motion.efforts import checked, effort_peaks, slowing_for_efforts
 from armwright.motion.joint_path import Grid, gridded, pieces_of, through_knots

@@ -21,8 +21,8 @@ import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, one_per_joint
 from armwright.errors import InvalidValueError, ShapeError
-from armwright.motion.continuity import continuity
-from armwright.motion.cubic import hermite
+from armwright.motion.continuity_report import continuity
+from armwright.motion.cubic_polynomials import hermite
 from armwright.motion.knots import limit_per_joint, timed_points
 from armwright.motion.trajectory import Trajectory
 from armwright.tracing.scalar import Scalar

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from armwright.kinematics.inverse.geometry import (
+from armwright.kinematics.inverse_kinematics.geometry import (
     ON_AXIS,
     ClosedFormGeometry,
     Sign,
@@ -13,7 +13,7 @@ from armwright.kinematics.inverse.geometry import (
     solve_elbow,
     solve_joint_1,
 )
-from armwright.kinematics.inverse.wrist import last_three
+from armwright.kinematics.inverse_kinematics.wrist import last_three
 from armwright.tracing.scalar import Scalar, atan2, cos, select, sin, sqrt
 from armwright.tracing.vectors import Matrix, Vector, product, transpose
 

@@ -12,7 +12,7 @@ from armwright.accuracy.distance import distance_accuracy, distance_repeatabilit
 from armwright.accuracy.measurement_file import AnyTest, Cloud, PathTest, PoseTest
 from armwright.accuracy.path import path_deviation, path_velocity
 from armwright.accuracy.pose import pose_accuracy, pose_repeatability
-from armwright.accuracy.settling import posing_time, settling
+from armwright.accuracy.settling_time import posing_time, settling
 from armwright.accuracy.variation import exchangeability, multidirectional_variation, pose_drift
 from armwright.accuracy.weaving import weaving_deviation
 from armwright.arrays import Array

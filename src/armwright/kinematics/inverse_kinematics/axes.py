@@ -11,7 +11,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.forward import link_frames, tool_frame
+from armwright.kinematics.forward_kinematics import link_frames, tool_frame
 from armwright.spatial.poses import pose
 
 # Lines this close to a right angle, to one direction or to one point are so: typed numbers multiplied a few times

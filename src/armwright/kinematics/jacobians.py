@@ -9,7 +9,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.errors import InvalidValueError, ShapeError, shown
-from armwright.kinematics.forward import link_frames, per_joint, stack, tool_frame
+from armwright.kinematics.forward_kinematics import link_frames, per_joint, stack, tool_frame
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, scale, subtract, transpose
 
