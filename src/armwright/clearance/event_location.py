@@ -2,163 +2,208 @@
 
 The law of an impact divides by the speed with which the journal came. Without this part a simulation learns that speed
 at the end of the step in which the journal came, when the wall has already taken some of it. With it such a step is
-made again, in two parts: the first ends where the depth is 0, and there the speed is taken. The place comes of the
+made again, in two parts: the first ends where the depth is 0, and there the speed is taken. That point comes of the
 cubic through depth and rate at both ends of the step, and of a correction by Newton. Two pins that come down in
 one step are found one after the other.
 
 All lanes make the parts together, and those in which nothing came down are put back: they keep their bits.
+
+The functions are emitted for a linkage, see ``lane_layout``. What they share: ``x``, ``y``, ``state`` and ``change``
+are those of the loop; ``table`` holds the drives and ``h`` is the length of the step; ``done`` (LANES,) is the fraction
+of the step that each lane has made for good, ``part`` (LANES,) the fraction it makes next, and ``hit`` (LANES,) the pin
+that came down in it, or -1.
 """
 
-# What the simulation calls: the equations as a function, drives between the moments of the table, a part of a step.
-FUNCTIONS = """
-@njit(error_model="numpy")
-def rates(x, y):
-    for k in range({lanes}):
-{body}
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arrays import Array
+from armwright.clearance.lane_layout import (
+    COLUMNS,
+    FIRST_DEPTH,
+    FIRST_DRIVE,
+    FIRST_MEMORY,
+    LANES,
+    PINS,
+    RK4,
+    STAGES,
+    STATES,
+    N,
+    rates,
+)
 
 
-@njit(error_model="numpy")
-def tell(x, table, step, k, moment):
-    for i in range({columns}):
+def come_down(
+    x: Array,
+    y: Array,
+    state: Array,
+    before: Array,
+    after: Array,
+    change: Array,
+    depths: Array,
+    done: Array,
+    part: Array,
+    hit: npt.NDArray[np.int64],
+    table: Array,
+    lengths: Array,
+    step: int,
+    counts: npt.NDArray[np.int64],
+    row: npt.NDArray[np.int64],
+    runs: int,
+) -> None:
+    """Make the step before ``step`` again for the lanes in which pins came down, and count those of the first runs."""
+    steps, h = table.shape[0], lengths[step - 1]
+    ending = np.zeros(LANES)
+    done[:] = 0.0
+    for _ in range(PINS):
+        if find_impacts(x, y, depths, done, part, hit, h) == 0:
+            break
+        locate_impacts(x, y, state, before, after, change, depths, done, part, hit, table, step - 1, h)
+        for k in range(LANES):
+            if hit[k] >= 0 and k < runs:
+                counts[row[k], hit[k]] += 1
+            ending[k] = 1.0 if step == steps else 0.0
+        evaluate(x, y, state, table, min(step, steps - 1), ending)
+
+
+def set_drives(x: Array, table: Array, step: int, k: int, moment: float) -> None:
+    """Set the drives of a lane at a fraction of a step: a parabola through the three moments of the table."""
+    for i in range(COLUMNS):
         a, b, c = table[step, 0, i], table[step, 1, i], table[step, 2, i]
         bent = 2.0 * (a - 2.0 * b + c)
-        x[({first_drive} + i) * {lanes} + k] = a + moment * (c - a - bent + moment * bent)
+        x[(FIRST_DRIVE + i) * LANES + k] = a + moment * (c - a - bent + moment * bent)
 
 
-@njit(error_model="numpy")
-def look(x, y, state, table, step, moment):
-    for k in range({lanes}):
-        tell(x, table, step, k, moment[k])
-    for j in range({states} * {lanes}):
+def evaluate(x: Array, y: Array, state: Array, table: Array, step: int, moment: Array) -> None:
+    """Evaluate the equations at the state, each lane at its own fraction of a step."""
+    for k in range(LANES):
+        set_drives(x, table, step, k, moment[k])
+    for j in range(STATES * LANES):
         x[j] = state[j]
     rates(x, y)
 
 
-@njit(error_model="numpy")
-def go(x, y, state, change, table, step, h, done, part):
-    for stage in range({stages}):
-        at = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-        for k in range({lanes}):
-            tell(x, table, step, k, done[k] + at * part[k])
-        for i in range({states}):
-            for k in range({lanes}):
-                j = i * {lanes} + k
-                x[j] = state[j] + (at * h * part[k] * y[j] if stage > 0 else 0.0)
+def make_part(
+    x: Array, y: Array, state: Array, change: Array, table: Array, step: int, h: float, done: Array, part: Array
+) -> None:
+    """Integrate each lane over its part of a step."""
+    for stage in range(STAGES):
+        ahead = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+        for k in range(LANES):
+            set_drives(x, table, step, k, done[k] + ahead * part[k])
+        for i in range(STATES):
+            for k in range(LANES):
+                j = i * LANES + k
+                x[j] = state[j] + (ahead * h * part[k] * y[j] if stage > 0 else 0.0)
         rates(x, y)
-{advance}
+        if RK4:
+            weight = 1.0 if stage in {0, 3} else 2.0
+            for j in range(STATES * LANES):
+                change[j] = y[j] if stage == 0 else change[j] + weight * y[j]
+    add_part(y, state, change, h, part)
 
 
-@njit(error_model="numpy")
-def crossed(d0, r0, d1, r1):
-    # A cubic has its depths and rates; the straight line is where the search begins.
+def add_part(y: Array, state: Array, change: Array, h: float, part: Array) -> None:
+    """Move the state of each lane on by its part of a step."""
+    if RK4:
+        for i in range(STATES):
+            for k in range(LANES):
+                state[i * LANES + k] += h * part[k] / 6.0 * change[i * LANES + k]
+    else:
+        for i in range(N, STATES):
+            for k in range(LANES):
+                state[i * LANES + k] += h * part[k] * y[i * LANES + k]
+        for i in range(N):
+            for k in range(LANES):
+                state[i * LANES + k] += h * part[k] * state[(N + i) * LANES + k]
+
+
+def crossing_fraction(d0: float, r0: float, d1: float, r1: float) -> float:
+    """Return the fraction of an interval at which a depth passes 0, from depths and rates at both ends.
+
+    The straight line between the depths is where the search for the root of their cubic begins.
+    """
     bent, twisted = 3.0 * (d1 - d0) - 2.0 * r0 - r1, r0 + r1 - 2.0 * (d1 - d0)
-    place = d0 / (d0 - d1)
+    fraction = d0 / (d0 - d1)
     for _ in range(4):
-        depth = d0 + place * (r0 + place * (bent + place * twisted))
-        rate = r0 + place * (2.0 * bent + place * 3.0 * twisted)
+        depth = d0 + fraction * (r0 + fraction * (bent + fraction * twisted))
+        rate = r0 + fraction * (2.0 * bent + fraction * 3.0 * twisted)
         if rate > 0.0:
-            place = min(1.0, max(0.0, place - depth / rate))
-    return place
+            fraction = min(1.0, max(0.0, fraction - depth / rate))
+    return fraction
 
 
-@njit(error_model="numpy")
-def find(x, y, state, was, done, part, hit, h):
-    # Of each lane the first pin that came down since the step began, and when; how many lanes there are.
+def find_impacts(
+    x: Array, y: Array, depths: Array, done: Array, part: Array, hit: npt.NDArray[np.int64], h: float
+) -> int:
+    """Find of each lane the first pin that came down since ``done``, and at which part; return how many lanes have one.
+
+    ``depths`` (2 · PINS · LANES,) are the depths, and their rates, that the pins had then.
+    """
     found = 0
-    for k in range({lanes}):
+    for k in range(LANES):
         hit[k], part[k] = -1, 0.0
-        for i in range({pins}):
-            if y[({states} + 3 * i) * {lanes} + k] > x[({first_kept} + 2 * i) * {lanes} + k]:
+        for i in range(PINS):
+            if y[(STATES + 3 * i) * LANES + k] > x[(FIRST_MEMORY + 2 * i) * LANES + k]:
                 rest = (1.0 - done[k]) * h
-                j = ({first_depth} + 2 * i) * {lanes} + k
-                d0, r0 = was[2 * i * {lanes} + k], was[(2 * i + 1) * {lanes} + k]
-                place = (1.0 - done[k]) * crossed(d0, r0 * rest, y[j], y[j + {lanes}] * rest)
-                if hit[k] < 0 or place < part[k]:
-                    hit[k], part[k] = i, place
+                j = (FIRST_DEPTH + 2 * i) * LANES + k
+                d0, r0 = depths[2 * i * LANES + k], depths[(2 * i + 1) * LANES + k]
+                fraction = (1.0 - done[k]) * crossing_fraction(d0, r0 * rest, y[j], y[j + LANES] * rest)
+                if hit[k] < 0 or fraction < part[k]:
+                    hit[k], part[k] = i, fraction
         if hit[k] >= 0:
             found += 1
     return found
 
 
-@njit(error_model="numpy")
-def locate(x, y, state, before, after, change, was, done, part, hit, table, step, h):
+def locate_impacts(
+    x: Array,
+    y: Array,
+    state: Array,
+    before: Array,
+    after: Array,
+    change: Array,
+    depths: Array,
+    done: Array,
+    part: Array,
+    hit: npt.NDArray[np.int64],
+    table: Array,
+    step: int,
+    h: float,
+) -> None:
+    """Make a step again from the state ``before``, up to the impacts that were found and from there to its end."""
     after[:] = state
-    moment = np.zeros({lanes})
+    moment = np.zeros(LANES)
     for correction in range(2):
         state[:] = before
-        go(x, y, state, change, table, step, h, done, part)
-        for k in range({lanes}):
+        make_part(x, y, state, change, table, step, h, done, part)
+        for k in range(LANES):
             moment[k] = done[k] + part[k]
-        look(x, y, state, table, step, moment)
-        for k in range({lanes}):
-            if correction == 0 and hit[k] >= 0:
-                j = ({first_depth} + 2 * hit[k]) * {lanes} + k
-                if y[j + {lanes}] > 0.0:
-                    place = part[k] - y[j] / (y[j + {lanes}] * h)
-                    part[k] = min(1.0 - done[k], max(0.0, place))
-    for k in range({lanes}):
+        evaluate(x, y, state, table, step, moment)
+        if correction == 0:
+            correct(y, done, part, hit, h)
+    for k in range(LANES):
         if hit[k] >= 0:
             pin = hit[k]
-            x[({first_kept} + 2 * pin) * {lanes} + k] = 1.0
-            x[({first_kept} + 2 * pin + 1) * {lanes} + k] = y[({states} + 3 * pin + 1) * {lanes} + k]
+            x[(FIRST_MEMORY + 2 * pin) * LANES + k] = 1.0
+            x[(FIRST_MEMORY + 2 * pin + 1) * LANES + k] = y[(STATES + 3 * pin + 1) * LANES + k]
             done[k] = moment[k]
             part[k] = 1.0 - done[k]
-            for i in range(2 * {pins}):
-                was[i * {lanes} + k] = y[({first_depth} + i) * {lanes} + k]
-            for i in range({states}):
-                before[i * {lanes} + k] = state[i * {lanes} + k]
-    go(x, y, state, change, table, step, h, done, part)
-    for k in range({lanes}):
+            for i in range(2 * PINS):
+                depths[i * LANES + k] = y[(FIRST_DEPTH + i) * LANES + k]
+            for i in range(STATES):
+                before[i * LANES + k] = state[i * LANES + k]
+    make_part(x, y, state, change, table, step, h, done, part)
+    for k in range(LANES):
         if hit[k] < 0:
-            for i in range({states}):
-                state[i * {lanes} + k] = after[i * {lanes} + k]
-"""
+            for i in range(STATES):
+                state[i * LANES + k] = after[i * LANES + k]
 
-# Room for it.
-ARRAYS = """
-    before = np.zeros({states} * {lanes})
-    after = np.zeros({states} * {lanes})
-    was = np.zeros(2 * {pins} * {lanes})
-    done = np.zeros({lanes})
-    part = np.zeros({lanes})
-    ending = np.zeros({lanes})
-    hit = np.zeros({lanes}, dtype=np.int64)
-"""
 
-# After the equations have been looked at where a step ended: make it again where it has to be.
-AGAIN = """
-                if stage == 0 and step > 0:
-                    done[:] = 0.0
-                    for again in range({pins}):
-                        if find(x, y, state, was, done, part, hit, lengths[step - 1]) == 0:
-                            break
-                        came = lengths[step - 1]
-                        locate(x, y, state, before, after, change, was, done, part, hit, table, step - 1, came)
-                        for k in range({lanes}):
-                            if hit[k] >= 0 and begin + k < last:
-                                counts[row[k], hit[k]] += 1
-                            ending[k] = 1.0 if step == steps else 0.0
-                        look(x, y, state, table, now, ending)
-                if stage == 0:
-                    before[:] = state
-                    for j in range(2 * {pins} * {lanes}):
-                        was[j] = y[{first_depth} * {lanes} + j]
-"""
-
-RK4 = """
-        weight = 1.0 if stage == 0 or stage == 3 else 2.0
-        for j in range({states} * {lanes}):
-            change[j] = y[j] if stage == 0 else change[j] + weight * y[j]
-    for i in range({states}):
-        for k in range({lanes}):
-            state[i * {lanes} + k] += h * part[k] / 6.0 * change[i * {lanes} + k]
-"""
-
-SEMI_IMPLICIT = """
-    for i in range({n}, {states}):
-        for k in range({lanes}):
-            state[i * {lanes} + k] += h * part[k] * y[i * {lanes} + k]
-    for i in range({n}):
-        for k in range({lanes}):
-            state[i * {lanes} + k] += h * part[k] * state[({n} + i) * {lanes} + k]
-"""
+def correct(y: Array, done: Array, part: Array, hit: npt.NDArray[np.int64], h: float) -> None:
+    """Correct the parts by one step of Newton on the depth that was reached."""
+    for k in range(LANES):
+        if hit[k] >= 0:
+            j = (FIRST_DEPTH + 2 * hit[k]) * LANES + k
+            if y[j + LANES] > 0.0:
+                part[k] = min(1.0 - done[k], max(0.0, part[k] - y[j] / (y[j + LANES] * h)))

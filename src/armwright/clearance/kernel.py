@@ -4,15 +4,15 @@ A run keeps its bits whatever runs beside it: no lane reads another.
 """
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 import attrs
 
-from armwright.clearance import event_location
+from armwright.clearance import event_location, simulation_loop
 from armwright.clearance.equations import WORKS, Contact, ContactMemory, FrictionModel, State, rates
 from armwright.clearance.linkage import Linkage
-from armwright.tracing.emit import LANES, head, kernel_body
+from armwright.tracing.emit import LANES, function_source, head, kernel_body
 from armwright.tracing.scalar import Scalar
 
 Integrator: TypeAlias = Literal["rk4", "semi-implicit"]
@@ -20,102 +20,37 @@ Control: TypeAlias = Literal["effort", "pd+ff"]
 INTEGRATORS: tuple[Integrator, ...] = ("rk4", "semi-implicit")
 CONTROLS: tuple[Control, ...] = ("effort", "pd+ff")
 
-# After so many steps a simulation looks whether it is called off.
-_LOOK = 1024
-
-_SOURCE = """{head}{helpers}
-{functions}
-SIGNATURE = types.void(
+# The arguments of ``simulation_loop.simulate``; arrays that are only read come first.
+_SIGNATURE = """SIGNATURE = types.void(
     int64, int64, {matrix}, {matrix}, {matrix}, types.Array(float64, 3, "C", readonly=True),
     types.Array(float64, 1, "C", readonly=True), types.Array(int64, 1, "C", readonly=True),
     types.Array(float64, 3, "C"), types.Array(int64, 2, "C"), types.Array(float64, 2, "C"),
     types.Array(int64, 1, "C"),
 )
-
-def simulate(first, last, start, contacts, gains, table, lengths, kept, samples, counts, peaks, called_off):
-    steps = table.shape[0]
-    x = np.zeros({inputs} * {lanes})
-    y = np.zeros({outputs} * {lanes})
-    state = np.zeros({states} * {lanes})
-    change = np.zeros({states} * {lanes})
-    row = np.zeros({lanes}, dtype=np.int64)
-{arrays}
-    for begin in range(first, last, {lanes}):
-        # Lanes that are left over run the last run once more.
-        for k in range({lanes}):
-            row[k] = min(begin + k, last - 1)
-            for i in range({states}):
-                state[i * {lanes} + k] = start[row[k], i]
-            for i in range({parameters}):
-                x[({first_contact} + i) * {lanes} + k] = contacts[row[k], i]
-            for i in range({gains}):
-                x[({first_gain} + i) * {lanes} + k] = gains[row[k], i]
-            for i in range({kept}):
-                x[({first_kept} + i) * {lanes} + k] = 0.0
-            for i in range({pins}):
-                peaks[row[k], i] = 0.0
-                counts[row[k], i] = 0
-        y[:] = 0.0
-        for step in range(steps + 1):
-            if step % {look} == 0 and called_off[0] != 0:
-                return
-            now = min(step, steps - 1)
-            h = lengths[now]
-            for stage in range({stages}):
-                moment = 2 if step == steps else (stage + 1) // 2
-                ahead = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
-                for k in range({lanes}):
-                    for i in range({columns}):
-                        x[({first_drive} + i) * {lanes} + k] = table[now, moment, i]
-                for j in range({states} * {lanes}):
-                    x[j] = state[j] + ahead * y[j]
-{body}
-{again}
-                if stage == 0:
-                    for i in range({pins}):
-                        for k in range({lanes}):
-                            touching = y[({states} + 3 * i) * {lanes} + k]
-                            # What touches at the start has not come with a blow.
-                            if step > 0 and touching > x[({first_kept} + 2 * i) * {lanes} + k] and begin + k < last:
-                                counts[row[k], i] += 1
-                            x[({first_kept} + 2 * i) * {lanes} + k] = touching
-                            x[({first_kept} + 2 * i + 1) * {lanes} + k] = y[({states} + 3 * i + 1) * {lanes} + k]
-                            normal = y[({states} + 3 * i + 2) * {lanes} + k]
-                            if normal > peaks[row[k], i]:
-                                peaks[row[k], i] = normal
-                    if kept[step] >= 0:
-                        for k in range(min({lanes}, last - begin)):
-                            for i in range({states}):
-                                samples[row[k], kept[step], i] = state[i * {lanes} + k]
-                            for i in range({pins}):
-                                samples[row[k], kept[step], {states} + i] = y[({states} + 3 * i + 2) * {lanes} + k]
-                    if step == steps:
-                        break
-{advance}
 """
-
-_RK4 = """
-                weight = 1.0 if stage == 0 or stage == 3 else 2.0
-                if stage == 0:
-                    for j in range({states} * {lanes}):
-                        change[j] = y[j]
-                else:
-                    for j in range({states} * {lanes}):
-                        change[j] += weight * y[j]
-            if step < steps:
-                sixth = h / 6.0
-                for j in range({states} * {lanes}):
-                    state[j] += sixth * change[j]
-"""
-
-# The new speeds move the coordinates.
-_SEMI_IMPLICIT = """
-            if step < steps:
-                for j in range({n} * {lanes}, {states} * {lanes}):
-                    state[j] += h * y[j]
-                for j in range({n} * {lanes}):
-                    state[j] += h * state[{n} * {lanes} + j]
-"""
+_COMPILED = '@njit(error_model="numpy")'
+# Small parts of the loop, and its equations where they stand in one place, become part of it.
+_INLINED = '@njit(error_model="numpy", forceinline=True)'
+# What the loop calls; it is last itself.
+_EVENTS = (
+    event_location.set_drives,
+    event_location.evaluate,
+    event_location.add_part,
+    event_location.make_part,
+    event_location.crossing_fraction,
+    event_location.find_impacts,
+    event_location.correct,
+    event_location.locate_impacts,
+    event_location.come_down,
+)
+_PARTS = (
+    simulation_loop.begin_lanes,
+    simulation_loop.begin_stage,
+    simulation_loop.remember,
+    simulation_loop.take_sample,
+    simulation_loop.add_stage,
+    simulation_loop.add_step,
+)
 
 
 @attrs.frozen(kw_only=True)
@@ -206,45 +141,48 @@ class Layout:
 
 
 def emit_simulation(layout: Layout, integrator: Integrator) -> str:
-    """Write the source of a simulation."""
-    places = _places(layout)
-    body = kernel_body(layout.rates, places["inputs"])
-    sizes = {**places, "lanes": LANES, "stages": 4 if integrator == "rk4" else 1}
-    loop = f"for k in range({LANES}):\n" + textwrap.indent(body.lines, " " * 4)
-    parts = {"functions": "", "arrays": "", "again": "", "body": textwrap.indent(loop, " " * 16)}
-    if layout.located:
-        part = event_location.RK4 if integrator == "rk4" else event_location.SEMI_IMPLICIT
-        lines = {"body": textwrap.indent(body.lines, " " * 8), "advance": _filled(part, sizes)}
-        parts = {
-            "functions": _filled(event_location.FUNCTIONS, {**sizes, **lines}),
-            "arrays": _filled(event_location.ARRAYS, sizes),
-            "again": _filled(event_location.AGAIN, sizes),
-            "body": " " * 16 + "rates(x, y)",
-        }
-    return _SOURCE.format(
-        head=head(sum(body.operations.values())),
-        helpers=body.helpers,
-        outputs=body.outputs,
-        advance=_filled(_RK4 if integrator == "rk4" else _SEMI_IMPLICIT, sizes),
-        look=_LOOK,
-        matrix='types.Array(float64, 2, "C", readonly=True)',
-        **parts,
-        **sizes,
+    """Write the source of a simulation: its sizes, its equations, and the functions of the loop as they stand."""
+    sizes = _sizes(layout, integrator)
+    body = kernel_body(layout.rates, sizes["INPUTS"])
+    events = [function_source(function, _COMPILED) for function in _EVENTS] if layout.located else []
+    equations = textwrap.indent(body.lines, " " * 8)
+    return "\n\n".join(
+        [
+            head(sum(body.operations.values())) + body.helpers,
+            "\n".join(f"{name} = {value!r}" for name, value in {**sizes, "OUTPUTS": body.outputs}.items()),
+            f"{_COMPILED if layout.located else _INLINED}\ndef rates(x, y):\n    for k in range({LANES}):\n{equations}",
+            *events,
+            *(function_source(function, _INLINED) for function in _PARTS),
+            _SIGNATURE.format(matrix='types.Array(float64, 2, "C", readonly=True)'),
+            function_source(simulation_loop.simulate),
+            "",
+        ]
     )
 
 
-def _filled(template: str, sizes: Mapping[str, object]) -> str:
-    return template.format(**sizes).strip("\n")
-
-
-def _places(layout: Layout) -> dict[str, int]:
-    """Return where the rows of a simulation begin, and how many there are."""
-    kept, parameters = 2 * layout.pins, len(Contact._fields) * layout.pins
-    places = {"n": layout.n, "pins": layout.pins, "states": layout.states}
-    places |= {"kept": kept, "parameters": parameters, "gains": layout.gains, "columns": layout.columns}
-    places["first_depth"] = layout.states + 3 * layout.pins
-    row = layout.states
-    for name, count in (("kept", kept), ("contact", parameters), ("gain", layout.gains), ("drive", layout.columns)):
-        places[f"first_{name}"] = row
-        row += count
-    return {**places, "inputs": row}
+def _sizes(layout: Layout, integrator: Integrator) -> dict[str, int]:
+    """Return the sizes of a simulation, by their names in ``lane_layout``."""
+    memory, parameters = 2 * layout.pins, len(Contact._fields) * layout.pins
+    first_parameter = layout.states + memory
+    first_gain = first_parameter + parameters
+    first_drive = first_gain + layout.gains
+    return {
+        "LANES": LANES,
+        "N": layout.n,
+        "PINS": layout.pins,
+        "STATES": layout.states,
+        "MEMORY": memory,
+        "PARAMETERS": parameters,
+        "GAINS": layout.gains,
+        "COLUMNS": layout.columns,
+        "FIRST_MEMORY": layout.states,
+        "FIRST_PARAMETER": first_parameter,
+        "FIRST_GAIN": first_gain,
+        "FIRST_DRIVE": first_drive,
+        "INPUTS": first_drive + layout.columns,
+        "FIRST_DEPTH": layout.states + 3 * layout.pins,
+        "RK4": integrator == "rk4",
+        "STAGES": 4 if integrator == "rk4" else 1,
+        "LOCATED": layout.located,
+        "CHECK_EVERY": simulation_loop.CHECK_EVERY,
+    }

@@ -7,6 +7,7 @@ multiplication and an addition become one instruction is written down (``fuse``)
 alone, in any batch and inside other compiled code.
 """
 
+import ast
 import inspect
 import math
 import textwrap
@@ -263,6 +264,23 @@ def head(count: int) -> str:
         count: operations per configuration.
     """
     return _HEAD.format(count=count)
+
+
+def function_source(function: Callable[..., object], decorator: str = "") -> str:
+    """Return the text of a function for an emitted source: its statements alone, whatever else they are read with.
+
+    Args:
+        function: one whose names all stand in the emitted source.
+        decorator: a line to put above it.
+    """
+    (definition,) = ast.parse(inspect.getsource(function)).body
+    assert isinstance(definition, ast.FunctionDef)  # noqa: S101 - what is emitted is ours
+    if ast.get_docstring(definition) is not None:
+        del definition.body[0]
+    definition.returns = None
+    for argument in definition.args.args:
+        argument.annotation = None
+    return f"{decorator}\n{ast.unparse(definition)}".lstrip("\n")
 
 
 _HELPERS = {"sine_cosine": {"sin", "cos"}, "arc_tangent": {"atan2"}}
