@@ -88,7 +88,7 @@ def _wide(arm: Arm) -> Arm:
 def _random(arm: Arm, rng: np.random.Generator, count: int, margin: float = 0.0) -> Array:
     """Postures inside the limits, (count, 6), angles within half a turn."""
     turns = np.array([joint.revolute for joint in arm.joints])
-    lower, upper = arm.limit("lower") + margin, arm.limit("upper") - margin
+    lower, upper = arm.limits.lower + margin, arm.limits.upper - margin
     lower, upper = np.where(turns, np.maximum(lower, -np.pi), lower), np.where(turns, np.minimum(upper, np.pi), upper)
     return rng.uniform(lower, upper, size=(count, arm.n))
 
@@ -171,7 +171,7 @@ def _rounded(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
 
 def _whole_turns(arm: Arm, rng: np.random.Generator) -> EdgeSet:
     """Postures with an angle beyond half a turn, where the limits have room for it."""
-    q = rng.uniform(arm.limit("lower"), arm.limit("upper"), size=(100 * _MANY, arm.n))
+    q = rng.uniform(arm.limits.lower, arm.limits.upper, size=(100 * _MANY, arm.n))
     turns = np.array([joint.revolute for joint in arm.joints])
     q = q[(np.abs(q[:, turns]) > np.pi).any(axis=-1)]
     q = q[_smallest(arm, q) > REGULAR][:_MANY] if len(q) else q
@@ -181,7 +181,7 @@ def _whole_turns(arm: Arm, rng: np.random.Generator) -> EdgeSet:
 def _beyond_limits(arm: Arm, rng: np.random.Generator) -> EdgeSet:
     """Postures of which some joint is outside its limits; another branch of the pose may well be inside."""
     q = _random(_wide(arm), rng, 20 * _MANY)
-    outside = ((q < arm.limit("lower") - 1e-3) | (q > arm.limit("upper") + 1e-3)).any(axis=-1)
+    outside = ((q < arm.limits.lower - 1e-3) | (q > arm.limits.upper + 1e-3)).any(axis=-1)
     q = q[outside & (_smallest(arm, q) > REGULAR)][:_MANY]
     return _of_postures("made outside the limits", arm, q)
 

@@ -80,7 +80,7 @@ class Judge:
     def inside(self, arm: Arm, q: Array) -> bool:
         """Whether a posture is inside the limits, by whole turns if need be."""
         images = q[:, None] + np.where(self.turns[:, None], 2 * np.pi * np.arange(-2, 3), 0.0)
-        lower, upper = arm.limit("lower")[:, None] - ON_LIMIT, arm.limit("upper")[:, None] + ON_LIMIT
+        lower, upper = arm.limits.lower[:, None] - ON_LIMIT, arm.limits.upper[:, None] + ON_LIMIT
         return bool(((images >= lower) & (images <= upper)).any(axis=-1).all())
 
     def look(self, edge: EdgeSet, k: int, reply: Reply) -> Judged:

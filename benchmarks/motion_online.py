@@ -15,7 +15,7 @@ from armwright.motion.time_optimal_path import time_optimal
 from armwright.motion.trajectory import Trajectory
 
 ARM = load_arm("puma560")
-SPEED, ACCELERATION = ARM.limit("speed"), ARM.limit("acceleration")
+SPEED, ACCELERATION = ARM.limits.speed, ARM.limits.acceleration
 
 
 def new_goal() -> list[list[str]]:

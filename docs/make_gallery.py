@@ -79,10 +79,10 @@ fast = armwright.time_optimal(arm, slow).trajectory
 t = np.linspace(0, fast.duration, 800)
 efforts = armwright.inverse_dynamics(arm, fast(t), fast(t, 1), fast(t, 2))
 used = {
-    "acceleration of joint 1": abs(fast(t, 2))[:, 0] / arm.limit("acceleration")[0],
-    "acceleration of joint 2": abs(fast(t, 2))[:, 1] / arm.limit("acceleration")[1],
-    "speed of joint 1": abs(fast(t, 1))[:, 0] / arm.limit("speed")[0],
-    "effort of joint 2": abs(efforts)[:, 1] / arm.limit("effort")[1],
+    "acceleration of joint 1": abs(fast(t, 2))[:, 0] / arm.limits.acceleration[0],
+    "acceleration of joint 2": abs(fast(t, 2))[:, 1] / arm.limits.acceleration[1],
+    "speed of joint 1": abs(fast(t, 1))[:, 0] / arm.limits.speed[0],
+    "effort of joint 2": abs(efforts)[:, 1] / arm.limits.effort[1],
 }
 title = f"The fastest run along a path: {fast.duration:.2f} s, part of the limits that is used"
 Path("fastest.svg").write_text(curves(title, t, used, x_label="time, s", y_label="of the limit"))

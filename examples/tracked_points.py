@@ -35,7 +35,7 @@ def rows() -> Iterator[str]:
     for i, name in enumerate(chain.names):
         errors[i] = SAG.get(name, 0.0 if name.endswith(".sag") else errors[i])
     planned = plan_poses(arm, POSES).q
-    lower, upper = arm.limit("lower"), arm.limit("upper")
+    lower, upper = arm.limits.lower, arm.limits.upper
     chance = lower + (upper - lower) * rng.random((CHECKED, arm.n))
     # As the controller shows them.
     q = np.radians(np.round(np.degrees(np.vstack([planned, *[planned[:REPEATED]] * (CYCLES - 1), chance])), 3))

@@ -65,8 +65,8 @@ def test_arm_of_the_page(tmp_path: Path) -> None:
 
     assert (arm.name, arm.n, arm.reach, arm.tool_speed) == ("lift", 2, 0.6, 0.5)
     np.testing.assert_array_equal(arm.tool, [[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0.08], [0, 0, 0, 1]])
-    np.testing.assert_allclose(arm.limit("upper"), (0.9, np.radians(120)))
-    np.testing.assert_allclose(arm.limit("acceleration"), (2, 4))
+    np.testing.assert_allclose(arm.limits.upper, (0.9, np.radians(120)))
+    np.testing.assert_allclose(arm.limits.acceleration, (2, 4))
     # A rotor of 2e-5 kg m² behind a gear of 100:1; 0.51 kg m² about the end of the rod are 0.51 - 4.2 * 0.3² about
     # its middle.
     np.testing.assert_allclose([motor.inertia for motor in arm.motors], (3.0, 0.2))

@@ -76,22 +76,22 @@ def test_limits_of_the_puma() -> None:
     """Positions are those of Fu, Gonzalez & Lee; rates are Lin, Chang & Luh's; torques Armstrong and others'."""
     arm = load_arm("puma560")
 
-    np.testing.assert_allclose(np.degrees(arm.limit("lower")), (-160, -225, -45, -110, -100, -266))
-    np.testing.assert_allclose(np.degrees(arm.limit("upper")), (160, 45, 225, 170, 100, 266))
+    np.testing.assert_allclose(np.degrees(arm.limits.lower), (-160, -225, -45, -110, -100, -266))
+    np.testing.assert_allclose(np.degrees(arm.limits.upper), (160, 45, 225, 170, 100, 266))
     # From stop to stop as the maker's manual has it, but for what differs between its editions.
-    turns = np.degrees(arm.limit("upper") - arm.limit("lower"))
+    turns = np.degrees(arm.limits.upper - arm.limits.lower)
     np.testing.assert_allclose(turns, (320, 266, 284, 280, 200, 532), atol=15)
-    np.testing.assert_allclose(np.degrees(arm.limit("speed")), (100, 95, 100, 150, 130, 110))
-    np.testing.assert_allclose(np.degrees(arm.limit("acceleration")), (45, 40, 75, 70, 90, 80))
-    np.testing.assert_array_equal(arm.limit("effort"), (97.6, 186.4, 89.4, 24.2, 20.1, 21.3))
+    np.testing.assert_allclose(np.degrees(arm.limits.speed), (100, 95, 100, 150, 130, 110))
+    np.testing.assert_allclose(np.degrees(arm.limits.acceleration), (45, 40, 75, 70, 90, 80))
+    np.testing.assert_array_equal(arm.limits.effort, (97.6, 186.4, 89.4, 24.2, 20.1, 21.3))
 
 
 def test_the_puma_of_the_project() -> None:
     """The arm of the PUMA trajectory project has its limits, without its slips, and is the PUMA in all else."""
     seed, arm = load_arm("puma560-seed"), load_arm("puma560")
 
-    np.testing.assert_allclose(np.degrees(seed.limit("upper")), (160, 125, 135, 140, 100, 260))
-    np.testing.assert_array_equal(seed.limit("lower"), -seed.limit("upper"))
+    np.testing.assert_allclose(np.degrees(seed.limits.upper), (160, 125, 135, 140, 100, 260))
+    np.testing.assert_array_equal(seed.limits.lower, -seed.limits.upper)
     stops = [
         attrs.evolve(mine, limits=attrs.evolve(mine.limits, lower=real.limits.lower, upper=real.limits.upper))
         for mine, real in zip(seed.joints, arm.joints, strict=True)
@@ -125,11 +125,11 @@ def test_limits_of_the_stanford_arm(name: str) -> None:
     arm = load_arm(name)
     turns = [0, 1, 3, 4, 5]
 
-    np.testing.assert_allclose(np.degrees(arm.limit("upper")[turns]), (175, 175, 175, 110, 175))
-    np.testing.assert_array_equal(arm.limit("lower")[turns], -arm.limit("upper")[turns])
+    np.testing.assert_allclose(np.degrees(arm.limits.upper[turns]), (175, 175, 175, 110, 175))
+    np.testing.assert_array_equal(arm.limits.lower[turns], -arm.limits.upper[turns])
     boom = arm.joints[2].limits
     np.testing.assert_allclose((boom.lower, boom.upper), (0.14, 1.1176), rtol=ROUNDING)
-    np.testing.assert_array_equal(arm.limit("effort"), (91.8, 303, 198, 10.15, 10.15, 7.15))
+    np.testing.assert_array_equal(arm.limits.effort, (91.8, 303, 198, 10.15, 10.15, 7.15))
     np.testing.assert_array_equal([m.inertia for m in arm.motors], (0.953, 2.193, 0.782, 0.106, 0.097, 0.02))
 
 
@@ -207,11 +207,9 @@ def test_motors_are_strong_enough(name: str, rng: np.random.Generator) -> None:
     q = random_postures(arm, rng, 2000)
     forward_or_back = rng.choice((-1.0, 1.0), size=(2, *q.shape))
 
-    tau = inverse_dynamics(
-        arm, q, forward_or_back[0] * arm.limit("speed"), forward_or_back[1] * arm.limit("acceleration")
-    )
+    tau = inverse_dynamics(arm, q, forward_or_back[0] * arm.limits.speed, forward_or_back[1] * arm.limits.acceleration)
 
-    assert (np.abs(tau) < arm.limit("effort")).all()
+    assert (np.abs(tau) < arm.limits.effort).all()
 
 
 def test_gravity_of_the_puma(rng: np.random.Generator) -> None:

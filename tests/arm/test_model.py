@@ -147,8 +147,8 @@ def test_an_arm_of_geometry_alone() -> None:
     assert [link.mass for link in arm.links] == [0, 0]
     assert [motor.inertia for motor in arm.motors] == [0, 0]
     np.testing.assert_array_equal(arm.gravity, (0, 0, -STANDARD_GRAVITY))
-    np.testing.assert_array_equal(arm.limit("lower"), (-math.inf, -math.inf))
-    np.testing.assert_array_equal(arm.limit("effort"), (math.inf, math.inf))
+    np.testing.assert_array_equal(arm.limits.lower, (-math.inf, -math.inf))
+    np.testing.assert_array_equal(arm.limits.effort, (math.inf, math.inf))
 
 
 @pytest.mark.parametrize("turns", range(-4, 5))
@@ -275,3 +275,15 @@ def test_massless_parts() -> None:
     """A part that weighs nothing is a part: a joint between two links, a rod in a sketch."""
     assert Link(mass=0).mass == 0
     assert Arm(name="one", joints=ONE, links=[Link(mass=0)]).links == (Link(),)
+
+
+def test_limits_of_all_joints() -> None:
+    """The limits of all joints are one array each, made once, which nobody can write to, in copies too."""
+    arm = load_arm("puma560")
+
+    assert arm.limits is arm.limits
+    np.testing.assert_array_equal(arm.limits.speed, [joint.limits.speed for joint in arm.joints])
+    for limits in (arm.limits, pickle.loads(pickle.dumps(arm)).limits, attrs.evolve(arm, name="another").limits):
+        np.testing.assert_array_equal(limits.lower, arm.limit("lower"))
+        with pytest.raises(ValueError, match="read-only"):
+            limits.lower[0] = 0.0

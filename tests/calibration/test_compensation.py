@@ -118,7 +118,7 @@ def test_limits(rng: np.random.Generator) -> None:
     chain = chain_of(arm)
     q = 0.3 * postures(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
-    beyond = arm.limit("upper") + 0.05
+    beyond = arm.limits.upper + 0.05
 
     there = inverse_calibrated(found, found.predict(beyond), beyond)
 

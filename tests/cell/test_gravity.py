@@ -63,7 +63,7 @@ def base_of(rng: np.random.Generator, stand: str) -> Array:
 
 def cell_of(arm: Arm, base: Array, gravity: Array = UPRIGHT_GRAVITY) -> Cell:
     """A cell of one arm, which stands at zero."""
-    start = np.clip(np.zeros(arm.n), arm.limit("lower"), arm.limit("upper"))
+    start = np.clip(np.zeros(arm.n), arm.limits.lower, arm.limits.upper)
     return Cell(name="cell", arms={"ARM_1": CellArm(arm=arm, base=base, start=start)}, gravity=gravity)
 
 

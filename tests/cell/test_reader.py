@@ -106,8 +106,8 @@ def test_contact(name: str, height: float) -> None:
 def test_examples(name: str) -> None:
     """The cells of the examples are read, and every start posture is inside its limits."""
     for arm in read_cell(EXAMPLES / name).arms.values():
-        assert (arm.start >= arm.arm.limit("lower")).all()
-        assert (arm.start <= arm.arm.limit("upper")).all()
+        assert (arm.start >= arm.arm.limits.lower).all()
+        assert (arm.start <= arm.arm.limits.upper).all()
 
 
 def test_defaults(tmp_path: Path) -> None:

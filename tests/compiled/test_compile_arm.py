@@ -115,7 +115,7 @@ def assert_branches(arm: Arm, rng: np.random.Generator) -> None:
     fast = compile_arm(arm).inverse_branches
     postures = random_postures(arm, rng, 300)
     postures[:100, 4] = 0.0
-    X, near = forward(arm, postures), np.tile(arm.limit("lower") * 0.3, (300, 1))
+    X, near = forward(arm, postures), np.tile(arm.limits.lower * 0.3, (300, 1))
     X[250:, :3, 3] *= 2.0
 
     q, singular = fast(X, near)

@@ -227,7 +227,7 @@ def test_typed_poses(name: str, digits: int, off: float, rng: np.random.Generato
 
 
 def _at_a_limit(arm: Arm, q: Array, room: float) -> bool:
-    return bool(np.minimum(q - arm.limit("lower"), arm.limit("upper") - q).min() < room)
+    return bool(np.minimum(q - arm.limits.lower, arm.limits.upper - q).min() < room)
 
 
 @pytest.mark.parametrize(("digits", "beyond"), [(6, 1e-6), (4, 1e-4)])
@@ -273,7 +273,7 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
             # By brute force: no posture of the eight is inside by whole turns of any joint.
             q, _ = inverse_branches(arm, X)
             turns = q[..., None] + 2 * np.pi * np.arange(-2, 3)
-            lower, upper = arm.limit("lower")[:, None], arm.limit("upper")[:, None]
+            lower, upper = arm.limits.lower[:, None], arm.limits.upper[:, None]
             assert not ((turns >= lower) & (turns <= upper)).any(axis=-1).all(axis=-1).any()
     assert counts[Outcome.SOLVED] > 20
     assert counts[Outcome.OUT_OF_REACH] > 20
@@ -314,7 +314,7 @@ def test_made_outside_the_limits(name: str, rng: np.random.Generator) -> None:
     """
     arm = load_arm(name)
     turn = 2 * np.pi * np.array([joint.revolute for joint in arm.joints])[:, None] * np.arange(-2, 3)
-    lower, upper = arm.limit("lower")[:, None], arm.limit("upper")[:, None]
+    lower, upper = arm.limits.lower[:, None], arm.limits.upper[:, None]
     answers = dict.fromkeys(Outcome, 0)
     for q in random_postures(_wide(name), rng, 100):
         X = forward(arm, q)
@@ -393,7 +393,7 @@ def test_least_turn_of_a_straight_wrist(name: str, sample: Sample) -> None:
             limits = attrs.evolve(joints[i].limits, lower=middle - half, upper=middle + half)
             joints[i] = attrs.evolve(joints[i], limits=limits)
         narrow = attrs.evolve(arm, joints=tuple(joints))
-        lower, upper = narrow.limit("lower"), narrow.limit("upper")
+        lower, upper = narrow.limits.lower, narrow.limits.upper
         near = rng.uniform(lower, upper)
         q = rng.uniform(0.9 * lower + 0.1 * upper, 0.1 * lower + 0.9 * upper)
         q[4] = 0.0

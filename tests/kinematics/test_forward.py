@@ -92,7 +92,7 @@ def test_catalogue_against_pinocchio(name: str, rng: np.random.Generator) -> Non
 
 def _compare(arm: Arm, rng: np.random.Generator) -> None:
     model, data, tool = pinocchio_model(arm)
-    lower, upper = np.maximum(arm.limit("lower"), -3), np.minimum(arm.limit("upper"), 3)
+    lower, upper = np.maximum(arm.limits.lower, -3), np.minimum(arm.limits.upper, 3)
     for q in rng.uniform(lower, upper, size=(5, arm.n)):
         pin.framesForwardKinematics(model, data, q)
         base = pin.computeFrameJacobian(model, data, q, tool, pin.LOCAL_WORLD_ALIGNED).reshape(6, arm.n)

@@ -83,7 +83,7 @@ def test_grid_of_right_angles(name: str) -> None:
     if name == "stanford":
         steps[2] = np.degrees([0.3, 0.7, 1.0])  # the slide, back in metres below
     grid = np.radians(np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 6))
-    inside = ((grid >= arm.limit("lower")) & (grid <= arm.limit("upper"))).all(axis=-1)
+    inside = ((grid >= arm.limits.lower) & (grid <= arm.limits.upper)).all(axis=-1)
     for q in grid[inside][::97]:
         X = forward(arm, q)
         solution = inverse(arm, X, q)

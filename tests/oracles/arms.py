@@ -68,4 +68,4 @@ def squared(arm: Arm, rng: np.random.Generator) -> Arm:
 
 def random_postures(arm: Arm, rng: np.random.Generator, count: int) -> Array:
     """Postures spread evenly over the limits, (count, n)."""
-    return rng.uniform(arm.limit("lower"), arm.limit("upper"), size=(count, arm.n))
+    return rng.uniform(arm.limits.lower, arm.limits.upper, size=(count, arm.n))

@@ -11,6 +11,7 @@ All quantities are SI and radians.
 
 import math
 from collections.abc import Iterable, Sized
+from functools import cached_property
 from typing import Any, Literal, TypeAlias, TypeVar, get_args
 
 import attrs
@@ -130,6 +131,27 @@ class Limits:
         for name in magnitudes:
             if not getattr(self, name) > 0:
                 raise InvalidValueError(f"limits: {name} must be above 0, got {getattr(self, name):g}")
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class JointLimits:
+    """The ``Limits`` of n joints, one array of each.
+
+    Attributes:
+        lower: (n,) smallest positions [rad] or [m].
+        upper: (n,) largest positions.
+        speed: (n,) largest speeds [rad/s] or [m/s].
+        acceleration: (n,) largest accelerations [rad/s²] or [m/s²].
+        effort: (n,) largest torques [N m] or forces [N], at the joints.
+    """
+
+    lower: Array = attrs.field(converter=read_only)
+    upper: Array = attrs.field(converter=read_only)
+    speed: Array = attrs.field(converter=read_only)
+    acceleration: Array = attrs.field(converter=read_only)
+    effort: Array = attrs.field(converter=read_only)
+
+    __reduce__ = reduce_by_fields
 
 
 @attrs.frozen(kw_only=True)
@@ -371,6 +393,13 @@ class Arm:
         name = self.joints[joint].name
         return f"joint {joint + 1} ('{name}')" if name else f"joint {joint + 1}"
 
+    @cached_property
+    def limits(self) -> "JointLimits":
+        """The limits of all joints, each (n,)."""
+        names = [field.name for field in attrs.fields(JointLimits)]
+        return JointLimits(**{name: np.array([getattr(joint.limits, name) for joint in self.joints]) for name in names})
+
     def limit(self, name: str) -> Array:
-        """Return one limit of every joint, (n,), such as ``limit('speed')``."""
-        return np.array([getattr(joint.limits, name) for joint in self.joints])
+        """Return one of the limits of all joints, (n,), by its name in ``limits``."""
+        limit: Array = getattr(self.limits, name)
+        return limit

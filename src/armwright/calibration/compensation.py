@@ -78,7 +78,7 @@ def inverse_calibrated(
         if np.all(least < _MET):
             break
         q = q + np.clip((np.linalg.pinv(J, rcond=_WEAK) @ off[:, :, None])[:, :, 0], -_FARTHEST, _FARTHEST)
-    lower, upper = chain.arm.limit("lower"), chain.arm.limit("upper")
+    lower, upper = chain.arm.limits.lower, chain.arm.limits.upper
     return CalibratedInverse(
         best, np.asarray(least, dtype=np.float64), np.all((best >= lower) & (best <= upper), axis=1)
     )

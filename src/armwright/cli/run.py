@@ -298,7 +298,7 @@ def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
     from rich.text import Text
 
     arm = recording.cell.arms[stage.arm].arm
-    shares = stage.motion.peaks(1) / arm.limit("speed"), stage.peak_effort / arm.limit("effort")
+    shares = stage.motion.peaks(1) / arm.limits.speed, stage.peak_effort / arm.limits.effort
     texts = []
     for share in shares:
         joint = int(share.argmax())

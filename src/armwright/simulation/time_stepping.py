@@ -93,9 +93,9 @@ def simulate(
         arm=arm,
         controller=no_effort(arm) if controller is None else _held_to_shape(controller, arm.n),
         brakes=tuple(brakes),
-        lower=arm.limit("lower") if stops else -unlimited,
-        upper=arm.limit("upper") if stops else unlimited,
-        effort=arm.limit("effort") if saturation else unlimited,
+        lower=arm.limits.lower if stops else -unlimited,
+        upper=arm.limits.upper if stops else unlimited,
+        effort=arm.limits.effort if saturation else unlimited,
     )
     _check(plant, start, speed)
     run = _Run(plant, integrator, duration, period)

@@ -181,7 +181,7 @@ def joint_table(study: Torques) -> list[JointRow]:
     """Return how far the cases are apart, joint by joint: the report says the wrist suffers most."""
     empty = _mean(study.empty)
     bejczy, load = _mean(study.bejczy - study.empty) / empty, _mean(study.loaded - study.empty) / empty
-    limits = study_arm().limit("effort")
+    limits = study_arm().limits.effort
     return [
         JointRow(
             joint=i + 1,
@@ -204,7 +204,7 @@ def study_postures() -> Array:
     """Return the postures that constants are fitted to, (m, 6), spread over the joint limits."""
     arm = study_arm()
     rng = np.random.default_rng(SEED)
-    return rng.uniform(arm.limit("lower"), arm.limit("upper"), size=(POSTURES, arm.n))
+    return rng.uniform(arm.limits.lower, arm.limits.upper, size=(POSTURES, arm.n))
 
 
 def fitted_coefficients() -> Coefficients:

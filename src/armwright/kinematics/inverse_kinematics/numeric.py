@@ -78,8 +78,8 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     limited = _Task(
         arm=arm,
         X=X,
-        lower=arm.limit("lower"),
-        upper=arm.limit("upper"),
+        lower=arm.limits.lower,
+        upper=arm.limits.upper,
         size=size,
         length=max(size / 4, POSE_TOLERANCE),
     )

@@ -22,7 +22,7 @@ def joint_distance(arm: Arm, q_from: ArrayLike, q_to: ArrayLike) -> float:
 
 def joint_distances(arm: Arm, q_from: Array, q_to: Array) -> Array:
     """Return ``joint_distance`` (...) of configurations (..., n)."""
-    speed = arm.limit("speed")
+    speed = arm.limits.speed
     weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
     return np.asarray(np.linalg.norm((q_to - q_from) * weight, axis=-1))
 
@@ -62,7 +62,7 @@ def same_configuration(arm: Arm, a: Array, b: Array, tolerance: float) -> bool:
 
 def mid_range(arm: Arm) -> Array:
     """Return the middle of the limits of every joint (n,); 0 where there are none."""
-    return midpoints(arm.limit("lower"), arm.limit("upper"), np.zeros(arm.n))
+    return midpoints(arm.limits.lower, arm.limits.upper, np.zeros(arm.n))
 
 
 def midpoints(lower: Array, upper: Array, otherwise: Array) -> Array:
