@@ -30,7 +30,7 @@ def rows() -> Iterator[str]:
     """Give the rows: poses to fit, some of them several times, and poses by chance to check with."""
     rng = np.random.default_rng(1984)
     arm = load_arm("puma560-seed")
-    chain = chain_of(arm, base=HALL, bends=compliances(arm))
+    chain = chain_of(arm, base=HALL, joint_errors=compliances(arm))
     errors = rng.standard_normal(len(chain.names)) * np.where(chain.is_length, LENGTH, ANGLE)
     for i, name in enumerate(chain.names):
         errors[i] = SAG.get(name, 0.0 if name.endswith(".sag") else errors[i])
@@ -40,7 +40,7 @@ def rows() -> Iterator[str]:
     # As the controller shows them.
     q = np.radians(np.round(np.degrees(np.vstack([planned, *[planned[:REPEATED]] * (CYCLES - 1), chance])), 3))
     noise = rng.standard_normal((len(q), 3)) * RETURN + rng.standard_normal((len(q), 3)) * TRACKER
-    points = chain.reach(q, errors).position + noise
+    points = chain.forward(q, errors).position + noise
     yield ",".join([*(f"joint_{i + 1}_deg" for i in range(arm.n)), "x_mm", "y_mm", "z_mm", "set"])
     for number, (angles, place) in enumerate(zip(np.degrees(q), points * 1e3, strict=True)):
         cells = [*(f"{angle:.3f}" for angle in angles), *(f"{x:.4f}" for x in place)]

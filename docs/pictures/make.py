@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from armwright import forward, inverse, link_poses, load_arm, simulate
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.calibration.assess import assess_calibration
 from armwright.calibration.measurements import read_measurements
 from armwright.clearance.ideal import point_of, tip_of
 from armwright.clearance.linkage import Place
@@ -21,8 +22,7 @@ from armwright.clearance.simulation import Simulation as Rattling
 from armwright.clearance.simulation import simulate as simulate_play
 from armwright.kinematics.inverse_kinematics.solution import Branch
 from armwright.motion.plan import Manner, StageGoal, plan
-from armwright.report.calibrated import calibrated
-from armwright.report.calibrated_files import distances_figure
+from armwright.report.calibration_files import distances_figure
 from armwright.report.svg import alike, steady
 from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import Event, JointState, Simulation
@@ -403,7 +403,7 @@ def before_and_after() -> Figure:
     """Draw how far points of the imaginary PUMA are from it as said, calibrated, and with what its joints give."""
     arm = load_arm("puma560-seed")
     measured = read_measurements(HERE.parents[1] / "examples" / "puma_points.csv", arm)
-    return distances_figure(calibrated(arm, measured, beyond=True))
+    return distances_figure(assess_calibration(arm, measured, nongeometric=True))
 
 
 def main() -> None:

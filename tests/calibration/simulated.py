@@ -49,4 +49,4 @@ def postures(rng: np.random.Generator, arm: Arm, m: int) -> Array:
 
 def seen(chain: Chain, q: Array, errors: Array, noise: float, rng: np.random.Generator) -> Array:
     """Return (m, 3) where a measurement with noise [m] sees the tool of an arm with errors."""
-    return np.asarray(chain.reach(q, errors).position + noise * rng.standard_normal((len(q), 3)))
+    return np.asarray(chain.forward(q, errors).position + noise * rng.standard_normal((len(q), 3)))

@@ -61,7 +61,7 @@ def test_no_errors(name: str, rng: np.random.Generator) -> None:
     arm = load_arm(name)
     q = postures(rng, arm, 20)
 
-    reached = chain_of(arm).reach(q)
+    reached = chain_of(arm).forward(q)
 
     np.testing.assert_allclose(reached.position, forward(arm, q)[:, :3, 3], atol=ROUNDING)
     np.testing.assert_allclose(reached.rotation, forward(arm, q)[:, :3, :3], atol=ROUNDING)
@@ -73,7 +73,7 @@ def test_no_errors_anywhere(n: int, rng: np.random.Generator) -> None:
     arm = random_arm(rng, n, slides=True)
     q = postures(rng, arm, 20)
 
-    np.testing.assert_allclose(chain_of(arm).reach(q).position, forward(arm, q)[:, :3, 3], atol=ROUNDING)
+    np.testing.assert_allclose(chain_of(arm).forward(q).position, forward(arm, q)[:, :3, 3], atol=ROUNDING)
 
 
 @pytest.mark.parametrize("R", [((0, 0, 1), (0, 1, 0), (-1, 0, 0)), ((0, 0, -1), (0, 1, 0), (1, 0, 0))])
@@ -84,7 +84,7 @@ def test_quarter_turn_of_the_tool(R: tuple[tuple[int, ...], ...], rng: np.random
     arm = Arm(name="one", joints=[Joint(kind="revolute", a=0.3)], tool=tool)
     q = postures(rng, arm, 5)
 
-    np.testing.assert_allclose(chain_of(arm).reach(q).rotation, forward(arm, q)[:, :3, :3], atol=ROUNDING)
+    np.testing.assert_allclose(chain_of(arm).forward(q).rotation, forward(arm, q)[:, :3, :3], atol=ROUNDING)
 
 
 @pytest.mark.parametrize("n", range(3, 8))
@@ -95,7 +95,7 @@ def test_derivatives(n: int, rng: np.random.Generator) -> None:
     q = postures(rng, arm, 3)
     errors = random_errors(rng, chain, scale=30.0)
 
-    reached = chain.reach(q, errors)
+    reached = chain.forward(q, errors)
 
     for row in range(len(q)):
         X = product(chain, q[row], errors.astype(np.complex128))
@@ -106,8 +106,10 @@ def test_derivatives(n: int, rng: np.random.Generator) -> None:
             stepped[k] += 1j * STEP
             slope = product(chain, q[row], stepped).imag / STEP
             spin = slope[:3, :3] @ reached.rotation[row].T
-            np.testing.assert_allclose(reached.by_position[row, :, k], slope[:3, 3], atol=ROUNDING)
-            np.testing.assert_allclose(reached.by_turn[row, :, k], (spin[2, 1], spin[0, 2], spin[1, 0]), atol=ROUNDING)
+            np.testing.assert_allclose(reached.position_jacobian[row, :, k], slope[:3, 3], atol=ROUNDING)
+            np.testing.assert_allclose(
+                reached.rotation_jacobian[row, :, k], (spin[2, 1], spin[0, 2], spin[1, 0]), atol=ROUNDING
+            )
 
 
 def test_differences(rng: np.random.Generator) -> None:
@@ -116,10 +118,10 @@ def test_differences(rng: np.random.Generator) -> None:
     q = postures(rng, chain.arm, 10)
     errors = random_errors(rng, chain)
 
-    slopes = chain.reach(q, errors).by_position
+    slopes = chain.forward(q, errors).position_jacobian
 
     for k, step in enumerate(DIFFERENCE * np.eye(len(errors))):
-        moved = chain.reach(q, errors + step).position - chain.reach(q, errors - step).position
+        moved = chain.forward(q, errors + step).position - chain.forward(q, errors - step).position
         np.testing.assert_allclose(slopes[:, :, k], moved / (2 * DIFFERENCE), atol=DIFFERENCED)
 
 
@@ -145,10 +147,10 @@ def test_wrong_number_of_errors() -> None:
     chain = chain_of(load_arm("ur5"))
 
     with pytest.raises(ShapeError, match=r"errors: expected 38 of them, got shape \(3,\)"):
-        chain.reach(np.zeros(6), np.zeros(3))
+        chain.forward(np.zeros(6), np.zeros(3))
 
 
 def test_wrong_number_of_joints() -> None:
     """Joint positions of another arm are refused."""
     with pytest.raises(ShapeError, match="q: expected 6 numbers on the last axis"):
-        chain_of(load_arm("ur5")).reach(np.zeros(7))
+        chain_of(load_arm("ur5")).forward(np.zeros(7))

@@ -23,9 +23,9 @@ MET = 1e-9
 def bent(rng: np.random.Generator) -> tuple[Chain, Array]:
     """Return a PUMA whose dimensions are off and whose joints give."""
     arm = load_arm("puma560")
-    chain = chain_of(arm, bends=compliances(arm))
+    chain = chain_of(arm, joint_errors=compliances(arm))
     errors = random_errors(rng, chain)
-    errors[-len(chain.bends) :] = 1e-3
+    errors[-len(chain.joint_errors) :] = 1e-3
     return chain, errors
 
 
@@ -35,14 +35,14 @@ def test_places(rng: np.random.Generator) -> None:
     q = postures(rng, chain.arm, 120)
     found = calibrate_nongeometric(chain.arm, readings(q, seen(chain, q, errors, NOISE, rng)))
     near = postures(rng, chain.arm, 10)
-    goals = chain_of(chain.arm).reach(near).position
+    goals = chain_of(chain.arm).forward(near).position
 
     there = inverse_calibrated(found, goals, near)
 
-    assert found.tried[1].kept
-    assert there.missed.max() < MET
-    off = np.linalg.norm(chain.reach(there.q, errors).position - goals, axis=1)
-    as_said = np.linalg.norm(chain.reach(near, errors).position - goals, axis=1)
+    assert found.comparisons[1].accepted
+    assert there.residual.max() < MET
+    off = np.linalg.norm(chain.forward(there.q, errors).position - goals, axis=1)
+    as_said = np.linalg.norm(chain.forward(near, errors).position - goals, axis=1)
     assert off.mean() < 2 * NOISE
     assert as_said.mean() > 30 * off.mean()
 
@@ -53,15 +53,15 @@ def test_poses(rng: np.random.Generator) -> None:
     chain = chain_of(arm)
     errors, q = random_errors(rng, chain), postures(rng, arm, 40)
     X = np.tile(np.eye(4), (40, 1, 1))
-    reached = chain.reach(q, errors)
+    reached = chain.forward(q, errors)
     X[:, :3, 3], X[:, :3, :3] = reached.position, reached.rotation
     found = calibrate_points(arm, q, X)
 
     there = inverse_calibrated(found, X[:5], q[:5] + 0.01)
 
     assert any(name.endswith(".beta") for name in found.names)
-    assert there.missed.max() < MET
-    again = chain.reach(there.q, errors)
+    assert there.residual.max() < MET
+    again = chain.forward(there.q, errors)
     np.testing.assert_allclose(again.position, X[:5, :3, 3], atol=1e-7)
     np.testing.assert_allclose(again.rotation, X[:5, :3, :3], atol=1e-6)
 
@@ -73,14 +73,14 @@ def test_a_hand_the_other_way_round(rng: np.random.Generator) -> None:
     q = postures(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
     near = np.array([0.3, -0.7, 0.4, 0.2, 0.9, 0.1])
-    reached = found.chain.reach(near, found.own)
+    reached = found.chain.forward(near, found.arm_errors)
     goal = np.eye(4)
     goal[:3, 3], goal[:3, :3] = reached.position[0], reached.rotation[0] @ np.diag([-1.0, -1.0, 1.0])
 
     there = inverse_calibrated(found, goal, near)
 
-    turned = found.chain.reach(there.q, found.own).rotation[0]
-    assert there.missed[0] >= np.linalg.norm(rotation_vector(goal[:3, :3] @ turned.T)) - MET
+    turned = found.chain.forward(there.q, found.arm_errors).rotation[0]
+    assert there.residual[0] >= np.linalg.norm(rotation_vector(goal[:3, :3] @ turned.T)) - MET
     assert np.abs(there.q[0] - near).max() > 1.0
 
 
@@ -93,7 +93,7 @@ def test_out_of_reach(rng: np.random.Generator) -> None:
 
     there = inverse_calibrated(found, (5.0, 0.0, 0.0), q[0])
 
-    assert there.missed[0] > 3.0
+    assert there.residual[0] > 3.0
 
 
 def test_no_step_that_leads_away(rng: np.random.Generator) -> None:
@@ -108,8 +108,8 @@ def test_no_step_that_leads_away(rng: np.random.Generator) -> None:
 
     there = inverse_calibrated(found, goals, near)
 
-    assert np.all(there.missed <= np.linalg.norm(goals - found.predict(near), axis=1))
-    np.testing.assert_allclose(there.missed, np.linalg.norm(goals - found.predict(there.q), axis=1), atol=1e-12)
+    assert np.all(there.residual <= np.linalg.norm(goals - found.predict(near), axis=1))
+    np.testing.assert_allclose(there.residual, np.linalg.norm(goals - found.predict(there.q), axis=1), atol=1e-12)
 
 
 def test_limits(rng: np.random.Generator) -> None:
@@ -122,7 +122,7 @@ def test_limits(rng: np.random.Generator) -> None:
 
     there = inverse_calibrated(found, found.predict(beyond), beyond)
 
-    np.testing.assert_array_equal(there.inside, [False])
+    np.testing.assert_array_equal(there.within_limits, [False])
 
 
 def test_as_many(rng: np.random.Generator) -> None:
@@ -134,5 +134,5 @@ def test_as_many(rng: np.random.Generator) -> None:
     assert inverse_calibrated(found, found.predict(q[:3]), q[0]).q.shape == (3, 6)
     with pytest.raises(ShapeError, match="near: expected 3 joint positions for as many goals, or one, got 2"):
         inverse_calibrated(found, np.zeros((3, 3)), q[:2])
-    with pytest.raises(ShapeError, match=r"goals: expected \(m, 3\) places or \(m, 4, 4\) poses, got \(3, 2\)"):
+    with pytest.raises(ShapeError, match=r"goals: expected \(m, 3\) positions or \(m, 4, 4\) poses, got \(3, 2\)"):
         inverse_calibrated(found, np.zeros((3, 2)), q[0])

@@ -78,7 +78,7 @@ def test_held_out_points_tell_the_noise(rng: np.random.Generator) -> None:
 
     usual = noise * np.sqrt(8 / np.pi)
     assert 0.95 * usual < off.distance.mean() < 1.35 * usual
-    assert np.all(np.isnan(off.turn))
+    assert np.all(np.isnan(off.angle))
 
 
 @pytest.mark.parametrize("folds", [1, 7])
@@ -213,5 +213,5 @@ def test_known_in_the_file(rng: np.random.Generator, tmp_path: Path) -> None:
 
 def test_nothing_known() -> None:
     """An arm of the catalogue does not say how well it is known."""
-    with pytest.raises(InvalidValueError, match="puma560: it is not said how well its dimensions are known; calibrate"):
+    with pytest.raises(InvalidValueError, match="puma560: its dimensions have no covariance; calibrate"):
         position_covariance(load_arm("puma560"), np.zeros(6))

@@ -19,12 +19,12 @@ from samples import Sample
 
 
 @pytest.mark.parametrize("index", INDICES)
-def test_better_than_by_chance(index: str) -> None:
+def test_better_than_random(index: str) -> None:
     """Whatever is asked to be large is larger than with as many poses by chance, and all lie inside the limits."""
     arm = load_arm("puma560")
     plan = plan_poses(arm, 20, index=index)  # type: ignore[arg-type]
 
-    assert getattr(plan.observability, index) > getattr(plan.by_chance, index)
+    assert getattr(plan.observability, index) > getattr(plan.random, index)
     assert plan.q.shape == (20, 6)
     for joint, q in zip(arm.joints, plan.q.T, strict=True):
         assert np.all((q >= joint.limits.lower) & (q <= joint.limits.upper))
@@ -38,7 +38,7 @@ def test_indices_of_the_plan() -> None:
 
     kept = [chain.names.index(name) for name in plan.names]
     np.testing.assert_allclose(plan.observability, observability(chain, plan.q, kept), rtol=1e-9)
-    A = chain.reach(plan.q).by_position[:, :, kept].reshape(-1, len(kept))
+    A = chain.forward(plan.q).position_jacobian[:, :, kept].reshape(-1, len(kept))
     assert pytest.approx(1 / np.linalg.cond(A), rel=1e-9) == plan.observability.O2
 
 
@@ -53,7 +53,7 @@ def test_planned_poses_leave_smaller_deviations() -> None:
     def mean_deviation(q: np.ndarray) -> float:
         found = calibrate_points(arm, q, seen(chain, q, errors, 5e-5, rng), base=np.eye(4), only=plan.names)
         assert found.names == plan.names
-        return float(np.log(found.deviations / found.noise.length).mean())
+        return float(np.log(found.standard_errors / found.noise.length).mean())
 
     chance = [mean_deviation(lower + (upper - lower) * rng.random((25, 6))) for _ in range(5)]
     assert mean_deviation(plan.q) < np.mean(chance)
@@ -124,7 +124,7 @@ def test_enough_to_calibrate(name: str, fewest: int, sample: Sample) -> None:
         points = seen(chain, plan.q, random_errors(rng, chain), 5e-5, rng)
         found = calibrate_points(arm, plan.q, points)
 
-        assert found.freedom > 0
+        assert found.degrees_of_freedom > 0
         # A part alone may leave what looks like another arm; what it leaves is never too little.
         with contextlib.suppress(ContradictionError):
             cross_validate(arm, readings(plan.q, points))
@@ -156,7 +156,7 @@ def test_next_poses_see_what_the_first_did_not() -> None:
     plan = plan_poses(arm, 3, measured=before, index="O3")
 
     assert np.ptp(plan.q[:, 1]) > 0.5
-    assert plan.observability.O3 > plan.by_chance.O3
+    assert plan.observability.O3 > plan.random.O3
     chain = chain_of(arm)
     kept = [chain.names.index(name) for name in plan.names]
     together = observability(chain, np.vstack([plan.q, before]), kept)
@@ -168,7 +168,7 @@ def test_poses_with_turns() -> None:
     """Where turns are measured too, the turns of the tool frame are told, and half as many poses will do."""
     arm = load_arm("puma560")
 
-    plan = plan_poses(arm, 8, turns=True)
+    plan = plan_poses(arm, 8, rotations=True)
 
     assert {"tool.rx", "tool.ry", "tool.rz"} <= set(plan.names)
     with pytest.raises(InvalidValueError, match=r"one in 5 poses is held out .* expected 10 poses or more, got 9"):

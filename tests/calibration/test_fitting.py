@@ -44,7 +44,7 @@ def trial(seed: int) -> Trial:
     chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
     q = postures(rng, arm, POINTS)
     none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
-    expected = calibrate_points(arm, q, seen(chain, q, none, noise, rng), base=np.eye(4)).identified.kept
+    expected = calibrate_points(arm, q, seen(chain, q, none, noise, rng), base=np.eye(4)).identifiability.fitted
     true[list(expected)] = random_errors(rng, chain)[list(expected)]
     found = calibrate_points(arm, q, seen(chain, q, true, noise, rng), base=np.eye(4))
     return Trial(chain, true, noise, found, expected)
@@ -60,9 +60,11 @@ def deviating(trials: list[Trial]) -> Array:
 
     In a few arms, errors make of two that are nearly one the other the better known: there they are not comparable.
     """
-    same = [one for one in trials if one.found.identified.kept == one.expected]
+    same = [one for one in trials if one.found.identifiability.fitted == one.expected]
     assert len(same) > 0.9 * ARMS
-    return np.concatenate([(one.found.values - one.true[list(one.expected)]) / one.found.deviations for one in same])
+    return np.concatenate(
+        [(one.found.values - one.true[list(one.expected)]) / one.found.standard_errors for one in same]
+    )
 
 
 @pytest.fixture
@@ -105,12 +107,12 @@ def test_intervals_by_student(ur5: Arm, rng: np.random.Generator) -> None:
 
     lower, upper = found.intervals(0.9).T
 
-    assert found.freedom < 12
+    assert found.degrees_of_freedom < 12
     np.testing.assert_allclose((lower + upper) / 2, found.values, atol=EXACT)
-    half = (upper - lower) / 2 / found.deviations
-    np.testing.assert_allclose(half, student.ppf(0.95, found.freedom))
+    half = (upper - lower) / 2 / found.standard_errors
+    np.testing.assert_allclose(half, student.ppf(0.95, found.degrees_of_freedom))
     assert half[0] > 1.05 * norm.ppf(0.95)
-    with pytest.raises(InvalidValueError, match="part: expected between 0 and 1, got 95"):
+    with pytest.raises(InvalidValueError, match="confidence: expected between 0 and 1, got 95"):
         found.intervals(95)
 
 
@@ -132,9 +134,9 @@ def test_corrected_arms_are_right_elsewhere() -> None:
         errors, q, elsewhere = random_errors(rng, chain), postures(rng, arm, POINTS), postures(rng, arm, 50)
         found = calibrate_points(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
 
-        missed = found.predict(elsewhere) - chain.reach(elsewhere, errors).position
-        kept = list(found.identified.kept)
-        J = chain.reach(elsewhere, found.errors).by_position[:, :, kept]
+        missed = found.predict(elsewhere) - chain.forward(elsewhere, errors).position
+        kept = list(found.identifiability.fitted)
+        J = chain.forward(elsewhere, found.errors).position_jacobian[:, :, kept]
         stated = np.sqrt(np.einsum("mik,kl,mil->mi", J, found.covariance, J))
         off.append(np.abs(missed / stated).ravel())
         far.append(np.sqrt(np.mean(missed**2)) / noise)
@@ -160,7 +162,7 @@ def test_nearly_dependent_errors(seed: int) -> None:
 
     assert np.abs(found.errors).max() < 0.05
     assert found.noise.length == pytest.approx(noise, rel=0.25)
-    missed = found.predict(elsewhere) - chain.reach(elsewhere, errors).position
+    missed = found.predict(elsewhere) - chain.forward(elsewhere, errors).position
     assert np.sqrt(np.mean(missed**2)) < 0.6 * noise
 
 
@@ -206,7 +208,7 @@ def test_many_outliers(seed: int) -> None:
     found = calibrate_points(arm, q, points, base=np.eye(4))
 
     assert found.outliers == tuple(range(20))
-    assert np.sqrt(np.mean((found.predict(elsewhere) - chain.reach(elsewhere, errors).position) ** 2)) < 2 * 5e-5
+    assert np.sqrt(np.mean((found.predict(elsewhere) - chain.forward(elsewhere, errors).position) ** 2)) < 2 * 5e-5
 
 
 def test_outliers_do_not_count() -> None:
@@ -220,15 +222,15 @@ def test_outliers_do_not_count() -> None:
         arm = random_arm(rng, 3 + seed % 5)
         chain, q = chain_of(arm), postures(rng, arm, POINTS)
         none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
-        told = list(calibrate_points(arm, q, seen(chain, q, none, 5e-5, rng), base=np.eye(4)).identified.kept)
+        told = list(calibrate_points(arm, q, seen(chain, q, none, 5e-5, rng), base=np.eye(4)).identifiability.fitted)
         true[told] = random_errors(rng, chain)[told]
         points = seen(chain, q, true, 5e-5, rng)
         points[:16] += rng.uniform(0.005, 0.03, (16, 3)) * rng.choice([-1, 1], (16, 3))
         found = calibrate_points(arm, q, points, base=np.eye(4))
-        assert found.freedom == 3 * (POINTS - 16) - len(found.names)
+        assert found.degrees_of_freedom == 3 * (POINTS - 16) - len(found.names)
         noises.append(found.noise.length / 5e-5)
-        if list(found.identified.kept) == told:
-            misses.append((found.values - true[told]) / found.deviations)
+        if list(found.identifiability.fitted) == told:
+            misses.append((found.values - true[told]) / found.standard_errors)
 
     assert len(misses) >= 8
     assert np.sqrt(np.mean(np.concatenate(misses) ** 2)) == pytest.approx(1.0, abs=0.3)
@@ -266,7 +268,7 @@ def test_registered(ur5: Arm, rng: np.random.Generator) -> None:
     """Points of a perfect arm tell its base to rounding; what a mirror shows is brought near by a turn all the same."""
     chain, X = chain_of(ur5), random_pose(rng, 5.0)
     q = postures(rng, ur5, 10)
-    points = chain.reach(q).position @ X[:3, :3].T + X[:3, 3]
+    points = chain.forward(q).position @ X[:3, :3].T + X[:3, 3]
 
     base = register(chain, q, points)
 
@@ -282,7 +284,7 @@ def test_only(ur5: Arm, rng: np.random.Generator) -> None:
     found = calibrate_points(ur5, q, points, base=np.eye(4), only=["base", "joint3.a"])
 
     assert found.names == ("base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz", "joint3.a")
-    assert all(found.errors[i] == 0.0 for i in range(len(found.errors)) if i not in found.identified.kept)
+    assert all(found.errors[i] == 0.0 for i in range(len(found.errors)) if i not in found.identifiability.fitted)
     assert found.after.distance.mean() < found.before.distance.mean()
 
 
@@ -336,7 +338,7 @@ def test_joint_that_never_moved(ur5: Arm, rng: np.random.Generator) -> None:
 
     found = calibrate_points(ur5, q[:60], seen(chain, q[:60], errors, 3e-5, rng), base=np.eye(4))
 
-    missed = np.linalg.norm(found.predict(q[60:]) - chain.reach(q[60:], errors).position, axis=1)
+    missed = np.linalg.norm(found.predict(q[60:]) - chain.forward(q[60:], errors).position, axis=1)
     assert missed.max() < 5 * 3e-5
 
 
@@ -351,7 +353,7 @@ def test_other_units(factor: float, words: str, ur5: Arm, rng: np.random.Generat
     """Points in another unit are refused with a question."""
     q, points, _ = measured(ur5, rng, 3e-5)
 
-    with pytest.raises(ContradictionError, match=rf"as far as ur5 reaches in these postures: are they .*{words}"):
+    with pytest.raises(ContradictionError, match=rf"as far as ur5 reaches in these configurations: are they .*{words}"):
         calibrate_points(ur5, q, points * factor)
 
 
@@ -418,13 +420,13 @@ def test_round_that_leaves_less_is_kept(monkeypatch: pytest.MonkeyPatch, rng: np
     chain = chain_of(arm)
     q, errors = postures(rng, arm, 60), random_errors(rng, chain)
     points = seen(chain, q, errors, 3e-5, rng)
-    fitted, rounds = fitting._fitted, count()
+    fitted, rounds = fitting._fit, count()
 
     def worse(*arguments: Any, **named: Any) -> Array:
         found = fitted(*arguments, **named)
         return found if next(rounds) == 0 else found + 0.005
 
-    monkeypatch.setattr(fitting, "_fitted", worse)
+    monkeypatch.setattr(fitting, "_fit", worse)
     found = calibrate_points(arm, q, points, robust=False)
 
     assert next(rounds) > 2

@@ -22,12 +22,12 @@ ZERO = 1e-10
 def told(chain: Chain, q: Array, noise: float = NONE) -> Identifiability:
     """Return what points at postures q tell, base and tool first."""
     first = [i for part in ("base.", "tool.") for i, name in enumerate(chain.names) if part in name]
-    J = chain.reach(q).by_position.reshape(-1, len(chain.names))
+    J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     return select_identifiable(chain.names, J, chain.is_length, noise, first=first)
 
 
 def kept(found: Identifiability) -> set[str]:
-    return {found.names[i] for i in found.kept}
+    return {found.names[i] for i in found.fitted}
 
 
 def skew(rng: np.random.Generator, n: int) -> Arm:
@@ -85,14 +85,14 @@ def test_skew_arm(n: int, rng: np.random.Generator) -> None:
     """Of n turning joints, a measured point tells 4 n + 3 mixtures of errors, and hides just what geometry says."""
     chain = chain_of(skew(rng, n))
     q = postures(rng, chain.arm, 60)
-    J = chain.reach(q).by_position.reshape(-1, len(chain.names))
+    J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     hidden = null_space(chain)
 
     found = told(chain, q)
 
     np.testing.assert_allclose(J @ hidden, 0.0, atol=STILL)
     assert np.linalg.matrix_rank(hidden) == len(chain.names) - (4 * n + 3)
-    assert len(found.kept) == 4 * n + 3
+    assert len(found.fitted) == 4 * n + 3
     assert np.count_nonzero(found.singular_values > ZERO * found.singular_values[0]) == 4 * n + 3
 
 
@@ -103,14 +103,14 @@ def test_parallel_axes(n: int, parallel: tuple[int, ...], rng: np.random.Generat
     joints = [attrs.evolve(joint, alpha=0.0) if i in parallel else joint for i, joint in enumerate(arm.joints, 1)]
     chain = chain_of(attrs.evolve(arm, joints=joints))
     q = postures(rng, chain.arm, 60)
-    J = chain.reach(q).by_position.reshape(-1, len(chain.names))
+    J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     hidden = null_space(chain)
 
     found = told(chain, q)
 
     np.testing.assert_allclose(J @ hidden, 0.0, atol=STILL)
     assert np.linalg.matrix_rank(hidden) == len(chain.names) - (4 * n + 3)
-    assert len(found.kept) == 4 * n + 3
+    assert len(found.fitted) == 4 * n + 3
     for i in parallel:
         assert f"joint{i}.beta" in kept(found)
         assert f"joint{i + 1}.d" not in kept(found)
@@ -122,10 +122,10 @@ def test_antiparallel_axes(rng: np.random.Generator) -> None:
     joints = [attrs.evolve(joint, alpha=np.pi) if i == 2 else joint for i, joint in enumerate(arm.joints, 1)]
     chain = chain_of(attrs.evolve(arm, joints=joints))
 
-    held = {one.name: one for one in told(chain, postures(rng, chain.arm, 60)).held}
+    fixed = {one.name: one for one in told(chain, postures(rng, chain.arm, 60)).fixed}
 
-    assert held["joint3.d"].why == "it does just what joint2.d does"
-    assert held["joint3.d"].same[0] == ("joint2.d", pytest.approx(-1.0))
+    assert fixed["joint3.d"].reason == "redundant: it has the same effect as joint2.d"
+    assert fixed["joint3.d"].collinear[0] == ("joint2.d", pytest.approx(-1.0))
 
 
 def test_planar_arm(rng: np.random.Generator) -> None:
@@ -134,7 +134,7 @@ def test_planar_arm(rng: np.random.Generator) -> None:
 
     found = told(chain, postures(rng, chain.arm, 40))
 
-    assert len(found.kept) == 15
+    assert len(found.fitted) == 15
     assert {"joint1.beta", "joint2.beta"} <= kept(found)
     assert not {"joint1.d", "joint2.d", "joint3.d"} & kept(found)
 
@@ -151,28 +151,28 @@ def test_slides(seed: int) -> None:
 
     found = told(chain, postures(rng, chain.arm, 60))
 
-    assert len(found.kept) == 4 * 4 + 2 * 1 + 3
+    assert len(found.fitted) == 4 * 4 + 2 * 1 + 3
 
 
 def test_what_does_the_same(rng: np.random.Generator) -> None:
-    """What is held is named with what does the same, and with how much of it."""
+    """What is fixed is named with what does the same, and with how much of it."""
     arm = skew(rng, 6)
     chain = chain_of(arm)
     _, y, z = arm.tool[:3, 3]
 
-    held = {one.name: one for one in told(chain, postures(rng, arm, 60)).held}
+    fixed = {one.name: one for one in told(chain, postures(rng, arm, 60)).fixed}
 
-    assert held["joint1.theta"] == (
+    assert fixed["joint1.theta"] == (
         "joint1.theta",
-        "it does just what base.rz does",
+        "redundant: it has the same effect as base.rz",
         (("base.rz", pytest.approx(1.0)),),
     )
-    assert held["joint1.d"].why == "it does just what base.z does"
-    assert held["joint6.a"].why == "it does just what tool.x does"
-    assert dict(held["joint6.alpha"].same) == {"tool.y": pytest.approx(-z), "tool.z": pytest.approx(y)}
-    assert held["joint6.alpha"].why == "it does just what tool.y and tool.z do together"
+    assert fixed["joint1.d"].reason == "redundant: it has the same effect as base.z"
+    assert fixed["joint6.a"].reason == "redundant: it has the same effect as tool.x"
+    assert dict(fixed["joint6.alpha"].collinear) == {"tool.y": pytest.approx(-z), "tool.z": pytest.approx(y)}
+    assert fixed["joint6.alpha"].reason == "redundant: it has the same effect as a combination of tool.y and tool.z"
     for turned in "xyz":
-        assert held[f"tool.r{turned}"].why == "it does not move the tool in any of the poses"
+        assert fixed[f"tool.r{turned}"].reason == "unobservable: it does not move the tool in any of the poses"
 
 
 def test_tool_on_the_last_axis(rng: np.random.Generator) -> None:
@@ -184,9 +184,9 @@ def test_tool_on_the_last_axis(rng: np.random.Generator) -> None:
 
     found = told(chain, postures(rng, arm, 60))
 
-    held = {one.name: one.why for one in found.held}
-    assert held["joint4.theta"] == "it does not move the tool in any of the poses"
-    assert held["joint4.d"] == "it does just what tool.z does"
+    fixed = {one.name: one.reason for one in found.fixed}
+    assert fixed["joint4.theta"] == "unobservable: it does not move the tool in any of the poses"
+    assert fixed["joint4.d"] == "redundant: it has the same effect as tool.z"
     assert {"tool.x", "tool.y", "tool.z"} <= kept(found)
 
 
@@ -197,7 +197,7 @@ def test_joint_that_never_moved(still: int, rng: np.random.Generator) -> None:
     q = postures(rng, chain.arm, 60)
     q[:, still - 1] = 0.4
 
-    assert len(told(chain, q).kept) == 4 * (5 - 1) + 3
+    assert len(told(chain, q).fitted) == 4 * (5 - 1) + 3
 
 
 def test_few_poses(rng: np.random.Generator) -> None:
@@ -206,8 +206,8 @@ def test_few_poses(rng: np.random.Generator) -> None:
 
     found = told(chain, postures(rng, chain.arm, 5))
 
-    assert len(found.kept) <= 15
-    assert len(found.kept) + len(found.held) == len(chain.names)
+    assert len(found.fitted) <= 15
+    assert len(found.fitted) + len(found.fixed) == len(chain.names)
 
 
 def test_noise_hides(rng: np.random.Generator) -> None:
@@ -215,22 +215,22 @@ def test_noise_hides(rng: np.random.Generator) -> None:
     chain = chain_of(skew(rng, 6))
     q = 0.1 * postures(rng, chain.arm, 40)
 
-    counts = [len(told(chain, q, noise).kept) for noise in (NONE, 1e-5, 1e-4, 1e-3)]
-    held = [one.why for one in told(chain, q, 1e-4).held]
+    counts = [len(told(chain, q, noise).fitted) for noise in (NONE, 1e-5, 1e-4, 1e-3)]
+    fixed = [one.reason for one in told(chain, q, 1e-4).fixed]
 
     assert counts[0] == 27
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] < counts[0]
-    assert any(why.startswith("these poses hardly tell it from ") for why in held)
+    assert any(reason.startswith("nearly collinear with ") for reason in fixed)
 
 
 def test_allowed(rng: np.random.Generator) -> None:
-    """What may not be fitted is neither fitted nor held for a reason of geometry."""
+    """What may not be fitted is neither fitted nor fixed for a reason of geometry."""
     chain = chain_of(skew(rng, 4))
     q = postures(rng, chain.arm, 40)
-    J = chain.reach(q).by_position.reshape(-1, len(chain.names))
+    J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
 
     found = select_identifiable(chain.names, J, chain.is_length, NONE, allowed=range(6))
 
     assert kept(found) == {"base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"}
-    assert found.held == ()
+    assert found.fixed == ()

@@ -48,7 +48,7 @@ def test_one_posture() -> None:
 
 def test_one_posture_cannot_be_held_out() -> None:
     """Of one posture, however often measured, nothing is left to hold out."""
-    with pytest.raises(TooFewError, match="folds: 30 readings of one posture leave none to hold out"):
+    with pytest.raises(TooFewError, match="folds: 30 readings of one joint configuration leave none to hold out"):
         random_folds(np.ones((30, 6)), 5, 0)
 
 

@@ -32,12 +32,12 @@ def measured(
     arm: Arm, rng: np.random.Generator, bends: tuple[JointErrorModel, ...], by: float, m: int = 200
 ) -> tuple[Readings, Array]:
     """Return points seen of an arm whose joints bend, and by how much each does."""
-    chain = chain_of(arm, bends=bends)
+    chain = chain_of(arm, joint_errors=bends)
     errors = random_errors(rng, chain)
     bent = by * rng.uniform(0.5, 1.0, len(bends))
     errors[len(errors) - len(bends) :] = bent
     q = postures(rng, arm, m)
-    return readings(q, chain.reach(q, errors).position + NOISE * rng.standard_normal((m, 3))), np.asarray(bent)
+    return readings(q, chain.forward(q, errors).position + NOISE * rng.standard_normal((m, 3))), np.asarray(bent)
 
 
 def test_springs_are_found(puma: Arm, rng: np.random.Generator) -> None:
@@ -46,18 +46,18 @@ def test_springs_are_found(puma: Arm, rng: np.random.Generator) -> None:
 
     found = calibrate_nongeometric(puma, seen, folds=3)
 
-    kept = {one.name for one in found.tried if one.kept}
-    assert kept == {"geometry", "joints that give under gravity"}
+    kept = {one.name for one in found.comparisons if one.accepted}
+    assert kept == {"geometry", "joint compliance under gravity"}
     fitted = found.calibration
-    values = dict(zip(fitted.names, zip(fitted.values, fitted.deviations, strict=True), strict=True))
+    values = dict(zip(fitted.names, zip(fitted.values, fitted.standard_errors, strict=True), strict=True))
     for bend, true in zip(compliances(puma), bent, strict=True):
         if bend.name in values:
             value, deviation = values[bend.name]
             assert abs(value - true) < 4 * deviation
     assert "joint2.sag" in values
     assert found.held_out.distance.mean() < 2.5 * NOISE
-    assert found.tried[0].held_out is not None
-    assert found.tried[0].held_out > 3 * NOISE
+    assert found.comparisons[0].held_out is not None
+    assert found.comparisons[0].held_out > 3 * NOISE
 
 
 def test_gears_are_found(puma: Arm, rng: np.random.Generator) -> None:
@@ -66,7 +66,7 @@ def test_gears_are_found(puma: Arm, rng: np.random.Generator) -> None:
 
     found = calibrate_nongeometric(puma, seen, folds=3)
 
-    assert [one.name for one in found.tried if one.kept] == ["geometry", "gears, once a turn"]
+    assert [one.name for one in found.comparisons if one.accepted] == ["geometry", "transmission error, first harmonic"]
     assert {"joint2.sin1", "joint3.cos1"} <= set(found.calibration.names)
     assert found.held_out.distance.mean() < 2.5 * NOISE
 
@@ -80,8 +80,8 @@ def test_what_is_left_is_learnt(puma: Arm, rng: np.random.Generator) -> None:
 
     found = calibrate_nongeometric(puma, seen, folds=3)
 
-    first, last = found.tried[0].held_out, found.tried[-1]
-    assert last.kept
+    first, last = found.comparisons[0].held_out, found.comparisons[-1]
+    assert last.accepted
     assert last.held_out is not None
     assert first is not None
     assert last.held_out < 0.5 * first
@@ -94,8 +94,8 @@ def test_nothing_there(puma: Arm, rng: np.random.Generator) -> None:
 
     found = calibrate_nongeometric(puma, seen)
 
-    assert [one.name for one in found.tried if one.kept] == ["geometry"]
-    assert found.learnt is None
+    assert [one.name for one in found.comparisons if one.accepted] == ["geometry"]
+    assert found.residual_model is None
     np.testing.assert_array_equal(found.predict(seen.q), found.calibration.predict(seen.q))
 
 
@@ -106,11 +106,11 @@ def test_no_choice_has_seen_them(rng: np.random.Generator) -> None:
     part = random_folds(seen.q, 3, 0)[0]
     other = attrs.evolve(seen, points=seen.points + 2e-3 * part[:, None] * rng.standard_normal(seen.points.shape))
 
-    first, second = (calibrate_nongeometric(arm, one, folds=3, unseen=True).unseen for one in (seen, other))
+    first, second = (calibrate_nongeometric(arm, one, folds=3, nested=True).nested for one in (seen, other))
 
     assert first is not None
     assert second is not None
-    np.testing.assert_array_equal(first.places[part], second.places[part])
+    np.testing.assert_array_equal(first.positions[part], second.positions[part])
     assert np.isfinite(first.distance).all()
     assert second.distance[part].mean() > 2 * first.distance[part].mean()
 
@@ -120,7 +120,7 @@ def test_two_parts_leave_no_choice(rng: np.random.Generator) -> None:
     arm = random_arm(rng, 3)
     seen, _ = measured(arm, rng, (), 0.0, m=30)
 
-    assert calibrate_nongeometric(arm, seen, folds=2, unseen=True).unseen is None
+    assert calibrate_nongeometric(arm, seen, folds=2, nested=True).nested is None
 
 
 def test_readings_of_one_posture_count_once(rng: np.random.Generator) -> None:
@@ -129,8 +129,8 @@ def test_readings_of_one_posture_count_once(rng: np.random.Generator) -> None:
     once = compare_held_out("", before, after, np.arange(40))
     often = compare_held_out("", *(np.repeat(one, 4) for one in (before, after)), np.repeat(np.arange(40), 4))
 
-    assert once.chance == pytest.approx((before - after).std(ddof=1) / np.sqrt(40), rel=1e-9)
-    assert often.chance == pytest.approx(once.chance, rel=1e-9)
+    assert once.standard_error == pytest.approx((before - after).std(ddof=1) / np.sqrt(40), rel=1e-9)
+    assert often.standard_error == pytest.approx(once.standard_error, rel=1e-9)
     assert often.gain == pytest.approx(once.gain, abs=1e-18)
 
 
@@ -139,11 +139,11 @@ def test_no_masses(puma: Arm, rng: np.random.Generator) -> None:
     bare = attrs.evolve(puma, links=[attrs.evolve(link, mass=0.0, inertia=np.zeros((3, 3))) for link in puma.links])
     seen, _ = measured(bare, rng, (), 0.0, m=80)
 
-    tried = {one.name: one for one in calibrate_nongeometric(bare, seen).tried}
+    tried = {one.name: one for one in calibrate_nongeometric(bare, seen).comparisons}
 
     assert compliances(bare) == ()
-    assert tried["joints that give under gravity"].why == "puma560 has no masses"
-    assert tried["joints that give under gravity"].held_out is None
+    assert tried["joint compliance under gravity"].reason == "puma560 has no masses"
+    assert tried["joint compliance under gravity"].held_out is None
 
 
 def test_springs_follow_gravity(puma: Arm, rng: np.random.Generator) -> None:
@@ -167,7 +167,7 @@ def test_needs_points(puma: Arm, rng: np.random.Generator) -> None:
 def test_bends_do_not_fit_a_table(puma: Arm, rng: np.random.Generator) -> None:
     """An arm file has no number for a joint that gives."""
     seen, _ = measured(puma, rng, compliances(puma), SAG)
-    found = calibrate(puma, seen, bends=compliances(puma), without=("beta",))
+    found = calibrate(puma, seen, joint_errors=compliances(puma), without=("beta",))
 
-    with pytest.raises(InvalidValueError, match=r"joint2\.sag.* bend with the posture, which no table holds"):
+    with pytest.raises(InvalidValueError, match=r"joint2\.sag.* depend on the configuration, which no table holds"):
         corrected_arm(found)

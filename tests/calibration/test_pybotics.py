@@ -100,4 +100,6 @@ def test_the_same_fit(pybotics: Any, rng: np.random.Generator) -> None:
     assert len(ours.names) == theirs.x.size
     missing(theirs.x)
     np.testing.assert_allclose([robot.fk(one)[:3, 3] for one in elsewhere], ours.predict(elsewhere), atol=SAME)
-    assert np.linalg.norm(ours.predict(elsewhere) - chain.reach(elsewhere, errors).position, axis=1).mean() < 3 * NOISE
+    assert (
+        np.linalg.norm(ours.predict(elsewhere) - chain.forward(elsewhere, errors).position, axis=1).mean() < 3 * NOISE
+    )

@@ -45,7 +45,7 @@ class Truth:
 
     def poses(self, q: Array, noise: float = NOISE, turn: float = TURN) -> Array:
         """Return (m, 4, 4) poses seen."""
-        reached = self.chain.reach(q, self.errors)
+        reached = self.chain.forward(q, self.errors)
         X = np.tile(np.eye(4), (len(q), 1, 1))
         X[:, :3, 3] = self.points(q, noise)
         X[:, :3, :3] = rotation_from_vector(turn * self.rng.standard_normal((len(q), 3))) @ reached.rotation
@@ -79,7 +79,9 @@ def test_derivatives(rng: np.random.Generator) -> None:
         JointErrorModel("joint1.sin", 0, lambda q: np.sin(q[:, 0])),
         JointErrorModel("joint3.sag", 2, lambda q: np.cos(q[:, 1] + q[:, 2])),
     )
-    chain = chain_of(arm, base=random_pose(rng, 1.0), hand=rotation_from_vector([0.1, 0.2, 0.3]), bends=bends)
+    chain = chain_of(
+        arm, base=random_pose(rng, 1.0), target_rotation=rotation_from_vector([0.1, 0.2, 0.3]), joint_errors=bends
+    )
     model = MeasurementModel(
         chain=chain,
         frames=(np.eye(4), random_pose(rng, 1.0)),
@@ -91,7 +93,7 @@ def test_derivatives(rng: np.random.Generator) -> None:
     )
     q = postures(rng, arm, 6)
     X = np.stack([random_pose(rng, 1.0) for _ in q])
-    X[:, :3, :3] = rotation_from_vector(0.3 * rng.standard_normal((6, 3))) @ chain.reach(q).rotation
+    X[:, :3, :3] = rotation_from_vector(0.3 * rng.standard_normal((6, 3))) @ chain.forward(q).rotation
     given = concatenate(
         readings(q, X, frame=list("ababab")),
         readings(q, plane=["table"] * 6),
@@ -100,9 +102,12 @@ def test_derivatives(rng: np.random.Generator) -> None:
     )
     x, h = 0.05 * rng.standard_normal(len(model.names)), 1e-6
 
-    columns = [(model.rows(given, x + h * e).off - model.rows(given, x - h * e).off) / (2 * h) for e in np.eye(len(x))]
+    columns = [
+        (model.residuals(given, x + h * e).values - model.residuals(given, x - h * e).values) / (2 * h)
+        for e in np.eye(len(x))
+    ]
 
-    np.testing.assert_allclose(model.rows(given, x).by, np.stack(columns, axis=1), atol=DIFFERENCES)
+    np.testing.assert_allclose(model.residuals(given, x).jacobian, np.stack(columns, axis=1), atol=DIFFERENCES)
 
 
 def test_poses_tell_the_tool_frame(truth: Truth) -> None:
@@ -115,10 +120,10 @@ def test_poses_tell_the_tool_frame(truth: Truth) -> None:
     assert {"tool.rx", "tool.ry", "tool.rz"} <= set(found.names)
     assert not {"tool.rx", "tool.ry", "tool.rz"} & set(points.names)
     assert found.noise.length == pytest.approx(NOISE, rel=0.2)
-    assert found.noise.turn == pytest.approx(TURN, rel=0.2)
+    assert found.noise.angle == pytest.approx(TURN, rel=0.2)
     assert truth.missed(found).mean() < NOISE
-    turned = found.chain.reach(q, found.own).rotation
-    truly = truth.chain.reach(q, truth.errors).rotation
+    turned = found.chain.forward(q, found.arm_errors).rotation
+    truly = truth.chain.forward(q, truth.errors).rotation
     assert np.abs(turned - truly).max() < TURN
 
 
@@ -146,7 +151,7 @@ def test_intervals_of_few_poses() -> None:
         found = calibrate_points(truth.arm, q, truth.poses(q))
         off = found.predict(elsewhere) - truth.points(elsewhere, 0.0)
         deviation = np.sqrt(np.diagonal(found.uncertainty(elsewhere), axis1=1, axis2=2))
-        within.append(np.abs(off) < student.ppf(0.95, found.freedom) * deviation)
+        within.append(np.abs(off) < student.ppf(0.95, found.degrees_of_freedom) * deviation)
         noises.append(np.divide(found.noise, (NOISE, TURN)))
 
     assert np.mean(within) > 0.8
@@ -161,7 +166,7 @@ def test_poses_of_another_frame_of_the_hand(truth: Truth) -> None:
 
     found = calibrate_points(truth.arm, q, X)
 
-    assert found.noise.turn == pytest.approx(TURN, rel=0.2)
+    assert found.noise.angle == pytest.approx(TURN, rel=0.2)
     assert truth.missed(found).mean() < NOISE
 
 
@@ -186,7 +191,7 @@ def test_poses_that_are_turned_over(truth: Truth) -> None:
     found = calibrate_points(truth.arm, q, X)
 
     assert found.outliers == (0, 1, 2, 3, 4, 5)
-    np.testing.assert_allclose(found.after.turn[:6], np.pi, atol=10 * TURN)
+    np.testing.assert_allclose(found.after.angle[:6], np.pi, atol=10 * TURN)
     assert truth.missed(found).mean() < NOISE
 
 
@@ -199,15 +204,18 @@ def test_derivatives_of_large_turns(angle: float, rng: np.random.Generator) -> N
     q = postures(rng, arm, 4)
     X, axes = np.tile(np.eye(4), (4, 1, 1)), rng.standard_normal((4, 3))
     axes *= angle / np.linalg.norm(axes, axis=1)[:, None]
-    X[:, :3, :3] = rotation_from_vector(axes) @ chain.reach(q).rotation
+    X[:, :3, :3] = rotation_from_vector(axes) @ chain.forward(q).rotation
     X[2:, :3, :3] = model.frames[1][:3, :3].T @ X[2:, :3, :3]
     given, h = readings(q, X, frame=list("aabb")), 1e-6
     x = 0.01 * rng.standard_normal(len(model.names))
 
-    columns = [(model.rows(given, x + h * e).off - model.rows(given, x - h * e).off) / (2 * h) for e in np.eye(len(x))]
+    columns = [
+        (model.residuals(given, x + h * e).values - model.residuals(given, x - h * e).values) / (2 * h)
+        for e in np.eye(len(x))
+    ]
 
-    np.testing.assert_allclose(model.rows(given, x).by, np.stack(columns, axis=1), atol=DIFFERENCES)
-    np.testing.assert_allclose(model.off(given).turn, angle, rtol=1e-9)
+    np.testing.assert_allclose(model.residuals(given, x).jacobian, np.stack(columns, axis=1), atol=DIFFERENCES)
+    np.testing.assert_allclose(model.pose_errors(given).angle, angle, rtol=1e-9)
 
 
 def test_a_board_set_up_three_times(truth: Truth) -> None:
@@ -239,10 +247,10 @@ def test_touched_planes(truth: Truth) -> None:
     assert not [name for name in found.names if name.startswith("base")]
     assert {"plane.floor.z", "plane.wall.rx", "plane.door.ry"} <= set(found.names)
     assert found.after.distance.mean() < 1e-7
-    held = {one.name for one in found.held}
+    held = {one.name for one in found.fixed}
     assert held >= {"base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"}
     q = truth.postures(100)
-    lengths = [one.name for one in found.held if one.name in calibrate_points(truth.arm, q, truth.points(q)).names]
+    lengths = [one.name for one in found.fixed if one.name in calibrate_points(truth.arm, q, truth.points(q)).names]
     assert [name for name in lengths if not name.startswith("base")] == ["joint5.d"]
 
 
@@ -252,10 +260,10 @@ def _on(truth: Truth, X: Array, m: int) -> Array:
     while len(taken) < m:
         q = truth.postures(200)
         for _ in range(30):
-            reached = truth.chain.reach(q, truth.errors)
+            reached = truth.chain.forward(q, truth.errors)
             height = (reached.position - X[:3, 3]) @ X[:3, 2]
             theta = [truth.chain.names.index(f"joint{i + 1}.theta") for i in range(6)]
-            slope = np.einsum("i,mik->mk", X[:3, 2], reached.by_position[:, :, theta])
+            slope = np.einsum("i,mik->mk", X[:3, 2], reached.position_jacobian[:, :, theta])
             q = q - slope * (height / np.maximum((slope**2).sum(axis=1), 1e-3))[:, None]
         good = (np.abs(height) < 1e-12) & (np.abs(q).max(axis=1) < 3.0)
         taken.extend(q[good])
@@ -372,7 +380,7 @@ def test_turns_told_another_way(how: str, truth: Truth) -> None:
         X[:, :3, :3] = rotation_from_quaternion(Rotation.from_matrix(X[:, :3, :3]).as_quat())
 
     with pytest.raises(
-        ContradictionError, match=r"half of the poses are turned \d+ degrees .* are these its turns, in"
+        ContradictionError, match=r"half of the poses are rotated \d+ degrees .* are these its rotations, in"
     ):
         calibrate_points(truth.arm, q, X)
 

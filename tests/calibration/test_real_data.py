@@ -88,10 +88,10 @@ def test_ur5_errors() -> None:
 
     found = calibrate_points(arm, measured.q, measured.points, base=np.eye(4))
 
-    lengths = found.chain.is_length[list(found.identified.kept)]
+    lengths = found.chain.is_length[list(found.identifiability.fitted)]
     assert len(found.names) == 25
-    assert found.deviations[lengths].max() < 1e-4
-    assert found.deviations[~lengths].max() < 2.5e-4
+    assert found.standard_errors[lengths].max() < 1e-4
+    assert found.standard_errors[~lengths].max() < 2.5e-4
     assert found.after.distance.mean() < 0.04 * found.before.distance.mean()
 
 

@@ -34,7 +34,7 @@ def measured(planned: Path) -> Path:
     errors = np.where(chain.is_length, 5e-4, 2e-3) * rng.standard_normal(len(chain.names))
     # Which a table cannot hold.
     errors[["beta" in name for name in chain.names]] = 0.0
-    points = chain.reach(q, errors).position + 5e-5 * rng.standard_normal((len(q), 3))
+    points = chain.forward(q, errors).position + 5e-5 * rng.standard_normal((len(q), 3))
     lines = [f"{row},{','.join(f'{x * 1e3:.5f}' for x in point)}" for row, point in zip(rows, points, strict=True)]
     path = planned.with_name("measured.csv")
     path.write_text("\n".join([f"{head},x_mm,y_mm,z_mm", *lines]) + "\n", encoding="utf-8")
@@ -46,7 +46,7 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
     done = armwright("calibrate", ARM, measured, "-o", tmp_path / "out", "--folds", "4", columns=120)
 
     assert done.returncode == 0, done.stderr
-    assert "it does just what base.rz does" in done.stdout
+    assert "redundant: it has the same effect as base.rz" in done.stdout
     files = {path.name for path in (tmp_path / "out").iterdir()}
     tables = {"dh_standard.csv", "dh_modified.csv", "dh_hayati.csv"}
     assert files == {
@@ -72,11 +72,11 @@ def test_calibrate(measured: Path, tmp_path: Path) -> None:
 
 
 def test_json(measured: Path) -> None:
-    """The same as data: every error with its deviation, the covariance, why the others are held."""
+    """The same as data: every error with its standard error, the covariance, why the others are fixed."""
     told = json.loads(armwright("calibrate", ARM, measured, "--json", "--folds", "3").stdout)
 
-    assert set(told["errors"]) | set(told["held"]) == set(chain_of(load_arm(ARM)).names)
-    deviations = [one["deviation"] for one in told["errors"].values()]
+    assert set(told["errors"]) | set(told["fixed"]) == set(chain_of(load_arm(ARM)).names)
+    deviations = [one["standard_error"] for one in told["errors"].values()]
     np.testing.assert_allclose(np.sqrt(np.diag(told["covariance"])), deviations, rtol=1e-9)
     assert told["distances"]["calibrated, held out"]["mean"] < 3e-4
 
@@ -167,7 +167,7 @@ def test_stated_noise(measured: Path) -> None:
     assert honest.returncode == 0, honest.stderr
     assert sharp.returncode == 3
     assert "times the 0.02 mm that are stated" in sharp.stderr
-    assert "DOUBTFUL: what is left is" in sharp.stdout
+    assert "DOUBTFUL: the residuals have a standard deviation of" in sharp.stdout
 
 
 def test_next_poses(measured: Path, tmp_path: Path) -> None:
@@ -217,11 +217,15 @@ def test_beyond(measured: Path, tmp_path: Path) -> None:
     done = armwright("calibrate", ARM, some, "--beyond", "--folds", "3", "-o", tmp_path / "out", columns=160)
 
     assert done.returncode == 0, done.stderr
-    for words in ("joints that give under gravity", "gears, twice a turn", "what is left, learnt"):
+    for words in (
+        "joint compliance under gravity",
+        "transmission error, second harmonic",
+        "Gaussian process of the residuals",
+    ):
         assert words in done.stdout
         assert words in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     told = json.loads((tmp_path / "out" / "errors.json").read_text(encoding="utf-8"))
-    tried = told["beyond"]["tried"]
-    assert {"beyond geometry, held out", "beyond geometry, kept to check"} <= set(told["distances"])
-    assert "is of points that neither fit nor choice has seen" in done.stdout
-    assert [one["kept"] for one in tried] == [True, False, False, False, False]
+    candidates = told["nongeometric"]["candidates"]
+    assert {"non-geometric, held out", "non-geometric, check readings"} <= set(told["distances"])
+    assert "is of points that neither fit nor choice has used" in done.stdout
+    assert [candidate["accepted"] for candidate in candidates] == [True, False, False, False, False]

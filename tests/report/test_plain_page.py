@@ -4,9 +4,10 @@ import re
 
 import pytest
 
+from armwright.files.result_table import ResultTable
 from armwright.report.elements import table
 from armwright.report.figures import Drawing
-from armwright.report.plain_page import Table, plain_page
+from armwright.report.plain_page import plain_page
 
 NASTY = '</td><script>bite()</script>"&'
 SVG = '<svg xmlns="http://www.w3.org/2000/svg"></svg>'
@@ -16,7 +17,7 @@ def page(**changes: object) -> str:
     told = {
         "title": "A page",
         "command": "armwright iso9283 <x>",
-        "tables": [Table(title="Errors", heads=("error", "mm"), rows=[("j1.d", "+0.12")], numbers=(1,))],
+        "tables": [ResultTable(title="Errors", heads=("error", "mm"), rows=[("j1.d", "+0.12")], numbers=(1,))],
     }
     return plain_page(**{**told, **changes})
 
@@ -28,7 +29,7 @@ def cards(text: str) -> list[str]:
 def test_parts_in_order() -> None:
     """The page has its tables in order, then its figures, and says what made it."""
     drawn = [Drawing("one", "A picture", SVG), Drawing("two", "Another", SVG)]
-    tables = [Table(title=name, heads=("x",), rows=[("1",)]) for name in ("First", "Second")]
+    tables = [ResultTable(title=name, heads=("x",), rows=[("1",)]) for name in ("First", "Second")]
     text = page(tables=tables, drawn=drawn)
 
     assert cards(text) == ["First", "Second", "Figures"]
@@ -38,7 +39,7 @@ def test_parts_in_order() -> None:
 
 def test_nothing_empty() -> None:
     """A table without rows is left out, and so are figures where there are none."""
-    assert cards(page(tables=[Table(title="Not fitted", heads=("error", "why"), rows=())])) == []
+    assert cards(page(tables=[ResultTable(title="Not fitted", heads=("error", "why"), rows=())])) == []
 
 
 def test_asks_for_nothing() -> None:
@@ -59,7 +60,7 @@ def test_texts_stay_texts() -> None:
         notes=[NASTY],
         named=[("Arm", NASTY), (NASTY, "x")],
         verdict=(NASTY, False),
-        tables=[Table(title=NASTY, remark=NASTY, heads=(NASTY, "mm"), rows=[(NASTY, NASTY)])],
+        tables=[ResultTable(title=NASTY, remark=NASTY, heads=(NASTY, "mm"), rows=[(NASTY, NASTY)])],
         drawn=[Drawing("one", NASTY, SVG)],
     )
 

@@ -19,7 +19,7 @@ def test_the_true_arm_touches_the_points() -> None:
     """Without noise the cameras see the points where the true arm has its tool."""
     data = study.touched("roll", noise=0.0)
 
-    np.testing.assert_allclose(study.chain().reach(data.q, study.truth()).position, data.points, atol=1e-9)
+    np.testing.assert_allclose(study.chain().forward(data.q, study.truth()).position, data.points, atol=1e-9)
 
 
 def test_verification() -> None:

@@ -1,7 +1,7 @@
-"""What makes a calibration doubtful though its fit looks good: outliers that share a joint, errors beyond belief.
+"""Signs that readings contradict an arm though its fit looks good: outliers that share a joint, impossible errors.
 
-A joint whose encoder turns another one too (q3 = a2 q2 + q3, as on palletisers), one in other units or of the other
-sign, makes readings outliers as soon as it moves. A robust fit then drops all of them and is sure of the rest.
+A joint whose encoder turns another joint too (q3 = a2 q2 + q3, as on palletisers), one in other units or of the other
+sign, makes outliers of readings as soon as it moves. A robust fit then drops all of them and is sure of the rest.
 """
 
 from collections.abc import Iterator
@@ -9,54 +9,54 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.stats import chi2, mannwhitneyu
 
+from armwright.arrays import Array, Flags
 from armwright.calibration.fitting import CHECK, PRIOR_SIGMA_ANGLE, PRIOR_SIGMA_LENGTH, Calibration
 from armwright.calibration.readings import Readings
 from armwright.errors import InvalidValueError
 
-# Outliers share a joint, or readings are too far off, when chance does it less often; so many outliers are looked at,
-# and so large a part of all is too many.
-_CHANCE, _FEWEST, _MANY = 1e-4, 5, 0.2
-# Errors of a link that are larger than what is believed by this factor are no errors of a link.
-_BEYOND = 3.0
+# A hypothesis is rejected at this level of significance; so few outliers are not tested, and so large a part of all is
+# too many.
+_SIGNIFICANCE, _FEWEST, _MANY = 1e-4, 5, 0.2
+# Errors of a link that are larger than so many prior sigmas are no errors of a link.
+_MAX_SIGMAS = 3.0
 
 
-def contradictions(found: Calibration, seen: Readings, noise: float | None = None) -> Iterator[str]:
-    """Say what is doubtful of a calibration.
+def contradictions(calibration: Calibration, measured: Readings, noise: float | None = None) -> Iterator[str]:
+    """Give the reasons, in words, for which readings contradict the arm that was fitted to them.
 
     Args:
-        found: the calibration.
-        seen: the readings that it was fitted to.
+        calibration: of the arm.
+        measured: the readings that it was fitted to.
         noise: standard deviation of a measured coordinate or distance, if it is stated [m].
 
     Raises:
         InvalidValueError: the noise is not above 0.
     """
-    out = np.zeros(len(seen), dtype=np.bool_)
-    out[list(found.outliers)] = True
-    shared = [] if out.sum() < _FEWEST or (~out).sum() < _FEWEST else _shared(seen.q, out)
-    if shared:
-        names = " and ".join(f"joint {i + 1}" for i in shared)
+    outlying = np.zeros(len(measured), dtype=np.bool_)
+    outlying[list(calibration.outliers)] = True
+    count = int(outlying.sum())
+    shared = _shared_joint(measured.q, outlying) if _FEWEST <= count <= len(measured) - _FEWEST else None
+    if shared is not None:
         yield (
-            f"the {int(out.sum())} readings that do not count are those in which {names} is elsewhere "
-            f"than in the {int((~out).sum())} that do; what is left says nothing of it: {CHECK}"
+            f"the {count} readings that do not count are those in which joint {shared + 1} is elsewhere "
+            f"than in the {len(measured) - count} that do; the residuals of the rest say nothing of it: {CHECK}"
         )
-    elif out.mean() > _MANY:
+    elif outlying.mean() > _MANY:
         yield (
-            f"{int(out.sum())} of {len(seen)} readings do not count, and a fit that leaves out so many "
+            f"{count} of {len(measured)} readings do not count, and a fit that leaves out so many "
             f"praises the rest: {CHECK}"
         )
-    lengths = dict(zip(found.model.names, found.model.is_length, strict=True))
-    far = [
+    lengths = dict(zip(calibration.model.names, calibration.model.is_length, strict=True))
+    impossible = [
         f"{name} {value * 1e3:+.3g} {'mm' if lengths[name] else 'mrad'}"
-        for name, value in zip(found.names, found.values, strict=True)
+        for name, value in zip(calibration.names, calibration.values, strict=True)
         if name.startswith("joint")
-        and abs(value) > _BEYOND * (PRIOR_SIGMA_LENGTH if lengths[name] else PRIOR_SIGMA_ANGLE)
+        and abs(value) > _MAX_SIGMAS * (PRIOR_SIGMA_LENGTH if lengths[name] else PRIOR_SIGMA_ANGLE)
     ]
-    if far:
-        yield f"{', '.join(far)}: no link is made so badly; {CHECK}"
-
+    if impossible:
+        yield f"{', '.join(impossible)}: no link is made so badly; {CHECK}"
     if noise is not None:
-        yield from _too_far(found, seen, noise)
+        yield from _excess_residuals(calibration, measured, noise)
 
 
 def refuse_noise(noise: float) -> None:
@@ -69,28 +69,29 @@ def refuse_noise(noise: float) -> None:
         raise InvalidValueError(f"noise: expected a standard deviation above 0, got {noise:g}")
 
 
-def _too_far(found: Calibration, seen: Readings, noise: float) -> Iterator[str]:
-    """Say if what is left is more than the noise that is stated makes of it."""
+def _excess_residuals(calibration: Calibration, measured: Readings, noise: float) -> Iterator[str]:
+    """Test by chi-square whether the residuals are larger than the stated noise makes them."""
     refuse_noise(noise)
-    rows = found.model.rows(seen, found.errors)
-    # Of the numbers that are to spare lengths have their share.
-    freedom = max(1.0, found.freedom * float(np.mean(~rows.turning)))
-    by_chance = float(chi2.sf(freedom * (found.noise.length / noise) ** 2, freedom))
-    if by_chance < _CHANCE:
+    residuals = calibration.model.residuals(measured, calibration.errors)
+    # Lengths have their share of the degrees of freedom.
+    degrees_of_freedom = max(1.0, calibration.degrees_of_freedom * float(np.mean(~residuals.is_rotation)))
+    ratio = calibration.noise.length / noise
+    p_value = float(chi2.sf(degrees_of_freedom * ratio**2, degrees_of_freedom))
+    if p_value < _SIGNIFICANCE:
         yield (
-            f"what is left is {found.noise.length * 1e3:.3g} mm per coordinate, {found.noise.length / noise:.3g} times "
-            f"the {noise * 1e3:.3g} mm that are stated, which comes by chance in {100 * by_chance:.2g} % of cases: the "
-            f"geometry of this arm does not explain the readings; --beyond tries what else may"
+            f"the residuals have a standard deviation of {calibration.noise.length * 1e3:.3g} mm per coordinate, "
+            f"{ratio:.3g} times the {noise * 1e3:.3g} mm that are stated, which comes by chance in {100 * p_value:.2g} "
+            f"% of cases: the geometry of this arm does not explain the readings; --beyond tries what else may"
         )
 
 
-def _shared(q: np.ndarray, out: np.ndarray) -> list[int]:
-    """Return the joint, from 0, by which outliers differ most from the others, if chance does not do that."""
+def _shared_joint(q: Array, outlying: Flags) -> int | None:
+    """Return the joint, from 0, by which outliers differ most from the others; None if that may be chance."""
     joints = [i for i in range(q.shape[1]) if np.ptp(q[:, i]) > 0]
-    by_chance = []
+    p_values = []
     for i in joints:
-        away = np.abs(q[:, i] - np.median(q[~out, i]))
-        by_chance.append(float(mannwhitneyu(away[out], away[~out], alternative="greater").pvalue))
-    if not joints or min(by_chance) * len(joints) > _CHANCE:
-        return []
-    return [joints[int(np.argmin(by_chance))]]
+        away = np.abs(q[:, i] - np.median(q[~outlying, i]))
+        p_values.append(float(mannwhitneyu(away[outlying], away[~outlying], alternative="greater").pvalue))
+    if not joints or min(p_values) * len(joints) > _SIGNIFICANCE:
+        return None
+    return joints[int(np.argmin(p_values))]

@@ -1,4 +1,4 @@
-"""The arm with its errors taken in, in the forms that users need: an arm of this package, tables, URDF."""
+"""The corrected arm in the forms that users need: an arm of this package, tables, URDF."""
 
 import csv
 import io
@@ -26,30 +26,30 @@ _NUMBERS = ("theta", "d", "a", "alpha")
 
 
 def corrected_arm(calibration: Calibration) -> Arm:
-    """Return the arm with the errors that were found and how well they are known.
+    """Return the arm with its estimated errors and their covariance.
 
     Its base is in the frame of the measurements, and so is gravity, which points where it did as seen from the arm.
 
     Raises:
-        InvalidValueError: a turn about y was fitted, which a Denavit-Hartenberg table cannot hold without axes that
-            meet a kilometre away, or a bend of a joint; calibrate ``without=("beta",)`` and without bends.
+        InvalidValueError: a rotation about y was fitted, which a Denavit-Hartenberg table cannot hold without axes that
+            meet a kilometre away, or an error model of a joint; calibrate ``without=("beta",)`` and joint errors.
     """
     arm = calibration.chain.arm
     tilted = [name for name in calibration.names if name.endswith(".beta")]
     if tilted:
         raise InvalidValueError(
-            f"{arm.name}: {', '.join(tilted)} turns about y, which a Denavit-Hartenberg table has no number for; "
-            f'calibrate without=("beta",)'
+            f"{arm.name}: {', '.join(tilted)} is a rotation about y, which a Denavit-Hartenberg table has no number "
+            f'for; calibrate without=("beta",)'
         )
     corrected = _corrected(calibration)
     return attrs.evolve(corrected, uncertainty=_uncertainty(calibration, corrected))
 
 
 def corrected_urdf(calibration: Calibration) -> str:
-    """Return the arm with all errors that were found as the text of a URDF file, turns about y and all.
+    """Return the arm with all estimated errors as the text of a URDF file, rotations about y included.
 
     Raises:
-        InvalidValueError: a bend of a joint was fitted, or the arm's name has characters that XML cannot hold.
+        InvalidValueError: an error model of a joint was fitted, or the arm's name has characters that XML cannot hold.
     """
     return urdf_text(_corrected(calibration), _tilts(calibration))
 
@@ -57,11 +57,11 @@ def corrected_urdf(calibration: Calibration) -> str:
 def corrected_tables(calibration: Calibration) -> dict[str, str]:
     """Return the corrected arm as tables of numbers, CSV by convention: standard, modified, hayati.
 
-    A row for the base, one for each joint, one for the tool. With turns about y there is the last alone, whose rows
+    A row for the base, one for each joint, one for the tool. With rotations about y there is the last alone, whose rows
     are Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta).
 
     Raises:
-        InvalidValueError: a bend of a joint was fitted.
+        InvalidValueError: an error model of a joint was fitted.
     """
     arm, tilts = _corrected(calibration), _tilts(calibration)
     tables = {"hayati": _table(arm.base, arm.joints, arm.tool, tilts)}
@@ -75,24 +75,24 @@ def corrected_tables(calibration: Calibration) -> dict[str, str]:
 
 
 def position_covariance(arm: Arm, q: ArrayLike) -> Array:
-    """Return (m, 3, 3) the covariance of where an arm has its tool, from how well its dimensions are known [m²].
+    """Return (m, 3, 3) the covariance of the position of an arm's tool that follows from that of its dimensions [m²].
 
     Args:
         arm: that was calibrated, with n joints.
         q: (m, n) joint positions [rad] or [m].
 
     Raises:
-        InvalidValueError: nothing is known of the arm's errors.
-        UnknownNameError: an error is told that the arm cannot have.
+        InvalidValueError: the arm has no covariance.
+        UnknownNameError: the covariance is of an error that the arm cannot have.
         ShapeError: ``q`` does not fit.
     """
     if arm.uncertainty is None:
-        raise InvalidValueError(f"{arm.name}: it is not said how well its dimensions are known; calibrate it")
+        raise InvalidValueError(f"{arm.name}: its dimensions have no covariance; calibrate it")
     chain = chain_of(arm)
     for name in arm.uncertainty.errors:
         if name not in chain.names:
             raise UnknownNameError("error", name, chain.names)
-    J = chain.reach(q).by_position[:, :, [chain.names.index(name) for name in arm.uncertainty.errors]]
+    J = chain.forward(q).position_jacobian[:, :, [chain.names.index(name) for name in arm.uncertainty.errors]]
     return np.asarray(J @ arm.uncertainty.covariance @ J.swapaxes(1, 2), dtype=np.float64)
 
 
@@ -100,12 +100,14 @@ def position_covariance(arm: Arm, q: ArrayLike) -> Array:
 
 
 def _corrected(calibration: Calibration) -> Arm:
-    """Return the arm with all errors that were found but for turns about y."""
+    """Return the arm with all estimated errors but for rotations about y."""
     chain, arm = calibration.chain, calibration.chain.arm
-    if chain.bends:
-        names = ", ".join(bend.name for bend in chain.bends)
-        raise InvalidValueError(f"{arm.name}: {names} bend with the posture, which no table holds; calibrate without")
-    by_name = dict(zip(chain.names, calibration.own.tolist(), strict=True))
+    if chain.joint_errors:
+        names = ", ".join(error.name for error in chain.joint_errors)
+        raise InvalidValueError(
+            f"{arm.name}: {names} depend on the configuration, which no table holds; calibrate without joint errors"
+        )
+    by_name = dict(zip(chain.names, calibration.arm_errors.tolist(), strict=True))
     joints = [
         attrs.evolve(joint, **{key: getattr(joint, key) + by_name[f"joint{i}.{key}"] for key in _NUMBERS})
         for i, joint in enumerate(arm.joints, 1)
@@ -116,13 +118,13 @@ def _corrected(calibration: Calibration) -> Arm:
         joints=tuple(joints),
         base=base @ arm.base,
         gravity=felt_gravity(inverse(base), arm.gravity),
-        tool=arm.tool @ pose(chain.hand, np.zeros(3)) @ _pose_of(chain, by_name, "tool"),
+        tool=arm.tool @ pose(chain.target_rotation, np.zeros(3)) @ _pose_of(chain, by_name, "tool"),
         title=f"{arm.title or arm.name}, calibrated",
     )
 
 
 def _tilts(calibration: Calibration) -> list[float]:
-    by_name = dict(zip(calibration.chain.names, calibration.own.tolist(), strict=True))
+    by_name = dict(zip(calibration.chain.names, calibration.arm_errors.tolist(), strict=True))
     return [by_name.get(f"joint{i + 1}.beta", 0.0) for i in range(calibration.chain.arm.n)]
 
 
@@ -131,35 +133,35 @@ def _pose_of(chain: Chain, by_name: dict[str, float], part: str) -> Array:
     X = np.eye(4)
     for element in chain.elements:
         if element.name.startswith(f"{part}."):
-            X = X @ _moved(element, by_name[element.name])
+            X = X @ _transform(element, by_name[element.name])
     return X
 
 
-def _moved(element: Element, by: float) -> Array:
-    along = by * np.eye(3)[element.axis]
-    return pose(np.eye(3), along) if element.kind == "shift" else pose(rotation_from_vector(along), np.zeros(3))
+def _transform(element: Element, value: float) -> Array:
+    along = value * np.eye(3)[element.axis]
+    return pose(np.eye(3), along) if element.kind == "translation" else pose(rotation_from_vector(along), np.zeros(3))
 
 
 def _uncertainty(calibration: Calibration, corrected: Arm) -> Uncertainty:
-    """Return how well the corrected arm is known: the errors of base and tool count from where these are now."""
+    """Return the covariance of the corrected arm: errors of base and tool count from where these are now."""
     chain, now = calibration.chain, chain_of(corrected)
     q = np.zeros((1, corrected.n))
-    then_reached, now_reached = chain.reach(q, calibration.own), now.reach(q)
+    then_tool, now_tool = chain.forward(q, calibration.arm_errors), now.forward(q)
     M = np.eye(len(now.names))
     for part in ("base.", "tool."):
         own = [i for i, name in enumerate(now.names) if name.startswith(part)]
         theirs = [chain.names.index(now.names[i]) for i in own]
-        moved = np.vstack([then_reached.by_position[0][:, theirs], then_reached.by_turn[0][:, theirs]])
-        moving = np.vstack([now_reached.by_position[0][:, own], now_reached.by_turn[0][:, own]])
+        moved = np.vstack([then_tool.position_jacobian[0][:, theirs], then_tool.rotation_jacobian[0][:, theirs]])
+        moving = np.vstack([now_tool.position_jacobian[0][:, own], now_tool.rotation_jacobian[0][:, own]])
         M[np.ix_(own, own)] = np.linalg.solve(moving, moved)
     fitted = [i for i, name in enumerate(calibration.names) if name in now.names]
     columns = [now.names.index(calibration.names[i]) for i in fitted]
-    # An error of base or tool that was held is told as the mixture that the others of its part make of it.
-    told = np.flatnonzero(np.abs(M[:, columns]).max(axis=1) > 0)
-    N = M[told][:, columns]
+    # An error of base or tool that was fixed is the mixture that the others of its part make of it.
+    rows = np.flatnonzero(np.abs(M[:, columns]).max(axis=1) > 0)
+    N = M[rows][:, columns]
     covariance = N @ calibration.covariance[np.ix_(fitted, fitted)] @ N.T
     return Uncertainty(
-        errors=[now.names[i] for i in told],
+        errors=[now.names[i] for i in rows],
         covariance=(covariance + covariance.T) / 2,
         noise=calibration.noise.length,
     )
@@ -183,5 +185,5 @@ def _table(base: Array, joints: Sequence[Joint], tool: Array, tilts: Iterable[fl
 
 
 def _six(X: Array) -> list[float]:
-    """Return place [mm] and roll, pitch, yaw [deg] of a pose."""
+    """Return position [mm] and roll, pitch, yaw [deg] of a pose."""
     return [*(X[:3, 3] * 1e3).tolist(), *np.degrees(to_rpy(X[:3, :3])).tolist()]

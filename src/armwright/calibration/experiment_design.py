@@ -1,4 +1,4 @@
-"""Which poses to measure: those that tell most of an arm's errors.
+"""Design of experiments: poses to measure in which the errors of an arm are most observable.
 
 Source:
     Borm & Menq (1991); Driels & Pathre (1990); Nahvi, Hollerbach, Hayward (1994); Nahvi & Hollerbach (1996).
@@ -22,18 +22,18 @@ from armwright.errors import InvalidValueError, one_of
 Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
 INDICES: tuple[Index, ...] = ("O1", "O2", "O3", "O4", "O5")
 
-# As many candidates, and so many for each pose that is asked for.
-_CANDIDATES, _EACH = 400, 4
+# Candidates in all, and at least so many for each pose that is asked for.
+_CANDIDATES, _PER_POSE = 400, 4
 # More poses than anybody measures.
 _MOST_POSES = 10_000
-# Poses are exchanged for better ones so often at most.
-_MOST_EXCHANGES = 200
-# Noise at which one asks what can be told at all [m], [rad].
-_USUAL_NOISE, _USUAL_TURN = 1e-4, 5e-4
+# Exchanges of single poses at most.
+_MAX_EXCHANGES = 200
+# Noise for which errors have to be identifiable [m], [rad].
+_NOISE_LENGTH, _NOISE_ANGLE = 1e-4, 5e-4
 
 
 class Observability(NamedTuple):
-    """How well poses tell errors that are counted in metres and radians; the larger the better.
+    """Observability indices of errors in metres and radians; the larger the better.
 
     Attributes:
         O1: geometric mean of the singular values, by the root of the number of poses.
@@ -56,19 +56,19 @@ class MeasurementPlan(NamedTuple):
     Attributes:
         q: (m, n) joint positions [rad] or [m].
         observability: of these poses, with those that were measured before.
-        by_chance: that of as many poses taken by chance, the median of some tries.
-        names: of the errors that they tell.
+        random: that of as many random poses, the median of some draws.
+        names: of the errors that are identifiable.
     """
 
     q: Array
     observability: Observability
-    by_chance: Observability
+    random: Observability
     names: tuple[str, ...]
 
 
-def observability(chain: Chain, q: Array, kept: list[int], *, turns: bool = False) -> Observability:
-    """Return how well poses (m, n), or their places alone, tell the errors with these numbers."""
-    return _indices(_rows(chain, q, turns=turns)[:, :, kept].reshape(-1, len(kept)), len(q))
+def observability(chain: Chain, q: Array, fitted: list[int], *, rotations: bool = False) -> Observability:
+    """Return the observability of the errors with these numbers by poses (m, n), or by their positions alone."""
+    return _indices(_jacobians(chain, q, rotations=rotations)[:, :, fitted].reshape(-1, len(fitted)), len(q))
 
 
 def plan_poses(
@@ -78,14 +78,14 @@ def plan_poses(
     index: Index = "O1",
     seed: int = 0,
     candidates: int | None = None,
-    turns: bool = False,
+    rotations: bool = False,
     measured: ArrayLike | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> MeasurementPlan:
-    """Return poses inside the limits that tell an arm's errors well, beside those that were measured before.
+    """Return poses within the limits in which an arm's errors are observable, beside those that were measured before.
 
-    Poses are taken one by one from candidates drawn by chance, each the one that adds most to what is told of all
-    errors together (the determinant); then single ones are exchanged as long as the index asked for gets better.
+    Poses are taken one by one from random candidates, each the one that increases the determinant of the information
+    matrix most (D-optimal); then single ones are exchanged as long as the index asked for gets better.
 
     Args:
         arm: with n joints.
@@ -93,12 +93,12 @@ def plan_poses(
         index: O1 to O5; see ``Observability``.
         seed: of the candidates.
         candidates: how many there are; 400 when left out, or 4 for each pose if that is more.
-        turns: whether turns are measured too, not places alone.
-        measured: (k, n) postures that were measured before [rad] or [m]; none when left out.
-        progress: told how many poses are chosen.
+        rotations: whether rotations are measured too, not positions alone.
+        measured: (k, n) configurations that were measured before [rad] or [m]; none when left out.
+        progress: called with how many poses are chosen.
 
     Raises:
-        InvalidValueError: so few poses do not tell the errors of the arm, or there are fewer candidates.
+        InvalidValueError: so few poses do not identify the errors of the arm, or there are fewer candidates.
         ShapeError: ``measured`` does not fit.
         UnknownNameError: there is no such index.
     """
@@ -109,36 +109,38 @@ def plan_poses(
     chain = chain_of(arm)
     rng = np.random.default_rng(seed)
     if candidates is None:
-        candidates = max(_CANDIDATES, _EACH * count)
+        candidates = max(_CANDIDATES, _PER_POSE * count)
     if candidates < count:
         raise InvalidValueError(f"candidates: expected {count} or more, got {candidates}")
     lower, upper = ranges(arm)
     q = lower + (upper - lower) * rng.random((candidates, arm.n))
     before = np.zeros((0, arm.n)) if measured is None else np.atleast_2d(joint_array(measured, arm.n, "measured"))
-    slopes = _rows(chain, np.vstack([q, before]), turns=turns)
-    J = slopes.reshape(-1, len(chain.names))
-    told = select_identifiable(chain.names, J, chain.is_length, _USUAL_NOISE, first=preferred_parameters(chain.names))
-    kept = list(told.kept)
-    numbers, poses = slopes.shape[1], count + len(before)
-    fewest = _fewest(numbers, len(kept))
+    every = _jacobians(chain, np.vstack([q, before]), rotations=rotations)
+    J = every.reshape(-1, len(chain.names))
+    selected = select_identifiable(
+        chain.names, J, chain.is_length, _NOISE_LENGTH, first=preferred_parameters(chain.names)
+    )
+    fitted = list(selected.fitted)
+    numbers, poses = every.shape[1], count + len(before)
+    fewest = _fewest(numbers, len(fitted))
     if poses < fewest:
         raise InvalidValueError(
-            f"count: {arm.name} has {len(kept)} errors that {'poses' if turns else 'points'} can tell, and one in "
-            f"{FOLDS} poses is held out to see how good a calibration is; expected {fewest - len(before)} poses or "
+            f"count: {arm.name} has {len(fitted)} errors that {'poses' if rotations else 'points'} identify, and one "
+            f"in {FOLDS} poses is held out to assess a calibration; expected {fewest - len(before)} poses or "
             f"more, got {count}"
         )
-    rows, fixed = slopes[:, :, kept], list(range(candidates, len(slopes)))
-    taken = _greedy(rows, count, fixed, progress)
-    taken = _exchanged(rows, taken, fixed, INDICES.index(index))
-    chance = [
-        _indices(_stacked(rows, [*rng.choice(candidates, count, replace=False).tolist(), *fixed]), poses)
+    jacobians, fixed = every[:, :, fitted], list(range(candidates, len(every)))
+    taken = _greedy(jacobians, count, fixed, progress)
+    taken = _exchanged(jacobians, taken, fixed, INDICES.index(index))
+    draws = [
+        _indices(_stacked(jacobians, [*rng.choice(candidates, count, replace=False).tolist(), *fixed]), poses)
         for _ in range(15)
     ]
     return MeasurementPlan(
         q=q[taken],
-        observability=_indices(_stacked(rows, [*taken, *fixed]), poses),
-        by_chance=Observability(*(float(np.median([one[i] for one in chance])) for i in range(len(INDICES)))),
-        names=tuple(chain.names[i] for i in kept),
+        observability=_indices(_stacked(jacobians, [*taken, *fixed]), poses),
+        random=Observability(*(float(np.median([draw[i] for draw in draws])) for i in range(len(INDICES)))),
+        names=tuple(chain.names[i] for i in fitted),
     )
 
 
@@ -152,16 +154,16 @@ def _fewest(numbers: int, errors: int) -> int:
     )
 
 
-def _rows(chain: Chain, q: Array, *, turns: bool) -> Array:
-    """Return (m, 3 or 6, k) what is measured in each posture by all errors; turns as lengths of the same noise."""
-    reached = chain.reach(q)
-    if not turns:
-        return reached.by_position
-    return np.concatenate([reached.by_position, reached.by_turn * (_USUAL_NOISE / _USUAL_TURN)], axis=1)
+def _jacobians(chain: Chain, q: Array, *, rotations: bool) -> Array:
+    """Return (m, 3 or 6, k) the Jacobian of each pose by all errors; rotations as lengths of the same noise."""
+    tool = chain.forward(q)
+    if not rotations:
+        return tool.position_jacobian
+    return np.concatenate([tool.position_jacobian, tool.rotation_jacobian * (_NOISE_LENGTH / _NOISE_ANGLE)], axis=1)
 
 
-def _stacked(rows: Array, taken: Sequence[int]) -> Array:
-    return np.asarray(rows[list(taken)].reshape(-1, rows.shape[-1]), dtype=np.float64)
+def _stacked(jacobians: Array, taken: Sequence[int]) -> Array:
+    return np.asarray(jacobians[list(taken)].reshape(-1, jacobians.shape[-1]), dtype=np.float64)
 
 
 def _indices(A: Array, poses: int) -> Observability:
@@ -177,34 +179,34 @@ def _indices(A: Array, poses: int) -> Observability:
     )
 
 
-def _greedy(rows: Array, count: int, fixed: Sequence[int], progress: Callable[[int], None] | None) -> list[int]:
+def _greedy(jacobians: Array, count: int, fixed: Sequence[int], progress: Callable[[int], None] | None) -> list[int]:
     """Return the poses that add most to the determinant, one after the other."""
-    known = _stacked(rows, fixed)
-    information = 1e-6 * np.eye(rows.shape[-1]) + known.T @ known
+    before = _stacked(jacobians, fixed)
+    information = 1e-6 * np.eye(jacobians.shape[-1]) + before.T @ before
     taken: list[int] = []
     for _ in range(count):
         inverse = np.linalg.inv(information)
         # det(I + A C Aᵀ) of the rows of each candidate.
-        gains = np.linalg.det(np.eye(rows.shape[1]) + rows @ inverse @ np.swapaxes(rows, 1, 2))
+        gains = np.linalg.det(np.eye(jacobians.shape[1]) + jacobians @ inverse @ np.swapaxes(jacobians, 1, 2))
         gains[[*taken, *fixed]] = -np.inf
         best = int(np.argmax(gains))
         taken.append(best)
-        information = information + rows[best].T @ rows[best]
+        information = information + jacobians[best].T @ jacobians[best]
         if progress is not None:
             progress(len(taken))
     return taken
 
 
-def _exchanged(rows: Array, taken: list[int], fixed: list[int], index: int) -> list[int]:
+def _exchanged(jacobians: Array, taken: list[int], fixed: list[int], index: int) -> list[int]:
     """Exchange single poses for others as long as the index gets better."""
     rng = np.random.default_rng(0)
-    best = _indices(_stacked(rows, [*taken, *fixed]), len(taken) + len(fixed))[index]
-    others = [i for i in range(len(rows) - len(fixed)) if i not in taken]
-    for _ in range(min(_MOST_EXCHANGES, len(others) * len(taken))):
-        place, other = int(rng.integers(len(taken))), int(rng.integers(len(others)))
+    best = _indices(_stacked(jacobians, [*taken, *fixed]), len(taken) + len(fixed))[index]
+    others = [i for i in range(len(jacobians) - len(fixed)) if i not in taken]
+    for _ in range(min(_MAX_EXCHANGES, len(others) * len(taken))):
+        position, other = int(rng.integers(len(taken))), int(rng.integers(len(others)))
         tried = taken.copy()
-        tried[place] = others[other]
-        value = _indices(_stacked(rows, [*tried, *fixed]), len(tried) + len(fixed))[index]
+        tried[position] = others[other]
+        value = _indices(_stacked(jacobians, [*tried, *fixed]), len(tried) + len(fixed))[index]
         if value > best:
-            others[other], taken, best = taken[place], tried, value
+            others[other], taken, best = taken[position], tried, value
     return taken

@@ -1,11 +1,11 @@
-"""The errors of an arm from what was measured of it: robust least squares, with the covariance of what is found.
+"""Calibration as a robust least-squares problem: the errors of an arm and their covariance from measured readings.
 
-A reading that is far off counts less, as a whole: all three coordinates of a point, in whatever frame they are told;
-in the end, one that is off by twice what usual ones stay below does not count. Turns are weighed against lengths by
-what is left of either.
+A prior of zero mean keeps errors small that the readings hardly identify; the rest is Gauss and Newton's method with
+iteratively reweighted readings. A reading has one robust weight for all its numbers, in whatever frame they are; in the
+last fit outliers have weight 0. Rotations are scaled against lengths by the noise of either.
 
 Source:
-    Holland & Welsch (1977) for least squares with weights; spec of the calibration.
+    Holland & Welsch (1977) for iteratively reweighted least squares; spec of the calibration.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,26 +30,33 @@ from armwright.calibration.identifiability import (
 )
 from armwright.calibration.initial_guess import initial_guess
 from armwright.calibration.measurement_model import MeasurementModel, PoseError
-from armwright.calibration.noise import TYPICAL, Noise, length_scales, median_noise, noise_and_outliers, robust_weights
+from armwright.calibration.noise import (
+    TYPICAL,
+    Noise,
+    length_scales,
+    median_noise,
+    noise_and_outliers,
+    robust_weights,
+    standard_deviations,
+)
 from armwright.calibration.readings import Readings, readings
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError, UnknownNameError
 
-_ROUNDS, _WEIGHINGS = 8, 30
-# Rounds end when one finds the noise no smaller than this part of what the last found: outliers then weigh what they
-# should.
-_SETTLED = 0.9
-# Weights are settled when none changes by more.
-_WEIGHED = 1e-3
-# A fit ends when it gets better by less than this part; its errors are then far nearer than they are known.
-_FINISHED = 1e-11
-# It takes some ten steps; readings that make no sense could take minutes.
-_STEPS = 100
-# What is off by more than this is not believed unless the readings say so clearly [m], [rad]. It binds what they
-# hardly tell: two such errors can otherwise run away together. What is told to a tenth of it is moved by a hundredth
-# of its deviation at most.
+# Rounds of selecting errors and fitting them, and of reweighting within one fit.
+_ROUNDS, _REWEIGHTINGS = 8, 30
+# Rounds end when the noise is no longer below this part of that of the round before: outliers then have their weight.
+_NOISE_SETTLED = 0.9
+# Reweighting ends when no weight changes by more.
+_WEIGHTS_SETTLED = 1e-3
+# A fit ends when its cost decreases by less than this part; its error is then far below the standard errors.
+_COST_TOLERANCE = 1e-11
+# A fit takes some ten evaluations; readings that make no sense could take minutes.
+_MAX_EVALUATIONS = 100
+# Standard deviation of the prior of errors [m], [rad]. It binds errors that readings hardly identify: two such errors
+# can otherwise run away together. One whose standard error is a tenth of it is moved by a hundredth of that at most.
 PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE = 0.02, 0.05
-# Bends of joints are a twentieth of that: gears run true to an arc minute or a few.
-_BENDS = 0.05
+# Errors of joints have a twentieth of that: gears run true to an arc minute or a few.
+_JOINT_ERRORS = 0.05
 # What may be wrong where an arm and its readings do not belong together.
 CHECK = (
     "check the units, the sign and the zero of the joint, the order of the columns, and whether a joint is coupled to "
@@ -59,28 +66,28 @@ CHECK = (
 
 @attrs.frozen(kw_only=True, eq=False)
 class Calibration:
-    """What a measurement says of an arm.
+    """The errors of an arm, estimated from a measurement.
 
     Attributes:
-        model: the arm with all errors that it can have, and what it was measured against.
-        identified: which of them are fitted, and why the others are not.
-        errors: (k,) of all, 0 for those that are held [m], [rad].
-        covariance: (f, f) of those that are fitted.
-        before: by how much each of m readings misses the arm as said, its base moved to fit.
+        model: the arm with all errors that it can have, and the setup of the measurement.
+        identifiability: which errors are fitted, and why the others are not.
+        errors: (k,) all errors, 0 where they are fixed [m], [rad].
+        covariance: (f, f) of the errors that are fitted.
+        before: by how much each of m readings misses the nominal arm, its base best-fitted.
         after: by how much it misses the corrected arm.
-        noise: of the measurement, from what is left.
-        freedom: how many more numbers were measured than errors fitted, outliers left out.
-        outliers: numbers of readings that are off by more than they should be; they do not count.
+        noise: of the measurement, from the residuals.
+        degrees_of_freedom: how many more numbers were measured than errors fitted, without outliers.
+        outliers: numbers of readings whose residuals are too large for the noise; they do not count.
     """
 
     model: MeasurementModel
-    identified: Identifiability
+    identifiability: Identifiability
     errors: Array
     covariance: Array
     before: PoseError
     after: PoseError
     noise: Noise
-    freedom: int
+    degrees_of_freedom: int
     outliers: tuple[int, ...]
 
     @property
@@ -89,50 +96,50 @@ class Calibration:
         return self.model.chain
 
     @property
-    def own(self) -> Array:
-        """The errors of the arm alone [m], [rad]."""
+    def arm_errors(self) -> Array:
+        """The errors of the arm, without those of the setup [m], [rad]."""
         return self.errors[: len(self.chain.names)]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The errors that are fitted."""
-        return tuple(self.identified.names[i] for i in self.identified.kept)
+        """The f errors that are fitted."""
+        return tuple(self.identifiability.names[i] for i in self.identifiability.fitted)
 
     @property
     def values(self) -> Array:
         """(f,) the errors that are fitted [m], [rad]."""
-        return np.asarray(self.errors[list(self.identified.kept)], dtype=np.float64)
+        return np.asarray(self.errors[list(self.identifiability.fitted)], dtype=np.float64)
 
     @property
-    def deviations(self) -> Array:
-        """(f,) their standard deviations [m], [rad]."""
+    def standard_errors(self) -> Array:
+        """(f,) of the errors that are fitted [m], [rad]."""
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
     @property
-    def held(self) -> tuple[FixedParameter, ...]:
+    def fixed(self) -> tuple[FixedParameter, ...]:
         """The errors that are not fitted, and why."""
-        return self.identified.held
+        return self.identifiability.fixed
 
-    def intervals(self, part: float = 0.95) -> Array:
-        """Return (f, 2) in which each error is with this probability, by Student's t [m], [rad].
+    def intervals(self, confidence: float = 0.95) -> Array:
+        """Return (f, 2) the confidence intervals of the errors that are fitted, by Student's t [m], [rad].
 
         Raises:
-            InvalidValueError: ``part`` is not between 0 and 1.
+            InvalidValueError: ``confidence`` is not between 0 and 1.
         """
-        if not 0 < part < 1:
-            raise InvalidValueError(f"part: expected between 0 and 1, got {part:g}")
-        half = float(student.ppf((1 + part) / 2, self.freedom)) * self.deviations
+        if not 0 < confidence < 1:
+            raise InvalidValueError(f"confidence: expected between 0 and 1, got {confidence:g}")
+        half = float(student.ppf((1 + confidence) / 2, self.degrees_of_freedom)) * self.standard_errors
         return np.stack([self.values - half, self.values + half], axis=1)
 
     def predict(self, q: ArrayLike) -> Array:
-        """Return (m, 3) where the corrected arm has its tool, in the frame of the measurements [m]."""
-        return self.chain.reach(q, self.own).position
+        """Return (m, 3) the positions of the corrected arm's tool, in the frame of the measurements [m]."""
+        return self.chain.forward(q, self.arm_errors).position
 
     def uncertainty(self, q: ArrayLike) -> Array:
-        """Return (m, 3, 3) the covariance of where the corrected arm has its tool, from that of its errors [m²]."""
-        own = [(i, j) for i, j in enumerate(self.identified.kept) if j < len(self.chain.names)]
+        """Return (m, 3, 3) the covariance of ``predict`` that follows from that of the errors [m²]."""
+        own = [(i, j) for i, j in enumerate(self.identifiability.fitted) if j < len(self.chain.names)]
         rows, columns = [i for i, _ in own], [j for _, j in own]
-        J = self.chain.reach(q, self.own).by_position[:, :, columns]
+        J = self.chain.forward(q, self.arm_errors).position_jacobian[:, :, columns]
         return np.asarray(J @ self.covariance[np.ix_(rows, rows)] @ J.swapaxes(1, 2), dtype=np.float64)
 
 
@@ -147,12 +154,12 @@ def calibrate_points(
     robust: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
-    """Find the errors of an arm from points or poses that its tool was measured at.
+    """Estimate the errors of an arm from measured points or poses of its tool.
 
     Args:
-        arm: as it is said to be, with n joints.
+        arm: the nominal arm, with n joints.
         q: (m, n) joint positions [rad] or [m].
-        points: (m, 3) where the tool was [m], or (m, 4, 4) how it stood.
+        points: (m, 3) positions of the tool [m], or (m, 4, 4) its poses.
         base: see ``calibrate``.
         only: see ``calibrate``.
         without: see ``calibrate``.
@@ -163,206 +170,226 @@ def calibrate_points(
         ShapeError: joint positions and points are not as many.
         ContradictionError: the points are those of another arm.
         TooFewError: there are fewer numbers than errors.
-        UnknownNameError: ``only`` or ``without`` names what there is not.
+        UnknownNameError: ``only`` or ``without`` has a name that no error has.
     """
-    seen = readings(q, points)
-    return calibrate(arm, seen, base=base, only=only, without=without, robust=robust, progress=progress)
+    measured = readings(q, points)
+    return calibrate(arm, measured, base=base, only=only, without=without, robust=robust, progress=progress)
 
 
 def calibrate(
     arm: Arm,
-    seen: Readings,
+    measured: Readings,
     *,
     base: Array | None = None,
-    bends: tuple[JointErrorModel, ...] = (),
+    joint_errors: tuple[JointErrorModel, ...] = (),
     only: Sequence[str] | None = None,
     without: Sequence[str] = (),
     robust: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Calibration:
-    """Find the errors of an arm from whatever was measured of it.
+    """Estimate the errors of an arm from readings of any kind.
 
     Args:
-        arm: as it is said to be, with n joints.
-        seen: points, poses, planes that were touched, distances.
-        base: (4, 4) pose of the arm's base frame in the frame of the measurements, roughly; found when left out.
-        bends: of its joints, to be found beside the errors of its geometry.
-        only: errors of the arm to fit, such as ``base.x`` or all of a part such as ``tool``; all that can be told when
-            left out.
+        arm: the nominal arm, with n joints.
+        measured: points, poses, planes that were touched, distances.
+        base: (4, 4) pose of the arm's base frame in the frame of the measurements, roughly; estimated when left out.
+        joint_errors: models of the joints whose coefficients are estimated beside the errors of the geometry.
+        only: errors of the arm to fit, such as ``base.x`` or all of a part such as ``tool``; all that are identifiable
+            when left out.
         without: errors not to fit, such as ``beta`` of all joints, or ``joint3.alpha``.
-        robust: whether readings that are far off count less.
-        progress: told what is being done.
+        robust: whether readings with large residuals weigh less.
+        progress: called with what is being done.
 
     Raises:
         ShapeError: the readings are of arms with another number of joints.
-        ContradictionError: the readings are those of another arm, or what is left of them hides every error.
+        ContradictionError: the readings are those of another arm, or their residuals hide every error.
         TooFewError: there are fewer numbers than errors.
-        UnknownNameError: ``only`` or ``without`` names what there is not.
+        UnknownNameError: ``only`` or ``without`` has a name that no error has.
     """
-    if seen.q.shape[1] != arm.n:
-        raise ShapeError(f"expected readings of {arm.n} joints, as {arm.name} has, got {seen.q.shape[1]}")
-    model = initial_guess(arm, seen, base=base, bends=bends)
-    found, errors, noise = _rounds(model, seen, _chosen(model, only, without), robust=robust, progress=progress)
-    kept = list(found.kept)
-    if robust and kept:
-        # Each outlier, though it counts little, still pulls as hard as a usual reading, and many pull together.
-        errors = _fitted(model, seen, kept, errors, noise, robust=True, strict=True)
-    return _told(model, found, seen, errors, robust=robust)
+    if measured.q.shape[1] != arm.n:
+        raise ShapeError(f"expected readings of {arm.n} joints, as {arm.name} has, got {measured.q.shape[1]}")
+    model = initial_guess(arm, measured, base=base, joint_errors=joint_errors)
+    selected, errors, noise = _select_and_fit(
+        model, measured, *_candidates(model, only, without), robust=robust, progress=progress
+    )
+    if robust and selected.fitted:
+        # Each outlier, though its weight is small, still pulls as hard as a usual reading, and many pull together.
+        errors = _fit(model, measured, list(selected.fitted), errors, noise, robust=True, strict=True)
+    return _with_covariance(model, selected, measured, errors, robust=robust)
 
 
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _chosen(model: MeasurementModel, only: Sequence[str] | None, without: Sequence[str]) -> tuple[list[int], set[int]]:
-    """Return the order in which errors are taken, and those that may be."""
+def _candidates(
+    model: MeasurementModel, only: Sequence[str] | None, without: Sequence[str]
+) -> tuple[list[int], set[int]]:
+    """Return the errors that are selected before all others, in order, and all that may be fitted."""
     names = model.names
 
-    def named(one: str) -> set[int]:
-        fits = {i for i, name in enumerate(names) if name == one or one in name.split(".")}
-        if not fits:
+    def matching(word: str) -> set[int]:
+        matches = {i for i, name in enumerate(names) if name == word or word in name.split(".")}
+        if not matches:
             parts = dict.fromkeys(part for name in names for part in name.split("."))
-            raise UnknownNameError("error", one, [*names, *parts])
-        return fits
+            raise UnknownNameError("error", word, [*names, *parts])
+        return matches
 
-    around = set(model.surroundings)
-    allowed = set(range(len(names))) if only is None else around.union(*map(named, only))
-    # What there is not need not be left out.
+    setup = set(model.setup)
+    allowed = set(range(len(names))) if only is None else setup.union(*map(matching, only))
+    # An arm without parallel axes has no beta to leave out.
     parts = {part for name in names for part in (name, *name.split("."))}
-    allowed -= set[int]().union(*(named(one) for one in without if one in parts or one != "beta"))
-    return [*sorted(around), *preferred_parameters(names)], allowed
+    allowed -= set[int]().union(*(matching(word) for word in without if word in parts or word != "beta"))
+    return [*sorted(setup), *preferred_parameters(names)], allowed
 
 
-def _no_more(found: Identifiability, before: Identifiability) -> Identifiability:
-    """Return what was fitted before; what else seems to be told is held."""
-    why = "so few readings leave nothing over to tell it from noise"
-    more = (FixedParameter(found.names[i], why, ()) for i in found.kept if i not in before.kept)
-    return attrs.evolve(before, held=(*found.held, *more))
-
-
-def _rounds(
+def _select_and_fit(
     model: MeasurementModel,
-    seen: Readings,
-    chosen: tuple[list[int], set[int]],
+    measured: Readings,
+    first: list[int],
+    allowed: set[int],
     *,
     robust: bool,
     progress: Callable[[str], None] | None,
 ) -> tuple[Identifiability, Array, Noise]:
-    """Return what can be fitted, the errors, and the noise, which depend on one another."""
-    first, allowed = chosen
-    known = np.where(model.is_length, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE) * _parts(model)
-    errors, kept = np.zeros(len(model.names)), tuple[int, ...]()
-    tried: list[tuple[Identifiability, Array, Noise]] = []
-    # Before anything is fitted, what is left says nothing of the noise.
-    start = median_noise(model.rows(seen), 0)
+    """Return which errors are identifiable, the errors, and the noise, which depend on one another."""
+    max_standard_error = _geometric(model, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
+    errors, fitted = np.zeros(len(model.names)), tuple[int, ...]()
+    rounds: list[tuple[Identifiability, Array, Noise]] = []
+    # Before anything is fitted, the residuals say nothing of the noise.
+    start = median_noise(model.residuals(measured), 0)
     noise = before = Noise(*map(min, start, TYPICAL))
     for _ in range(_ROUNDS):
-        rows = model.rows(seen, errors)
-        J = rows.by * length_scales(rows, noise)[:, None]
-        # What is fitted already comes first: of two that are nearly one, one would displace the other and run away.
-        order = list(dict.fromkeys([*kept, *first]))
-        identified = partial(
-            select_identifiable, model.names, J, model.is_length, noise.length, first=order, known=known
+        residuals = model.residuals(measured, errors)
+        J = residuals.jacobian * length_scales(residuals, noise)[:, None]
+        count = len(residuals.values)
+        # What is fitted already comes first: of two nearly collinear errors, one would displace the other and run away.
+        select = partial(
+            select_identifiable,
+            model.names,
+            J,
+            model.is_length,
+            noise.length,
+            first=list(dict.fromkeys([*fitted, *first])),
+            max_standard_error=max_standard_error,
         )
-        found = identified(allowed=allowed)
-        if kept and not is_overdetermined(len(rows.off), len(found.kept)):
-            # What so few readings leave is next to nothing, and seems to tell what it does not: noise.
-            found = _no_more(found, identified(allowed=set(kept)))
-        if found.kept == kept and all(now > _SETTLED * then for now, then in zip(noise, before, strict=True)):
-            tried[-1:] = [(found, errors, noise)]
+        selected = select(allowed=allowed)
+        if fitted and not is_overdetermined(count, len(selected.fitted)):
+            # The residuals of so few readings are next to nothing, and more errors seem identifiable than are.
+            selected = _without_new(selected, select(allowed=set(fitted)))
+        settled = all(now > _NOISE_SETTLED * then for now, then in zip(noise, before, strict=True))
+        if selected.fitted == fitted and settled:
+            rounds[-1:] = [(selected, errors, noise)]
             break
-        if not found.kept:
+        if not selected.fitted:
             raise ContradictionError(
                 f"what {model.chain.arm.name} misses its readings by, {noise.length * 1e3:.3g} mm, hides every error "
                 f"that it may have: are these its readings? If so, {CHECK}"
             )
-        kept, before = found.kept, noise
-        if not is_overdetermined(len(rows.off), len(kept)):
-            raise TooFewError(f"{len(seen)} readings give {len(rows.off)} numbers for {len(kept)} errors; measure more")
+        fitted, before = selected.fitted, noise
+        if not is_overdetermined(count, len(fitted)):
+            raise TooFewError(f"{len(measured)} readings give {count} numbers for {len(fitted)} errors; measure more")
         if progress is not None:
-            progress(f"fitting {len(kept)} errors to {len(seen)} readings")
-        errors = _fitted(model, seen, list(kept), errors, noise, robust=robust)
-        noise = median_noise(model.rows(seen, errors), len(kept))
-        tried.append((found, errors, noise))
-    # What is left hides errors, and what is not fitted is left: rounds may lead away, and the last is not the best.
-    best = min(tried, key=lambda one: one[2].length)
-    return best if best[2].length < _SETTLED * noise.length else tried[-1]
+            progress(f"fitting {len(fitted)} errors to {len(measured)} readings")
+        errors = _fit(model, measured, list(fitted), errors, noise, robust=robust)
+        noise = median_noise(model.residuals(measured, errors), len(fitted))
+        rounds.append((selected, errors, noise))
+    # Noise hides errors, and errors that are not fitted look like noise: rounds may lead away, and the last is not
+    # always the best.
+    best = min(rounds, key=lambda result: result[2].length)
+    return best if best[2].length < _NOISE_SETTLED * noise.length else rounds[-1]
 
 
-def _fitted(
+def _without_new(selected: Identifiability, before: Identifiability) -> Identifiability:
+    """Return what was fitted before; whatever else seems identifiable is fixed."""
+    reason = "so few readings have no degree of freedom left to distinguish it from noise"
+    new = (FixedParameter(selected.names[i], reason, ()) for i in selected.fitted if i not in before.fitted)
+    return attrs.evolve(before, fixed=(*selected.fixed, *new))
+
+
+def _fit(
     model: MeasurementModel,
-    seen: Readings,
-    kept: list[int],
+    measured: Readings,
+    fitted: list[int],
     start: Array,
     noise: Noise,
     *,
     robust: bool,
     strict: bool = False,
 ) -> Array:
-    """Return (k,) errors of which those that are kept fit the readings best; if strict, without outliers."""
+    """Return (k,) the errors by iteratively reweighted least squares; if strict, without outliers.
+
+    The cost is the sum of the squares of the weighted residuals and of the prior residuals, errors by their prior
+    sigmas, all scaled to lengths with the standard deviation of the noise.
+    """
     errors = start.copy()
-    errors[[i for i in range(len(errors)) if i not in kept]] = 0.0
-    belief = noise.length * np.diag(1 / _believed(model)[kept])
-    rows = model.rows(seen, errors)
-    scale = weighed = length_scales(rows, noise)
+    errors[[i for i in range(len(errors)) if i not in fitted]] = 0.0
+    prior = noise.length * np.diag(1 / _prior_sigma(model)[fitted])
+    scales = weights = length_scales(model.residuals(measured, errors), noise)
 
-    def missing(x: Array) -> Array:
-        errors[kept] = x
-        return np.concatenate([model.rows(seen, errors).off * weighed, belief @ x])
+    def cost_residuals(x: Array) -> Array:
+        errors[fitted] = x
+        return np.concatenate([model.residuals(measured, errors).values * weights, prior @ x])
 
-    def slopes(x: Array) -> Array:
-        errors[kept] = x
-        return np.vstack([model.rows(seen, errors).by[:, kept] * weighed[:, None], belief])
+    def cost_jacobian(x: Array) -> Array:
+        errors[fitted] = x
+        return np.vstack([model.residuals(measured, errors).jacobian[:, fitted] * weights[:, None], prior])
 
-    for _ in range(_WEIGHINGS):
+    for _ in range(_REWEIGHTINGS):
         if robust:
-            weighed = scale * robust_weights(model.rows(seen, errors), noise, strict=strict)
-        found = least_squares(
-            missing,
-            errors[kept].copy(),
-            slopes,
+            weights = scales * robust_weights(model.residuals(measured, errors), noise, strict=strict)
+        solution = least_squares(
+            cost_residuals,
+            errors[fitted].copy(),
+            cost_jacobian,
             x_scale="jac",
-            ftol=_FINISHED,
-            xtol=_FINISHED,
+            ftol=_COST_TOLERANCE,
+            xtol=_COST_TOLERANCE,
             gtol=None,
-            max_nfev=_STEPS,
+            max_nfev=_MAX_EVALUATIONS,
         )
-        errors[kept] = found.x
-        settled = scale * robust_weights(model.rows(seen, errors), noise, strict=strict) if robust else weighed
-        if np.all(np.abs(settled - weighed) <= _WEIGHED * scale):
+        errors[fitted] = solution.x
+        if not robust:
+            break
+        reweighted = scales * robust_weights(model.residuals(measured, errors), noise, strict=strict)
+        if np.all(np.abs(reweighted - weights) <= _WEIGHTS_SETTLED * scales):
             break
     return errors
 
 
-def _believed(model: MeasurementModel) -> Array:
-    """Return (k,) how far errors may be off without a question [m], [rad]."""
-    return np.where(model.is_length, PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE) * _parts(model)
-
-
-def _parts(model: MeasurementModel) -> Array:
-    """Return (k,) how large errors may be as a part of those of the geometry."""
-    bends = {bend.name for bend in model.chain.bends}
-    return np.array([_BENDS if name in bends else 1.0 for name in model.names])
-
-
-def _told(
-    model: MeasurementModel, found: Identifiability, seen: Readings, errors: Array, *, robust: bool
+def _with_covariance(
+    model: MeasurementModel, selected: Identifiability, measured: Readings, errors: Array, *, robust: bool
 ) -> Calibration:
-    kept = list(found.kept)
-    rows = model.rows(seen, errors)
-    noise, outlying, freedom = noise_and_outliers(rows, len(seen), len(kept), robust=robust)
-    deviation = np.where(rows.turning, noise.turn, noise.length)
-    believed = _believed(model)[kept]
-    counted = ~outlying[rows.of]
-    A = rows.by[counted][:, kept] / deviation[counted, None] * believed
-    covariance = np.linalg.inv(A.T @ A + np.eye(len(kept))) * np.outer(believed, believed)
+    """Return the errors with their covariance: the inverse of the information of readings and prior.
+
+    The information matrix is formed in units of the prior sigmas, in which that of the prior is the identity.
+    """
+    fitted = list(selected.fitted)
+    residuals = model.residuals(measured, errors)
+    noise, outlying, degrees_of_freedom = noise_and_outliers(residuals, len(measured), len(fitted), robust=robust)
+    sigma, prior_sigma = standard_deviations(residuals, noise), _prior_sigma(model)[fitted]
+    counted = ~outlying[residuals.reading]
+    A = residuals.jacobian[counted][:, fitted] / sigma[counted, None] * prior_sigma
+    covariance = np.linalg.inv(A.T @ A + np.eye(len(fitted))) * np.outer(prior_sigma, prior_sigma)
     return Calibration(
         model=model,
-        identified=found,
+        identifiability=selected,
         errors=errors,
         covariance=np.asarray(covariance, dtype=np.float64),
-        before=model.off(seen),
-        after=model.off(seen, errors),
+        before=model.pose_errors(measured),
+        after=model.pose_errors(measured, errors),
         noise=noise,
-        freedom=freedom,
+        degrees_of_freedom=degrees_of_freedom,
         outliers=tuple(np.flatnonzero(outlying).tolist()),
     )
+
+
+def _prior_sigma(model: MeasurementModel) -> Array:
+    """Return (k,) the standard deviations of the prior of all errors [m], [rad]."""
+    return _geometric(model, PRIOR_SIGMA_LENGTH, PRIOR_SIGMA_ANGLE)
+
+
+def _geometric(model: MeasurementModel, length: float, angle: float) -> Array:
+    """Return (k,) one value for lengths and one for angles; of errors of joints a twentieth."""
+    joint_errors = {error.name for error in model.chain.joint_errors}
+    parts = np.array([_JOINT_ERRORS if name in joint_errors else 1.0 for name in model.names])
+    return np.asarray(np.where(model.is_length, length, angle) * parts, dtype=np.float64)

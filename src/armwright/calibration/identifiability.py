@@ -1,8 +1,9 @@
-"""Which errors of an arm a measurement tells, and which it cannot tell from others.
+"""Which errors of an arm a measurement identifies, and which are redundant with others.
 
-One error after the other is taken, in an order of preference, as long as it moves the tool in a way that those taken
-before do not, and by so much that the noise of the measurement leaves it known to a millimetre or a few milliradians.
-What is left over is held at 0 and named, with the errors that do the same.
+The columns of the Jacobian are orthogonalised one after the other, in an order of preference (Gram and Schmidt, with
+column selection). An error is fitted where its column has so much that is independent of those before it that the noise
+leaves it a standard error of a millimetre or a few milliradians. All others are fixed at 0, and named with the errors
+that they are collinear with.
 """
 
 from collections.abc import Collection, Sequence
@@ -13,12 +14,12 @@ import numpy as np
 
 from armwright.arrays import Array
 
-# An error is told when its standard deviation would be below this [m], [rad].
+# An error is fitted where its standard error would be below this [m], [rad].
 MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE = 2e-3, 5e-3
-# Columns that lie in the others but for this part are rounding.
+# A column of which a smaller part is independent of the others is collinear with them but for rounding.
 _ROUNDING = 1e-9
-# How many others are named that do the same, and from what part on.
-_NAMED, _SMALLEST_PART = 3, 0.05
+# How many collinear errors are named, and from what share on.
+_NAMED, _SMALLEST_SHARE = 3, 0.05
 
 
 class FixedParameter(NamedTuple):
@@ -26,30 +27,30 @@ class FixedParameter(NamedTuple):
 
     Attributes:
         name: of the error.
-        why: in words.
-        same: those that do the same, with how much of each [1, m/rad or rad/m].
+        reason: in words.
+        collinear: the errors whose mixture has the same effect, with their factors [1, m/rad or rad/m].
     """
 
     name: str
-    why: str
-    same: tuple[tuple[str, float], ...]
+    reason: str
+    collinear: tuple[tuple[str, float], ...]
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Identifiability:
-    """What a measurement tells of an arm.
+    """Which errors of an arm a measurement identifies.
 
     Attributes:
         names: of all k errors.
-        kept: numbers of those that are fitted.
-        held: those that are not, and why.
-        singular_values: of the scaled equations of all k, largest first; how many are not small is how many
-            mixtures of errors the measurement tells.
+        fitted: numbers of those that are fitted.
+        fixed: those that are not, and why.
+        singular_values: of the scaled Jacobian of all k, largest first; how many are not small is the rank, the number
+            of identifiable combinations.
     """
 
     names: tuple[str, ...]
-    kept: tuple[int, ...]
-    held: tuple[FixedParameter, ...]
+    fitted: tuple[int, ...]
+    fixed: tuple[FixedParameter, ...]
     singular_values: Array
 
 
@@ -61,7 +62,7 @@ def select_identifiable(
     *,
     first: Sequence[int] = (),
     allowed: Collection[int] | None = None,
-    known: Array | None = None,
+    max_standard_error: Array | None = None,
 ) -> Identifiability:
     """Return which errors can be fitted.
 
@@ -72,64 +73,61 @@ def select_identifiable(
         noise: standard deviation of a measured number [m].
         first: numbers of errors that come before all others.
         allowed: numbers of those that may be fitted; all when left out.
-        known: (k,) how well each should be known at least [m], [rad]; to 2 mm or 5 mrad when left out.
+        max_standard_error: (k,) with which an error is fitted [m], [rad]; 2 mm or 5 mrad when left out.
     """
-    if known is None:
-        known = np.where(is_length, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
-    # The triangle has the same lengths and angles between columns, and few rows.
-    A: Array = np.asarray(np.linalg.qr(jacobian * known, mode="r"), dtype=np.float64)
-    order = [*first, *(i for i in range(len(names)) if i not in first)]
+    if max_standard_error is None:
+        max_standard_error = np.where(is_length, MAX_STANDARD_ERROR_LENGTH, MAX_STANDARD_ERROR_ANGLE)
+    # R of a QR decomposition has the same lengths and angles between columns, and few rows.
+    A: Array = np.asarray(np.linalg.qr(jacobian * max_standard_error, mode="r"), dtype=np.float64)
     basis: list[Array] = []
-    kept, left = [], []
-    for i in order:
+    fitted, dependent = [], []
+    for i in (*first, *(i for i in range(len(names)) if i not in first)):
         if allowed is not None and i not in allowed:
             continue
         column = A[:, i].copy()
         # Twice, so that rounding leaves nothing of the others in it.
         for _ in range(2):
-            for one in basis:
-                column -= one * (one @ column)
-        rest, size = float(np.linalg.norm(column)), float(np.linalg.norm(A[:, i]))
-        if rest > max(noise, _ROUNDING * max(size, 1e-6)):
-            basis.append(column / rest)
-            kept.append(i)
+            for direction in basis:
+                column -= direction * (direction @ column)
+        independent, size = float(np.linalg.norm(column)), float(np.linalg.norm(A[:, i]))
+        if independent > max(noise, _ROUNDING * max(size, 1e-6)):
+            basis.append(column / independent)
+            fitted.append(i)
         else:
-            left.append(i)
-    held = tuple(_held(names, A, known, kept, i) for i in left)
-    values = np.linalg.svd(A, compute_uv=False)
+            dependent.append(i)
     return Identifiability(
-        names=tuple(names), kept=tuple(sorted(kept)), held=held, singular_values=np.asarray(values, dtype=np.float64)
+        names=tuple(names),
+        fitted=tuple(sorted(fitted)),
+        fixed=tuple(_fixed(names, A, max_standard_error, fitted, i) for i in dependent),
+        singular_values=np.asarray(np.linalg.svd(A, compute_uv=False), dtype=np.float64),
     )
 
 
 def is_overdetermined(numbers: int, errors: int) -> bool:
-    """Whether so many measured numbers are enough for so many errors: one more, or nothing tells noise from them."""
+    """Whether more numbers were measured than errors are fitted, without which there is no estimate of the noise."""
     return numbers > errors
 
 
 def preferred_parameters(names: Sequence[str]) -> list[int]:
-    """Return the numbers of those errors that are taken before all others: base, tool, joint offsets.
+    """Return the numbers of those errors that are fitted before all others: base, tool, joint offsets.
 
     The tool comes before the last joint, which moves it as the tool's own errors do but for one direction.
     """
     return [i for part in ("base.", "tool.", ".theta") for i, name in enumerate(names) if part in name]
 
 
-def _held(names: Sequence[str], A: Array, known: Array, kept: Sequence[int], number: int) -> FixedParameter:
-    """Return why an error is held."""
+def _fixed(names: Sequence[str], A: Array, scales: Array, fitted: Sequence[int], number: int) -> FixedParameter:
+    """Return why an error is not fitted."""
     size = float(np.linalg.norm(A[:, number]))
     if size <= _ROUNDING * float(np.linalg.norm(A, axis=0).max(initial=1e-300)):
-        return FixedParameter(names[number], "it does not move the tool in any of the poses", ())
-    mix, *_ = np.linalg.lstsq(A[:, kept], A[:, number], rcond=None)
-    left = float(np.linalg.norm(A[:, number] - A[:, kept] @ mix)) / size
-    part = np.abs(mix) * np.linalg.norm(A[:, kept], axis=0) / size
-    best = [j for j in np.argsort(-part)[:_NAMED] if part[j] > _SMALLEST_PART]
-    same = tuple((names[kept[j]], float(mix[j] * known[kept[j]] / known[number])) for j in best)
-    others = " and ".join(name for name, _ in same)
-    if left < 1e-6:
-        return FixedParameter(
-            names[number],
-            f"it does just what {others} do together" if len(same) > 1 else f"it does just what {others} does",
-            same,
-        )
-    return FixedParameter(names[number], f"these poses hardly tell it from {others}", same)
+        return FixedParameter(names[number], "unobservable: it does not move the tool in any of the poses", ())
+    mixture, *_ = np.linalg.lstsq(A[:, fitted], A[:, number], rcond=None)
+    independent = float(np.linalg.norm(A[:, number] - A[:, fitted] @ mixture)) / size
+    share = np.abs(mixture) * np.linalg.norm(A[:, fitted], axis=0) / size
+    largest = [j for j in np.argsort(-share)[:_NAMED] if share[j] > _SMALLEST_SHARE]
+    collinear = tuple((names[fitted[j]], float(mixture[j] * scales[fitted[j]] / scales[number])) for j in largest)
+    others = " and ".join(name for name, _ in collinear)
+    if independent >= 1e-6:
+        return FixedParameter(names[number], f"nearly collinear with {others} in these poses", collinear)
+    what = f"a combination of {others}" if len(collinear) > 1 else others
+    return FixedParameter(names[number], f"redundant: it has the same effect as {what}", collinear)

@@ -1,6 +1,6 @@
-"""Where a fit begins: where the arm, further frames, planes and anchors are, if the arm is as it is said to be.
+"""The initial guess of a fit: base, target, frames, planes and anchors registered to the nominal arm.
 
-What cannot be brought near at all is of another arm, of other joints, or in other units, and is refused with a
+Readings that no registration brings near are of another arm, of other joints, or in other units, and are refused with a
 question.
 """
 
@@ -19,12 +19,12 @@ from armwright.spatial.poses import one_pose, pose
 from armwright.spatial.rotations import nearest_rotation, rotation_vector
 
 # A measurement that no rigid motion brings so near to the arm is of another arm, or in other units [m].
-_FARTHEST = 0.2
-# Poses that are turned farther than this from the arm's, in half of all, are told in another way [rad].
-_FARTHEST_TURN = 0.5
-# What is measured is another frame of the hand, not the tool a little off, from this turn on [rad].
+_MAX_DISTANCE = 0.2
+# Rotations that differ by more than this from the arm's, in half of all, follow another convention [rad].
+_MAX_ANGLE = 0.5
+# From this rotation on the measured target is another frame, not the tool with an error [rad].
 _ANOTHER = 0.05
-# Points whose second width is a smaller part of the first lie on a line, and leave a turn about it free.
+# Points whose second width is a smaller part of the first lie on a line, and leave a rotation about it free.
 _LINE = 1e-3
 _UNITS = (
     (1e3, "millimetres read as metres"),
@@ -34,33 +34,35 @@ _UNITS = (
 
 
 def initial_guess(
-    arm: Arm, readings: Readings, *, base: Array | None = None, bends: tuple[JointErrorModel, ...] = ()
+    arm: Arm, readings: Readings, *, base: Array | None = None, joint_errors: tuple[JointErrorModel, ...] = ()
 ) -> MeasurementModel:
-    """Return the model of an arm as it is said to be, brought near to readings.
+    """Return the measurement model of a nominal arm, registered to readings.
 
     Args:
         arm: with n joints.
         readings: of it.
-        base: (4, 4) pose of the arm's base frame in the frame of the measurements, roughly; found when left out.
-        bends: of its joints.
+        base: (4, 4) pose of the arm's base frame in the frame of the measurements, roughly; estimated when left out.
+        joint_errors: models of its joints.
 
     Raises:
-        ContradictionError: the readings are those of another arm, told otherwise or in other units.
-        TooFewError: there are too few readings of a frame, a plane or an anchor to find it.
+        ContradictionError: the readings are those of another arm, in another convention or in other units.
+        TooFewError: there are too few readings of a frame, a plane or an anchor to locate it.
         InvalidValueError: ``base`` has no rotation in it.
         ShapeError: ``base`` is not (4, 4).
     """
-    given = base is not None
+    is_base_known = base is not None
     base = None if base is None else one_pose(base, "base")
     chain = chain_of(arm)
     first = readings.with_point & (readings.frame == 0)
     _refuse_other_units(chain, readings, first)
     if base is None:
         base = register(chain, readings.q[first], readings.points[first]) if first.any() else np.eye(4)
-    chain = chain_of(arm, base=base, bends=bends)
+    chain = chain_of(arm, base=base, joint_errors=joint_errors)
     frames = (np.eye(4), *(_frame(chain, readings, i) for i in range(1, len(readings.frames))))
     model = MeasurementModel(
-        chain=chain_of(arm, base=base, hand=_hand(chain, readings, frames), bends=bends),
+        chain=chain_of(
+            arm, base=base, target_rotation=_target_rotation(chain, readings, frames), joint_errors=joint_errors
+        ),
         frames=frames,
         planes=tuple(_plane(chain, readings, i) for i in range(len(readings.planes))),
         anchors=tuple(_anchor(chain, readings, i) for i in range(len(readings.anchors))),
@@ -68,30 +70,30 @@ def initial_guess(
         plane_names=readings.planes,
         anchor_names=readings.anchors,
     )
-    off = model.off(readings)
-    far = float(np.median(off.distance))
-    if far > _FARTHEST:
+    errors = model.pose_errors(readings)
+    distance = float(np.median(errors.distance))
+    if distance > _MAX_DISTANCE:
         raise ContradictionError(
-            f"the points lie {far * 1e3:.0f} mm from where {arm.name} would have its tool, wherever it stands: are "
-            f"these its joints, in this order and these units?"
+            f"the points lie {distance * 1e3:.0f} mm from where {arm.name} would have its tool, wherever it stands: "
+            f"are these its joints, in this order and these units?"
         )
-    turns = off.turn[readings.with_rotation]
-    # Points on a line leave a turn of the base about it free, which the fit finds.
-    if len(turns) and np.median(turns) > _FARTHEST_TURN and (given or not _on_a_line(readings.points[first])):
+    angles = errors.angle[readings.with_rotation]
+    # Points on a line leave a rotation of the base about it free, which the fit estimates.
+    if len(angles) and np.median(angles) > _MAX_ANGLE and (is_base_known or not _on_a_line(readings.points[first])):
         raise ContradictionError(
-            f"half of the poses are turned {np.degrees(np.median(turns)):.0f} degrees or more from where {arm.name} "
-            f"would have its hand, however the measured frame is fixed to it: are these its turns, in this order and "
+            f"half of the poses are rotated {np.degrees(np.median(angles)):.0f} degrees or more from where {arm.name} "
+            f"would have its tool, however the target is fixed to it: are these its rotations, in this order and "
             f"these units?"
         )
     return model
 
 
 def register(chain: Chain, q: Array, points: Array) -> Array:
-    """Return (4, 4) the base frame that brings the arm as it is said to be nearest to the points."""
-    return _brought(chain.reach(q).position, points)
+    """Return (4, 4) the base frame that brings the nominal arm nearest to the points."""
+    return _rigid_motion(chain.forward(q).position, points)
 
 
-def _brought(points: Array, goals: Array) -> Array:
+def _rigid_motion(points: Array, goals: Array) -> Array:
     """Return the pose (4, 4) that brings points nearest to goals.
 
     Source:
@@ -104,18 +106,18 @@ def _brought(points: Array, goals: Array) -> Array:
 
 def _refuse_other_units(chain: Chain, readings: Readings, first: Array) -> None:
     """Refuse points and distances that are in other units."""
-    away = np.flatnonzero(np.isfinite(readings.other[:, 0]))
-    own, there = chain.reach(readings.q).position, chain.reach(readings.other[away]).position
-    for what, nominal, seen in (
-        ("points spread", _spread(own[first]), _spread(readings.points[first])),
-        ("distances are", np.linalg.norm(own[away] - there, axis=1).sum(), readings.distances[away].sum()),
+    pairs = np.flatnonzero(np.isfinite(readings.other[:, 0]))
+    tool, other = chain.forward(readings.q).position, chain.forward(readings.other[pairs]).position
+    for what, nominal, measured in (
+        ("points spread", _spread(tool[first]), _spread(readings.points[first])),
+        ("distances are", np.linalg.norm(tool[pairs] - other, axis=1).sum(), readings.distances[pairs].sum()),
     ):
-        ratio = float(seen) / max(float(nominal), 1e-12)
-        for factor, word in _UNITS:
+        ratio = float(measured) / max(float(nominal), 1e-12)
+        for factor, mistake in _UNITS:
             if 0.8 < ratio / factor < 1.25:
                 raise ContradictionError(
-                    f"the {what} {ratio:.4g} times as far as {chain.arm.name} reaches in these postures: "
-                    f"are they {word}?"
+                    f"the {what} {ratio:.4g} times as far as {chain.arm.name} reaches in these configurations: "
+                    f"are they {mistake}?"
                 )
 
 
@@ -123,33 +125,33 @@ def _spread(points: Array) -> float:
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).mean()) if len(points) else 0.0
 
 
-def _hand(chain: Chain, readings: Readings, frames: Sequence[Array]) -> Array:
-    """Return (3, 3) how the measured frame is turned in the tool; not at all where that is an error like others."""
+def _target_rotation(chain: Chain, readings: Readings, frames: Sequence[Array]) -> Array:
+    """Return (3, 3) the rotation of the measured target in the tool; none where it is small enough to be an error."""
     which = np.flatnonzero(readings.with_rotation)
     if not len(which):
         return np.eye(3)
-    seen = np.stack([X[:3, :3] for X in frames])[readings.frame[which]] @ readings.rotations[which]
-    R = nearest_rotation((chain.reach(readings.q[which]).rotation.swapaxes(1, 2) @ seen).sum(axis=0))
+    measured = np.stack([X[:3, :3] for X in frames])[readings.frame[which]] @ readings.rotations[which]
+    R = nearest_rotation((chain.forward(readings.q[which]).rotation.swapaxes(1, 2) @ measured).sum(axis=0))
     return R if np.linalg.norm(rotation_vector(R)) > _ANOTHER else np.eye(3)
 
 
 def _frame(chain: Chain, readings: Readings, number: int) -> Array:
-    """Return (4, 4) where a further frame stands in the measuring frame."""
+    """Return (4, 4) the pose of a further frame in the measuring frame."""
     which = readings.with_point & (readings.frame == number)
-    seen, name = readings.points[which], readings.frames[number]
+    measured, name = readings.points[which], readings.frames[number]
     if not which.any():
         return np.eye(4)  # nothing is read in it here
-    if _on_a_line(seen):
+    if _on_a_line(measured):
         raise TooFewError(
-            f"frame {name}: {len(seen)} points"
-            f"{' on a line' if len(seen) > 2 else ''} do not tell where it stands; measure 3 or more that are not "
+            f"frame {name}: {len(measured)} points"
+            f"{' on a line' if len(measured) > 2 else ''} do not tell where it stands; measure 3 or more that are not "
             f"on a line"
         )
-    return _brought(seen, chain.reach(readings.q[which]).position)
+    return _rigid_motion(measured, chain.forward(readings.q[which]).position)
 
 
 def _on_a_line(points: Array) -> bool:
-    """Whether points (m, 3) lie on a line or in one place, as fewer than three always do."""
+    """Whether points (m, 3) are collinear or all the same, as fewer than three always are."""
     if len(points) < 3:
         return True
     widths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
@@ -157,32 +159,32 @@ def _on_a_line(points: Array) -> bool:
 
 
 def _plane(chain: Chain, readings: Readings, number: int) -> Plane:
-    """Return the plane nearest to where the arm as said would have touched it."""
+    """Return the plane nearest to the points at which the nominal arm would have touched it."""
     which = readings.plane == number
     if not which.any():
         return Plane(np.zeros(3), np.eye(3))
     _refuse_few("plane", readings.planes[number], int(which.sum()), "touches")
-    points = chain.reach(readings.q[which]).position
+    points = chain.forward(readings.q[which]).position
     _, _, axes = np.linalg.svd(points - points.mean(axis=0))
     return Plane(points.mean(axis=0), axes.T)
 
 
 def _anchor(chain: Chain, readings: Readings, number: int) -> Array:
-    """Return (3,) the place that is as far as measured from where the arm as said would have its tool."""
+    """Return (3,) the position whose distances from the nominal arm's tool are as measured (trilateration)."""
     which = readings.anchor == number
     if not which.any():
         return np.zeros(3)
     _refuse_few("anchor", readings.anchors[number], int(which.sum()), "distances")
-    points, distances = chain.reach(readings.q[which]).position, readings.distances[which]
+    points, distances = chain.forward(readings.q[which]).position, readings.distances[which]
 
-    def missing(place: Array) -> Array:
-        return np.asarray(np.linalg.norm(points - place, axis=1) - distances, dtype=np.float64)
+    def residuals(position: Array) -> Array:
+        return np.asarray(np.linalg.norm(points - position, axis=1) - distances, dtype=np.float64)
 
     # From all sides: points near a plane have an image of the anchor behind it.
-    middle, far = points.mean(axis=0), float(np.median(distances))
-    sides = [middle + far * sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
-    found = [least_squares(missing, side, loss="soft_l1", f_scale=1e-2) for side in sides]
-    best: Array = min(found, key=lambda one: float(one.cost)).x
+    centre, radius = points.mean(axis=0), float(np.median(distances))
+    starts = [centre + radius * sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    solutions = [least_squares(residuals, start, loss="soft_l1", f_scale=1e-2) for start in starts]
+    best: Array = min(solutions, key=lambda solution: float(solution.cost)).x
     return best
 
 

@@ -1,7 +1,7 @@
-"""What a measurement says of an arm in the words of ISO 9283: AP and AD of a model, RP of the arm itself.
+"""A measurement in the terms of ISO 9283: AP and AD of a model, RP of the arm itself.
 
-Where the model has the tool is what is commanded, where it was measured is what is attained. A posture that was
-measured once has an AP all the same, as it has with n = 1; the standard asks for 30 cycles, and the number is told.
+The position of the model's tool is the command, the measured one is attained. A configuration that was measured once
+has an AP all the same, with n = 1; the standard asks for 30 cycles, and their number is reported.
 
 Source:
     ISO 9283:1998, 7.2.1, 7.2.2, 7.3.2.
@@ -23,9 +23,9 @@ class Accuracy(NamedTuple):
     """How far attained poses are from commanded ones.
 
     Attributes:
-        AP: mean pose accuracy over all postures [m].
+        AP: mean pose accuracy over all configurations [m].
         AP_largest: the largest [m].
-        AD: mean size of the distance accuracy between postures that follow one another [m].
+        AD: mean size of the distance accuracy between successive configurations [m].
         AD_largest: the largest [m].
     """
 
@@ -39,9 +39,9 @@ class Repeatability(NamedTuple):
     """How closely an arm comes back.
 
     Attributes:
-        RP: mean pose repeatability over the postures that were measured more than once [m].
+        RP: mean pose repeatability over the configurations that were measured more than once [m].
         RP_largest: the largest [m].
-        floor: root mean square distance of an attained pose from the mean of its posture [m].
+        floor: root mean square distance of an attained pose from the mean of its configuration [m].
         configurations: how many were measured more than once.
         cycles: how often at least.
     """
@@ -53,22 +53,22 @@ class Repeatability(NamedTuple):
     cycles: int
 
 
-def accuracy(seen: Readings, places: Array) -> Accuracy | None:
-    """Return AP and AD of points in the measuring frame; None where there are not two postures.
+def accuracy(measured: Readings, positions: Array) -> Accuracy | None:
+    """Return AP and AD of points in the measuring frame; None where there are not two configurations.
 
     Args:
-        seen: m readings.
-        places: (m, 3) where a model has the tool in them [m].
+        measured: m readings.
+        positions: (m, 3) of the model's tool in them [m].
     """
-    groups = _groups(seen)
+    groups = _groups(measured)
     if len(groups) < 2:
         return None
-    goals = [places[rows].mean(axis=0) for rows in groups]
-    clouds = [seen.points[rows] for rows in groups]
+    goals = [positions[rows].mean(axis=0) for rows in groups]
+    clouds = [measured.points[rows] for rows in groups]
     ap = np.array([pose_accuracy(cloud, goal, few=True).position for cloud, goal in zip(clouds, goals, strict=True)])
     ad = np.array(
         [
-            # Cycles of two postures are not pairs: their barycentres are.
+            # Cycles of two configurations are not pairs: their barycentres are.
             distance_accuracy(a.mean(axis=0)[None], b.mean(axis=0)[None], p, q, few=True).distance
             for (a, b), (p, q) in zip(pairwise(clouds), pairwise(goals), strict=True)
         ]
@@ -76,25 +76,25 @@ def accuracy(seen: Readings, places: Array) -> Accuracy | None:
     return Accuracy(float(ap.mean()), float(ap.max()), float(np.abs(ad).mean()), float(np.abs(ad).max()))
 
 
-def repeatability(seen: Readings) -> Repeatability | None:
-    """Return RP of postures that were measured more than once; None where none was."""
-    clouds = [seen.points[rows] for rows in _groups(seen) if len(rows) > 1]
+def repeatability(measured: Readings) -> Repeatability | None:
+    """Return RP of configurations that were measured more than once; None where none was."""
+    clouds = [measured.points[rows] for rows in _groups(measured) if len(rows) > 1]
     if not clouds:
         return None
     radii = np.array([pose_repeatability(cloud, few=True).radius for cloud in clouds])
     square = sum(float(np.sum((cloud - cloud.mean(axis=0)) ** 2)) for cloud in clouds)
-    freedom = sum(len(cloud) - 1 for cloud in clouds)
+    degrees_of_freedom = sum(len(cloud) - 1 for cloud in clouds)
     return Repeatability(
         RP=float(radii.mean()),
         RP_largest=float(radii.max()),
-        floor=float(np.sqrt(square / freedom)),
+        floor=float(np.sqrt(square / degrees_of_freedom)),
         configurations=len(clouds),
         cycles=min(map(len, clouds)),
     )
 
 
-def _groups(seen: Readings) -> list[Array]:
-    """Return by posture the rows that tell a point in the measuring frame."""
-    rows = np.flatnonzero(seen.with_point & (seen.frame == 0))
-    posture = distinct_configurations(seen.q[rows]) if len(rows) else np.zeros(0, dtype=np.intp)
-    return [rows[posture == i] for i in range(int(posture.max(initial=-1)) + 1)]
+def _groups(measured: Readings) -> list[Array]:
+    """Return by configuration the rows with a point in the measuring frame."""
+    rows = np.flatnonzero(measured.with_point & (measured.frame == 0))
+    configuration = distinct_configurations(measured.q[rows]) if len(rows) else np.zeros(0, dtype=np.intp)
+    return [rows[configuration == i] for i in range(int(configuration.max(initial=-1)) + 1)]

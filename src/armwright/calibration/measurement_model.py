@@ -1,7 +1,7 @@
-"""What is unknown of an arm and of what it was measured against, and by how much readings miss what they should be.
+"""The measurement model: residuals of readings and their Jacobian by the unknown errors of arm and setup.
 
-Beside the errors of the arm there are those of where further frames stand, six each; of planes that were touched, a
-shift and two tilts each; and of anchors, three coordinates each.
+Beside the errors of the arm, the setup has unknowns: six for each further frame, a shift and two tilts for each plane
+that was touched, and three coordinates for each anchor.
 """
 
 from collections.abc import Iterator
@@ -16,12 +16,12 @@ from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import ShapeError
 from armwright.spatial.rotations import rotation_vector
 
-_SIX = ("x", "y", "z", "rx", "ry", "rz")
-_TILTS = ("z", "rx", "ry")
+_FRAME_ERRORS = ("x", "y", "z", "rx", "ry", "rz")
+_PLANE_ERRORS = ("z", "rx", "ry")
 
 
 class Plane(NamedTuple):
-    """A plane in the measuring frame, roughly.
+    """The approximate position and orientation of a plane in the measuring frame.
 
     Attributes:
         point: (3,) a point of it [m].
@@ -33,42 +33,42 @@ class Plane(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Equations of readings: what each number that was measured is off by.
+    """Residuals of readings: the value of the model minus the measured value, one row for each number.
 
     Attributes:
-        off: (r,) what the arm has, less what was measured [m], or small turns [rad].
-        by: (r, k) derivative by the errors.
-        of: (r,) number of the reading.
-        turning: (r,) which are turns.
+        values: (r,) lengths [m] or small rotations [rad].
+        jacobian: (r, k) derivative by the k errors.
+        reading: (r,) number of the reading.
+        is_rotation: (r,) which are rotations.
     """
 
-    off: Array
-    by: Array
-    of: Numbers
-    turning: Flags
+    values: Array
+    jacobian: Array
+    reading: Numbers
+    is_rotation: Flags
 
 
 class PoseError(NamedTuple):
-    """By how much readings miss.
+    """The size of the residuals of each reading.
 
     Attributes:
-        distance: (m,) length of what is missed [m].
-        turn: (m,) angle of what is missed [rad]; NaN of readings that tell no turn.
+        distance: (m,) norm of the residuals that are lengths [m].
+        angle: (m,) of the residual rotation [rad]; NaN for readings without a rotation.
     """
 
     distance: Array
-    turn: Array
+    angle: Array
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class MeasurementModel:
-    """An arm and what it was measured against.
+    """An arm with errors, and the setup that it was measured in.
 
     Attributes:
         chain: the arm.
-        frames: (4, 4) where each frame stands in the measuring frame, roughly; the first is that frame.
-        planes: that were touched, roughly.
-        anchors: (3,) where each anchor is in the measuring frame, roughly [m].
+        frames: (4, 4) approximate pose of each frame in the measuring frame; the first is that frame.
+        planes: that were touched.
+        anchors: (3,) approximate position of each anchor in the measuring frame [m].
         frame_names: of the frames.
         plane_names: of the planes.
         anchor_names: of the anchors.
@@ -87,28 +87,28 @@ class MeasurementModel:
         """The errors, in order: those of the arm come first."""
         return (
             *self.chain.names,
-            *(f"frame.{name}.{part}" for name in self.frame_names[1:] for part in _SIX),
-            *(f"plane.{name}.{part}" for name in self.plane_names for part in _TILTS),
+            *(f"frame.{name}.{part}" for name in self.frame_names[1:] for part in _FRAME_ERRORS),
+            *(f"plane.{name}.{part}" for name in self.plane_names for part in _PLANE_ERRORS),
             *(f"anchor.{name}.{part}" for name in self.anchor_names for part in "xyz"),
         )
 
     @property
     def is_length(self) -> Array:
         """(k,) whether each error is a length, not an angle."""
-        rest = [not name.rpartition(".")[2].startswith("r") for name in self.names[len(self.chain.names) :]]
-        return np.array([*self.chain.is_length, *rest], dtype=np.bool_)
+        setup = [not name.rpartition(".")[2].startswith("r") for name in self.names[len(self.chain.names) :]]
+        return np.array([*self.chain.is_length, *setup], dtype=np.bool_)
 
     @property
-    def surroundings(self) -> range:
-        """Numbers of the errors that are not the arm's."""
+    def setup(self) -> range:
+        """Numbers of the errors that belong to the setup, not to the arm."""
         return range(len(self.chain.names), len(self.names))
 
-    def rows(self, readings: Readings, errors: ArrayLike | None = None) -> Residuals:
-        """Return the equations of readings.
+    def residuals(self, readings: Readings, errors: ArrayLike | None = None) -> Residuals:
+        """Return the residuals of readings and their Jacobian.
 
         Args:
             readings: m of them.
-            errors: (k,) of the arm and its surroundings; none when left out.
+            errors: (k,) of arm and setup; zero when left out.
 
         Raises:
             ShapeError: there are not as many errors.
@@ -116,138 +116,142 @@ class MeasurementModel:
         x = np.zeros(len(self.names)) if errors is None else np.asarray(errors, dtype=np.float64)
         if x.shape != (len(self.names),):
             raise ShapeError(f"errors: expected {len(self.names)} of them, got shape {x.shape}")
-        reached = self.chain.reach(readings.q, x[: len(self.chain.names)])
+        tool = self.chain.forward(readings.q, x[: len(self.chain.names)])
         parts = [
-            *self._of_frames(readings, reached, x),
-            *self._of_planes(readings, reached, x),
-            *self._of_anchors(readings, reached, x),
-            *self._of_ways(readings, reached, x),
+            *self._of_poses(readings, tool, x),
+            *self._of_planes(readings, tool, x),
+            *self._of_anchors(readings, tool, x),
+            *self._of_displacements(readings, tool, x),
         ]
         return Residuals(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
-    def off(self, readings: Readings, errors: ArrayLike | None = None) -> PoseError:
-        """Return by how much readings miss."""
-        rows = self.rows(readings, errors)
-        square = rows.off**2
-        distance, turn = (
-            np.sqrt(np.bincount(rows.of[which], square[which], len(readings)))
-            for which in (~rows.turning, rows.turning)
+    def pose_errors(self, readings: Readings, errors: ArrayLike | None = None) -> PoseError:
+        """Return the size of the residuals of each reading."""
+        residuals = self.residuals(readings, errors)
+        square = residuals.values**2
+        distance, chord = (
+            np.sqrt(np.bincount(residuals.reading[rows], square[rows], len(readings)))
+            for rows in (~residuals.is_rotation, residuals.is_rotation)
         )
-        # The rows of a turn are twice the sine of half of it, along three axes.
-        turn = 2 * np.arcsin(np.minimum(turn / 2, 1.0))
-        return PoseError(distance, np.where(readings.with_rotation, turn, np.nan))
+        # The residuals of a rotation are twice the sine of half its angle, along three axes.
+        angle = 2 * np.arcsin(np.minimum(chord / 2, 1.0))
+        return PoseError(distance, np.where(readings.with_rotation, angle, np.nan))
 
-    # ---- the kinds of readings -----------------------------------------------------------------------------------
+    # ---- one kind of reading each --------------------------------------------------------------------------------
 
-    def _wide(self, own: Array, first: int = 0, more: Array | None = None) -> Array:
-        """Return derivatives (r, k) by all errors from those of the arm and of some that begin at a number."""
-        by = np.zeros((len(own), len(self.names)))
-        by[:, : own.shape[1]] = own
-        if more is not None:
-            by[:, first : first + more.shape[1]] = more
-        return by
-
-    def _of_frames(self, readings: Readings, reached: ToolPoses, x: Array) -> Iterator[Residuals]:
-        own = len(self.chain.names)
+    def _of_poses(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+        """Give the residuals of points and rotations, frame by frame."""
         for i, X in enumerate(self.frames):
-            first = own + 6 * (i - 1)
-            which = np.flatnonzero(readings.with_point & (readings.frame == i))
-            told = readings.points[which]
-            turned, place, axes = _six(X, x[first : first + 6] if i else np.zeros(6))
-            seen = told @ turned.T + place
-            by = reached.by_position[which]
+            first = len(self.chain.names) + 6 * (i - 1)
+            rows = np.flatnonzero(readings.with_point & (readings.frame == i))
+            R, origin, axes = _displaced(X, x[first : first + 6] if i else np.zeros(6))
+            measured = readings.points[rows] @ R.T + origin
+            J = tool.position_jacobian[rows]
             levers = np.concatenate(
-                [np.tile(X[:3, :3], (len(which), 1, 1)), np.cross(axes.T, (seen - place)[:, None]).swapaxes(1, 2)],
+                [
+                    np.tile(X[:3, :3], (len(rows), 1, 1)),
+                    np.cross(axes.T, (measured - origin)[:, None]).swapaxes(1, 2),
+                ],
                 axis=2,
             )
-            more = (-levers).reshape(-1, 6) if i else None
             yield Residuals(
-                (reached.position[which] - seen).ravel(),
-                self._wide(by.reshape(-1, by.shape[2]), first, more),
-                np.repeat(which, 3),
-                np.zeros(3 * len(which), dtype=np.bool_),
+                (tool.position[rows] - measured).ravel(),
+                self._jacobian(J.reshape(-1, J.shape[2]), first, (-levers).reshape(-1, 6) if i else None),
+                np.repeat(rows, 3),
+                np.zeros(3 * len(rows), dtype=np.bool_),
             )
-            which = which[readings.with_rotation[which]]
-            if not len(which):
+            rows = rows[readings.with_rotation[rows]]
+            if not len(rows):
                 continue
-            apart, by_turn = _apart(reached.rotation[which], turned @ readings.rotations[which])
-            by = by_turn @ reached.by_turn[which]
+            values, slope = _rotation_residual(tool.rotation[rows], R @ readings.rotations[rows])
+            J = slope @ tool.rotation_jacobian[rows]
             turns = np.concatenate([np.zeros((3, 3)), axes], axis=1)
-            more = (-by_turn.swapaxes(1, 2) @ turns).reshape(-1, 6) if i else None
             yield Residuals(
-                apart.ravel(),
-                self._wide(by.reshape(-1, by.shape[2]), first, more),
-                np.repeat(which, 3),
-                np.ones(3 * len(which), dtype=np.bool_),
+                values.ravel(),
+                self._jacobian(
+                    J.reshape(-1, J.shape[2]), first, (-slope.swapaxes(1, 2) @ turns).reshape(-1, 6) if i else None
+                ),
+                np.repeat(rows, 3),
+                np.ones(3 * len(rows), dtype=np.bool_),
             )
 
-    def _of_planes(self, readings: Readings, reached: ToolPoses, x: Array) -> Iterator[Residuals]:
+    def _of_planes(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+        """Give the heights of the tool over the planes that it touched."""
         first = len(self.chain.names) + 6 * (len(self.frames) - 1)
         for i, plane in enumerate(self.planes):
-            which = np.flatnonzero(readings.plane == i)
+            rows = np.flatnonzero(readings.plane == i)
             shift, a, b = x[first : first + 3]
             # Tilted by a about its x and by b about its y, as tangents.
             local = np.array([b, -a, 1.0])
             length = np.linalg.norm(local)
             normal = plane.axes @ local / length
-            away = reached.position[which] - plane.point
-            height = away @ normal
+            offset = tool.position[rows] - plane.point
             slopes = plane.axes.T @ (np.eye(3) - np.outer(normal, normal)) / length
-            more = np.stack([-np.ones(len(which)), -(away @ slopes[1]), away @ slopes[0]], axis=1)
-            by = np.einsum("i,mik->mk", normal, reached.by_position[which])
-            yield Residuals(height - shift, self._wide(by, first, more), which, np.zeros(len(which), dtype=np.bool_))
+            setup = np.stack([-np.ones(len(rows)), -(offset @ slopes[1]), offset @ slopes[0]], axis=1)
+            J = np.einsum("i,mik->mk", normal, tool.position_jacobian[rows])
+            yield _of_lengths(offset @ normal - shift, self._jacobian(J, first, setup), rows)
             first += 3
 
-    def _of_anchors(self, readings: Readings, reached: ToolPoses, x: Array) -> Iterator[Residuals]:
+    def _of_anchors(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+        """Give the distances from anchors."""
         first = len(self.chain.names) + 6 * (len(self.frames) - 1) + 3 * len(self.planes)
         for i, anchor in enumerate(self.anchors):
-            which = np.flatnonzero(readings.anchor == i)
-            away = reached.position[which] - anchor - x[first : first + 3]
-            distance = np.linalg.norm(away, axis=1)
-            along = away / np.maximum(distance, 1e-12)[:, None]
-            by = np.einsum("mi,mik->mk", along, reached.by_position[which])
-            yield Residuals(
-                distance - readings.distances[which],
-                self._wide(by, first, -along),
-                which,
-                np.zeros(len(which), dtype=np.bool_),
-            )
+            rows = np.flatnonzero(readings.anchor == i)
+            distance, direction = _polar(tool.position[rows] - anchor - x[first : first + 3])
+            J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows])
+            yield _of_lengths(distance - readings.distances[rows], self._jacobian(J, first, -direction), rows)
             first += 3
 
-    def _of_ways(self, readings: Readings, reached: ToolPoses, x: Array) -> Iterator[Residuals]:
-        which = np.flatnonzero(np.isfinite(readings.other[:, 0]))
-        there = self.chain.reach(readings.other[which], x[: len(self.chain.names)])
-        away = reached.position[which] - there.position
-        distance = np.linalg.norm(away, axis=1)
-        along = away / np.maximum(distance, 1e-12)[:, None]
-        by = np.einsum("mi,mik->mk", along, reached.by_position[which] - there.by_position)
-        yield Residuals(
-            distance - readings.distances[which], self._wide(by), which, np.zeros(len(which), dtype=np.bool_)
-        )
+    def _of_displacements(self, readings: Readings, tool: ToolPoses, x: Array) -> Iterator[Residuals]:
+        """Give the distances between the positions of the tool in two configurations."""
+        rows = np.flatnonzero(np.isfinite(readings.other[:, 0]))
+        other = self.chain.forward(readings.other[rows], x[: len(self.chain.names)])
+        distance, direction = _polar(tool.position[rows] - other.position)
+        J = np.einsum("mi,mik->mk", direction, tool.position_jacobian[rows] - other.position_jacobian)
+        yield _of_lengths(distance - readings.distances[rows], self._jacobian(J), rows)
+
+    def _jacobian(self, arm: Array, first: int = 0, setup: Array | None = None) -> Array:
+        """Return the Jacobian (r, k) by all errors from those by the arm's and by some that begin at a number."""
+        J = np.zeros((len(arm), len(self.names)))
+        J[:, : arm.shape[1]] = arm
+        if setup is not None:
+            J[:, first : first + setup.shape[1]] = setup
+        return J
 
 
-def _apart(R: Array, goals: Array) -> tuple[Array, Array]:
-    """Return by what rotations are turned from goals, both (m, 3, 3), and the derivative of that by a small turn of R.
+def _of_lengths(values: Array, jacobian: Array, rows: Numbers) -> Residuals:
+    """Return residuals that are lengths, one for each reading."""
+    return Residuals(values, jacobian, rows, np.zeros(len(rows), dtype=np.bool_))
 
-    It is the axis of the turn by twice the sine of half its angle, (m, 3): the turn itself where that is small, and
-    largest where R stands the other way round. The derivative (m, 3, 3), transposed and negative, is that by a small
-    turn of the goal.
+
+def _polar(vectors: Array) -> tuple[Array, Array]:
+    """Return lengths (m,) and directions (m, 3) of vectors (m, 3)."""
+    length = np.linalg.norm(vectors, axis=1)
+    return length, vectors / np.maximum(length, 1e-12)[:, None]
+
+
+def _rotation_residual(R: Array, goals: Array) -> tuple[Array, Array]:
+    """Return the residual rotation from goals to R, both (m, 3, 3), and its derivative by a small rotation of R.
+
+    The residual (m, 3) is the axis of the rotation times twice the sine of half its angle: the rotation vector itself
+    where that is small, and largest at half a turn. The derivative is (m, 3, 3); transposed and negative, it is that by
+    a small rotation of the goal.
     """
     w = rotation_vector(R @ goals.swapaxes(1, 2))
     half = np.linalg.norm(w, axis=1)[:, None] / 2
     vector = w * np.sinc(half / np.pi) / 2  # of the quaternion
     x, y, z = vector.T
     c = np.cos(half[:, 0])
-    by = np.stack([c, z, -y, -z, c, x, y, -x, c], axis=1).reshape(-1, 3, 3)
-    return 2 * vector, by
+    slope = np.stack([c, z, -y, -z, c, x, y, -x, c], axis=1).reshape(-1, 3, 3)
+    return 2 * vector, slope
 
 
-def _six(X: Array, six: Array) -> tuple[Array, Array, Array]:
-    """Return rotation and place of a frame that is shifted and turned by six errors, and its axes of turning."""
-    cosine, sine = np.cos(six[3:]), np.sin(six[3:])
+def _displaced(X: Array, errors: Array) -> tuple[Array, Array, Array]:
+    """Return rotation and origin of a frame that is displaced by six errors, and the axes of its three rotations."""
+    cosine, sine = np.cos(errors[3:]), np.sin(errors[3:])
     Rx = np.array([[1, 0, 0], [0, cosine[0], -sine[0]], [0, sine[0], cosine[0]]])
     Ry = np.array([[cosine[1], 0, sine[1]], [0, 1, 0], [-sine[1], 0, cosine[1]]])
     Rz = np.array([[cosine[2], -sine[2], 0], [sine[2], cosine[2], 0], [0, 0, 1]])
     R = X[:3, :3]
     axes = np.stack([R[:, 0], R @ Rx[:, 1], R @ Rx @ Ry[:, 2]], axis=1)
-    return R @ Rx @ Ry @ Rz, X[:3, 3] + R @ six[:3], axes
+    return R @ Rx @ Ry @ Rz, X[:3, 3] + R @ errors[:3], axes

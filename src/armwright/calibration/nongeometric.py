@@ -1,11 +1,11 @@
-"""What geometry leaves: joints that give, gears that run out of true, and what is learnt of the rest.
+"""Non-geometric calibration: joint compliance, transmission errors, and a model of the remaining residuals.
 
-Each is tried on top of what was kept before, and kept only if points that it has not seen are hit better: by more
-than chance makes of it, and by a part worth having. What was kept is left out again if what came later does without.
+Each candidate is added to those accepted before, and accepted only if it lowers the cross-validated errors
+significantly and by a part worth having. An accepted candidate is dropped again if a later one makes it superfluous
+(forward selection, then backward elimination).
 
-Points that were held out to choose by are hit better for that by chance, too. So how good the whole is, choice
-included, is seen on points that no choice has seen: one part after the other is left out, and the others alone choose
-and fit.
+Held-out points that were used to choose are biased by the choice. So the whole, choice included, is judged by nested
+cross-validation: one part after the other is left out, and the others alone choose and fit.
 
 Source:
     Thesis, outlook of chapter 5; spec of the calibration.
@@ -33,71 +33,79 @@ from armwright.calibration.joint_errors import compliances, transmission_errors
 from armwright.calibration.readings import Numbers, Readings
 from armwright.errors import ContradictionError, InvalidValueError, MissingExtraError, TooFewError
 
-# A gain that is so many times as large as chance makes it is one, if it is such a part of what there was. Four things
-# are tried, and chance is to be taken for any of them as rarely as two deviations are for one (Bonferroni).
-_SURE, _WORTH = 2.53, 0.01
-# From so many points the lengths are learnt over which what is left changes; more cost time with their cube.
-_MOST = 300
-# Lengths in sines and cosines of the joints, and noise as a part of the variance of what is left.
-_LENGTHS, _AMPLITUDE, _NOISE = (0.1, 100.0), (1e-4, 10.0), (1e-3, 10.0)
-_ORDERS = (1, 2)
+# A gain is significant from so many standard errors on, and worth having from such a part of the error on. Four
+# candidates share the level of significance that two standard errors are for one (Bonferroni).
+_SIGNIFICANT, _WORTH = 2.53, 0.01
+# From so many points the length scales of the Gaussian process are learnt; more cost time with their cube.
+_MAX_POINTS = 300
+# Bounds of length scales in sines and cosines of the joints, of the amplitude, and of the noise, as parts of the
+# variance of the residuals.
+_LENGTH_SCALES, _AMPLITUDE, _NOISE = (0.1, 100.0), (1e-4, 10.0), (1e-3, 10.0)
+_HARMONICS = ("first", "second")
 
 
 class ModelComparison(NamedTuple):
-    """Something beyond geometry that was tried.
+    """A candidate, compared with the model without it.
 
     Attributes:
-        name: what.
-        held_out: mean distance of held-out points with it [m]; None where it could not be tried.
+        name: of the candidate.
+        held_out: mean held-out distance with it [m]; None where it could not be tried.
         gain: by how much less that is than without [m].
-        chance: standard deviation of the gain [m].
-        kept: whether it is kept.
-        why: in words.
+        standard_error: of the gain [m].
+        accepted: whether it is part of the model.
+        reason: in words.
     """
 
     name: str
     held_out: float | None
     gain: float
-    chance: float
-    kept: bool
-    why: str
+    standard_error: float
+    accepted: bool
+    reason: str
+
+    @classmethod
+    def rejected(cls, name: str, reason: str) -> "ModelComparison":
+        """Return that of a candidate that could not be tried."""
+        return cls(name, None, 0.0, 0.0, accepted=False, reason=reason)
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class NongeometricCalibration:
-    """A calibration with all beyond geometry that held-out points confirm.
+    """A calibration with all non-geometric models that held-out points confirm.
 
     Attributes:
-        calibration: with the bends of joints that are kept.
-        learnt: what is added to where it has the tool; None where learning did not help.
-        tried: everything that was tried, in order; the first is geometry alone.
-        geometry: held out, of geometry alone.
-        held_out: of all that is kept, by which it was chosen.
-        unseen: held out of the choice, too; None where this was not asked for, or too few readings are left.
+        calibration: with the error models of joints that were accepted.
+        residual_model: what is added to its positions of the tool; None where that did not help.
+        comparisons: of all candidates, in order; the first is geometry alone.
+        geometry: held-out errors of geometry alone.
+        held_out: held-out errors of the accepted model, by which it was chosen.
+        nested: held out of the choice, too; None where this was not asked for, or too few readings are left.
     """
 
     calibration: Calibration
-    learnt: "ResidualModel | None"
-    tried: tuple[ModelComparison, ...]
+    residual_model: "ResidualModel | None"
+    comparisons: tuple[ModelComparison, ...]
     geometry: HeldOut
     held_out: HeldOut
-    unseen: HeldOut | None
+    nested: HeldOut | None
 
-    def pose_errors(self, seen: Readings) -> HeldOut:
-        """Return by how much readings miss the arm."""
-        return _missed(self.calibration, self.learnt, seen)
+    def errors(self, measured: Readings) -> HeldOut:
+        """Return by how much the arm misses readings."""
+        return _errors(self.calibration, self.residual_model, measured)
 
     def predict(self, q: ArrayLike) -> Array:
-        """Return (m, 3) where the arm has its tool, in the frame of the measurements [m]."""
-        places = self.calibration.predict(q)
-        return places if self.learnt is None else np.asarray(places + self.learnt.shift(q), dtype=np.float64)
+        """Return (m, 3) the positions of the arm's tool, in the frame of the measurements [m]."""
+        positions = self.calibration.predict(q)
+        if self.residual_model is None:
+            return positions
+        return np.asarray(positions + self.residual_model.shift(q), dtype=np.float64)
 
 
 class ResidualModel:
-    """What geometry leaves, as a Gaussian process of the posture.
+    """A Gaussian process of the residuals over the joint configuration.
 
-    Three coordinates share the lengths over which they change: how much, over what, and what is noise is learnt from
-    the points themselves. Far from all points it is 0.
+    Three coordinates share their length scales, amplitude and noise, which are learnt from the points themselves. Far
+    from all points it is 0.
     """
 
     def __init__(self, arm: Arm, process: Any, scale: float) -> None:
@@ -105,258 +113,272 @@ class ResidualModel:
         self._arm, self._process, self._scale = arm, process, scale
 
     def shift(self, q: ArrayLike) -> Array:
-        """Return (m, 3) what is to be added to where the arm has its tool [m]."""
+        """Return (m, 3) what is to be added to the positions of the arm's tool [m]."""
         with one_core():
             mean = self._process.predict(_features(self._arm, np.atleast_2d(joint_array(q, self._arm.n))))
         return np.asarray(mean * self._scale, dtype=np.float64)
 
 
-def compare_held_out(name: str, before: Array, after: Array, posture: Numbers) -> ModelComparison:
-    """Return whether held-out distances got smaller by more than chance makes of it.
+def compare_held_out(name: str, before: Array, after: Array, configuration: Numbers) -> ModelComparison:
+    """Compare held-out distances without and with a candidate.
 
     Args:
-        name: of what was tried.
+        name: of the candidate.
         before: (p,) distances without it [m].
         after: (p,) distances with it [m].
-        posture: (p,) of each by number; readings of one posture are off together, and count once.
+        configuration: (p,) number of that of each; readings of one configuration are correlated, and count once.
     """
     gain = float((before - after).mean())
-    by_posture = np.bincount(np.unique(posture, return_inverse=True)[1], before - after - gain)
-    count = len(by_posture)
-    chance = float(np.sqrt(count / max(1, count - 1) * np.sum(by_posture**2)) / len(before))
-    sure, worth = gain > _SURE * chance, gain > _WORTH * float(before.mean())
-    if sure and worth:
-        why = "held-out points are hit better"
+    cluster = np.bincount(np.unique(configuration, return_inverse=True)[1], before - after - gain)
+    count = len(cluster)
+    standard_error = float(np.sqrt(count / max(1, count - 1) * np.sum(cluster**2)) / len(before))
+    significant, worth = gain > _SIGNIFICANT * standard_error, gain > _WORTH * float(before.mean())
+    if significant and worth:
+        reason = "the held-out error decreases"
     elif gain <= 0:
-        why = "held-out points are hit no better"
-    elif not sure:
-        why = "the gain may be chance"
+        reason = "the held-out error does not decrease"
+    elif not significant:
+        reason = "the gain is not significant"
     else:
-        why = "the gain is not worth it"
-    return ModelComparison(name, float(after.mean()), gain, chance, kept=sure and worth, why=why)
+        reason = "the gain is too small to be worth it"
+    return ModelComparison(
+        name, float(after.mean()), gain, standard_error, accepted=significant and worth, reason=reason
+    )
 
 
-class _Parts:
-    """Readings dealt out into parts, and what was fitted without some of them: each is fitted once."""
+class _Folds:
+    """Readings in folds, and what was fitted without some of them: each is fitted once."""
 
-    def __init__(self, arm: Arm, seen: Readings, *, folds: int, seed: int, base: Array | None) -> None:
-        self.arm, self.seen, self.seed, self.base = arm, seen, seed, base
-        self.away = random_folds(seen.q, folds, seed)
-        self.points = seen.with_point & (seen.frame == 0)
-        self.posture = distinct_configurations(seen.q)
-        self._fitted: dict[tuple[frozenset[int], tuple[str, ...]], Calibration] = {}
-        self._learnt: dict[tuple[frozenset[int], tuple[str, ...]], ResidualModel] = {}
+    def __init__(self, arm: Arm, measured: Readings, *, folds: int, seed: int, base: Array | None) -> None:
+        self.arm, self.measured, self.seed, self.base = arm, measured, seed, base
+        self.folds = random_folds(measured.q, folds, seed)
+        self.points = measured.with_point & (measured.frame == 0)
+        self.configuration = distinct_configurations(measured.q)
+        self._calibrations: dict[tuple[frozenset[int], tuple[str, ...]], Calibration] = {}
+        self._residual_models: dict[tuple[frozenset[int], tuple[str, ...]], ResidualModel] = {}
 
-    def within(self, out: frozenset[int]) -> Flags:
-        """Return (m,) which readings are not in some parts."""
-        return ~np.any([self.away[part] for part in out], axis=0) if out else np.ones(len(self.seen), dtype=np.bool_)
+    def without(self, out: frozenset[int]) -> Flags:
+        """Return (m,) which readings are not in some folds."""
+        if not out:
+            return np.ones(len(self.measured), dtype=np.bool_)
+        return np.asarray(~np.any([self.folds[fold] for fold in out], axis=0), dtype=np.bool_)
 
-    def fitted(self, out: frozenset[int], bends: tuple[JointErrorModel, ...]) -> Calibration:
-        """Return the arm as calibrated without some parts."""
-        key = (out, tuple(bend.name for bend in bends))
-        if key not in self._fitted:
-            self._fitted[key] = (
+    def calibration(self, out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> Calibration:
+        """Return the arm as calibrated without some folds."""
+        key = (out, tuple(error.name for error in joints))
+        if key not in self._calibrations:
+            called = f"part {' and '.join(str(fold + 1) for fold in sorted(out))} of {len(self.folds)}"
+            self._calibrations[key] = (
                 calibrate_without(
-                    self.arm, self.seen, ~self.within(out), self._called(out), base=self.base, bends=bends
+                    self.arm, self.measured, ~self.without(out), called, base=self.base, joint_errors=joints
                 )
                 if out
-                else calibrate(self.arm, self.seen, base=self.base, bends=bends)
+                else calibrate(self.arm, self.measured, base=self.base, joint_errors=joints)
             )
-        return self._fitted[key]
+        return self._calibrations[key]
 
-    def _called(self, out: frozenset[int]) -> str:
-        return f"part {' and '.join(str(part + 1) for part in sorted(out))} of {len(self.away)}"
+    def residual_model(self, out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> "ResidualModel":
+        """Return the model of the residuals of the same readings."""
+        key = (out, tuple(error.name for error in joints))
+        if key not in self._residual_models:
+            calibration, train = self.calibration(out, joints), self.points & self.without(out)
+            q = self.measured.q[train]
+            residuals = self.measured.points[train] - calibration.predict(q)
+            self._residual_models[key] = _fit_residuals(self.arm, q, residuals, self.seed)
+        return self._residual_models[key]
 
-    def learnt(self, out: frozenset[int], bends: tuple[JointErrorModel, ...]) -> "ResidualModel":
-        """Return what the same readings teach of what it leaves."""
-        key = (out, tuple(bend.name for bend in bends))
-        if key not in self._learnt:
-            found, train = self.fitted(out, bends), self.points & self.within(out)
-            q = self.seen.q[train]
-            self._learnt[key] = _learn(self.arm, q, self.seen.points[train] - found.predict(q), self.seed)
-        return self._learnt[key]
-
-    def held(self, out: frozenset[int], bends: tuple[JointErrorModel, ...], *, learn: bool = False) -> HeldOut:
-        """Return by how much readings miss arms that were fitted without their part, and without some others."""
-        held = HeldOut.unknown(len(self.seen))
-        for part in set(range(len(self.away))) - out:
-            without = out | {part}
-            found, away = self.fitted(without, bends), self.away[part]
-            held.put(away, _missed(found, self.learnt(without, bends) if learn else None, self.seen.take(away)))
+    def held_out(
+        self, out: frozenset[int], joints: tuple[JointErrorModel, ...], *, with_residual_model: bool = False
+    ) -> HeldOut:
+        """Return by how much readings miss arms that were fitted without their fold, and without some others."""
+        held = HeldOut.unknown(len(self.measured))
+        for fold in set(range(len(self.folds))) - out:
+            without = out | {fold}
+            rows = self.folds[fold]
+            model = self.residual_model(without, joints) if with_residual_model else None
+            held.put(rows, _errors(self.calibration(without, joints), model, self.measured.take(rows)))
         return held
 
 
-class _Choice(NamedTuple):
-    """What held-out points chose."""
+class _Selection(NamedTuple):
+    """The model that held-out points chose."""
 
-    bends: tuple[JointErrorModel, ...]
-    learn: bool
+    joints: tuple[JointErrorModel, ...]
+    with_residual_model: bool
     geometry: HeldOut
-    held: HeldOut
-    tried: tuple[ModelComparison, ...]
+    held_out: HeldOut
+    comparisons: tuple[ModelComparison, ...]
 
 
 def calibrate_nongeometric(
     arm: Arm,
-    seen: Readings,
+    measured: Readings,
     *,
     folds: int = 5,
     seed: int = 0,
     base: Array | None = None,
-    unseen: bool = False,
+    nested: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> NongeometricCalibration:
-    """Calibrate an arm, and try what is not geometry: springs, gears once and twice a turn, a learnt residual.
+    """Calibrate an arm, and try joint compliance, two harmonics of transmission errors and a residual model.
 
     Args:
-        arm: as it is said to be, with n joints.
-        seen: readings of it, points among them.
-        folds: parts in which postures are held out.
-        seed: of the parts.
+        arm: the nominal arm, with n joints.
+        measured: readings of it, points among them.
+        folds: of the cross-validation.
+        seed: of the folds.
         base: see ``calibrate``.
-        unseen: whether to hold points out of the choice, too, which takes about three times as long.
-        progress: told what is being done.
+        nested: whether to hold points out of the choice, too, which takes about three times as long.
+        progress: called with what is being done.
 
     Raises:
         InvalidValueError: no point was measured, or see ``calibrate``.
     """
-
-    def told(what: str) -> None:
-        if progress is not None:
-            progress(what)
-
-    parts = _Parts(arm, seen, folds=folds, seed=seed, base=base)
-    if not parts.points.any():
-        raise InvalidValueError("expected points in the measuring frame, on which what is left is seen; got none")
-    chosen = _chosen(parts, frozenset(), told)
-    told("fitting all that is kept")
-    found = parts.fitted(frozenset(), chosen.bends)
+    report = progress or _ignore
+    data = _Folds(arm, measured, folds=folds, seed=seed, base=base)
+    if not data.points.any():
+        raise InvalidValueError("expected points in the measuring frame, whose residuals are modelled; got none")
+    every: frozenset[int] = frozenset()
+    selection = _select(data, every, report)
+    report("fitting the accepted model")
     return NongeometricCalibration(
-        calibration=found,
-        learnt=parts.learnt(frozenset(), chosen.bends) if chosen.learn else None,
-        tried=chosen.tried,
-        geometry=chosen.geometry,
-        held_out=chosen.held,
-        unseen=_unseen(parts, told) if unseen else None,
+        calibration=data.calibration(every, selection.joints),
+        residual_model=data.residual_model(every, selection.joints) if selection.with_residual_model else None,
+        comparisons=selection.comparisons,
+        geometry=selection.geometry,
+        held_out=selection.held_out,
+        nested=_nested(data, report) if nested else None,
     )
 
 
-def _unseen(parts: _Parts, told: Callable[[str], None]) -> HeldOut | None:
-    """Return by how much readings miss arms of which they chose nothing; None where too few are left to choose by."""
-    held = HeldOut.unknown(len(parts.seen))
-    for number, away in enumerate(parts.away):
+def _ignore(what: str) -> None:
+    """Report nothing."""
+
+
+def _nested(data: _Folds, report: Callable[[str], None]) -> HeldOut | None:
+    """Return the errors of nested cross-validation; None where too few readings are left to choose by."""
+    held = HeldOut.unknown(len(data.measured))
+    for number, rows in enumerate(data.folds):
         out = frozenset({number})
-        told(f"holding points out of the choice, part {number + 1} of {len(parts.away)}")
+        report(f"nested cross-validation, part {number + 1} of {len(data.folds)}")
         try:
-            chosen = _chosen(parts, out, lambda _: None)
+            selection = _select(data, out, _ignore)
         except (ContradictionError, InvalidValueError):
             return None
-        found = parts.fitted(out, chosen.bends)
-        learnt = parts.learnt(out, chosen.bends) if chosen.learn else None
-        held.put(away, _missed(found, learnt, parts.seen.take(away)))
+        model = data.residual_model(out, selection.joints) if selection.with_residual_model else None
+        held.put(rows, _errors(data.calibration(out, selection.joints), model, data.measured.take(rows)))
     return held
 
 
-def _chosen(parts: _Parts, out: frozenset[int], told: Callable[[str], None]) -> _Choice:
-    """Return what the points outside of some parts confirm.
+def _select(data: _Folds, out: frozenset[int], report: Callable[[str], None]) -> _Selection:
+    """Return the model that the points outside of some folds confirm.
 
     Args:
-        parts: the readings.
-        out: parts that are left out of everything.
-        told: is told what is being done.
+        data: the readings.
+        out: folds that are left out of everything.
+        report: called with what is being done.
     """
-    if len(parts.away) - len(out) < 2:
+    if len(data.folds) - len(out) < 2:
         raise TooFewError("two parts of the readings at least must be left to choose by")
-    points = parts.points & parts.within(out)
-    posture = parts.posture[points]
+    points = data.points & data.without(out)
+    configuration = data.configuration[points]
 
-    def of_points(name: str, before: HeldOut, after: HeldOut) -> ModelComparison:
-        return compare_held_out(name, before.distance[points], after.distance[points], posture)
+    def compare(name: str, before: HeldOut, after: HeldOut) -> ModelComparison:
+        return compare_held_out(name, before.distance[points], after.distance[points], configuration)
 
-    told("holding points out: geometry")
-    held = geometry = parts.held(out, ())
-    tried = [ModelComparison("geometry", float(held.distance[points].mean()), 0.0, 0.0, kept=True, why="")]
-    bends, held = _kept_bends(
-        parts.arm, held, judged=of_points, validated=lambda bends: parts.held(out, bends), tried=tried, told=told
+    report("cross-validating: geometry")
+    held = geometry = data.held_out(out, ())
+    comparisons = [ModelComparison("geometry", float(held.distance[points].mean()), 0.0, 0.0, accepted=True, reason="")]
+    joints, held = _select_joint_errors(
+        data.arm,
+        held,
+        compare=compare,
+        validate=lambda joints: data.held_out(out, joints),
+        comparisons=comparisons,
+        report=report,
     )
-    told("learning what is left")
-    name, learn = "what is left, learnt", False
+    report("modelling the residuals")
+    name, accepted = "Gaussian process of the residuals", False
     try:
-        better = parts.held(out, bends, learn=True)
+        better = data.held_out(out, joints, with_residual_model=True)
     except MissingExtraError as error:
-        tried.append(ModelComparison(name, None, 0.0, 0.0, kept=False, why=str(error)))
+        comparisons.append(ModelComparison.rejected(name, str(error)))
     else:
-        tried.append(of_points(name, held, better))
-        learn = tried[-1].kept
-        held = better if learn else held
-    return _Choice(bends, learn, geometry, held, tuple(tried))
+        comparisons.append(compare(name, held, better))
+        accepted = comparisons[-1].accepted
+        held = better if accepted else held
+    return _Selection(joints, accepted, geometry, held, tuple(comparisons))
 
 
-def _kept_bends(
+def _select_joint_errors(
     arm: Arm,
     held: HeldOut,
     *,
-    judged: Callable[[str, HeldOut, HeldOut], ModelComparison],
-    validated: Callable[[tuple[JointErrorModel, ...]], HeldOut],
-    tried: list[ModelComparison],
-    told: Callable[[str], None],
+    compare: Callable[[str, HeldOut, HeldOut], ModelComparison],
+    validate: Callable[[tuple[JointErrorModel, ...]], HeldOut],
+    comparisons: list[ModelComparison],
+    report: Callable[[str], None],
 ) -> tuple[tuple[JointErrorModel, ...], HeldOut]:
-    """Return the bends that held-out points confirm, and these points with them; say what was tried.
+    """Return the error models of joints that held-out points confirm, and the held-out errors with them.
 
     Args:
-        arm: as it is said to be.
-        held: of geometry alone.
-        judged: says whether readings are hit better.
-        validated: holds readings out, with some bends.
-        tried: grows by what is tried here.
-        told: is told what is being done.
+        arm: the nominal arm.
+        held: held-out errors of geometry alone.
+        compare: held-out errors without and with a candidate.
+        validate: cross-validates with some models.
+        comparisons: grows by what is tried here.
+        report: called with what is being done.
     """
-    candidates = [("joints that give under gravity", compliances(arm))]
+    candidates = [("joint compliance under gravity", compliances(arm), f"{arm.name} has no masses")]
     candidates += [
-        (f"gears, {('once', 'twice')[order - 1]} a turn", transmission_errors(arm, order)) for order in _ORDERS
+        (
+            f"transmission error, {harmonic} harmonic",
+            transmission_errors(arm, order),
+            f"no joint of {arm.name} is revolute",
+        )
+        for order, harmonic in enumerate(_HARMONICS, 1)
     ]
-    bends: tuple[JointErrorModel, ...] = ()
-    parts: list[tuple[int, tuple[JointErrorModel, ...]]] = []
-    for name, more in candidates:
+    joints: tuple[JointErrorModel, ...] = ()
+    accepted: list[tuple[int, tuple[JointErrorModel, ...]]] = []
+    for name, more, absent in candidates:
         if not more:
-            tried.append(ModelComparison(name, None, 0.0, 0.0, kept=False, why=_not_there(name, arm)))
+            comparisons.append(ModelComparison.rejected(name, absent))
             continue
-        told(f"holding points out: {name}")
+        report(f"cross-validating: {name}")
         try:
-            better = validated((*bends, *more))
+            better = validate((*joints, *more))
         except (ContradictionError, InvalidValueError) as error:
-            tried.append(ModelComparison(name, None, 0.0, 0.0, kept=False, why=str(error)))
+            comparisons.append(ModelComparison.rejected(name, str(error)))
             continue
-        tried.append(judged(name, held, better))
-        if tried[-1].kept:
-            bends, held = (*bends, *more), better
-            parts.append((len(tried) - 1, more))
-    # What was kept first may have stood in for what came later.
-    for number, part in parts[:-1]:
-        told(f"holding points out: without {tried[number].name}")
-        fewer = tuple(bend for bend in bends if bend not in part)
-        less = validated(fewer)
-        if not judged(tried[number].name, less, held).kept:
-            bends, held = fewer, less
-            tried[number] = tried[number]._replace(kept=False, why="what was kept later does it too")
-    return bends, held
+        comparisons.append(compare(name, held, better))
+        if comparisons[-1].accepted:
+            joints, held = (*joints, *more), better
+            accepted.append((len(comparisons) - 1, more))
+    # What was accepted first may have stood in for what came later.
+    for number, part in accepted[:-1]:
+        name = comparisons[number].name
+        report(f"cross-validating: without {name}")
+        fewer = tuple(error for error in joints if error not in part)
+        less = validate(fewer)
+        if not compare(name, less, held).accepted:
+            joints, held = fewer, less
+            comparisons[number] = comparisons[number]._replace(
+                accepted=False, reason="superfluous beside a later candidate"
+            )
+    return joints, held
 
 
-def _not_there(name: str, arm: Arm) -> str:
-    return f"{arm.name} has no masses" if "gravity" in name else f"no joint of {arm.name} turns"
+def _errors(calibration: Calibration, model: ResidualModel | None, measured: Readings) -> HeldOut:
+    """Return by how much a calibrated arm misses readings, with its residual model where they are points."""
+    errors, points = held_out_errors(calibration, measured), measured.with_point & (measured.frame == 0)
+    if model is not None and points.any():
+        errors.positions[points] += model.shift(measured.q[points])
+        errors.distance[points] = np.linalg.norm(errors.positions[points] - measured.points[points], axis=1)
+    return errors
 
 
-def _missed(found: Calibration, learnt: "ResidualModel | None", seen: Readings) -> HeldOut:
-    """Return by how much readings miss a calibrated arm, with what was learnt added where they are points."""
-    off, points = held_out_errors(found, seen), seen.with_point & (seen.frame == 0)
-    if learnt is not None and points.any():
-        off.places[points] += learnt.shift(seen.q[points])
-        off.distance[points] = np.linalg.norm(off.places[points] - seen.points[points], axis=1)
-    return off
-
-
-def _learn(arm: Arm, q: Array, left: Array, seed: int) -> ResidualModel:
-    """Learn what is left (m, 3) as a function of the posture (m, n).
+def _fit_residuals(arm: Arm, q: Array, residuals: Array, seed: int) -> ResidualModel:
+    """Fit a Gaussian process to residuals (m, 3) as a function of the configuration (m, n).
 
     Raises:
         MissingExtraError: scikit-learn is not installed.
@@ -367,23 +389,23 @@ def _learn(arm: Arm, q: Array, left: Array, seed: int) -> ResidualModel:
         from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
     except ImportError as error:
         raise MissingExtraError(
-            'learning what is left needs scikit-learn: pip install "armwright[calibration]"'
+            'a model of the residuals needs scikit-learn: pip install "armwright[calibration]"'
         ) from error
     x = _features(arm, q)
-    scale = float(np.sqrt(np.mean(left**2))) or 1.0
-    some = np.random.default_rng(seed).permutation(len(x))[:_MOST]
-    kernel = ConstantKernel(0.3, _AMPLITUDE) * RBF([1.0] * x.shape[1], _LENGTHS) + WhiteKernel(0.7, _NOISE)
+    scale = float(np.sqrt(np.mean(residuals**2))) or 1.0
+    some = np.random.default_rng(seed).permutation(len(x))[:_MAX_POINTS]
+    kernel = ConstantKernel(0.3, _AMPLITUDE) * RBF([1.0] * x.shape[1], _LENGTH_SCALES) + WhiteKernel(0.7, _NOISE)
     first = GaussianProcessRegressor(kernel, random_state=seed)
     with warnings.catch_warnings(), one_core():
-        # A length at its bound is a joint that hardly matters.
+        # A length scale at its bound is a joint that hardly matters.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        first.fit(x[some], left[some] / scale)
-        process = GaussianProcessRegressor(first.kernel_, optimizer=None).fit(x, left / scale)
+        first.fit(x[some], residuals[some] / scale)
+        process = GaussianProcessRegressor(first.kernel_, optimizer=None).fit(x, residuals / scale)
     return ResidualModel(arm, process, scale)
 
 
 def _features(arm: Arm, q: Array) -> Array:
-    """Return sines and cosines of turning joints, and positions of slides [m], (m, k)."""
-    turning = [joint.revolute for joint in arm.joints]
-    turns, slides = q[:, turning], q[:, [not one for one in turning]]
-    return np.hstack([np.sin(turns), np.cos(turns), slides])
+    """Return sines and cosines of revolute joints, and positions of prismatic ones [m], (m, k)."""
+    revolute = np.array([joint.revolute for joint in arm.joints], dtype=np.bool_)
+    angles, slides = q[:, revolute], q[:, ~revolute]
+    return np.hstack([np.sin(angles), np.cos(angles), slides])

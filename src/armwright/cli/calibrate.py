@@ -1,7 +1,7 @@
 """``armwright calibrate``: a better arm from measured points."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -9,13 +9,10 @@ from armwright.cli.failures import outcome
 from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json, Quiet
-from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
+from armwright.cli.printing import command_line, print_json, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.errors import DoubtfulError
-
-if TYPE_CHECKING:
-    from armwright.report.calibrated import Calibrated
 
 
 def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -57,48 +54,28 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.arrays import one_core
+    from armwright.calibration.assess import assess_calibration
     from armwright.calibration.measurements import read_measurements
-    from armwright.report.calibrated import as_data, calibrated
-    from armwright.report.calibrated_files import calibrated_files
+    from armwright.report.calibration_files import calibration_files
 
     model = with_tool(load_arm(arm), tool_mm)
     warn_of_stray(measured)
     measurements = read_measurements(measured, model, units=units_of(units))
-    with waiting("calibrating", quiet=quiet or as_json) as told, one_core():
+    with waiting("calibrating", quiet=quiet or as_json) as progress, one_core():
         noise = None if noise_um is None else noise_um * 1e-6
-        found = calibrated(model, measurements, folds=folds, seed=seed, beyond=beyond, noise=noise, progress=told)
+        assessment = assess_calibration(
+            model, measurements, folds=folds, seed=seed, nongeometric=beyond, noise=noise, progress=progress
+        )
     if output is not None:
         title = f"{model.name}, {measured.name}"
-        write_results(output, calibrated_files(found, title=title, command=command_line()))
-    against = found.contradictions
+        write_results(output, calibration_files(assessment, title=title, command=command_line()))
+    against = assessment.contradictions
     doubtful = DoubtfulError(f"the readings contradict the arm: {'; '.join(against)}") if against else None
     if as_json:
-        print_json({**outcome(doubtful), **as_data(found)})
+        print_json({**outcome(doubtful), **assessment.as_data()})
     elif not quiet:
-        _print(found)
+        print_result(assessment)
         if output is not None:
             print(f"report: {output / 'report.html'}")
     if doubtful is not None:
         raise doubtful
-
-
-def _print(found: "Calibrated") -> None:
-    from armwright.report.calibrated import shown_errors
-    from armwright.report.calibrated_files import result_tables
-
-    console = plain_console()
-    errors = table(
-        ("error", "value", "±", "unit"), shown_errors(found.full), title=f"{found.arm.name}: errors found", words=(0, 3)
-    )
-    print_table(console, errors)
-    held = ((one.name, one.why) for one in found.full.held)
-    print_table(console, table(("error", "why"), held, title="Not fitted", words=(0, 1)))
-    for one in result_tables(found):
-        rows = list(one.rows)
-        if rows:
-            words = [i for i in range(len(one.heads)) if i not in one.numbers]
-            print_table(console, table(one.heads, rows, title=one.title, words=words))
-            if one.remark:
-                console.print(one.remark)
-    for note in found.notes:
-        console.print(note)

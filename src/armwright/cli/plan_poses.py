@@ -56,7 +56,7 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     if after is not None:
         warn_of_stray(after)
     measured = None if after is None else read_measurements(after, model, units=units_of(units)).q
-    plan = planned(model, count, index=index, seed=seed, turns=turns, measured=measured)  # type: ignore[arg-type]
+    plan = planned(model, count, index=index, seed=seed, rotations=turns, measured=measured)  # type: ignore[arg-type]
     if output is not None:
         write_file(output, _csv(model, plan))
     if as_json:
@@ -72,7 +72,7 @@ def _as_data(plan: "MeasurementPlan") -> dict[str, Any]:
         "q": plan.q.tolist(),
         "tells": list(plan.names),
         "observability": plan.observability._asdict(),
-        "by chance": plan.by_chance._asdict(),
+        "by chance": plan.random._asdict(),
     }
 
 
@@ -96,6 +96,6 @@ def _print(model: "Arm", plan: "MeasurementPlan") -> None:
     console = plain_console()
     console.print(f"{len(plan.q)} poses of {model.name} tell {len(plan.names)} errors:")
     console.print(", ".join(plan.names))
-    rows = zip(plan.observability._fields, plan.observability, plan.by_chance, strict=True)
+    rows = zip(plan.observability._fields, plan.observability, plan.random, strict=True)
     shown = ((name, f"{ours:.4g}", f"{chance:.4g}") for name, ours, chance in rows)
     print_table(console, table(("index", "these poses", "by chance"), shown))

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+    from armwright.files.result_table import Result, ResultTable
+
 # Of a table that is measured: more than any has [columns].
 _WIDEST = 10_000
 
@@ -37,6 +39,24 @@ def print_json(data: Any) -> None:
 def plain_console() -> "Console":
     """Return a console that takes every text as it is."""
     return console(highlight=False)
+
+
+def print_result(result: "Result") -> None:
+    """Print the tables of a result, and its notes below."""
+    console = plain_console()
+    print_result_tables(console, result.tables())
+    for note in result.notes:
+        console.print(note)
+
+
+def print_result_tables(console: "Console", tables: "Iterable[ResultTable]") -> None:
+    """Print tables of results, those without rows left out."""
+    for result in tables:
+        if result.rows:
+            words = [i for i in range(len(result.heads)) if i not in result.numbers]
+            print_table(console, table(result.heads, result.rows, title=result.title or None, words=words))
+            if result.remark:
+                console.print(result.remark)
 
 
 def print_table(console: "Console", shown: "Table") -> None:

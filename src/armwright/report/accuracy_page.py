@@ -7,8 +7,9 @@ import numpy as np
 
 from armwright.accuracy.assessment import Assessment
 from armwright.accuracy.characteristics import Measure
+from armwright.files.result_table import ResultTable
 from armwright.report.figures import Drawing
-from armwright.report.plain_page import Table, plain_page
+from armwright.report.plain_page import plain_page
 
 # Units in which people read what is in SI units: name and how many of it are one.
 _SHOWN = {
@@ -91,13 +92,13 @@ def accuracy_page(found: Assessment, drawn: Sequence[Drawing], *, title: str, co
     bounded = [one.holds for one in found.measures if one.holds is not None]
     kept = all(bounded)
     seen = [shown_measure(one) for one in found.measures]
-    measures = Table(
+    measures = ResultTable(
         title="Measures",
         remark="n: cycles measured, of those that ISO 9283 asks for",
         heads=("Test", "Of", "Symbol", "Measure", "Value", "Unit", "n", "Limit", "Note"),
         rows=map(_row, found.measures, seen),
         numbers=(4, 6, 7),
-        marks=[{"exceeds": "over"}.get(one.verdict, one.verdict) for one in seen],
+        marks=tuple({"exceeds": "over"}.get(one.verdict, one.verdict) for one in seen),
     )
     return plain_page(
         title=title,

@@ -1,9 +1,8 @@
 """A page that stands still: heading, notes, tables and figures."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable
 
-import attrs
-
+from armwright.files.result_table import ResultTable
 from armwright.report.elements import badge, card, facts, figures, table
 from armwright.report.elements import notes as shown_notes
 from armwright.report.figures import Drawing
@@ -11,32 +10,11 @@ from armwright.report.markup import page_html
 from armwright.version import __version__
 
 
-@attrs.frozen(kw_only=True)
-class Table:
-    """A table of a page, in plain texts.
-
-    Attributes:
-        title: above it.
-        heads: names of the columns.
-        rows: texts of each row.
-        numbers: columns of numbers, from 0.
-        marks: of the rows: ``over`` or ``holds`` a limit, or empty; none needs one.
-        remark: beside the title; may be empty.
-    """
-
-    title: str
-    heads: Sequence[str]
-    rows: Iterable[Sequence[str]]
-    numbers: Collection[int] = ()
-    marks: Iterable[str] = ()
-    remark: str = ""
-
-
 def plain_page(
     *,
     title: str,
     command: str,
-    tables: Iterable[Table],
+    tables: Iterable[ResultTable],
     drawn: Iterable[Drawing] = (),
     notes: Iterable[str] = (),
     named: Iterable[tuple[str, str]] = (),
@@ -56,12 +34,11 @@ def plain_page(
     Returns:
         HTML text; write it as UTF-8.
     """
-    cards = []
-    for one in tables:
-        rows = list(one.rows)
-        if rows:
-            content = table(one.heads, rows, numbers=one.numbers, marks=one.marks)
-            cards.append(card(one.title, content, remark=one.remark))
+    cards = [
+        card(shown.title, table(shown.heads, shown.rows, numbers=shown.numbers, marks=shown.marks), remark=shown.remark)
+        for shown in tables
+        if shown.rows
+    ]
     pictures = list(drawn)
     if pictures:
         cards.append(card("Figures", figures(pictures)))

@@ -120,7 +120,7 @@ def postures(errors: Array, points: Array) -> Array:
     for point in points:
 
         def missing(q: Array, point: Array = point) -> Array:
-            return np.asarray(chain().reach(q, errors).position[0] - point, dtype=np.float64)
+            return np.asarray(chain().forward(q, errors).position[0] - point, dtype=np.float64)
 
         guess = least_squares(missing, guess, xtol=1e-15, ftol=1e-15, gtol=1e-15).x
         found.append(guess)
@@ -140,10 +140,10 @@ def thesis_fit(data: Touched) -> Array:
 
     def total(x: Array) -> tuple[float, Array]:
         errors[kept] = x * bound
-        reached = chain().reach(data.q, errors)
+        reached = chain().forward(data.q, errors)
         off = reached.position - data.points
         size = np.linalg.norm(off, axis=1)
-        slope = np.einsum("mi,mik->k", off / np.maximum(size, 1e-12)[:, None], reached.by_position)[kept] * bound
+        slope = np.einsum("mi,mik->k", off / np.maximum(size, 1e-12)[:, None], reached.position_jacobian)[kept] * bound
         return float(size.sum() * 1e3), slope * 1e3
 
     start, bounds = np.zeros(len(kept)), [(-1.0, 1.0)] * len(kept)
@@ -162,7 +162,7 @@ def full_fit(attitudes: tuple[str, ...]) -> Calibration:
 def verified(errors: Array) -> tuple[float, ...]:
     """Return how far the true arm is from six places when it is led by a model with these errors [mm]."""
     places = np.array(PRINTED_POINTS) / 1e3
-    reached = chain().reach(postures(errors, places), truth()).position
+    reached = chain().forward(postures(errors, places), truth()).position
     return tuple(float(x) * 1e3 for x in np.linalg.norm(reached - places, axis=1))
 
 
@@ -179,7 +179,7 @@ def parameter_table() -> list[tuple[str, float, float | None, float | None, floa
     """Return by error the truth, the thesis' fit on the flat board, ours on all boards and its deviation, SI."""
     ours = full_fit(tuple(ATTITUDES))
     thesis = thesis_fit(touched("flat"))
-    found = dict(zip(ours.names, zip(ours.values, ours.deviations, strict=True), strict=True))
+    found = dict(zip(ours.names, zip(ours.values, ours.standard_errors, strict=True), strict=True))
     table = []
     for i, name in enumerate(chain().names):
         value, deviation = found.get(name, (None, None))

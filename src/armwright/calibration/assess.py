@@ -1,0 +1,400 @@
+"""The assessment of a calibration: fits with and without rotations about y, held-out errors, ISO 9283, contradictions.
+
+Source:
+    Spec of the calibration; ISO 9283:1998 for accuracy and repeatability.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import attrs
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.calibration.chain import chain_of
+from armwright.calibration.contradictions import contradictions, refuse_noise
+from armwright.calibration.cross_validation import HeldOut, cross_validate
+from armwright.calibration.fitting import Calibration, calibrate
+from armwright.calibration.iso9283 import Accuracy, Repeatability, accuracy, repeatability
+from armwright.calibration.joint_errors import largest_gravity_efforts
+from armwright.calibration.measurement_model import PoseError
+from armwright.calibration.measurements import Measurements
+from armwright.calibration.nongeometric import NongeometricCalibration, calibrate_nongeometric
+from armwright.calibration.readings import Readings, refuse_not_fitted
+from armwright.errors import ContradictionError, InvalidValueError
+from armwright.files.result_table import ResultTable
+from armwright.spatial.euler import to_rpy
+
+# Rotations about y, which a Denavit-Hartenberg table has no number for.
+_TILTS = ("beta",)
+# A nominal arm whose points are farther from the readings was not measured in its own frame [m].
+_ANOTHER_FRAME = 0.2
+# How many readings a note names.
+_NAMED = 8
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class CalibrationAssessment:
+    """A calibration and how good it is.
+
+    Attributes:
+        arm: the nominal arm.
+        measurements: of it.
+        full: with all errors that are identifiable.
+        tabular: without rotations about y, for arm files.
+        nominal: (p,) distances of the points from the nominal arm; none where it stands in another frame [m].
+        held_out: from arms calibrated without the reading, all errors.
+        held_out_region: from arms calibrated without the region of the workspace in which the reading lies; None where
+            a region cannot be left out.
+        held_out_tabular: from arms calibrated without the reading, without rotations about y.
+        check: errors of readings that the file keeps for checking, from the corrected arm.
+        accuracy: AP and AD by kind of arm: nominal, with its base best-fitted, calibrated (held out).
+        repeatability: RP of configurations that were measured more than once; None where none was.
+        nongeometric: the non-geometric calibration; None where it was not asked for.
+        contradictions: by what the readings contradict the arm that was fitted to them; empty where they do not.
+    """
+
+    arm: Arm
+    measurements: Measurements
+    full: Calibration
+    tabular: Calibration
+    nominal: Array
+    held_out: HeldOut
+    held_out_region: HeldOut | None
+    held_out_tabular: HeldOut
+    check: PoseError
+    accuracy: dict[str, Accuracy]
+    repeatability: Repeatability | None
+    nongeometric: NongeometricCalibration | None
+    contradictions: tuple[str, ...]
+
+    @property
+    def fitted(self) -> Readings:
+        """The readings that were fitted to."""
+        return self.measurements.readings.take(~self.measurements.check)
+
+    @property
+    def distances(self) -> dict[str, Array]:
+        """Distances between readings and arms by the kind of arm [m]."""
+        beyond = self.nongeometric
+        kinds = {
+            "nominal arm and base": self.nominal,
+            "nominal, base best-fitted": self.full.before.distance,
+            "calibrated, held out": self.held_out.distance,
+            "calibrated, region held out": self.held_out_region.distance if self.held_out_region else (),
+            "calibrated, all readings": self.full.after.distance,
+            "arm file, held out": self.held_out_tabular.distance,
+            "non-geometric, held out": beyond.nested.distance if beyond and beyond.nested else (),
+            "calibrated, check readings": self.check.distance,
+            "non-geometric, check readings": (
+                beyond.errors(self.measurements.readings.take(self.measurements.check)).distance if beyond else ()
+            ),
+        }
+        return {name: np.asarray(x, dtype=np.float64) for name, x in kinds.items() if len(x)}
+
+    @property
+    def angles(self) -> dict[str, Array]:
+        """Angles between the rotations of readings and arms [rad]; none where no rotation was measured."""
+        kinds = {
+            "nominal, base best-fitted": self.full.before.angle,
+            "calibrated, held out": self.held_out.angle,
+            "calibrated, all readings": self.full.after.angle,
+            "calibrated, check readings": self.check.angle,
+        }
+        return {name: x[np.isfinite(x)] for name, x in kinds.items() if np.isfinite(x).any()}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know beside the numbers."""
+        return (
+            *(f"DOUBTFUL: {reason}" for reason in self.contradictions),
+            *_notes_on_fit(self.full, self.measurements),
+            _note_on_held_out(self.held_out, self.held_out_region),
+            *_notes_on_choice(self.nongeometric),
+        )
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data in SI units."""
+        full, beyond = self.full, self.nongeometric
+        data: dict[str, Any] = {
+            "arm": self.arm.name,
+            "readings": len(self.fitted),
+            "errors": _error_data(full),
+            "base_before": full.chain.base.tolist(),
+            "covariance": full.covariance.tolist(),
+            "fixed": {parameter.name: parameter.reason for parameter in full.fixed},
+            "singular_values": full.identifiability.singular_values.tolist(),
+            "noise": full.noise._asdict(),
+            "degrees_of_freedom": full.degrees_of_freedom,
+            "outliers": list(full.outliers),
+            "distances": _mean_and_largest(self.distances),
+            "angles": _mean_and_largest(self.angles),
+            "iso9283": {
+                **{name: figures._asdict() for name, figures in self.accuracy.items()},
+                "repeatability": self.repeatability._asdict() if self.repeatability else None,
+            },
+            "contradictions": list(self.contradictions),
+            "notes": list(self.notes),
+        }
+        if beyond:
+            data["nongeometric"] = {
+                "candidates": [comparison._asdict() for comparison in beyond.comparisons],
+                "errors": _error_data(beyond.calibration),
+            }
+        return data
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Give the errors of readings, then the errors of the arm."""
+        yield ResultTable(
+            title="Distances of the readings from the arm",
+            heads=("", "mean mm", "largest mm"),
+            rows=[(name, f"{x.mean() * 1e3:.4f}", f"{x.max() * 1e3:.4f}") for name, x in self.distances.items()],
+            numbers=(1, 2),
+        )
+        yield ResultTable(
+            title="Angles between the rotations of readings and arm",
+            heads=("", "mean deg", "largest deg"),
+            rows=[
+                (name, f"{math.degrees(x.mean()):.4f}", f"{math.degrees(x.max()):.4f}")
+                for name, x in self.angles.items()
+            ],
+            numbers=(1, 2),
+        )
+        yield ResultTable(
+            title="By ISO 9283",
+            heads=("", "AP mm", "largest", "AD mm", "largest"),
+            rows=[(name, *(f"{x * 1e3:.4f}" for x in figures)) for name, figures in self.accuracy.items()],
+            numbers=(1, 2, 3, 4),
+            remark=_repeatability_remark(self.repeatability),
+        )
+        if self.nongeometric:
+            yield from _nongeometric_tables(self.nongeometric)
+        yield ResultTable(
+            title=f"{self.arm.name}: identified parameter deviations",
+            heads=("error", "value", "±", "unit"),
+            rows=_error_rows(self.full),
+            numbers=(1, 2),
+        )
+        yield ResultTable(
+            title="Not fitted",
+            heads=("error", "reason"),
+            rows=[(parameter.name, parameter.reason) for parameter in self.full.fixed],
+        )
+
+
+def assess_calibration(
+    arm: Arm,
+    measurements: Measurements,
+    *,
+    folds: int = 5,
+    seed: int = 0,
+    nongeometric: bool = False,
+    noise: float | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> CalibrationAssessment:
+    """Calibrate an arm with and without rotations about y, and cross-validate.
+
+    Args:
+        arm: the nominal arm.
+        measurements: of it.
+        folds: of the cross-validation.
+        seed: of the folds.
+        nongeometric: whether to try joint compliance, transmission errors and a residual model.
+        noise: standard deviation of a measured coordinate; where it is stated, larger residuals than it explains are
+            a contradiction [m].
+        progress: called with what is being done.
+
+    Raises:
+        InvalidValueError: see ``calibrate`` and ``cross_validate``; readings to check with are in a frame, of a plane
+            or from an anchor that no fitted reading locates.
+        ShapeError: the readings are of an arm with another number of joints.
+    """
+    report = progress or (lambda _: None)
+    # Before a fit of some seconds.
+    if noise is not None:
+        refuse_noise(noise)
+    measured = measurements.readings.take(~measurements.check)
+    check = measurements.readings.take(measurements.check)
+    refuse_not_fitted(measured, check)
+    full = calibrate(arm, measured, progress=progress)
+    tabular = full if not any(map(_is_tilt, full.names)) else calibrate(arm, measured, without=_TILTS)
+    beyond = (
+        calibrate_nongeometric(arm, measured, folds=folds, seed=seed, nested=True, progress=progress)
+        if nongeometric
+        else None
+    )
+    report("cross-validating: all errors")
+    held_out = beyond.geometry if beyond else cross_validate(arm, measured, folds=folds, seed=seed)
+    report("cross-validating by regions of the workspace")
+    try:
+        held_out_region = cross_validate(arm, measured, folds=folds, regions=True)
+    except (ContradictionError, InvalidValueError):
+        # A frame, a plane or an anchor lies in one region, or too few readings are left.
+        held_out_region = None
+    held_out_tabular = held_out
+    if any(map(_is_tilt, full.chain.names)):
+        report("cross-validating: for the arm file")
+        held_out_tabular = cross_validate(arm, measured, folds=folds, seed=seed, without=_TILTS)
+    positions = {
+        "nominal": chain_of(arm).forward(measured.q).position,
+        "nominal, base best-fitted": full.chain.forward(measured.q).position,
+        "calibrated, held out": held_out.positions,
+    }
+    points = measured.with_point & (measured.frame == 0)
+    nominal = np.linalg.norm(positions["nominal"][points] - measured.points[points], axis=1)
+    if not len(nominal) or np.median(nominal) > _ANOTHER_FRAME:
+        nominal = nominal[:0]
+        del positions["nominal"]
+    if beyond and beyond.nested:
+        positions["non-geometric, held out"] = beyond.nested.positions
+    figures = {name: accuracy(measured, tool) for name, tool in positions.items()}
+    return CalibrationAssessment(
+        arm=arm,
+        measurements=measurements,
+        full=full,
+        tabular=tabular,
+        nominal=np.asarray(nominal, dtype=np.float64),
+        held_out=held_out,
+        held_out_region=held_out_region,
+        held_out_tabular=held_out_tabular,
+        check=full.model.pose_errors(check, full.errors),
+        accuracy={name: values for name, values in figures.items() if values is not None},
+        repeatability=repeatability(measured),
+        nongeometric=beyond,
+        contradictions=tuple(contradictions(full, measured, noise)),
+    )
+
+
+def _is_tilt(name: str) -> bool:
+    return name.endswith(_TILTS)
+
+
+# ---- notes ---------------------------------------------------------------------------------------------------------
+
+
+def _notes_on_fit(full: Calibration, measurements: Measurements) -> Iterator[str]:
+    fitted = np.flatnonzero(~measurements.check)
+    noise = f"the residuals have a standard deviation of {full.noise.length * 1e3:.3g} mm per coordinate"
+    if measurements.readings.with_rotation.any():
+        noise += f" and of {math.degrees(full.noise.angle):.3g} deg per axis"
+    yield f"{len(full.names)} errors fitted to {len(fitted)} readings; {noise}"
+    if any(name.startswith("base.") for name in full.names):
+        base = full.chain.base
+        x, y, z = base[:3, 3] * 1e3
+        angles = ", ".join(f"{angle:z.4f}" for angle in np.degrees(to_rpy(base[:3, :3])))
+        yield (
+            f"the errors base.* count from the best-fitted base of the nominal arm: at {x:z.4f}, {y:z.4f}, {z:z.4f} "
+            f"mm, roll, pitch, yaw {angles} deg in the frame of the measurements"
+        )
+    yield from measurements.warnings
+    if full.outliers:
+        names = ", ".join(measurements.names[fitted[i]] for i in full.outliers[:_NAMED])
+        more = f" and {len(full.outliers) - _NAMED} more" if len(full.outliers) > _NAMED else ""
+        yield f"outliers, which do not count: {names}{more}"
+
+
+def _note_on_held_out(held_out: HeldOut, region: HeldOut | None) -> str:
+    """Return what the figures of held-out readings are good for."""
+    if region is None:
+        return "held out by configuration only: no region of the workspace can be left out of these readings"
+    return (
+        f"held out by configuration ({held_out.distance.mean() * 1e3:.4g} mm) is for poses like those measured, by "
+        f"region ({region.distance.mean() * 1e3:.4g} mm) for poses where nothing was measured: use the second wherever "
+        f"the arm works elsewhere"
+    )
+
+
+def _notes_on_choice(beyond: NongeometricCalibration | None) -> Iterator[str]:
+    """Say of which points the figures of a non-geometric calibration are."""
+    if beyond is None:
+        return
+    if beyond.nested is None:
+        yield (
+            "the non-geometric model was chosen by all points that were held out, and so few leave none to assess the "
+            "choice: measure more, or keep rows to check with"
+        )
+        return
+    yield (
+        f"non-geometric, held out ({beyond.nested.distance.mean() * 1e3:.4g} mm) is of points that neither fit nor "
+        f"choice has used (nested cross-validation); the table of candidates has those that chose"
+    )
+
+
+# ---- rows ----------------------------------------------------------------------------------------------------------
+
+
+def _error_rows(calibration: Calibration) -> Iterator[tuple[str, ...]]:
+    """Give the estimated errors: name, value, standard error, unit."""
+    lengths = dict(zip(calibration.model.names, calibration.model.is_length, strict=True))
+    for name, value, error in zip(calibration.names, calibration.values, calibration.standard_errors, strict=True):
+        scale, unit = (1e3, "mm") if lengths[name] else (180 / math.pi, "deg")
+        yield name, f"{value * scale:+z.4f}", f"{error * scale:.4f}", unit
+
+
+def _nongeometric_tables(beyond: NongeometricCalibration) -> Iterator[ResultTable]:
+    geometry = beyond.comparisons[0]
+
+    def figures(comparison: Any) -> tuple[str, str, str]:
+        if comparison.held_out is None:
+            return "", "", ""
+        held_out = f"{comparison.held_out * 1e3:.4f}"
+        if comparison is geometry:
+            return held_out, "", ""
+        return held_out, f"{comparison.gain * 1e3:+z.4f}", f"{comparison.standard_error * 1e3:.4f}"
+
+    yield ResultTable(
+        title="Non-geometric candidates, on the held-out points that chose",
+        heads=("", "mean mm", "gain mm", "±", "accepted"),
+        rows=[
+            (
+                comparison.name,
+                *figures(comparison),
+                ": ".join(filter(None, ("yes" if comparison.accepted else "no", comparison.reason))),
+            )
+            for comparison in beyond.comparisons
+        ],
+        numbers=(1, 2, 3),
+    )
+    yield ResultTable(
+        title="Error models of joints that are accepted",
+        heads=("error", "value", "±", "unit"),
+        rows=_joint_error_rows(beyond.calibration),
+        numbers=(1, 2),
+    )
+
+
+def _joint_error_rows(calibration: Calibration) -> Iterator[tuple[str, ...]]:
+    """Give the coefficients of error models of joints: name, value, standard error, what it is of."""
+    models = {error.name: error for error in calibration.chain.joint_errors}
+    largest = largest_gravity_efforts(calibration.chain.arm)
+    for name, value, error in zip(calibration.names, calibration.values, calibration.standard_errors, strict=True):
+        if name not in models:
+            continue
+        joint = models[name].joint
+        unit, effort = ("mrad", "N m") if calibration.chain.arm.joints[joint].revolute else ("mm", "N")
+        of = f"{unit} under {largest[joint]:.3g} {effort}" if name.endswith(".sag") else f"amplitude, {unit}"
+        yield name, f"{value * 1e3:+z.3f}", f"{error * 1e3:.3f}", of
+
+
+def _repeatability_remark(figures: Repeatability | None) -> str:
+    if figures is None:
+        return "each configuration once; RP needs several"
+    return (
+        f"RP {figures.RP * 1e3:.4f} mm, largest {figures.RP_largest * 1e3:.4f}, of {figures.configurations} "
+        f"configurations measured {figures.cycles} times or more (of 30)"
+    )
+
+
+def _error_data(calibration: Calibration) -> dict[str, dict[str, float]]:
+    return {
+        name: {"value": float(value), "standard_error": float(error), "lower": float(lower), "upper": float(upper)}
+        for name, value, error, (lower, upper) in zip(
+            calibration.names, calibration.values, calibration.standard_errors, calibration.intervals(), strict=True
+        )
+    }
+
+
+def _mean_and_largest(kinds: dict[str, Array]) -> dict[str, dict[str, float]]:
+    return {name: {"mean": float(x.mean()), "largest": float(x.max())} for name, x in kinds.items()}
