@@ -86,6 +86,13 @@ def quantities(incomplete: str) -> list[str]:
     return _beginning(quantity_names(), incomplete)
 
 
+def studies(incomplete: str) -> list[str]:
+    """Complete the name of a study."""
+    from armwright.study.study import STUDIES
+
+    return _beginning(STUDIES, incomplete)
+
+
 def paths(incomplete: str) -> list[str]:
     """Complete the name of a path of the tip of a five-bar."""
     from armwright.clearance.paths import PICK_AND_PLACE, TEST_PATHS

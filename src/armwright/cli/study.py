@@ -1,24 +1,16 @@
 """``armwright study``: the experiments of the sources, printed numbers beside computed ones."""
 
-import importlib
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from armwright.cli.completing import one_of
-from armwright.cli.printing import json_text, plain_console, print_json, print_table
-from armwright.cli.progress import waiting
+from armwright.cli.completing import studies
+from armwright.cli.printing import json_text, print_json, print_result
+from armwright.cli.progress import parts, waiting
 from armwright.cli.results import write_results
 
-# By name: the module next to this one that runs, prints and draws it.
-_STUDIES = {
-    "stanford-torque": "study_stanford_torque",
-    "puma-moves": "study_puma_moves",
-    "five-bar-clearance": "study_five_bar_clearance",
-    "dh-calibration": "study_dh_calibration",
-}
-# Those that say themselves how far they are.
+# Those that show bars.
 _WITH_BARS = {"five-bar-clearance"}
 
 
@@ -27,7 +19,7 @@ def study(
         str,
         typer.Argument(
             help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.",
-            autocompletion=one_of(*_STUDIES),
+            autocompletion=studies,
             show_default=False,
         ),
     ],
@@ -54,20 +46,15 @@ def study(
 
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """
-    from armwright.errors import UnknownNameError
+    from armwright.study.study import run_study
 
-    if name not in _STUDIES:
-        raise UnknownNameError("study", name, _STUDIES)
-    chosen = importlib.import_module(f"armwright.cli.{_STUDIES[name]}")
-    with waiting(name, quiet=name in _WITH_BARS):
-        tables = chosen.tables()
+    with parts() as progress, waiting(name, quiet=name in _WITH_BARS):
+        result = run_study(name, progress)
     if output is not None:
-        write_results(output, {"tables.json": json_text(tables) + "\n", **chosen.figures()})
+        write_results(output, {"tables.json": json_text(result.as_data()) + "\n", **result.figures()})
     if as_json:
-        print_json(tables)
+        print_json(result.as_data())
         return
-    console = plain_console()
-    for table in chosen.printed(tables):
-        print_table(console, table)
+    print_result(result)
     if output is not None:
         print(f"figures: {output}")

@@ -69,6 +69,24 @@ class Row(NamedTuple):
         return float(np.mean(self.ours))
 
 
+class ParameterRow(NamedTuple):
+    """An error of the arm [m], [rad].
+
+    Attributes:
+        name: of the error.
+        true: of the arm that is measured.
+        thesis: as the thesis fits it on the flat board; None where it does not.
+        ours: by the complete model on all boards; None where it is fixed.
+        standard_error: of ours.
+    """
+
+    name: str
+    true: float
+    thesis: float | None
+    ours: float | None
+    standard_error: float | None
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Touched:
     """A board touched point by point.
@@ -175,14 +193,16 @@ def verification_table() -> list[Row]:
     return rows
 
 
-def parameter_table() -> list[tuple[str, float, float | None, float | None, float | None]]:
-    """Return by error the truth, the thesis' fit on the flat board, ours on all boards and its deviation, SI."""
+def parameter_table() -> list[ParameterRow]:
+    """Return the errors of the arm, printed beside computed."""
     ours = full_fit(tuple(ATTITUDES))
     thesis = thesis_fit(touched("flat"))
     found = dict(zip(ours.names, zip(ours.values, ours.standard_errors, strict=True), strict=True))
     table = []
     for i, name in enumerate(chain().names):
-        value, deviation = found.get(name, (None, None))
+        value, error = found.get(name, (None, None))
         if truth()[i] or value is not None:
-            table.append((name, float(truth()[i]), float(thesis[i]) if name in THESIS else None, value, deviation))
+            table.append(
+                ParameterRow(name, float(truth()[i]), float(thesis[i]) if name in THESIS else None, value, error)
+            )
     return table

@@ -3,6 +3,7 @@
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.clearance.correction import Correction
 from armwright.clearance.features import WINDOW, spectrum
 from armwright.clearance.ideal import tip_of
 from armwright.clearance.paths import Path, PickAndPlace, named_path
@@ -18,9 +19,9 @@ _TIME, _ERROR = "time, s", "error, mm"
 _SHOWN = {"slope": "slope, mm/s", "intercept": "intercept, mm", "amp_dc": "amplitude, mm"}
 
 
-def drawn(learnt: study.Learnt, estimates: list[study.EstimateRow]) -> dict[str, str | bytes]:
+def drawn(learnt: study.Learnt, correction: Correction) -> dict[str, str | bytes]:
     """Return all figures by the name of their file."""
-    return {**_single_run(), **_curves(), **_surfaces(learnt), **_arm_a(), **_corrected(estimates)}
+    return {**_single_run(), **_curves(), **_surfaces(learnt), **_arm_a(), **_corrected(correction)}
 
 
 def _single_run() -> dict[str, str | bytes]:
@@ -105,9 +106,9 @@ def _arm_a() -> dict[str, str | bytes]:
     return files
 
 
-def _corrected(estimates: list[study.EstimateRow]) -> dict[str, str | bytes]:
+def _corrected(correction: Correction) -> dict[str, str | bytes]:
     """Figures 5.10 to 5.13: the path as it is and corrected, what arm A makes of it, drives, speeds."""
-    both = {"path as it is": PickAndPlace().path(), "path corrected": study.corrected(estimates, "intercept").path}
+    both = {"path as it is": PickAndPlace().path(), "path corrected": correction.path}
     targets = np.array(PickAndPlace().nodes) * 1e3
     runs = {name: _simulated(path, study.ARMS["A"]) for name, path in both.items()}
     wanted = tip_of(study.arm(), runs["path as it is"].task.ideal.q) * 1e3

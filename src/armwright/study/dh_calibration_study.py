@@ -1,0 +1,103 @@
+"""The study of the calibrated three-joint arm: the thesis, section 2.3, table 2.4."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar
+
+import attrs
+
+from armwright.files.result_table import ResultTable
+from armwright.study.dh_calibration import NOISE, PRINTED_POINTS, ParameterRow, Row, parameter_table, verification_table
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class DhCalibration:
+    """A three-joint arm that touches a board of 33 points in three attitudes.
+
+    Attributes:
+        verification: errors at the verification points, printed and simulated.
+        parameters: errors of the arm: true, by the thesis' fit, by a complete model.
+    """
+
+    verification: list[Row]
+    parameters: list[ParameterRow]
+
+    inputs: ClassVar[Mapping[str, str]] = {
+        "source": "thesis, section 2.3",
+        "arm": "ntu-3r with the errors of table 2.3",
+        "noise": f"{NOISE * 1e3:g} mm per coordinate",
+    }
+    notes: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def run(cls, progress: Callable[[str, float], None] | None = None) -> "DhCalibration":  # noqa: ARG003 - takes seconds
+        """Run the study."""
+        return cls(verification=verification_table(), parameters=parameter_table())
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the tables as plain data."""
+        return {
+            "2.4": [row._asdict() | {"mean": row.mean} for row in self.verification],
+            "parameters": [row._asdict() for row in self.parameters],
+        }
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Give the tables, printed beside simulated."""
+        nominal = self.verification[0]
+        yield ResultTable(
+            title=f"Table 2.4: errors at six verification points [mm]; ours simulated, cameras with {NOISE * 1e3:g} mm",
+            heads=("fit", "", *(f"P{i}" for i in range(1, 7)), "mean", "better"),
+            rows=(line for row in self.verification for line in _verification(row, nominal)),
+        )
+        yield ResultTable(
+            title="Errors of the arm: true, by the thesis' fit on the flat board, by the complete model on all three",
+            heads=("error", "unit", "true", "thesis", "ours", "±"),
+            rows=map(_parameter, self.parameters),
+        )
+
+    def figures(self) -> dict[str, str | bytes]:
+        """Return a picture of the errors at the verification points."""
+        from armwright.report.figures import bars  # noqa: PLC0415 - matplotlib is slow to import
+
+        names = [f"{x}, {y}, {z}" for x, y, z in PRINTED_POINTS]
+        values = {
+            f"{row.model}, {row.points} boards" if row.model == "complete" else row.model: row.ours
+            for row in self.verification
+            if row.points in ("none", "flat", "all three")
+        }
+        title = "Errors at the verification points: nominal arm, the thesis' fit, the complete model"
+        return {"verification.svg": bars(title, names, values, y_label="error, mm", logarithmic=True)}
+
+
+def _verification(row: Row, nominal: Row) -> Iterator[tuple[str, ...]]:
+    """Give the lines of a fit: what the thesis prints, and ours."""
+    name = row.model if row is nominal else f"{row.model}, {row.points}"
+    for label, values, before in (("printed", row.printed, nominal.printed), ("ours", row.ours, nominal.ours)):
+        if values is None or before is None:
+            continue
+        mean = sum(values) / len(values)
+        better = 100 * (1 - mean / (sum(before) / len(before)))
+        yield (
+            name if label == "printed" or row.printed is None else "",
+            label,
+            *(f"{x:.3g}" for x in values),
+            f"{mean:.3g}",
+            f"{better:.0f} %" if row is not nominal else "",
+        )
+
+
+def _parameter(row: ParameterRow) -> tuple[str, ...]:
+    part = row.name.partition(".")[2]
+    scale, unit = (1e3, "mm") if part in ("d", "a", "x", "y", "z") else (180 / math.pi, "deg")
+
+    def shown(x: float | None, spec: str, absent: str = "") -> str:
+        return absent if x is None else format(x * scale, spec)
+
+    return (
+        row.name,
+        unit,
+        shown(row.true, "+z.3f"),
+        shown(row.thesis, "+z.3f"),
+        shown(row.ours, "+z.3f", "fixed"),
+        shown(row.standard_error, ".3f"),
+    )

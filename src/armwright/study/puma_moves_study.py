@@ -1,0 +1,166 @@
+"""The study of the PUMA's two moves through three poses: the project's figures 5 to 7, 10, 16 to 19, 22, 23 and 25."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+
+from armwright.arm.load import load_arm
+from armwright.files.result_table import ResultTable
+from armwright.motion.moves import Move
+from armwright.study import puma_moves
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class PumaMoves:
+    """A joint move and a Cartesian move of the PUMA through three poses.
+
+    Attributes:
+        configurations: the joint positions of the poses, printed and computed.
+        angles: their ZYZ angles.
+        moves: what each move asks of the joints.
+        detours: straight lines with stops, and detours around the singularity.
+    """
+
+    configurations: list[puma_moves.PostureRow]
+    angles: list[puma_moves.AngleRow]
+    moves: list[puma_moves.MoveRow]
+    detours: list[puma_moves.WayRoundRow]
+
+    inputs: ClassVar[Mapping[str, str]] = {
+        "source": "project on the trajectories of a PUMA",
+        "arm": "puma560-seed",
+        "poses": ", ".join(puma_moves.NAMES),
+    }
+    notes: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def run(cls, progress: Callable[[str, float], None] | None = None) -> "PumaMoves":  # noqa: ARG003 - takes seconds
+        """Run the study."""
+        return cls(
+            configurations=puma_moves.posture_table(),
+            angles=puma_moves.angle_table(),
+            moves=puma_moves.move_table(),
+            detours=puma_moves.way_round_table(),
+        )
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the tables as plain data."""
+        return {
+            "configurations": [attrs.asdict(row) for row in self.configurations],
+            "angles": [attrs.asdict(row) for row in self.angles],
+            "moves": [
+                {key: list(value) if isinstance(value, puma_moves.Largest) else value for key, value in row.items()}
+                for row in (attrs.asdict(row, recurse=False) for row in self.moves)
+            ],
+            "detours": [attrs.asdict(row) for row in self.detours],
+        }
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Give the tables, printed beside computed."""
+        yield ResultTable(
+            title="Joint configurations: printed, and computed from the printed poses",
+            heads=("pose", "", *(f"j{i + 1} deg" for i in range(6)), "branch"),
+            rows=[
+                line
+                for row in self.configurations
+                for line in (
+                    (row.pose, "printed", *(f"{q:z.2f}" for q in row.printed), ""),
+                    ("", "computed", *(f"{q:z.2f}" for q in row.computed), row.branch),
+                    ("", "allowed", *[""] * 6, "; ".join(row.allowed)),
+                )
+            ],
+        )
+        yield ResultTable(
+            title="ZYZ angles in degrees",
+            heads=("pose", "phi, MATLAB", "theta", "psi", "phi, nearest", "theta", "psi"),
+            rows=[(row.pose, *(f"{x:z.2f}" for x in (*row.matlab, *row.nearest))) for row in self.angles],
+        )
+        yield ResultTable(
+            title="A second from A by B to C",
+            heads=(
+                "move",
+                "inverse solved",
+                "path mm",
+                "off A B C mm",
+                "tool rotates deg",
+                "joints rotate deg",
+                "speed, of limit",
+                "acceleration",
+                "effort",
+                "must run slower",
+            ),
+            rows=map(_move, self.moves),
+        )
+        yield ResultTable(
+            title="What stops the Cartesian moves inside the joints' limits",
+            heads=("move", "where and why"),
+            rows=[(row.way, row.stopped) for row in self.moves if row.stopped],
+        )
+        yield ResultTable(
+            title="Straight lines with stops, and detours",
+            heads=("by", "path", "price, or what stops it"),
+            rows=[(row.by, "found" if row.found else "none", row.said) for row in self.detours],
+        )
+
+    def figures(self) -> dict[str, str | bytes]:
+        """Return the project's figures by the name of their file, the last one as a film."""
+        from armwright.report.move_figures import Panel, overview, panels, path_in_space  # noqa: PLC0415 - matplotlib
+
+        t = puma_moves.sample_times()
+        positions = {name: X[:3, 3] for name, X in zip(puma_moves.NAMES, puma_moves.study_poses(), strict=True)}
+        moments = dict(zip(puma_moves.NAMES, puma_moves.TIMES, strict=True))
+
+        def shown(number: int) -> list[Panel]:
+            return [Panel(course.title, course.unit, course.curves) for course in puma_moves.courses(number)]
+
+        files: dict[str, str | bytes] = {}
+        for number, (way, _) in puma_moves.CURVES.items():
+            files[_name(number)] = panels(f"Figure {number}: {_kind(way)}", t, shown(number), marks=moments)
+        for number, way in puma_moves.PATHS.items():
+            X = puma_moves.poses_along(way, t)
+            title = f"Figure {number}: {_kind(way)}, path and approach vectors"
+            files[_name(number)] = path_in_space(title, X, positions)
+        for number, way in puma_moves.OVERVIEWS.items():
+            X = puma_moves.poses_along(way, t)
+            three = [shown(curve)[0] for curve, (of, _) in puma_moves.CURVES.items() if of == way]
+            files[_name(number)] = overview(f"Figure {number}: {_kind(way)}", t, three, X, positions)
+        return {**files, **_films()}
+
+
+def _films() -> dict[str, bytes]:
+    from armwright.report.movie import films  # noqa: PLC0415 - matplotlib is slow to import
+
+    move = Move(
+        arm=load_arm("puma560-seed"),
+        poses=puma_moves.study_poses(),
+        times=np.array(puma_moves.TIMES),
+        postures=np.radians(puma_moves.PRINTED_Q),
+        label="",
+        trajectory=puma_moves.joint_trajectory(),
+        misses=np.zeros(len(puma_moves.NAMES)),
+    )
+    return {name.replace("move", f"figure{puma_moves.FILM}"): film for name, film in films(move).items()}
+
+
+def _move(row: puma_moves.MoveRow) -> tuple[str, ...]:
+    return (
+        row.way,
+        str(row.inverse),
+        f"{row.length * 1e3:.0f}",
+        f"{row.off * 1e3:.0f}",
+        f"{math.degrees(row.turn):.0f}",
+        f"{math.degrees(row.joints):.0f}",
+        *(f"{part:.2f} j{joint}" for part, joint in (row.speed, row.acceleration, row.effort)),
+        f"{row.slower:.1f} x",
+    )
+
+
+def _name(number: int) -> str:
+    return f"figure{number:02d}.svg"
+
+
+def _kind(way: puma_moves.Way) -> str:
+    return "joint move" if way == "joint" else "Cartesian move"

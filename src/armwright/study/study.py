@@ -1,0 +1,50 @@
+"""The experiments of the sources behind one protocol, by name."""
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Protocol
+
+from armwright.errors import one_of
+from armwright.files.result_table import Result
+
+Progress = Callable[[str, float], None]
+
+
+class Study(Result, Protocol):
+    """An experiment of a source that has run: its tables hold what is printed beside what is computed.
+
+    A module of this folder has a class for each experiment, whose ``run`` runs it.
+    """
+
+    @property
+    def inputs(self) -> Mapping[str, str]:
+        """What the experiment is made with, in words: source, arm, motion."""
+
+    def figures(self) -> dict[str, str | bytes]:
+        """Return the figures by the name of their file."""
+
+
+# By name: module and class.
+_STUDIES = {
+    "stanford-torque": ("stanford_torque_study", "StanfordTorque"),
+    "puma-moves": ("puma_moves_study", "PumaMoves"),
+    "five-bar-clearance": ("five_bar_clearance_study", "FiveBarClearance"),
+    "dh-calibration": ("dh_calibration_study", "DhCalibration"),
+}
+STUDIES = tuple(_STUDIES)
+
+
+def run_study(name: str, progress: Progress | None = None) -> Study:
+    """Run an experiment.
+
+    Args:
+        name: of ``STUDIES``.
+        progress: called with what is being done, and how much of it, 0 to 1.
+
+    Raises:
+        UnknownNameError: there is no such study.
+        MissingExtraError: the study needs a package that is not installed.
+    """
+    module, study = _STUDIES[one_of("study", name, _STUDIES)]
+    found: Study = getattr(import_module(f"armwright.study.{module}"), study).run(progress)
+    return found
