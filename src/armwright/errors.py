@@ -149,6 +149,10 @@ class UnitWarning(UserWarning):
     """A number looks as if it were in another unit: degrees where radians belong."""
 
 
+class IncompleteRowsWarning(UserWarning):
+    """Rows of a table were left out as asked, since cells are empty."""
+
+
 class CacheWarning(UserWarning):
     """The cache folder cannot be trusted and is not used; every start compiles anew."""
 

@@ -179,35 +179,44 @@ def test_radians_for_degrees(arm: Arm, write: Write) -> None:
         ("joint_1_deg,joint_2_deg,x_mm,y_mm", "points.csv:1: z_mm: no such column; there are joint_1_deg, joint_2_deg"),
         (
             "joint_2_deg,x_mm,y_mm,z_mm",
-            "points.csv:1: joint_1_deg: no such column; elbow has 2 joints, and the file has 1: joint_2_deg, x_mm",
+            "points.csv:1: joint_1_deg: no such column; elbow has 2 joints, and the file has 1; there are joint_2_deg",
         ),
         (f"{HEAD},joint_3_deg", "points.csv:1: joint_3_deg: elbow has 2 joints; is this a measurement of another arm?"),
         (
             f"{HEAD},speed",
-            "points.csv:1: speed: no such column. Known: joint_1_deg, joint_2_deg, x_mm, y_mm, z_mm, x_t",
+            "points.csv:1: speed: no such column. Known: joint_1_deg, joint_2_deg, x_mm, y_mm, z_mm, roll_deg",
         ),
         ("jiont_1_deg,joint_2_deg,x_mm,y_mm,z_mm", "jiont_1_deg: no such column. Did you mean 'joint_1_deg'? Known: "),
         (f"{HEAD},", "points.csv:1: '': no such column."),
-        (f"{HEAD},X_mm", "points.csv:1: x_mm: given twice, as x_mm too"),
-        (f"{HEAD},joint_1_rad", "points.csv:1: joint_1_rad: given twice, as joint_1_deg too"),
+        (f"{HEAD},X_mm", "points.csv:1: X_mm: there twice, as x_mm too"),
+        (f"{HEAD},joint_1_rad", "points.csv:1: joint_1_rad: there twice, as joint_1_deg too"),
         (
             "joint_1,joint_2_deg,x_mm,y_mm,z_mm",
-            "joint_1: the name tells no unit: write joint_1_rad or joint_1_mrad or joint_1_deg, or state the units",
+            "joint_1: the name has no unit: expected joint_1_deg or joint_1_rad or joint_1_mrad, in the file or by",
         ),
-        ("joint_1_deg,joint_2_deg,x,y,z", "x: the name tells no unit: write x_m or x_cm or x_mm or x_um or x_in, or"),
-        ("joint_1_deg,joint_2_deg,x_foot,y_mm,z_mm", "x_foot: unknown unit 'foot': expected x_m or x_cm or x_mm or"),
-        ("joint_1_mm,joint_2_deg,x_mm,y_mm,z_mm", "joint_1_mm: joint 1 of elbow turns: expected joint_1_rad or"),
+        (
+            "joint_1_deg,joint_2_deg,x,y,z",
+            "x: the name has no unit: expected x_mm or x_m or x_cm or x_um or x_in, in",
+        ),
+        ("joint_1_deg,joint_2_deg,x_foot,y_mm,z_mm", "x_foot: unknown unit 'foot': expected x_mm or x_m or x_cm or"),
+        (
+            "joint_1_mm,joint_2_deg,x_mm,y_mm,z_mm",
+            "joint_1_mm: mm is a unit of length, and joint 1 of elbow is revolute: expected joint_1_deg or",
+        ),
         ("joint_1_deg,joint_2_deg,x_mm,y_m,z_mm", "y_m: coordinates have one unit in a file, and x_mm has another"),
-        (f"{HEAD},x_t_mm", "points.csv:1: x: give the points, or targets and what was off, not both: joint_1_deg"),
+        (
+            f"{HEAD},x_dif_mm",
+            "points.csv:1: x_mm: give the points, or nominal points and deviations, not both: joint_",
+        ),
         (
             "joint_1_deg,joint_2_deg,x_t_mm,y_t_mm,z_t_mm",
-            "points.csv:1: x_dif_mm: no such column; there are joint_1_deg",
+            "points.csv:1: x_deviation_mm: no such column; there are joint_1_deg",
         ),
         (
             "joint_1_deg,joint_2_deg,x_t_mm,y_t_mm,z_t_mm,x_dif_um,y_dif_um,z_dif_um",
-            "x_dif_um: targets and what was off have one unit in a file, and x_t_mm has another",
+            "x_dif_um: nominal coordinates and deviations have one unit in a file, and x_t_mm has another",
         ),
-        (f"{HEAD},name,pose", "points.csv:1: pose: rows have one name, and name tells it"),
+        (f"{HEAD},name,pose", "points.csv:1: pose: rows have one name, and column name has it"),
     ],
 )
 def test_columns(head: str, message: str, arm: Arm, write: Write) -> None:
@@ -221,14 +230,16 @@ def test_unit_of_a_slide(sliding: Arm, write: Write) -> None:
     """A slide has no position in degrees."""
     said = refused(write(table(HEAD)), sliding)
 
-    assert said.startswith("points.csv:1: joint_2_deg: joint 2 of slider slides: expected joint_2_m or joint_2_cm or")
+    assert said.startswith(
+        "points.csv:1: joint_2_deg: deg is a unit of angle, and joint 2 of slider is prismatic: expected"
+    )
 
 
 @pytest.mark.parametrize(
     ("row", "message"),
     [
         ("10,twenty,1,2,3", "points.csv:2: joint_2_deg: expected a number, got 'twenty'"),
-        ("10,20,,2,3", "points.csv:2: x_mm: empty; expected a number"),
+        ("10,20,,2,3", "points.csv:2: x_mm: empty; expected a number, or --skip-incomplete to leave the row out"),
         ("10,20,nan,2,3", "points.csv:2: x_mm: every number must be finite and no larger than 1e+100, got nan"),
         ("10,20,1,2,-inf", "points.csv:2: z_mm: every number must be finite and no larger than 1e+100, got -inf"),
         ('10,20,"1,5",2,3', "points.csv:2: x_mm: expected a number, got '1,5'; write a decimal point"),
@@ -250,11 +261,9 @@ def test_values(row: str, message: str, arm: Arm, write: Write) -> None:
         ("", "points.csv: the file is empty; its first line should name the columns"),
         ("\n \n", "points.csv: the file is empty; its first line should name the columns"),
         (HEAD, "points.csv: no rows below the names of the columns"),
-        (HEAD.replace(",", ";"), "points.csv:1: columns are separated by semicolons; expected commas between columns"),
-        (HEAD.replace(",", "\t"), "points.csv:1: columns are separated by tabs; expected commas between columns"),
         (f"{HEAD}\n{'1' * 200_000},2,3,4,5", "points.csv:2: not valid CSV: field larger than field limit (131072)"),
     ],
-    ids=["empty", "blank", "no rows", "semicolons", "tabs", "endless"],
+    ids=["empty", "blank", "no rows", "endless"],
 )
 def test_no_table(text: str, message: str, arm: Arm, write: Write) -> None:
     """A file that is no table of numbers between commas says so."""
@@ -298,9 +307,9 @@ def test_millimetres_of_a_slide(sliding: Arm, write: Write) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("fit", "chek", "fit"), "points.csv:3: set: expected fit or check, got 'chek'; did you mean check?"),
+        (("fit", "chek", "fit"), "points.csv:3: set: expected fit or check, got 'chek'; did you mean 'check'?"),
         (("fit", "", "fit"), "points.csv:3: set: expected fit or check, got ''"),
-        (("check", "check", "check"), "points.csv: set: every row is kept to check with; none is left to fit"),
+        (("check", "check", "check"), "points.csv: set: every row is held out to check with; none is left to fit"),
     ],
 )
 def test_sets(words: tuple[str, ...], message: str, arm: Arm, write: Write) -> None:
@@ -381,9 +390,21 @@ def test_planes_and_distances(arm: Arm, write: Write) -> None:
         (f"{HEAD},qw,qx,qy,qz", "1,2,3,4,5,1,0,0,1", "points.csv:2: qw: expected a quaternion of length 1, got one of"),
         (f"{HEAD},roll_deg,pitch_deg,yaw_rad", "1,2,3,4,5,1,0,0", "yaw_rad: angles have one unit in a file, and roll_"),
         (f"{HEAD},roll_deg,qw", "1,2,3,4,5,1,0", "points.csv:1: qw: give roll, pitch and yaw, or a quaternion, not bo"),
-        (f"{HEAD},distance_mm", "1,2,3,4,5,1", "distance_mm: tell from where: a column anchor, or a column to with na"),
-        (f"{HEAD},anchor", "1,2,3,4,5,wire", "points.csv:1: anchor: no column tells the distance; there are joint_1"),
-        (f"{HEAD},distance_mm,to", "1,2,3,4,5,1,a", "points.csv:1: to: rows need names for that, in a column name"),
+        (
+            f"{HEAD},distance_mm",
+            "1,2,3,4,5,1",
+            "distance_mm: from where? Expected a column anchor, or a column to with",
+        ),
+        (
+            f"{HEAD},anchor",
+            "1,2,3,4,5,wire",
+            "points.csv:1: distance_mm: no such column; anchor says from where it is",
+        ),
+        (
+            f"{HEAD},distance_mm,to",
+            "1,2,3,4,5,1,a",
+            "points.csv:1: name: no such column; to has names of rows; there are",
+        ),
         (f"{HEAD},plane", "1,2,,,,", "points.csv:2: the row tells no point, no plane and no distance"),
         (f"{HEAD},frame", "1,2,3,4,5,", "points.csv:2: frame: empty; where one point tells its frame all do"),
         (

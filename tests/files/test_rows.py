@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from armwright.errors import FileFormatError
-from armwright.files.rows import Cells, number_in_cell, of_one_width, read_rows, text_cell
+from armwright.files.rows import Cells, NumberFormat, read_rows, text_cell
 
 Write = Callable[[str], Path]
 
@@ -23,10 +23,29 @@ def write(tmp_path: Path) -> Write:
 
 def test_rows(write: Write) -> None:
     """Rows know their lines; blanks around cells, empty lines, a mark of byte order and ends of lines are nothing."""
-    head, rows = read_rows(write('\ufeffa, b\r\n\r\n1 ,"2,5"\r\n,\r\n3,4\r\n'))
+    head, rows, separator = read_rows(write('\ufeffa, b\r\n\r\n1 ,"2,5"\r\n,\r\n3,4\r\n'))
 
-    assert head == Cells(1, ("a", "b"))
+    assert (head, separator) == (Cells(1, ("a", "b")), ",")
     assert [*rows] == [Cells(3, ("1", "2,5")), Cells(5, ("3", "4"))]
+
+
+@pytest.mark.parametrize(
+    ("text", "separator"),
+    [
+        ('\n;;\nx;y\n"1;5";2\n', ";"),
+        ("\n\nx\ty\n1;5\t2\n", "\t"),
+        ('\n\n"x [mm], of the flange";y\n1;2\n', ";"),
+        ("\n\nx; of the flange,y,z\n1,2,3\n", ","),
+        ("\n\nx\n1\n", ","),
+    ],
+)
+def test_separators(text: str, separator: str, write: Write) -> None:
+    """Columns are parted by whichever of comma, semicolon and tab makes most of them of the first line."""
+    head, rows, found = read_rows(write(text))
+
+    assert found == separator
+    assert head.line == 3
+    assert {len(row.cells) for row in rows} == {len(head.cells)}
 
 
 @pytest.mark.parametrize(
@@ -35,14 +54,10 @@ def test_rows(write: Write) -> None:
         ("", "table.csv: the file is empty; its first line should name the columns"),
         ("\n,,\n", "table.csv: the file is empty"),
         ("a,b\n\n", "table.csv: no rows below the names of the columns"),
-        (
-            "\na;b\n1;2\n",
-            "table.csv:2: columns are separated by semicolons; expected commas between columns and points",
-        ),
-        ("a\tb\n1\t2\n", "table.csv:1: columns are separated by tabs"),
+        ('\n,,\n;;;\n"",\n', "table.csv: the file is empty"),
         (f"a,b\n1,2\n{'1' * 200_000},2\n", "table.csv:3: not valid CSV: field larger than field limit"),
     ],
-    ids=["empty", "blank", "no rows", "semicolons", "tabs", "endless"],
+    ids=["empty", "blank", "no rows", "blank in any way", "endless"],
 )
 def test_no_table(text: str, message: str, write: Write) -> None:
     """What is no table is refused with file and line."""
@@ -53,32 +68,40 @@ def test_no_table(text: str, message: str, write: Write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("cells", "message"),
+    ("text", "message"),
     [
-        (("1", "5", "2"), "t.csv:7: expected 2 values, as there are columns, got 3; is there a comma in a number?"),
-        (("1",), "t.csv:7: expected 2 values, as there are columns, got 1"),
+        (
+            "a,b\n1,2\n\n1,5,2",
+            "table.csv:4: expected 2 values, as there are columns, got 3; is there a comma in a number?",
+        ),
+        ("a;b\n1;2\n\n1;5;2", "table.csv:4: expected 2 values, as there are columns, got 3"),
+        ("a,b\n1\n", "table.csv:2: expected 2 values, as there are columns, got 1"),
     ],
 )
-def test_widths(cells: tuple[str, ...], message: str) -> None:
+def test_widths(text: str, message: str, write: Write) -> None:
     """A row has as many cells as there are columns."""
-    head = Cells(1, ("a", "b"))
-    assert [*of_one_width("t.csv", head, [Cells(2, ("1", "2"))])] == [Cells(2, ("1", "2"))]
-
+    path = write(text)
     with pytest.raises(FileFormatError) as caught:
-        [*of_one_width("t.csv", head, [Cells(2, ("1", "2")), Cells(7, cells)])]
+        [*read_rows(path).below]
 
-    assert str(caught.value) == message
+    assert str(caught.value).replace(str(path), path.name) == message
+
+
+def number(text: str, separator: str = ",") -> float:
+    return NumberFormat(Path("t.csv"), separator).number(3, "x_mm", text)
 
 
 def test_number() -> None:
-    """A number is read as Python reads it."""
-    assert number_in_cell("t.csv", 3, "x_mm", "-1.5e-3") == -0.0015
+    """A number is read as Python reads it; between semicolons or tabs it may have a decimal comma."""
+    assert number("-1.5e-3") == -0.0015
+    assert number("-1.5e-3", ";") == -0.0015
+    assert number("-1,5e-3", ";") == -0.0015
+    assert number("12,25", "\t") == 12.25
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "t.csv:3: x_mm: empty; expected a number"),
         ("abc", "t.csv:3: x_mm: expected a number, got 'abc'"),
         ("1,5", "t.csv:3: x_mm: expected a number, got '1,5'; write a decimal point"),
         ("nan", "t.csv:3: x_mm: every number must be finite and no larger than 1e+100, got nan"),
@@ -88,9 +111,21 @@ def test_number() -> None:
 def test_no_number(text: str, message: str) -> None:
     """What is no number is refused with file, line and column."""
     with pytest.raises(FileFormatError) as caught:
-        number_in_cell("t.csv", 3, "x_mm", text)
+        number(text)
 
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(("first", "second"), [("1,5", "2.5"), ("1.234", "2,5")])
+def test_thousands(first: str, second: str) -> None:
+    """A file with commas and points in its numbers has thousands in it, or numbers a thousand times too large."""
+    written = NumberFormat(Path("t.csv"), ";")
+    written.number(3, "x_mm", first)
+
+    with pytest.raises(FileFormatError, match=r"t\.csv:4: x_mm: expected a decimal (comma|point), as in line 3, got"):
+        written.number(4, "x_mm", second)
+    with pytest.raises(FileFormatError, match=r"expected a number, got '1\.234,5'"):
+        number("1.234,5", ";")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.accuracy.cycles import Kind
 from armwright.accuracy.scales import angles_question, lengths_question
-from armwright.accuracy.table import Row, read_table
+from armwright.accuracy.table import Row, read_tables
 from armwright.accuracy.trace import Trace
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError
@@ -106,11 +106,18 @@ class PathTest:
 AnyTest: TypeAlias = PoseTest | PathTest
 
 
-def read_measurements(paths: Path | str | Sequence[Path | str]) -> tuple[AnyTest, ...]:
+def read_measurements(
+    paths: Path | str | Sequence[Path | str],
+    *,
+    columns: Mapping[str, str] | None = None,
+    skip_incomplete: bool = False,
+) -> tuple[AnyTest, ...]:
     """Read the tests of one file or of several that belong together.
 
     Args:
         paths: CSV files, in the format of docs/iso9283.md; each has its own units.
+        columns: names of columns, with unit, by those in the files: ``{"X": "x_mm"}``.
+        skip_incomplete: leave out rows with cells that should not be empty; an ``IncompleteRowsWarning`` says how many.
 
     Returns:
         The tests, in the order in which they begin.
@@ -123,8 +130,8 @@ def read_measurements(paths: Path | str | Sequence[Path | str]) -> tuple[AnyTest
     if not files:
         raise InvalidValueError("measurements: expected one file at least, got none")
     groups: dict[tuple[str, ...], list[Row]] = {}
-    for file in files:
-        for row in read_table(file).rows():
+    for table in read_tables(files, columns=columns, skip_incomplete=skip_incomplete):
+        for row in table.rows():
             # A distance takes two poses.
             name = "" if row.test == "distance" else row.name
             groups.setdefault((row.test, name, row.condition), []).append(row)

@@ -1,19 +1,19 @@
-"""What was measured of an arm, from CSV whose column names tell the units.
+"""What was measured of an arm, from CSV whose column names have units.
 
-One row for each measurement: ``joint_1_deg, joint_2_deg, ...`` and what was measured in that posture:
+One row for each measurement: ``joint_1_deg, joint_2_deg, ...`` and what was measured in that joint configuration:
 
-- ``x_mm, y_mm, z_mm``, the place of the tool; or, where a file has targets and how far the tool was from them,
-  ``x_t_mm, ..., x_dif_mm, ...``. With ``frame``, the word for the frame that they are told in, where there are several;
-- with it ``roll_deg, pitch_deg, yaw_deg`` (about fixed x, y, z) or ``qw, qx, qy, qz``, how it was turned;
+- ``x_mm, y_mm, z_mm``, the position of the tool; or ``x_nominal_mm, ..., x_deviation_mm, ...``, of which it is the sum.
+  With ``frame``, the word for the frame of these coordinates, where there are several;
+- with it ``roll_deg, pitch_deg, yaw_deg`` (about fixed x, y, z) or ``qw, qx, qy, qz``, its orientation;
 - ``plane``, the word for a plane that the tool touched;
 - ``distance_mm`` from an ``anchor``, or ``to`` the tool in the row of that name.
 
-Cells may be empty where a row tells something else. ``set`` tells the rows that are kept to check with, and ``name``
-names the rows. Units may be left out of the names and stated.
+Cells may be empty where a row has something else. ``set`` marks the rows that are held out to check with, and ``name``
+names the rows. docs/tables.md says how columns may be named.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import attrs
@@ -23,22 +23,11 @@ from armwright.arm.dh import turn
 from armwright.arm.model import Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array, Flags, read_only
-from armwright.calibration.columns import (
-    DISTANCE,
-    NAMES,
-    OFFSETS,
-    POINTS,
-    QUATERNION,
-    RPY,
-    TARGETS,
-    WORDS,
-    Column,
-    read_columns,
-)
+from armwright.calibration.columns import DEVIATIONS, DISTANCE, NAMES, NOMINAL, RPY, joint_columns, read_columns
 from armwright.calibration.readings import Numbers, Readings
-from armwright.errors import FileFormatError, closest, one_of
-from armwright.files.columns import Columns
-from armwright.files.rows import ANGLE_UNITS, LENGTH_UNITS, Cells, number_in_cell, of_one_width, read_rows
+from armwright.errors import FileFormatError, closest
+from armwright.files.column_names import Heading, units_of
+from armwright.files.unit_table import UnitTable, in_lines
 from armwright.spatial.rotations import rotation_from_quaternion
 
 _SETS = ("fit", "check")
@@ -52,8 +41,6 @@ _RADIANS = 2 * math.pi
 _SHOWN = 5
 # Rows that are compared at once.
 _AT_ONCE = 10_000
-# SI values of units; a quaternion has none.
-_SCALES = {**LENGTH_UNITS, **ANGLE_UNITS, "": 1.0}
 # A unit quaternion that is written with four digits.
 _WRITTEN = 1e-3
 
@@ -87,111 +74,70 @@ class Measurements:
         return self.readings.points
 
 
-def read_measurements(path: Path | str, arm: Arm, *, units: tuple[str, str] | None = None) -> Measurements:
+def read_measurements(
+    path: Path | str,
+    arm: Arm,
+    *,
+    units: tuple[str, str] | None = None,
+    columns: Mapping[str, str] | None = None,
+    skip_incomplete: bool = False,
+) -> Measurements:
     """Read a file of measurements.
 
     Args:
         path: the file.
         arm: that was measured, with n joints.
-        units: of lengths and of angles, such as ``("mm", "deg")``, for columns whose names tell none.
+        units: of lengths and of angles, such as ``("mm", "deg")``, for columns whose names have none.
+        columns: names of columns, with unit, by those in the file: ``{"A1": "joint_1_deg"}``.
+        skip_incomplete: leave out rows with cells that should not be empty; an ``IncompleteRowsWarning`` says how many.
 
     Raises:
-        FileFormatError: the file is missing, empty, not separated by commas; a column is missing, unknown, given twice
-            or without unit; joints are not those of the arm; a value is no number; a row tells nothing; positions look
-            like another unit. The text has file, line and column.
-        UnknownNameError: ``units`` are none.
+        FileFormatError: the file is missing or empty; a column is missing, unknown, there twice or without unit; joints
+            are not those of the arm; a value is no number; a row has no measurement; positions look like another unit.
+            The text has file, line and column.
+        UnknownNameError: there are no such ``units``.
     """
-    path = Path(path)
-    stated = (
-        None
-        if units is None
-        else (one_of("unit of length", units[0], LENGTH_UNITS), one_of("unit of angle", units[1], ANGLE_UNITS))
+    header, position, orientation = read_columns(path, arm, columns=columns, units=units_of(*units) if units else None)
+    joints, partial = joint_columns(arm), bool(header.present(("plane", DISTANCE)))
+    table = header.rows(
+        filled=[*joints, *(() if partial else position)],
+        together=[position, orientation],
+        skip_incomplete=skip_incomplete,
     )
-    head, below = read_rows(path)
-    named = read_columns(path, head, arm, stated)
-    table = _stored(path, named, of_one_width(path, head, below))
-    joints = [f"joint_{i + 1}" for i in range(arm.n)]
-    readings = _readings(table, table.numbers(joints, needed=True))
-    lines = table.rows.lines
-    columns = [table.columns[joint] for joint in joints]
-    _refuse_other_units(path, arm, readings.q, lines, columns)
+    readings = _readings(table, table.numbers(joints), position, orientation)
+    headings = [table.headings[joint] for joint in joints]
+    _refuse_other_units(table, arm, readings.q, headings)
     return Measurements(
-        path=path,
+        path=table.path,
         readings=readings,
-        names=table.names,
+        names=_names(table),
         check=_checks(table),
-        warnings=_warnings(arm, readings, lines, columns),
+        warnings=_warnings(arm, readings, table.lines, headings),
     )
 
 
 # ---- rows ----------------------------------------------------------------------------------------------------------
 
 
-@attrs.frozen(eq=False)
-class _Table:
-    path: Path
-    rows: Columns
-    columns: Mapping[str, Column]
-
-    def numbers(self, names: Sequence[str], *, needed: bool) -> Array:
-        """Return (m, k) numbers in SI units; NaN in rows where all are empty, if they are not needed."""
-        found = self.rows.stacked(names)
-        empty = np.isnan(found)
-        wrong = empty if needed else empty & ~empty.all(axis=1, keepdims=True)
-        if wrong.any():
-            row = int(wrong.any(axis=1).argmax())
-            raise self.error(row, names[int(wrong[row].argmax())], "empty; expected a number")
-        return found
-
-    def words(self, name: str) -> Sequence[str]:
-        """Return the words of a column; empty ones where there is none."""
-        return self.rows.words[name] if name in self.columns else [""] * len(self.rows)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The names of the rows; their lines where the file names none."""
-        label = next((name for name in NAMES if name in self.columns), None)
-        return tuple(self.words(label)) if label else tuple(map(str, self.rows.lines))
-
-    def error(self, number: int, name: str, text: str) -> FileFormatError:
-        """Return the error that says something of a cell."""
-        header = self.columns[name].header if name in self.columns else name
-        return FileFormatError(self.path, self.rows.lines[number], header, text)
+def _names(table: UnitTable) -> tuple[str, ...]:
+    """Return the names of the rows; their lines where the file names none."""
+    label = next((name for name in NAMES if name in table), None)
+    return tuple(table.words(label)) if label else tuple(map(str, table.lines))
 
 
-def _stored(path: Path, columns: Mapping[str, Column], rows: Iterable[Cells]) -> _Table:
-    """Read the rows into columns, numbers in SI units.
-
-    Raises:
-        FileFormatError: what should be a number is none.
-    """
-    words = [name for name in columns if name in WORDS]
-    scales = {name: _SCALES[one.unit] for name, one in columns.items() if name not in WORDS}
-    table = Columns.of(scales, words)
-    for line, cells in rows:
-        numbers: dict[str, float | None] = {}
-        for name, scale in scales.items():
-            place, _, header = columns[name]
-            text = cells[place]
-            numbers[name] = number_in_cell(path, line, header, text) * scale if text else None
-        table.add(line, numbers, {name: cells[columns[name].place] for name in words})
-    return _Table(path, table, columns)
-
-
-def _readings(table: _Table, q: Array) -> Readings:
-    m, columns = len(q), table.columns
-    partial = bool({"plane", DISTANCE} & columns.keys())
+def _readings(table: UnitTable, q: Array, position: Sequence[str], orientation: Sequence[str]) -> Readings:
+    m = len(q)
     points = np.full((m, 3), np.nan)
-    if OFFSETS[0] in columns:
-        points = table.numbers(TARGETS, needed=not partial) + table.numbers(OFFSETS, needed=not partial)
-    elif POINTS[0] in columns:
-        points = table.numbers(POINTS, needed=not partial)
-    rotations = _rotations(table, points)
-    frame, frames = _numbered(table.words("frame"), np.isfinite(points[:, 0]), named="frame" in columns)
+    if DEVIATIONS[0] in position:
+        points = table.numbers(NOMINAL) + table.numbers(DEVIATIONS)
+    elif position:
+        points = table.numbers(position)
+    rotations = _rotations(table, points, orientation)
+    frame, frames = _numbered(table.words("frame"), np.isfinite(points[:, 0]), named="frame" in table)
     plane, planes = _numbered(table.words("plane"))
-    distances = table.numbers([DISTANCE], needed=False)[:, 0] if DISTANCE in columns else np.full(m, np.nan)
+    distances = table.numbers([DISTANCE])[:, 0] if DISTANCE in table else np.full(m, np.nan)
     anchor, anchors = _numbered(table.words("anchor"))
-    for i, word in enumerate(table.words("frame") if "frame" in columns else ()):
+    for i, word in enumerate(table.words("frame") if "frame" in table else ()):
         if not word and np.isfinite(points[i, 0]):
             raise table.error(i, "frame", "empty; where one point tells its frame all do")
     other = _others(table, q, distances, anchor)
@@ -226,19 +172,16 @@ def _numbered(
     return np.array(numbers, dtype=np.intp), tuple(order)
 
 
-def _rotations(table: _Table, points: Array) -> Array:
-    """Return (m, 3, 3) how the tool was turned; NaN where that was not measured."""
-    if QUATERNION[0] in table.columns:
-        numbers = table.numbers(QUATERNION, needed=False)
-    elif RPY[0] in table.columns:
-        numbers = table.numbers(RPY, needed=False)
-    else:
+def _rotations(table: UnitTable, points: Array, orientation: Sequence[str]) -> Array:
+    """Return (m, 3, 3) orientations of the tool; NaN where they were not measured."""
+    if not orientation:
         return np.broadcast_to(np.nan, (len(points), 3, 3))
+    numbers = table.numbers(orientation)
     rotations = np.full((len(points), 3, 3), np.nan)
     for i in np.flatnonzero(np.isfinite(numbers[:, 0])):
         if not np.isfinite(points[i, 0]):
             raise table.error(int(i), "", "the row tells how the tool was turned, and not where it was")
-        if numbers.shape[1] == 3:
+        if orientation is RPY:
             roll, pitch, yaw = numbers[i]
             rotations[i] = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
             continue
@@ -249,11 +192,11 @@ def _rotations(table: _Table, points: Array) -> Array:
     return rotations
 
 
-def _others(table: _Table, q: Array, distances: Array, anchor: Numbers) -> Array:
+def _others(table: UnitTable, q: Array, distances: Array, anchor: Numbers) -> Array:
     """Return (m, n) the postures that distances are from; NaN where they are from an anchor, or none are told."""
-    if not {DISTANCE, "anchor", "to"} & table.columns.keys():
+    if DISTANCE not in table:
         return np.broadcast_to(np.nan, q.shape)
-    other, names = np.full(q.shape, np.nan), table.names
+    other, names = np.full(q.shape, np.nan), _names(table)
     called: dict[str, list[int]] = {to: [] for to in table.words("to")}
     for k, name in enumerate(names):
         if name in called:
@@ -273,7 +216,7 @@ def _others(table: _Table, q: Array, distances: Array, anchor: Numbers) -> Array
     return other
 
 
-def _refuse_half_a_distance(table: _Table, row: int, distance: float, *, to: bool, anchor: bool) -> None:
+def _refuse_half_a_distance(table: UnitTable, row: int, distance: float, *, to: bool, anchor: bool) -> None:
     """Refuse a distance from nothing or from two places, no distance from one, and one below 0."""
     if math.isnan(distance):
         if to or anchor:
@@ -286,49 +229,42 @@ def _refuse_half_a_distance(table: _Table, row: int, distance: float, *, to: boo
         raise table.error(row, DISTANCE, f"expected a distance, got {distance:g} m")
 
 
-def _checks(table: _Table) -> Flags:
-    """Return which rows are kept to check with."""
-    if "set" not in table.columns:
-        return np.zeros(len(table.rows), dtype=np.bool_)
-    words = table.words("set")
-    for i, word in enumerate(words):
-        if word.lower() not in _SETS:
-            near = closest(word.lower(), _SETS)
-            hint = f"; did you mean {near}?" if near else ""
-            raise table.error(i, "set", f"expected fit or check, got '{word}'{hint}")
-    check = np.array([word.lower() == "check" for word in words], dtype=np.bool_)
+def _checks(table: UnitTable) -> Flags:
+    """Return which rows are held out to check with."""
+    if "set" not in table:
+        return np.zeros(len(table), dtype=np.bool_)
+    check = np.array([table.choice("set", i, _SETS) == "check" for i in range(len(table))], dtype=np.bool_)
     if check.all():
-        raise FileFormatError(table.path, None, "set", "every row is kept to check with; none is left to fit")
+        raise FileFormatError(table.path, None, "set", "every row is held out to check with; none is left to fit")
     return check
 
 
-def _refuse_other_units(path: Path, arm: Arm, q: Array, lines: Sequence[int], columns: Sequence[Column]) -> None:
-    """Refuse positions of joints that look as if they were in another unit."""
-    for i, (joint, column) in enumerate(zip(arm.joints, columns, strict=True)):
+def _refuse_other_units(table: UnitTable, arm: Arm, q: Array, headings: Sequence[Heading]) -> None:
+    """Refuse joint positions that look as if they were in another unit."""
+    for i, (joint, heading) in enumerate(zip(arm.joints, headings, strict=True)):
         worst = int(np.argmax(np.abs(q[:, i])))
         if joint.revolute:
             alone = np.zeros(arm.n)
             alone[i] = q[worst, i]
-            mistake = degrees_by_mistake(arm, alone) if column.unit == "rad" else ""
+            mistake = degrees_by_mistake(arm, alone) if heading.unit == "rad" else ""
             if mistake:
-                raise FileFormatError(path, lines[worst], column.header, f"{mistake}; are the units right?")
+                raise table.error(worst, heading.column.name, f"{mistake}; are the units right?")
             continue
         lower, upper = joint.limits.lower, joint.limits.upper
         if math.isfinite(upper - lower) and max(q[worst, i] - upper, lower - q[worst, i]) > _BEYOND * (upper - lower):
-            raise FileFormatError(
-                path,
-                lines[worst],
-                column.header,
+            raise table.error(
+                worst,
+                heading.column.name,
                 f"{arm.called(i)} of {arm.name} stands at {q[worst, i]:.4g} m, and its limits are {lower:.4g} to "
                 f"{upper:.4g} m; are the units right?",
             )
 
 
-def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], columns: Sequence[Column]) -> tuple[str, ...]:
+def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], headings: Sequence[Heading]) -> tuple[str, ...]:
     """Return what is odd but may be so."""
     texts, q = [], readings.q
-    for i, (joint, column) in enumerate(zip(arm.joints, columns, strict=True)):
-        scale, unit = {**LENGTH_UNITS, **ANGLE_UNITS}[column.unit], column.unit
+    for i, (joint, heading) in enumerate(zip(arm.joints, headings, strict=True)):
+        scale, unit = heading.scale, heading.unit
         if len(q) > 1 and np.ptp(q[:, i]) < _MOVED:
             texts.append(
                 f"{arm.called(i)} never moved: it stands at {q[0, i] / scale:.6g} {unit} in all {len(q)} rows. What it "
@@ -340,8 +276,8 @@ def _warnings(arm: Arm, readings: Readings, lines: Sequence[int], columns: Seque
                 f"{arm.called(i)} is beyond its limits of {joint.limits.lower / scale:.6g} to "
                 f"{joint.limits.upper / scale:.6g} {unit} in {_in_lines(np.flatnonzero(beyond).tolist(), lines)}"
             )
-    turning = [i for i, (joint, column) in enumerate(zip(arm.joints, columns, strict=True)) if joint.revolute]
-    if turning and all(columns[i].unit == "deg" for i in turning) and len(q) > 1:
+    turning = [i for i, joint in enumerate(arm.joints) if joint.revolute]
+    if turning and all(headings[i].unit == "deg" for i in turning) and len(q) > 1:
         largest = float(np.degrees(np.abs(q[:, turning]).max()))
         if largest < _RADIANS:
             texts.append(f"no joint is farther than {largest:.3g} degrees from 0; are these radians?")
@@ -379,7 +315,5 @@ def _copies(readings: Readings, lines: Sequence[int]) -> list[str]:
 
 
 def _in_lines(numbers: Sequence[int], lines: Sequence[int]) -> str:
-    """Name lines of the file, not too many of them."""
-    told = ", ".join(str(lines[i]) for i in numbers[:_SHOWN])
-    more = f" and {len(numbers) - _SHOWN} more" if len(numbers) > _SHOWN else ""
-    return f"line{'s' if len(numbers) > 1 else ''} {told}{more}"
+    """Name the lines of rows, not too many of them."""
+    return in_lines([lines[i] for i in numbers[:_SHOWN]], len(numbers))

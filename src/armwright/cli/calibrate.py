@@ -12,6 +12,7 @@ from armwright.cli.options import ArmName, Json, Quiet
 from armwright.cli.printing import command_line, print_json, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import warn_of_stray, write_results
+from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 from armwright.errors import DoubtfulError
 
 
@@ -23,6 +24,8 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     units: Annotated[
         str | None, typer.Option(help="Of a file whose header has none: mm,deg.", show_default=False)
     ] = None,
+    columns: ColumnMap = None,
+    skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
     folds: Annotated[int, typer.Option(help="Parts in which postures are held out to see how good it is.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of the parts.")] = 0,
@@ -60,7 +63,9 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     model = with_tool(load_arm(arm), tool_mm)
     warn_of_stray(measured)
-    measurements = read_measurements(measured, model, units=units_of(units))
+    measurements = read_measurements(
+        measured, model, units=units_of(units), columns=columns_of(columns), skip_incomplete=skip_incomplete
+    )
     with waiting("calibrating", quiet=quiet or as_json) as progress, one_core():
         noise = None if noise_um is None else noise_um * 1e-6
         assessment = assess_calibration(

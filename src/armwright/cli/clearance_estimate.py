@@ -10,6 +10,7 @@ import typer
 from armwright.cli.linkages import LinkageName
 from armwright.cli.printing import plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
+from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
 if TYPE_CHECKING:
     from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured
@@ -24,7 +25,7 @@ _LEVEL = 0.9
 _SHOWN_AS = {"1": (1e2, "%", 10.0), "m": (1e3, "mm", 0.1), "rad": (180 / math.pi, "deg", 0.01)}
 
 
-def estimate(
+def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     measured: Annotated[
         Path, typer.Argument(help="CSV of a resting tip, or of a tip on paths (docs/clearance.md).", show_default=False)
@@ -37,6 +38,8 @@ def estimate(
         float | None,
         typer.Option(help="Standard deviation of a measured coordinate; that of repeated readings without it."),
     ] = None,
+    columns: ColumnMap = None,
+    skip_incomplete: SkipIncomplete = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the estimate as JSON, in SI units.")] = False,
 ) -> None:
     """Tell the clearances of a linkage from where its tip rests, or from how it follows paths.
@@ -52,7 +55,8 @@ def estimate(
     from armwright.cli.results import warn_of_stray
 
     warn_of_stray(measured)
-    model, found = load_linkage(linkage), read_measured(measured)
+    model = load_linkage(linkage)
+    found = read_measured(measured, columns=columns_of(columns), skip_incomplete=skip_incomplete)
     noise = None if noise_um is None else noise_um * 1e-6
     told = _at_rest(model, found, noise) if isinstance(found, RestMeasured) else _on_paths(model, found, sweep, noise)
     if as_json:

@@ -1,19 +1,26 @@
 """``armwright forward`` and ``armwright jacobian``: where the hand is, and how it moves."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from armwright.cli.completing import one_of
 from armwright.cli.options import ArmName, Json, Posture, Rows
+from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.arrays import Array
 
 
-def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Json = False) -> None:
+def forward(  # noqa: PLR0917 - Typer reads one parameter per option
+    arm: ArmName,
+    posture: Posture = None,
+    csv: Rows = None,
+    columns: ColumnMap = None,
+    skip_incomplete: SkipIncomplete = False,
+    as_json: Json = False,
+) -> None:
     """Print the tool pose for joint positions.
 
     **Example:** `armwright forward puma560 -q 10,20,30,40,50,60`
@@ -25,7 +32,7 @@ def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Js
     from armwright.spatial.poses import to_noap
 
     model = load_arm(arm)
-    for q in postures(model, posture, csv):
+    for q in postures(model, posture, table_file(csv, columns, skip_incomplete=skip_incomplete)):
         X = tool_pose(model, q)
         if as_json:
             print(json.dumps({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()}))
@@ -36,10 +43,12 @@ def forward(arm: ArmName, posture: Posture = None, csv: Rows = None, as_json: Js
             print(numbers, f"  {round(place * 1e3, 3) + 0.0:12.3f}")
 
 
-def jacobian(
+def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     posture: Posture = None,
     csv: Rows = None,
+    columns: ColumnMap = None,
+    skip_incomplete: SkipIncomplete = False,
     frame: Annotated[
         str, typer.Option(help="Whose axes: base or tool.", autocompletion=one_of("base", "tool"))
     ] = "base",
@@ -57,7 +66,7 @@ def jacobian(
     model = load_arm(arm)
     if frame not in ("base", "tool"):
         raise typer.BadParameter(f"expected base or tool, got {frame}", param_hint="--frame")
-    for q in postures(model, posture, csv):
+    for q in postures(model, posture, table_file(csv, columns, skip_incomplete=skip_incomplete)):
         J = tool_jacobian(model, q, "tool" if frame == "tool" else "base")
         if as_json:
             print(json.dumps({"q": q.tolist(), "frame": frame, "jacobian": J.tolist()}))
@@ -72,13 +81,13 @@ def _per_rate(model: "Arm") -> list[str]:
     return [f"j{i} {'rad/s' if joint.revolute else 'm/s'}" for i, joint in enumerate(model.joints, 1)]
 
 
-def postures(model: "Arm", posture: str | None, csv: Path | None) -> "list[Array]":
+def postures(model: "Arm", posture: str | None, file: TableFile | None) -> "list[Array]":
     """Return the joint positions asked for: from the option, or one per row of a file."""
     from armwright.cli.joints import joint_values, rows
 
-    if (posture is None) == (csv is None):
+    if (posture is None) == (file is None):
         raise typer.BadParameter("give the joint positions, either here or as --csv FILE", param_hint="-q")
-    if csv is not None:
-        return list(rows(model, csv, ("q",))[0])
+    if file is not None:
+        return list(rows(model, file, ("q",))[0])
     assert posture is not None  # noqa: S101 - one of the two is given
     return [joint_values(model, posture, "-q")]

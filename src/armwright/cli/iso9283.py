@@ -9,14 +9,16 @@ from armwright.cli.failures import outcome
 from armwright.cli.numbers import Named, named_numbers
 from armwright.cli.options import Json, Quiet
 from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table
-from armwright.cli.results import write_results
+from armwright.cli.results import warn_of_stray, write_results
+from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 from armwright.errors import CheckFailedError, TooFewError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from armwright.accuracy.assessment import Assessment
     from armwright.accuracy.characteristics import Measure
+    from armwright.accuracy.measurement_file import AnyTest
 
 
 def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -38,6 +40,8 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
         list[str] | None,
         typer.Option(help="What a measure should keep: RP=0.05mm; may be repeated.", show_default=False),
     ] = None,
+    columns: ColumnMap = None,
+    skip_incomplete: SkipIncomplete = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -50,7 +54,14 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
-    found = _assessed(files, few=few, band_mm=band_mm, corners_mm=corners_mm, limits=limit or [])
+    from armwright.accuracy.measurement_file import read_measurements
+
+    _refuse_no_lengths(band_mm, corners_mm)
+    bounds = _bounds(limit or [])
+    for path in files:
+        warn_of_stray(path)
+    tests = read_measurements(files, columns=columns_of(columns), skip_incomplete=skip_incomplete)
+    found = _assessed(tests, bounds, few=few, band_mm=band_mm, corners_mm=corners_mm)
     plain = _plain(found)
     if output is not None:
         write_results(output, _files(found, files, plain))
@@ -78,24 +89,22 @@ def _exceeded(measures: "Sequence[Measure]") -> str:
     return f"limit exceeded: {'; '.join(told)}"
 
 
-def _assessed(
-    files: list[Path], *, few: bool, band_mm: float | None, corners_mm: float, limits: list[str]
-) -> "Assessment":
-    """Read the files and work out all measures."""
-    from armwright.accuracy.assessment import assess
-    from armwright.accuracy.measurement_file import read_measurements
-    from armwright.cli.results import warn_of_stray
-
+def _refuse_no_lengths(band_mm: float | None, corners_mm: float) -> None:
+    """Refuse a band or a distance from corners that is none."""
     for name, value, valid in (
         ("--band-mm", band_mm, band_mm is None or 0 < band_mm < float("inf")),
         ("--corners-mm", corners_mm, 0 <= corners_mm < float("inf")),
     ):
         if not valid:
             raise typer.BadParameter(f"expected a number above 0, got {value:g}", param_hint=name)
-    bounds = _bounds(limits)
-    for path in files:
-        warn_of_stray(path)
-    tests = read_measurements(files)
+
+
+def _assessed(
+    tests: "Sequence[AnyTest]", bounds: "Mapping[str, Named]", *, few: bool, band_mm: float | None, corners_mm: float
+) -> "Assessment":
+    """Work out all measures and compare them with their limits."""
+    from armwright.accuracy.assessment import assess
+
     try:
         found = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)
         return found.within({symbol: _in_si(found, *bound) for symbol, bound in bounds.items()})

@@ -10,6 +10,8 @@ from armwright.cli.numbers import numbers
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
     from armwright.arrays import Array
+    from armwright.cli.tables import TableFile
+    from armwright.files.column_names import Schema
 
 
 def joint_values(arm: "Arm", text: str, option: str) -> "Array":
@@ -31,13 +33,13 @@ def unit_names(arm: "Arm") -> list[str]:
     return [f"j{i} {'deg' if joint.revolute else 'mm'}" for i, joint in enumerate(arm.joints, 1)]
 
 
-def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
-    """Read columns such as q1 … qn, qd1 … qdn of a CSV file in SI units, such as motion.csv; others are passed over.
+def rows(arm: "Arm", file: "TableFile", quantities: tuple[str, ...]) -> list["Array"]:
+    """Read columns such as q1 … qn, qd1 … qdn of a CSV file, such as motion.csv, in SI; others are passed over.
 
     Args:
         arm: the arm.
-        path: the file.
-        quantities: what to read; the first are the joint positions.
+        file: what to read, and how.
+        quantities: what to read, of q, qd and qdd; the first are the joint positions.
 
     Returns:
         One array (rows, n) per quantity.
@@ -45,36 +47,43 @@ def rows(arm: "Arm", path: Path, quantities: tuple[str, ...]) -> list["Array"]:
     Raises:
         FileFormatError: the file, a column or all rows are missing, or a value is no finite number.
     """
-    from array import array
-
-    import numpy as np
-
     from armwright.cli.results import warn_of_stray
-    from armwright.errors import FileFormatError, shown
-    from armwright.files.rows import number_in_cell, of_one_width, read_rows
+    from armwright.errors import shown
+    from armwright.files.unit_table import read_header
 
-    warn_of_stray(path)
-    head, below = read_rows(path)
-    header = head.cells
+    warn_of_stray(file.path)
     wanted = [f"{quantity}{i + 1}" for quantity in quantities for i in range(arm.n)]
-    missing = [name for name in wanted if name not in header]
-    if missing:
-        raise FileFormatError(path, 1, missing[0], f"no such column; expected {wanted[0]} to {wanted[-1]}, with commas")
-    twice = [name for name in wanted if header.count(name) > 1]
-    if twice:
-        raise FileFormatError(path, 1, twice[0], "there are two columns of this name")
-    places = [(name, header.index(name)) for name in wanted]
-    # Eight bytes a number: a table may have many millions.
-    values = array("d")
-    at, name_of_arm = header.index("arm") if "arm" in header else None, ""
-    for row in of_one_width(path, head, below):
-        if at is not None and row.cells[at] != (name_of_arm := name_of_arm or row.cells[at]):
-            said = f"rows of several arms, {shown(name_of_arm)} and {shown(row.cells[at])}; leave those of one"
-            raise FileFormatError(path, row.line, "arm", said)
-        values.extend(number_in_cell(path, row.line, name, row.cells[place]) for name, place in places)
-    table = np.array(values).reshape(-1, len(quantities), arm.n)
-    _ask_for_degrees(arm, path, table[:, 0])
-    return [table[:, i] for i in range(len(quantities))]
+    header = read_header(file.path, _columns(arm, quantities), columns=file.columns)
+    header.require(wanted, f"{arm.name} has {arm.n} joints")
+    table = header.rows(filled=wanted, skip_incomplete=file.skip_incomplete)
+    arms = table.words("arm")
+    other = next((i for i, name in enumerate(arms) if name != arms[0]), None)
+    if other is not None:
+        said = f"rows of several arms, {shown(arms[0])} and {shown(arms[other])}; leave those of one"
+        raise table.error(other, "arm", said)
+    numbers = [table.numbers(wanted[k : k + arm.n]) for k in range(0, len(wanted), arm.n)]
+    if any(table.headings[name].unit == "rad" for name in wanted[: arm.n]):
+        _ask_for_degrees(arm, file.path, numbers[0])
+    return numbers
+
+
+def _columns(arm: "Arm", quantities: tuple[str, ...]) -> "Schema":
+    """Return the columns of joint positions, velocities and accelerations, in SI where their names have no unit."""
+    from armwright.files import column_names as names
+
+    kinds = {
+        "q": ("", (names.ANGLE, "rad"), (names.LENGTH, "m")),
+        "qd": ("_velocity", (names.ANGULAR_VELOCITY, "rad_per_s"), (names.VELOCITY, "m_per_s")),
+        "qdd": ("_acceleration", (names.ANGULAR_ACCELERATION, "rad_per_s2"), (names.ACCELERATION, "m_per_s2")),
+    }
+    columns = [names.Column(name="arm")]
+    for symbol in quantities:
+        suffix, *units = kinds[symbol]
+        for i, joint in enumerate(arm.joints, 1):
+            quantity, unit = units[not joint.revolute]
+            synonyms = tuple(f"{name}{suffix}" for name in (f"joint_{i}", joint.name) if name)
+            columns.append(names.Column(name=f"{symbol}{i}", quantity=quantity, unit=unit, synonyms=synonyms))
+    return names.Schema(columns=columns, passes_over=True)
 
 
 def _ask_for_degrees(arm: "Arm", path: Path, q: "Array") -> None:
@@ -83,4 +92,4 @@ def _ask_for_degrees(arm: "Arm", path: Path, q: "Array") -> None:
 
     found = degrees_by_mistake(arm, q)
     if found:
-        print(f"armwright: warning: {path}: {found}; the columns of a file are in SI units", file=sys.stderr)
+        print(f"armwright: warning: {path}: {found}; columns without a unit are in SI units", file=sys.stderr)

@@ -15,7 +15,12 @@ Posture: TypeAlias = Annotated[
     str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
 ]
 Rows: TypeAlias = Annotated[
-    Path | None, typer.Option("--csv", help="Rows of q1 ... qn in SI units, such as motion.csv.", show_default=False)
+    Path | None,
+    typer.Option(
+        "--csv",
+        help="Table of q1 ... qn, in SI units or those of its names, such as motion.csv.",
+        show_default=False,
+    ),
 ]
 Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
 JsonSummary: TypeAlias = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")]

@@ -10,6 +10,7 @@ from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json
 from armwright.cli.printing import plain_console, print_json, print_table, table
+from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -34,6 +35,8 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     units: Annotated[
         str | None, typer.Option(help="Of that file, if its header has none: mm,deg.", show_default=False)
     ] = None,
+    columns: ColumnMap = None,
+    skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="CSV of the poses, to be measured and given to calibrate.")
@@ -53,9 +56,12 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.files.output import write_file
 
     model = with_tool(load_arm(arm), tool_mm)
+    measured = None
     if after is not None:
         warn_of_stray(after)
-    measured = None if after is None else read_measurements(after, model, units=units_of(units)).q
+        measured = read_measurements(
+            after, model, units=units_of(units), columns=columns_of(columns), skip_incomplete=skip_incomplete
+        ).q
     plan = planned(model, count, index=index, seed=seed, rotations=turns, measured=measured)  # type: ignore[arg-type]
     if output is not None:
         write_file(output, _csv(model, plan))

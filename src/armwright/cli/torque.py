@@ -7,6 +7,7 @@ import typer
 
 from armwright.cli.load import Load
 from armwright.cli.options import ArmName, Json
+from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 
 if TYPE_CHECKING:
     from armwright.arm.model import Arm
@@ -24,9 +25,9 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     qd: Annotated[str | None, typer.Option(help="Joint speeds in degrees/s and mm/s; 0 when left out.")] = None,
     qdd: Annotated[str | None, typer.Option(help="Joint accelerations in degrees/s² and mm/s²; likewise.")] = None,
-    csv: Annotated[
-        Path | None, typer.Option("--csv", help="Rows of q, qd and qdd in SI units, such as motion.csv.")
-    ] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Table of q, qd and qdd, such as motion.csv.")] = None,
+    columns: ColumnMap = None,
+    skip_incomplete: SkipIncomplete = False,
     load: Load = None,
     wrench: Annotated[
         str | None,
@@ -55,7 +56,7 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     model = load_arm(arm)
     held = Link() if load is None else load_in_hand(load)
     push = None if wrench is None else numbers(wrench, 6, "--wrench")
-    motion = _motion(model, q, qd, qdd, csv)
+    motion = _motion(model, (q, qd, qdd), table_file(csv, columns, skip_incomplete=skip_incomplete))
     for first in range(0, len(motion[0]), _BLOCK):
         found = terms(model, *(values[first : first + _BLOCK] for values in motion), load=held, wrench=push)
         causes = _causes(found)
@@ -67,15 +68,16 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
                 _print(model, efforts)
 
 
-def _motion(model: "Arm", q: str | None, qd: str | None, qdd: str | None, csv: Path | None) -> "list[Array]":
+def _motion(model: "Arm", values: tuple[str | None, str | None, str | None], file: TableFile | None) -> "list[Array]":
     from armwright.cli.joints import joint_values, rows
 
-    if (q is None) == (csv is None):
+    q, qd, qdd = values
+    if (q is None) == (file is None):
         raise typer.BadParameter("give the motion, either as -q, --qd and --qdd or as --csv FILE", param_hint="-q")
-    if csv is not None:
+    if file is not None:
         if qd is not None or qdd is not None:
             raise typer.BadParameter("a file has its own speeds and accelerations", param_hint="--csv")
-        return rows(model, csv, ("q", "qd", "qdd"))
+        return rows(model, file, ("q", "qd", "qdd"))
     still = ",".join(["0"] * model.n)
     texts = (("-q", q), ("--qd", qd), ("--qdd", qdd))
     return [joint_values(model, still if text is None else text, option)[None] for option, text in texts]

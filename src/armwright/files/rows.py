@@ -1,8 +1,7 @@
-"""Tables in CSV as people send them: rows of cells with their lines, and the numbers in them."""
+"""Tables in CSV as people send them: rows of cells with their lines, between commas, semicolons or tabs."""
 
 import csv
 import itertools
-import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -12,12 +11,11 @@ from armwright.errors import FileFormatError, shown
 from armwright.files.limits import beyond, limit
 from armwright.files.reading import read_lines
 
-# SI values of the units that names of columns end in.
-LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
-ANGLE_UNITS = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180}
-# Columns whose names begin so are for people.
-NOTE = "note"
-# A number that is written longer is told in short.
+# The first is taken where a line has none of them.
+_SEPARATORS = (",", ";", "\t")
+# A line of these alone is empty.
+_NOTHING = ' ,;\t\r\n"'
+# A number that is written longer is shown rounded.
 _LONGEST = 40
 
 
@@ -33,6 +31,21 @@ class Cells(NamedTuple):
     cells: tuple[str, ...]
 
 
+class Rows(NamedTuple):
+    """A table as cells.
+
+    Attributes:
+        head: the names of the columns as they are written.
+        below: the rows, each as wide as the head; they are read when they are asked for, so that a table of many
+            millions needs no more memory than one row.
+        separator: what stands between cells: a comma, a semicolon or a tab.
+    """
+
+    head: Cells
+    below: Iterator[Cells]
+    separator: str
+
+
 def text_cell(text: str) -> str:
     """Return a text as one cell of a table, which no spreadsheet takes for a formula: quoted where it must be."""
     plain = " ".join(text.splitlines()) if len(text.splitlines()) > 1 else text.strip("\r\n")
@@ -41,61 +54,67 @@ def text_cell(text: str) -> str:
     return '"' + plain.replace('"', '""') + '"' if any(sign in plain for sign in ',;"\t') else plain
 
 
-def read_rows(path: Path | str) -> tuple[Cells, Iterator[Cells]]:
-    """Return the names of the columns as they are written, and the rows below; empty lines are left out.
-
-    Rows are read when they are asked for, so that a table of many millions needs no more memory than one row.
+def read_rows(path: Path | str) -> Rows:
+    """Read a table; the first line in which something stands names its columns, and empty lines are left out.
 
     Raises:
-        FileFormatError: the file is missing, empty, not separated by commas, has no rows or more columns than the
-            limit; and while rows are asked for, that one of them is no CSV, or there are more than the limit.
+        FileFormatError: the file is missing, empty, has no rows or more columns than the limit; and while rows are
+            asked for, that a row is no CSV or not as wide as the head, or that there are more than the limit.
     """
     path = Path(path)
-    lines = _lines(path)
-    head = next(lines, None)
+    lines = read_lines(path)
+    skipped = 0
+    for text in lines:
+        if text.strip(_NOTHING):
+            break
+        skipped += 1
+    else:
+        raise _empty(path)
+    # Most columns win: the name of a column may have a sign in it that separates cells elsewhere.
+    begin = text[: csv.field_size_limit()]
+    separator = max(_SEPARATORS, key=lambda sign: len(next(csv.reader([begin], delimiter=sign))))
+    cells = _cells(path, itertools.chain([text], lines), separator, skipped)
+    head = next(cells, None)
     if head is None:
-        raise FileFormatError(path, None, "", "the file is empty; its first line should name the columns")
+        raise _empty(path)
     if len(head.cells) > limit("table_columns"):
         raise FileFormatError(path, head.line, "", f"too many columns: {beyond('table_columns', len(head.cells))}")
-    for mark, name in ((";", "semicolons"), ("\t", "tabs")):
-        if len(head.cells) == 1 and mark in head.cells[0]:
-            raise FileFormatError(
-                path,
-                head.line,
-                "",
-                f"columns are separated by {name}; expected commas between columns and points in numbers",
-            )
-    first = next(lines, None)
+    first = next(cells, None)
     if first is None:
         raise FileFormatError(path, None, "", "no rows below the names of the columns")
-    return head, itertools.chain([first], lines)
+    return Rows(head, _of_one_width(path, head, itertools.chain([first], cells), separator), separator)
 
 
-def _lines(path: Path) -> Iterator[Cells]:
-    """Give the lines in which something stands; the first names the columns."""
-    reader = csv.reader(read_lines(path))
+def _empty(path: Path) -> FileFormatError:
+    return FileFormatError(path, None, "", "the file is empty; its first line should name the columns")
+
+
+def _cells(path: Path, lines: Iterable[str], separator: str, skipped: int) -> Iterator[Cells]:
+    """Give the lines in which something stands, below those that were skipped; the first names the columns."""
+    reader = csv.reader(lines, delimiter=separator)
     count, most = 0, limit("table_rows")
     try:
         for row in reader:
             cells = tuple(cell.strip() for cell in row)
             if any(cells):
                 if count > most:
-                    raise FileFormatError(path, reader.line_num, "", f"too many rows: {beyond('table_rows')}")
+                    raise FileFormatError(path, skipped + reader.line_num, "", f"too many rows: {beyond('table_rows')}")
                 count += 1
-                yield Cells(reader.line_num, cells)
+                yield Cells(skipped + reader.line_num, cells)
     except csv.Error as error:
-        raise FileFormatError(path, reader.line_num, "", f"not valid CSV: {error}") from error
+        raise FileFormatError(path, skipped + reader.line_num, "", f"not valid CSV: {error}") from error
 
 
-def of_one_width(path: Path | str, head: Cells, rows: Iterable[Cells]) -> Iterator[Cells]:
-    """Give the rows of a table, each with as many cells as there are columns, which should be looked at before.
+def _of_one_width(path: Path, head: Cells, rows: Iterable[Cells], separator: str) -> Iterator[Cells]:
+    """Give the rows, each with as many cells as there are columns.
 
     Raises:
         FileFormatError: a row is longer or shorter.
     """
     for row in rows:
         if len(row.cells) != len(head.cells):
-            hint = "; is there a comma in a number?" if len(row.cells) > len(head.cells) else ""
+            decimal = separator == "," and len(row.cells) > len(head.cells)
+            hint = "; is there a comma in a number?" if decimal else ""
             raise FileFormatError(
                 path,
                 row.line,
@@ -105,27 +124,55 @@ def of_one_width(path: Path | str, head: Cells, rows: Iterable[Cells]) -> Iterat
         yield row
 
 
-def number_in_cell(path: Path | str, line: int, header: str, text: str) -> float:
-    """Return the number that stands in a cell.
+class NumberFormat:
+    """How the numbers of a table are written: with decimal points or, between semicolons or tabs, decimal commas."""
 
-    Raises:
-        FileFormatError: there is none, or none that a robot has.
-    """
-    if not text:
-        raise FileFormatError(path, line, header, "empty; expected a number")
-    value = _number(text)
-    if value is None:
-        hint = "; write a decimal point" if _number(text.replace(",", ".")) is not None else ""
-        raise FileFormatError(path, line, header, f"expected a number, got {shown(text)}{hint}")
-    if not abs(value) <= LARGEST:
-        got = text if len(text) < _LONGEST else f"{value:g}"
-        raise FileFormatError(
-            path, line, header, f"every number must be finite and no larger than {LARGEST:g}, got {got}"
-        )
-    return value
+    def __init__(self, path: Path, separator: str) -> None:
+        """Expect decimal points between commas; elsewhere the first number decides."""
+        self._path, self._comma_separates = path, separator == ","
+        self._sign, self._line = "", 0
+
+    def number(self, line: int, header: str, text: str) -> float:
+        """Return the number that stands in a cell.
+
+        Raises:
+            FileFormatError: there is none, or none that a robot has.
+        """
+        point = text
+        if not self._comma_separates and ("," in text or "." in text):
+            point = self._with_point(line, header, text)
+        value = _parsed(point)
+        if value is None:
+            hint = "; write a decimal point" if _parsed(text.replace(",", ".")) is not None else ""
+            raise FileFormatError(self._path, line, header, f"expected a number, got {shown(text)}{hint}")
+        if not abs(value) <= LARGEST:
+            got = text if len(text) < _LONGEST else f"{value:g}"
+            raise FileFormatError(
+                self._path, line, header, f"every number must be finite and no larger than {LARGEST:g}, got {got}"
+            )
+        return value
+
+    def _with_point(self, line: int, header: str, text: str) -> str:
+        """Return a number with a decimal point; where a file has both signs, one of them parts thousands.
+
+        Raises:
+            FileFormatError: other numbers of the file have the other sign.
+        """
+        sign = "," if "," in text else "."
+        if not self._sign:
+            self._sign, self._line = sign, line
+        if sign != self._sign:
+            expected = "point" if sign == "," else "comma"
+            raise FileFormatError(
+                self._path,
+                line,
+                header,
+                f"expected a decimal {expected}, as in line {self._line}, got {shown(text)}; thousands are not parted",
+            )
+        return text.replace(",", ".")
 
 
-def _number(text: str) -> float | None:
+def _parsed(text: str) -> float | None:
     try:
         return float(text)
     except ValueError:

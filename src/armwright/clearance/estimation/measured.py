@@ -18,14 +18,23 @@ from armwright.clearance.estimation.static import Estimate, estimate_at_rest
 from armwright.clearance.features import Features, features_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
-from armwright.errors import FileFormatError, closest
+from armwright.files.column_names import LENGTH, TIME, Column, Schema
 from armwright.files.limits import beyond, limit
-from armwright.files.rows import number_in_cell, of_one_width, read_rows
+from armwright.files.unit_table import UnitTable, read_header
 
-_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-_TIMES = {"s": 1.0, "ms": 1e-3}
 _AT_REST = ("pose", "commanded_x", "commanded_y", "x", "y")
 _ON_PATHS = ("path", "t", "x", "y")
+_SCHEMA = Schema(
+    columns=(
+        Column(name="pose"),
+        Column(name="path"),
+        Column(name="t", quantity=TIME),
+        *(
+            Column(name=name, quantity=LENGTH, group="lengths", synonyms=(f"{name[-1]}_nominal",) * (len(name) > 1))
+            for name in _AT_REST[1:]
+        ),
+    )
+)
 # An error beyond this is no play but another unit, or another arm [m].
 _LARGEST = 0.02
 # No instrument that is meant tells a resting tip to less [m].
@@ -128,78 +137,56 @@ class PathsMeasured:
         return np.atleast_2d(np.cov(table, rowvar=False))
 
 
-def read_measured(path: Path | str) -> RestMeasured | PathsMeasured:
+def read_measured(
+    path: Path | str, *, columns: Mapping[str, str] | None = None, skip_incomplete: bool = False
+) -> RestMeasured | PathsMeasured:
     """Read a file of measurements.
+
+    Args:
+        path: the file.
+        columns: names of columns, with unit, by those in the file: ``{"X": "x_mm"}``.
+        skip_incomplete: leave out rows with empty cells; an ``IncompleteRowsWarning`` says how many.
 
     Raises:
         FileFormatError: it is missing or broken; columns are missing or in mixed units; a number is none; the tip is
             farther off than any play lets it be. The text has file and line.
     """
-    path = Path(path)
-    head, below = read_rows(path)
-    columns, scales = _columns(path, head.line, [name.lower() for name in head.cells])
-    wanted = _AT_REST if "pose" in columns else _ON_PATHS
-    found: dict[str, list[tuple[int, list[float]]]] = {}
-    most = limit("entries")
-    for row in of_one_width(path, head, below):
-        values = [number_in_cell(path, row.line, name, row.cells[columns[name]]) * scales[name] for name in wanted[1:]]
-        name = row.cells[columns[wanted[0]]]
-        if not name:
-            raise FileFormatError(path, row.line, wanted[0], "expected a name, got nothing")
-        found.setdefault(name, []).append((row.line, values))
-        if len(found) > most:
-            raise FileFormatError(path, row.line, wanted[0], f"too many: {beyond('entries')}")
-    return _at_rest(path, found) if "pose" in columns else _on_paths(path, found)
+    header = read_header(path, _SCHEMA, columns=columns)
+    names = header.present(("pose", "path"))
+    if len(names) != 1:
+        there = "both" if names else "neither"
+        raise header.error("pose", f"expected a column pose or a column path, and there are {there}: {header.listing}")
+    wanted = _AT_REST if names[0] == "pose" else _ON_PATHS
+    header.require(wanted)
+    table = header.rows(filled=wanted, skip_incomplete=skip_incomplete)
+    groups = _rows_by_name(table, names[0])
+    numbers = table.numbers(wanted[1:])
+    return _at_rest(table, numbers, groups) if names[0] == "pose" else _on_paths(table, numbers, groups)
 
 
-def _columns(path: Path, line: int, head: list[str]) -> tuple[dict[str, int], dict[str, float]]:
-    """Return where the columns are, and what their units are in SI.
+def _rows_by_name(table: UnitTable, column: str) -> dict[str, list[int]]:
+    """Return the numbers of the rows of each pose or path.
 
     Raises:
-        FileFormatError: one is missing, stands there twice, is unknown, or lengths are in different units.
+        FileFormatError: there are more poses or paths than the limit.
     """
-    wanted = _AT_REST if "pose" in head else _ON_PATHS
-    found: dict[str, int] = {}
-    scales: dict[str, float] = {}
-    lengths: dict[str, str] = {}
-    for i, name in enumerate(head):
-        base, _, unit = name.rpartition("_")
-        if name in ("pose", "path"):
-            base = name
-        elif base not in wanted or unit not in (units := _TIMES if base == "t" else _LENGTHS):
-            usual = [wanted[0], *(f"{one}_s" if one == "t" else f"{one}_mm" for one in wanted[1:])]
-            near = next((one for one in usual if one.rpartition("_")[0] == base), None) or closest(name, usual)
-            hint = f"; did you mean {near}?" if near else ""
-            raise FileFormatError(path, line, name, f"unknown column{hint}; expected {_expected(wanted)}")
-        else:
-            scales[base] = units[unit]
-            if base != "t":
-                lengths[name] = unit
-        if base in found:
-            raise FileFormatError(path, line, name, "this column stands there twice")
-        found[base] = i
-    missing = [name for name in wanted if name not in found]
-    if missing:
-        raise FileFormatError(path, line, missing[0], f"missing; expected the columns {_expected(wanted)}")
-    if len(set(lengths.values())) > 1:
-        raise FileFormatError(
-            path, line, "", f"lengths are in mixed units: {', '.join(lengths)}; expected one unit for all"
-        )
-    return found, scales
+    groups: dict[str, list[int]] = {}
+    most = limit("entries")
+    for row, name in enumerate(table.words(column)):
+        groups.setdefault(name, []).append(row)
+        if len(groups) > most:
+            raise table.error(row, column, f"too many: {beyond('entries')}")
+    return groups
 
 
-def _expected(wanted: tuple[str, ...]) -> str:
-    return ", ".join([wanted[0], *(f"{name}_s" if name == "t" else f"{name}_mm" for name in wanted[1:])])
-
-
-def _at_rest(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) -> RestMeasured:
+def _at_rest(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> RestMeasured:
     poses, offsets, counts, spread = [], [], [], []
-    for name, rows in table.items():
-        values = np.array([row for _, row in rows])
+    for name, rows in groups.items():
+        values = numbers[rows]
         if np.any(np.ptp(values[:, :2], axis=0) > 0):
-            raise FileFormatError(path, rows[0][0], name, "this pose is commanded at different places")
+            raise table.error(rows[0], name, "this pose is commanded at different positions")
         off = values[:, 2:] - values[:, :2]
-        _refuse_far(path, rows[0][0], name, off)
+        _refuse_far(table, rows[0], name, off)
         poses.append(values[0, :2])
         offsets.append(off.mean(axis=0))
         counts.append(len(rows))
@@ -208,7 +195,7 @@ def _at_rest(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) -> 
     again = sum(counts) - len(counts)
     variance = sum(spread) / again if again else 0.0
     return RestMeasured(
-        names=tuple(table),
+        names=tuple(groups),
         poses=np.array(poses),
         offsets=np.array(offsets),
         readings=tuple(counts),
@@ -216,42 +203,39 @@ def _at_rest(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) -> 
     )
 
 
-def _on_paths(path: Path, table: Mapping[str, list[tuple[int, list[float]]]]) -> PathsMeasured:
+def _on_paths(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> PathsMeasured:
     times: dict[str, Array] = {}
     errors: dict[str, Array] = {}
-    for name, rows in table.items():
+    for name, rows in groups.items():
         try:
             wanted = named_path(name)
         except LookupError as error:
-            raise FileFormatError(path, rows[0][0], "path", str(error)) from error
-        values = np.array([row for _, row in rows])
+            raise table.error(rows[0], "path", str(error)) from error
+        values = numbers[rows]
         t = values[:, 0]
         if len(rows) < _FEWEST:
-            raise FileFormatError(path, rows[0][0], name, f"expected {_FEWEST} samples or more, got {len(rows)}")
+            raise table.error(rows[0], name, f"expected {_FEWEST} samples or more, got {len(rows)}")
         steps = np.diff(t)
         if np.any(steps <= 0) or np.ptp(steps) > 0.01 * steps.mean():
             late = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
-            raise FileFormatError(path, rows[late][0], "t", "samples must be equally spaced in time")
+            raise table.error(rows[late], "t", "samples must be equally spaced in time")
         if abs(t[0]) > 1.5 * steps.mean() or t[-1] < _WHOLE * wanted.duration - 1.5 * steps.mean():
-            raise FileFormatError(
-                path, rows[0][0], "t", f"path {name} takes {wanted.duration:g} s; got {t[0]:g} to {t[-1]:g} s"
-            )
+            raise table.error(rows[0], "t", f"path {name} takes {wanted.duration:g} s; got {t[0]:g} to {t[-1]:g} s")
         # While the tip rests after the path its error says something else than on the way: a mean must not count it.
         on_the_way = t <= wanted.duration + 0.5 * steps.mean()
         t, values = t[on_the_way], values[on_the_way]
         off = values[:, 1:] - wanted.at(t).at
-        _refuse_far(path, rows[0][0], name, off)
+        _refuse_far(table, rows[0], name, off)
         times[name], errors[name] = t, off
     return PathsMeasured(times=times, errors=errors)
 
 
-def _refuse_far(path: Path, line: int, name: str, off: Array) -> None:
+def _refuse_far(table: UnitTable, row: int, name: str, off: Array) -> None:
     """Refuse what no play explains."""
     worst = float(np.hypot(off[:, 0], off[:, 1]).max())
     if worst > _LARGEST:
-        raise FileFormatError(
-            path,
-            line,
+        raise table.error(
+            row,
             name,
             f"the tip is {worst * 1e3:.4g} mm from where it was told to be; are the units right, and is it in the axes "
             f"of the ground? More than {_LARGEST * 1e3:g} mm is no play",

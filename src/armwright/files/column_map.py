@@ -1,0 +1,39 @@
+"""Column maps: which columns of somebody's file are those that a reader expects."""
+
+from pathlib import Path
+
+from armwright.errors import InvalidValueError, shown
+from armwright.files.document import Document
+from armwright.files.limits import beyond, limit
+
+
+def column_map(text: str) -> dict[str, str]:
+    """Return the names that columns are taken for, by their names in the file.
+
+    Args:
+        text: such as ``A1=joint_1_deg,X=x_mm``, or the path of a TOML file with a table ``[columns]`` of such pairs.
+
+    Raises:
+        InvalidValueError: the text is neither.
+        FileFormatError: the file is missing or broken, or says something else.
+    """
+    if "=" not in text:
+        return _in_file(Path(text))
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        name, _, target = (word.strip() for word in part.rpartition("="))
+        if not name or not target or name in found:
+            why = "that name is there twice" if name in found else "expected A1=joint_1_deg,X=x_mm"
+            raise InvalidValueError(f"columns: {why}, got {shown(part)}")
+        found[name] = target
+    return found
+
+
+def _in_file(path: Path) -> dict[str, str]:
+    root = Document.read(path).root
+    table = root.table("columns", required=True)
+    root.finish()
+    names = list(table.free_keys())
+    if len(names) > limit("table_columns"):
+        raise root.error("columns", f"too many: {beyond('table_columns', len(names))}")
+    return {name: table.text(name) for name in names}
