@@ -191,7 +191,7 @@ def test_next_poses_without_units(measured: Path, tmp_path: Path) -> None:
     done = armwright("plan-poses", ARM, "-n", "2", "--after", path, "--units", "mm,deg")
 
     assert refused.returncode == 4
-    assert "or state the units" in refused.stderr
+    assert "in the file or by --columns or --units" in refused.stderr
     assert done.returncode == 0, done.stderr
 
 

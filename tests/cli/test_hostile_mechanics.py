@@ -131,11 +131,11 @@ def test_mistakes_in_a_call(call: Call, arguments: tuple[str, ...], status: int,
 FILES = {
     "empty": ("", ": the file is empty; its first line should name the columns"),
     "columns without rows": (HEADER + "\n", ": no rows below the names of the columns"),
-    "semicolons": (
-        HEADER.replace(",", ";") + "\n1;2;3;4;5;6\n",
-        ":1: columns are separated by semicolons; expected commas",
+    "a thousand and a decimal comma": (
+        HEADER.replace(",", ";") + "\n1,5;2;3;4;5;1.000\n",
+        ":2: q6: expected a decimal comma, as in line 2, got '1.000'",
     ),
-    "a column twice": (HEADER + ",q2\n1,1,1,1,1,1,1\n", ":1: q2: there are two columns of this name"),
+    "a column twice": (HEADER + ",q2\n1,1,1,1,1,1,1\n", ":1: q2: there twice, as q2 too"),
     "a short row": (HEADER + "\n1,1\n", ":2: expected 6 values, as there are columns, got 2"),
     "a word": (HEADER + "\n1,1,1,1,1,1\n\n1,1,one,1,1,1\n", ":4: q3: expected a number, got 'one'"),
     "an endless number": (HEADER + "\n1,1,1,1,1,inf\n", ":2: q6: every number must be finite"),

@@ -85,7 +85,7 @@ def test_the_page_of_the_format(tmp_path: Path) -> None:
 SLIPS = [
     ("y_mm", "y_m"),
     ("x_mm", "x"),
-    (",", ";"),
+    ("400.129", ""),
     ("400.129", '"400,129"'),
     ("P1,2,", "P1,1,"),
     ("commanded,400,0,300", "commanded,0.4,0,0.3"),

@@ -55,7 +55,7 @@ def measured_columns(arm: Arm) -> Schema:
 
 
 def read_columns(
-    path: Path | str, arm: Arm, *, columns: Mapping[str, str] | None, units: Mapping[str, str] | None
+    path: Path | str, arm: Arm, *, columns: Mapping[str, str] | None, units: Mapping[str, str]
 ) -> tuple[Header, tuple[str, ...], tuple[str, ...]]:
     """Read which columns a file of measurements has.
 

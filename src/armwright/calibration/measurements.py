@@ -97,7 +97,7 @@ def read_measurements(
             The text has file, line and column.
         UnknownNameError: there are no such ``units``.
     """
-    header, position, orientation = read_columns(path, arm, columns=columns, units=units_of(*units) if units else None)
+    header, position, orientation = read_columns(path, arm, columns=columns, units=units_of(*units) if units else {})
     joints, partial = joint_columns(arm), bool(header.present(("plane", DISTANCE)))
     table = header.rows(
         filled=[*joints, *(() if partial else position)],

@@ -39,7 +39,7 @@ class Quantity(NamedTuple):
     @property
     def usual(self) -> str:
         """The unit that is proposed."""
-        return next(iter(self.units), "")
+        return next(iter(self.units))
 
 
 _DEGREE = math.pi / 180
@@ -78,8 +78,8 @@ class Column:
 
     @property
     def proposed(self) -> str:
-        """Its name with the usual unit."""
-        return "_".join(filter(None, (self.name, self.quantity.usual)))
+        """Its name, with the usual unit where it must have one."""
+        return self.name if self.unit or not self.quantity.units else f"{self.name}_{self.quantity.usual}"
 
     @property
     def choices(self) -> str:
@@ -137,7 +137,7 @@ def units_of(length: str, angle: str) -> dict[str, str]:
 
 
 def headings_of(
-    path: Path, head: Cells, schema: Schema, mapping: Mapping[str, tuple[str, str]], units: Mapping[str, str]
+    path: Path, head: Cells, schema: Schema, mapping: Mapping[str, tuple[str, str]], units: Mapping[str, str] | None
 ) -> dict[str, Heading]:
     """Return the columns of a file by their names in the schema.
 
@@ -146,7 +146,7 @@ def headings_of(
         head: its first line.
         schema: the columns that there may be.
         mapping: what columns are taken for, by their ``plain`` names: as it was written, and a name with unit.
-        units: for columns whose names have none, by quantity.
+        units: for columns whose names have none, by quantity; None where a reader takes none.
 
     Raises:
         FileFormatError: a column is unknown, there twice or without unit, or has another unit than its group.
@@ -161,9 +161,10 @@ def headings_of(
         column, unit = names.resolve(target or written, text, mapped=bool(target)) or (None, "")
         if column is None:
             continue
-        unit = unit or units.get(column.quantity.name, "") or column.unit
+        unit = unit or (units or {}).get(column.quantity.name, "") or column.unit
         if column.quantity.units and not unit:
-            raise names.error(text, f"the name has no unit: expected {column.choices}, in the file or by --columns")
+            options = "--columns" if units is None else "--columns or --units"
+            raise names.error(text, f"the name has no unit: expected {column.choices}, in the file or by {options}")
         if column.name in found:
             raise names.error(text, f"there twice, as {found[column.name].text} too")
         found[column.name] = Heading(cell, column, unit, text)

@@ -195,7 +195,8 @@ def read_header(
         schema: the columns that there may be.
         columns: names of the schema, with unit, by the names in the file: ``{"A1": "joint_1_deg"}``; a column that is
             called ``note`` is passed over.
-        units: for columns whose names have none, by quantity, such as ``{"length": "mm"}``.
+        units: for columns whose names have none, by quantity, such as ``{"length": "mm"}``; None where the caller takes
+            none.
 
     Raises:
         FileFormatError: the file is missing or empty; a column is unknown, there twice or without unit, or has another
@@ -218,21 +219,21 @@ def read_headers(
     """
     mapping = {plain(name): (name, target) for name, target in (columns or {}).items()}
     files = [(Path(path), read_rows(path)) for path in paths]
-    headers = {plain(text) for _, rows in files for text in rows.head.cells}
+    headers = {plain(text): text for _, rows in files for text in rows.head.cells}
     for key, (name, target) in mapping.items():
         if key not in headers:
             near = closest(key, headers)
-            hint = f"; did you mean '{near}'?" if near else ""
+            hint = f"; did you mean '{headers[near]}'?" if near else "."
             path, rows = files[0]
             there = ", ".join(rows.head.cells)
             raise FileFormatError(
-                path, rows.head.line, name, f"no such column to be taken for {target}{hint}; there are {there}"
+                path, rows.head.line, name, f"no such column to be taken for {target}{hint} There are {there}"
             )
     return [
         Header(
             path=path,
             line=rows.head.line,
-            headings=headings_of(path, rows.head, schema, mapping, units or {}),
+            headings=headings_of(path, rows.head, schema, mapping, units),
             schema=schema,
             below=rows.below,
             separator=rows.separator,
