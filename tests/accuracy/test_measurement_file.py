@@ -10,7 +10,7 @@ import pytest
 
 from armwright.accuracy.assessment import Assessment, assess
 from armwright.accuracy.measurement_file import AnyTest, PathTest, PoseTest, read_measurements
-from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
+from armwright.errors import ArmwrightError, FileFormatError, IncompleteRowsWarning, InvalidValueError, UnknownNameError
 from armwright.files.limits import raised
 
 Read = Callable[..., tuple[AnyTest, ...]]
@@ -180,6 +180,53 @@ def test_limits(read: Read) -> None:
         found.within({"PR": 1.0})
 
 
+NOMINAL = """Pose;X nominal [mm];Y nominal [mm];X measured [mm];Y measured [mm]
+P1;400,0;0,0;401,0;0,0
+P2;100,0;50,0;100,0;50,5
+P1;400,0;0,0;403,0;0,0
+P2;100,0;50,0;100,0;50,5
+"""
+
+
+def test_nominal_beside_measured(read: Read) -> None:
+    """A tracker writes nominal beside measured poses: P1 is 1 and 3 mm off, so AP is 2 mm, RP 1 mm; P2 0.5 and 0 mm."""
+    found = assess(read(NOMINAL), few=True)
+
+    of = {(one.symbol, one.name): one.value for one in found.measures}
+    assert [of["AP", "P1"], of["RP", "P1"]] == pytest.approx([2e-3, 1e-3])
+    assert [of["AP", "P2"], of["RP", "P2"]] == pytest.approx([0.5e-3, 0.0], abs=1e-12)
+
+
+def test_nominal_columns_say_what_rows_say(read: Read) -> None:
+    """What is commanded means the same in columns of its own as in a row of its own, angles and distances too."""
+    head = "test,pose,cycle,x_mm,y_mm,c_deg"
+    numbers = {"A": ("0,0,10", "0.1,0,10.5", "0.3,0,10"), "B": ("90,0,0", "90,0.2,0", "90.1,0,-0.5")}
+    in_rows, in_columns = [head], [f"{head},x_nominal_mm,y_nominal_mm,c_nominal_deg"]
+    for test in ("pose", "distance"):
+        for pose, (goal, *attained) in numbers.items():
+            in_rows.append(f"{test},{pose},commanded,{goal}")
+            in_rows += [f"{test},{pose},{j},{row}" for j, row in enumerate(attained, 1)]
+            in_columns += [f"{test},{pose},{j},{row},{goal}" for j, row in enumerate(attained, 1)]
+
+    one, other = (assess(read("\n".join(rows)), few=True).measures for rows in (in_rows, in_columns))
+
+    assert one == other
+    assert {"AP", "AP_c", "RP", "AD", "AD_c", "RD"} <= {measure.symbol for measure in one}
+
+
+def test_column_map_and_gaps(read: Read, tmp_path: Path) -> None:
+    """A file of other names is read by a column map, and rows of which a cell is missing can be left out."""
+    path = tmp_path / "other.csv"
+    path.write_text(POSE.replace("x_mm,y_mm", "Across,Along") + "pose,P1,3,,0\n", encoding="utf-8")
+
+    with pytest.warns(
+        IncompleteRowsWarning, match=r"other\.csv: 1 row left out for empty cells, 3 read: Across as x_mm"
+    ):
+        found = read_measurements(path, columns={"Across": "x_mm", "Along": "y_mm"}, skip_incomplete=True)
+
+    assert values(assess(found, few=True)) == values(assess(read(POSE), few=True))
+
+
 MISTAKES = {
     "two units": (POSE.replace("y_mm", "y_m"), "1: y_m: coordinates have one unit in a file, and x_mm has another"),
     "two units of angles": (
@@ -210,6 +257,26 @@ MISTAKES = {
     "NaN": (POSE.replace("401", "nan"), "3: x_mm: every number must be finite and no larger than 1e+100, got nan"),
     "empty": ("\n\n", ": the file is empty; its first line should name the columns"),
     "no rows": (HEAD, ": no rows below the names of the columns"),
+    "no nominal y": (
+        NOMINAL.replace("Y nominal [mm]", "note"),
+        "1: y_nominal_mm: no such column; all that is measured is nominal too, or nothing; there are Pose, X nominal",
+    ),
+    "nothing measured": (
+        NOMINAL.replace("Y measured [mm]", "z nominal [mm]"),
+        "1: y_mm: no such column; there are Pose, X nominal [mm], Y nominal [mm], X measured [mm], z nominal [mm]",
+    ),
+    "other nominal poses": (
+        NOMINAL.replace("400,0;0,0;403", "401,0;0,0;403"),
+        "4: X nominal [mm]: P1 has other nominal coordinates in line 2",
+    ),
+    "nominal and commanded": (
+        NOMINAL.replace("Pose", "Pose;cycle").replace("P1;4", "P1;commanded;4").replace("P2;", "P2;1;"),
+        "2: cycle: commanded is what the nominal columns say; leave the row out",
+    ),
+    "nominal paths": (
+        NOMINAL.replace("Pose", "Path"),
+        "1: X nominal [mm]: only poses have nominal columns; a path is given by rows of cycle commanded",
+    ),
     "a strange test": (
         POSE.replace("pose,P1,1", "posse,P1,1"),
         "3: test: expected one of pose, multidirectional, distance, ",

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.calibration.measurements import read_measurements
-from armwright.errors import FileFormatError, UnknownNameError
+from armwright.errors import FileFormatError, IncompleteRowsWarning, UnknownNameError
 
 Write = Callable[[str], Path]
 HEAD = "joint_1_deg,joint_2_deg,x_mm,y_mm,z_mm"
@@ -92,6 +92,70 @@ def test_targets_and_differences(arm: Arm, write: Write) -> None:
     np.testing.assert_allclose(measured.points, [[0.2995, 0.01025, 0.006]])
     np.testing.assert_allclose(measured.q, np.radians([[10, 20]]))
     assert measured.names == ("7",)
+
+
+def test_nominal_beside_measured(arm: Arm, write: Write) -> None:
+    """Nominal points beside measured ones change nothing: the joints say where the tool should be."""
+    export = """Name;A1 [deg];A2 [deg];nominal X [mm];nominal Y [mm];nominal Z [mm];X meas [mm];Y meas [mm];Z meas [mm]
+a;10,0;-20,0;300,0;10,0;5,0;300,5;10,0;5,0
+b;20,0;30,0;-310,0;20,0;5,0;-310,0;20,25;5,0
+c;-40,0;55,0;100,0;-200,0;5,0;100,0;-200,0;6,0
+"""
+    columns = {"A1 [deg]": "joint_1_deg", "A2 [deg]": "joint_2_deg"}
+
+    measured, plain = read_measurements(write(export), arm, columns=columns), read_measurements(write(table(HEAD)), arm)
+
+    np.testing.assert_array_equal(measured.q, plain.q)
+    np.testing.assert_array_equal(measured.points, plain.points)
+    assert measured.names == ("a", "b", "c")
+
+
+def test_joint_names_of_a_urdf(arm: Arm, write: Write) -> None:
+    """The joints of an arm from URDF may be called what the URDF calls them."""
+    names = ("shoulder_pan_joint", "J.Elbow")
+    named = attrs.evolve(
+        arm, joints=[attrs.evolve(joint, name=name) for joint, name in zip(arm.joints, names, strict=True)]
+    )
+    head = HEAD.replace("joint_1_deg", "J.Elbow_deg").replace("joint_2", "shoulder_pan_joint")
+
+    measured = read_measurements(write(table(head)), named)
+
+    np.testing.assert_array_equal(measured.q, read_measurements(write(table(HEAD)), arm).q[:, ::-1])
+
+
+def test_joints_that_a_urdf_counts_from_0(arm: Arm, write: Write) -> None:
+    """Where the second joint of a URDF is called joint_1 nobody knows which is meant, until a column map says it."""
+    joints = [attrs.evolve(joint, name=f"joint_{i}") for i, joint in enumerate(arm.joints)]
+    path, named = write(table(HEAD)), attrs.evolve(arm, joints=joints)
+
+    assert "joint_1_deg: joint_1 is a name of joint_1 and joint_2; say which is meant by --columns" in refused(
+        path, named
+    )
+    columns = {f"joint_{i}_deg": f"joint_{i}_deg" for i in (1, 2)}
+    measured = read_measurements(path, named, columns=columns)
+    np.testing.assert_array_equal(measured.q, read_measurements(path, arm).q)
+
+
+def test_rows_with_gaps(arm: Arm, write: Write) -> None:
+    """Rows without a joint or with part of a point are refused together, or left out with a warning."""
+    path = write(table(HEAD, [*ROWS, "1,,3,4,5", "1,2,3,,5"]))
+
+    said = "points.csv:5: cells are empty: joint_2_deg in line 5; y_mm in line 6; --skip-incomplete leaves out 2 rows"
+    assert refused(path, arm) == said
+    with pytest.warns(IncompleteRowsWarning, match="2 rows left out for empty cells, 3 read"):
+        measured = read_measurements(path, arm, skip_incomplete=True)
+    assert measured.names == ("2", "3", "4")
+
+
+def test_a_row_that_has_no_point_is_complete(arm: Arm, write: Write) -> None:
+    """A row of a touched plane has no point, and is not left out for that; one with half a point is."""
+    path = write(table(f"{HEAD},plane", [*(f"{row}," for row in ROWS), "1,2,,,,table", "1,2,3,,,table"]))
+
+    with pytest.warns(
+        IncompleteRowsWarning, match="1 row left out for empty cells, 4 read: y_mm in line 6; z_mm in line 6"
+    ):
+        measured = read_measurements(path, arm, skip_incomplete=True)
+    assert measured.readings.plane.tolist() == [-1, -1, -1, 0]
 
 
 def test_units_in_the_names_come_first(arm: Arm, write: Write) -> None:

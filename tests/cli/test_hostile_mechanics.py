@@ -171,6 +171,64 @@ def test_files_of_any_system(call: Call, tmp_path: Path, end: str) -> None:
     assert json.loads(out)["q"] == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
 
 
+@pytest.mark.filterwarnings("always::armwright.errors.IncompleteRowsWarning")
+def test_files_with_units(call: Call, tmp_path: Path) -> None:
+    """Joints may be in degrees and columns may have other names, where the names or a map say so."""
+    file, mapping = tmp_path / "rows.csv", tmp_path / "map.toml"
+    file.write_text("A1;joint_2 [deg];q3_mrad;q4;q5;q6;remark\n90,5;;1;1;1;1;lost\n90,5;-20;100;0;0;0,25;warm\n")
+    mapping.write_text('[columns]\nA1 = "q1_deg"\n')
+    options = ("forward", "puma560", "--csv", file, "--json", "--skip-incomplete", "--columns")
+
+    typed, written = call(*options, "A1=joint_1_deg"), call(*options, mapping)
+
+    assert typed == written
+    assert f"armwright: warning: {file}: 1 row left out for empty cells, 1 read: joint_2 [deg] in line 2" in typed[2]
+    np.testing.assert_allclose(json.loads(typed[1])["q"], [*np.radians([90.5, -20]), 0.1, 0, 0, 0.25])
+
+
+@pytest.mark.parametrize(
+    ("columns", "status", "said"),
+    [
+        ("A1=", 2, "--columns: expected a column map such as A1=joint_1_deg,X=x_mm, got 'A1='"),
+        ("nowhere.toml", 4, "nowhere.toml: no such file"),
+        ("A9=q1_deg", 4, "rows.csv:1: A9: no such column to be taken for q1_deg. There are q1, q2"),
+    ],
+)
+def test_bad_column_maps(call: Call, tmp_path: Path, columns: str, status: int, said: str) -> None:
+    """A column map that is none, is missing, or is of another file ends the command with one line."""
+    file = tmp_path / "rows.csv"
+    file.write_text(f"{HEADER}\n0,0,0,0,0,0\n")
+
+    got, out, error = call("forward", "puma560", "--csv", file, "--columns", columns)
+
+    assert (got, out) == (status, "")
+    assert said in error
+
+
+@pytest.mark.parametrize("option", [("--columns", "A1=q1"), ("--skip-incomplete",)])
+def test_table_options_without_a_table(call: Call, option: tuple[str, ...]) -> None:
+    """What is said of a table is refused where none is read."""
+    got, _, error = call("forward", "puma560", "-q", Q, *option)
+
+    assert got == 2
+    assert f"{option[0]}: there is no table to read: give --csv FILE" in error
+
+
+def test_velocities_by_joint_names(call: Call, tmp_path: Path) -> None:
+    """Positions, velocities and accelerations of joints may have the names and units of the arm's joints."""
+    file, arm = tmp_path / "rows.csv", load_arm("puma560")
+    names = [
+        f"joint_{i}{what}" for what in ("_deg", "_velocity_deg_per_s", "_acceleration_deg_per_s2") for i in range(1, 7)
+    ]
+    row = np.arange(1.0, 19.0)
+    file.write_text(f"{','.join(names)}\n{','.join(map(str, row))}\n")
+
+    _, out, _ = call("torque", "puma560", "--csv", file, "--json")
+
+    q, qd, qdd = np.radians(row).reshape(3, 6)
+    np.testing.assert_allclose(json.loads(out)["total"], inverse_dynamics(arm, q, qd, qdd), atol=1e-9)
+
+
 def test_files_in_degrees(call: Call, tmp_path: Path) -> None:
     """A file that looks as if it were in degrees is read as it stands, with a warning that names it."""
     file = tmp_path / "rows.csv"

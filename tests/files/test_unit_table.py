@@ -234,7 +234,7 @@ def test_written_column_maps(write: Write) -> None:
 def test_bad_pairs(text: str) -> None:
     """Pairs are a name and another, each name once."""
     with pytest.raises(
-        InvalidValueError, match=r"^columns: (expected A1=joint_1_deg,X=x_mm|that name is there twice), g"
+        InvalidValueError, match=r"^expected (a column map such as A1=joint_1_deg,X=x_mm|every name once), g"
     ):
         column_map(text)
 

@@ -100,8 +100,8 @@ def read_measurements(
     header, position, orientation = read_columns(path, arm, columns=columns, units=units_of(*units) if units else {})
     joints, partial = joint_columns(arm), bool(header.present(("plane", DISTANCE)))
     table = header.rows(
-        filled=[*joints, *(() if partial else position)],
-        together=[position, orientation],
+        filled=joints if partial else [*joints, *position],
+        together=[position, orientation] if partial else [orientation],
         skip_incomplete=skip_incomplete,
     )
     readings = _readings(table, table.numbers(joints), position, orientation)

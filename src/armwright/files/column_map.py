@@ -23,8 +23,8 @@ def column_map(text: str) -> dict[str, str]:
     for part in text.split(","):
         name, _, target = (word.strip() for word in part.rpartition("="))
         if not name or not target or name in found:
-            why = "that name is there twice" if name in found else "expected A1=joint_1_deg,X=x_mm"
-            raise InvalidValueError(f"columns: {why}, got {shown(part)}")
+            expected = "every name once" if name in found else "a column map such as A1=joint_1_deg,X=x_mm"
+            raise InvalidValueError(f"expected {expected}, got {shown(part)}")
         found[name] = target
     return found
 

@@ -13,7 +13,7 @@ from armwright.clearance.features import features_of
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.clearance.reader import load_linkage
-from armwright.errors import FileFormatError
+from armwright.errors import FileFormatError, IncompleteRowsWarning
 from clearance.arms import ARM_A, STARTS, accuracy
 
 # Of a metre, written with nine digits.
@@ -242,6 +242,21 @@ def test_spreadsheets(tmp_path: Path) -> None:
     found = read_measured(tmp_path / "rest.csv")
 
     assert isinstance(found, RestMeasured)
+    np.testing.assert_allclose(found.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
+
+
+def test_tracker_export(tmp_path: Path) -> None:
+    """Nominal and measured columns, semicolons, decimal commas, other names and a gap, as an instrument writes them."""
+    rows = ["Pkt;X nominal [mm];Y nominal [mm];X measured [mm];Y measured [mm]"]
+    rows += [row.replace(",", ";").replace(".", ",") for row in [*REST[1:], "P2,150,-700,,-700.5"]]
+
+    with pytest.warns(
+        IncompleteRowsWarning, match=r"1 row left out for empty cells, 2 read: X measured \[mm\] in line 4"
+    ):
+        found = read_measured(written(tmp_path / "rest.csv", rows), columns={"pkt": "pose"}, skip_incomplete=True)
+
+    assert isinstance(found, RestMeasured)
+    assert found.names == ("P1", "P2")
     np.testing.assert_allclose(found.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
 
 
