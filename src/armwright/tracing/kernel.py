@@ -26,31 +26,32 @@ CalledOff: TypeAlias = npt.NDArray[np.int64]
 # Below this many rows a second thread costs more than it saves.
 _ROWS_PER_THREAD = 4096
 
-# The function that is called with arrays: the shortest way for those that come as they should, which is why its text
-# is made for the kernel. What does not come so goes the careful way. The inputs are names that ``emit`` has checked.
-_DOOR = """
-def door({inputs}, *, threads=None, out=None):
+# The function that is called with arrays, with the inputs and outputs of the kernel by name: a closure over ``*inputs``
+# takes a fifth to a third longer (docs/decisions/0012-the-house.md). Arrays that are not as expected go to ``careful``.
+# The inputs are names that ``emit`` has checked.
+_CALL = """
+def call({inputs}, *, threads=None, out=None):
     try:
         if not ({plain} is array):
             pass
         elif {first}.ndim == {axes}:
             if out is None:
-                {blanks}
+                {allocations}
                 if not one({inputs}, {outputs}):
                     return {outputs}
             else:
-                {given}
-                if {fit} and not one({inputs}, {outputs}):
+                {unpack}
+                if {fits} and not one({inputs}, {outputs}):
                     return out
         elif {all_rows} and (len({first}) < {few} or threads == 1):
             rows_asked = len({first})
             if out is None:
-                {blanks_of_many}
+                {allocations_of_many}
                 if not rows(0, rows_asked, {inputs}, {outputs}):
                     return {outputs}
             else:
-                {given}
-                if {fit_many} and not rows(0, rows_asked, {inputs}, {outputs}):
+                {unpack}
+                if {fits_many} and not rows(0, rows_asked, {inputs}, {outputs}):
                     return out
     except foreign:
         pass
@@ -102,18 +103,18 @@ class Kernel:
         outputs = [f"out{i}" for i in range(len(self._kinds))]
         known: dict[str, Any] = {"empty": np.empty, "array": np.ndarray, "careful": self._careful, "foreign": _FOREIGN}
 
-        def blanks(before: str) -> str:
+        def allocations(before: str) -> str:
             shapes = (f"({before}{', '.join(map(str, shape))},), {kind.__name__}" for shape, kind in self._kinds)
             return "; ".join(f"{out} = empty({shape})" for out, shape in zip(outputs, shapes, strict=True))
 
-        def fitting(before: str) -> str:
+        def shape_checks(before: str) -> str:
             return " and ".join(
                 f"{out}.shape == ({before}{', '.join(map(str, shape))},)"
                 for out, (shape, _) in zip(outputs, self._kinds, strict=True)
             )
 
-        def when_needed(part: str) -> Callable[..., int]:
-            def detour(*arrays: Array) -> int:
+        def compiled_when_called(part: str) -> Callable[..., int]:
+            def compile_and_call(*arrays: Array) -> int:
                 # Compiled when it is first needed, and from then on called directly.
                 known[part] = getattr(self, part)
                 known["foreign"] = (*_FOREIGN, _refused_by_numba())
@@ -122,10 +123,10 @@ class Kernel:
                 except known["foreign"]:
                     return MEANINGLESS  # the careful way says why
 
-            return detour
+            return compile_and_call
 
-        known |= {part: when_needed(part) for part in ("one", "rows")}
-        text = _DOOR.format(
+        known |= {part: compiled_when_called(part) for part in ("one", "rows")}
+        text = _CALL.format(
             inputs=", ".join(inputs),
             # Numba takes a masked array for its numbers, once it has met an array of another class.
             plain=" is ".join(f"{x}.__class__" for x in inputs),
@@ -134,15 +135,15 @@ class Kernel:
             # A compiled function takes long to find out that one of its inputs has too few axes.
             all_rows=" and ".join(f"{x}.ndim == {len(shape) + 1}" for x, shape in inputs.items()),
             few=2 * _ROWS_PER_THREAD,
-            blanks=blanks(""),
-            blanks_of_many=blanks("rows_asked, "),
-            given=f"{', '.join(outputs)} = out",
-            fit=fitting(""),
-            fit_many=fitting("rows_asked, "),
+            allocations=allocations(""),
+            allocations_of_many=allocations("rows_asked, "),
+            unpack=f"{', '.join(outputs)} = out",
+            fits=shape_checks(""),
+            fits_many=shape_checks("rows_asked, "),
             outputs=", ".join(outputs),
         )
         exec(text, known)  # noqa: S102 - numbers, and names that are identifiers
-        made: Callable[..., Any] = known["door"]
+        made: Callable[..., Any] = known["call"]
         made.__name__, made.__qualname__, made.__doc__ = name, name, doc
         return made
 
