@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from armwright import forward, inverse, link_poses, load_arm, simulate
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.calibration.assess import assess_calibration
+from armwright.calibration.assessment import assess_calibration
 from armwright.calibration.measurements import read_measurements
 from armwright.clearance.ideal import point_of, tip_of
 from armwright.clearance.linkage import Place
@@ -347,14 +347,14 @@ def past_frames() -> Figure:
 
 def draw_linkage(axes: Axes, run: Rattling) -> None:
     """Draw the five-bar at the start, its path, and the path taken with the error magnified."""
-    linkage, q = run.task.linkage, run.task.ideal.q
+    linkage, q = run.scenario.linkage, run.scenario.ideal.q
     corners = [Place("ground", "J1"), Place("link1", "J2"), Place("link2", "J3")]
     others = [Place("ground", "J5"), Place("link4", "J4"), Place("link3", "J3")]
     for way in (corners, others):
         ends = np.array([point_of(linkage, place, q[0]) for place in way]) * 1e3
         axes.plot(*ends.T, color="#c3cad2", linewidth=7, solid_capstyle="round", zorder=1)
         axes.plot(*ends.T, "o", color="white", markeredgecolor=FAINT, markersize=5, zorder=2)
-    path = tip_of(linkage, q)[:: run.task.stride] * 1e3
+    path = tip_of(linkage, q)[:: run.scenario.stride] * 1e3
     axes.plot(*path.T, color=INK, linewidth=1.2, linestyle=(0, (4, 3)), label="without play", zorder=3)
     taken = path + MAGNIFIED * run.error * 1e3
     axes.plot(*taken.T, color=BY_HAND, linewidth=1.6, label=f"with play, error × {MAGNIFIED}", zorder=4)
@@ -369,7 +369,7 @@ def draw_bearing(axes: Axes, run: Rattling, number: int) -> None:
     gap, wall = run.gaps[:, number] * 1e3, run.clearances[number] * 1e3
     angle = np.linspace(0, 2 * np.pi, 200)
     axes.plot(wall * np.cos(angle), wall * np.sin(angle), color=FAINT, linewidth=0.9)
-    slows = run.time >= run.task.path.knots[-2]
+    slows = run.time >= run.scenario.path.knots[-2]
     axes.plot(*gap[slows].T, color=ALARM, linewidth=0.7)
     axes.plot(*gap[~slows].T, color=INK, linewidth=2.4)
     axes.set_aspect("equal")
@@ -388,7 +388,7 @@ def rattling() -> Figure:
         draw_bearing(axes, run, i)
     axes = below.subplots()
     axes.plot(run.time, run.distance * 1e3, color=BY_HAND, linewidth=1.5)
-    for knot in run.task.path.knots[1:-1]:
+    for knot in run.scenario.path.knots[1:-1]:
         axes.axvline(knot, color=FAINT, linewidth=0.7, linestyle=(0, (2, 2)))
     axes.set(xlabel="time, s", ylabel="error of the tip, mm", xlim=(0, run.time[-1]), ylim=(0, None))
     axes.grid(color=GRID)

@@ -89,7 +89,7 @@ def left_alone(task: Scenario) -> Scenario:
 
 def energies(found: Simulation) -> Array:
     """(..., s) kinetic energy, that of gravity and loads, and that of indentations, all together [J]."""
-    linkage, settings = found.task.linkage, found.task.settings
+    linkage, settings = found.scenario.linkage, found.scenario.settings
     c = np.broadcast_to(found.clearances[..., None, :], (*found.q.shape[:-1], len(linkage.pins)))
     K = contact_stiffness(linkage, c)
     contacts = [Contact(c[..., i], K[..., i], 0.0, 0.0, settings.threshold) for i in range(len(linkage.pins))]

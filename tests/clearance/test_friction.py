@@ -53,14 +53,14 @@ class TestBraking:
 
     def test_stops(self, found: Simulation) -> None:
         """It stops after (v² + s²) / 2a: friction takes all down to the threshold s, and in proportion below it."""
-        threshold = found.task.settings.threshold
+        threshold = found.scenario.settings.threshold
         # Below the threshold it would never stop; after half a second of the slowest only 1e-11 of it is left.
         way = (SPEED**2 + threshold**2) / (2 * BRAKING)
         np.testing.assert_allclose(found.q[:, -1, 0], way, rtol=CLOSE)
 
     def test_slows_down(self, found: Simulation) -> None:
         """Until then its speed falls along a straight line, by μ g m / M."""
-        falling = found.qd[..., 0] > 2 * found.task.settings.threshold
+        falling = found.qd[..., 0] > 2 * found.scenario.settings.threshold
         line = SPEED - BRAKING[:, None] * found.time
         np.testing.assert_allclose(found.qd[..., 0][falling], line[falling], rtol=0, atol=CLOSE * SPEED)
 
@@ -80,7 +80,7 @@ def test_slope() -> None:
     slides = frictions < MASS * tangent
     speeding = np.ptp(found.qd[:, 50:, 0], axis=-1) / np.ptp(found.time[50:])
     np.testing.assert_allclose(speeding[slides], (down - up)[slides], rtol=CLOSE)
-    creeping = found.task.settings.threshold * (down / up[~slides])
+    creeping = found.scenario.settings.threshold * (down / up[~slides])
     np.testing.assert_allclose(found.qd[~slides, -1, 0], creeping, rtol=CLOSE)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from armwright.clearance import simulation
+from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.correction import correct_nodes, tip_at
 from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured, read_measured
 from armwright.clearance.estimation.static import estimate_at_rest, rest_matrix
@@ -21,7 +22,6 @@ from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
 from armwright.clearance.sweeping import FeatureSweep, is_sweep_of
 from armwright.errors import FileFormatError, InvalidValueError
-from armwright.report.rattling import Run, summary
 
 # Sums of a few doubles.
 ROUNDING = 1e-12
@@ -48,7 +48,9 @@ class TestSamples:
         np.testing.assert_array_equal(seldom.time, [0.0, often.time[-1]])
         np.testing.assert_array_equal(seldom.tip, often.tip[[0, -1]])
         np.testing.assert_allclose(tip_at(seldom, np.array([0.0, 0.25])), seldom.tip, atol=ROUNDING)
-        assert [one["time"] for one in summary(Run.of(seldom))["targets"]] == pytest.approx([0.0, 0.25], abs=ROUNDING)
+        assert [one["time"] for one in ClearanceRun.of(seldom).as_data()["targets"]] == pytest.approx(
+            [0.0, 0.25], abs=ROUNDING
+        )
 
 
 class TestDiverging:
@@ -58,7 +60,7 @@ class TestDiverging:
         """With a step ten times too long a run diverges without a warning; what is shown of it is finite."""
         monkeypatch.setattr(simulation, "check_step", lambda *_: None)
         found = simulate(prepare(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=2e-4)), [1e-4] * 3)
-        told = summary(Run.of(found))
+        told = ClearanceRun.of(found).as_data()
 
         assert found.status == Status.DIVERGED
         assert told["sound_until"] < 0.25

@@ -186,7 +186,7 @@ def falling(x: Scalar) -> Scalar:
 
 
 class Bristles:
-    """The LuGre law: what rubs is brushes that bend before they slip.
+    """The LuGre law: bristles that bend before they slip.
 
     Attributes:
         stiffness: σ0 [1/m].
@@ -207,16 +207,16 @@ class Bristles:
 
     @classmethod
     def step(cls, bend: Scalar, speed: Scalar, friction: Scalar) -> tuple[Scalar, Scalar]:
-        """Return the coefficient of friction and the rate at which the brushes bend [m/s].
+        """Return the coefficient of friction and the rate at which the bristles bend [m/s].
 
         Args:
-            bend: of the brushes [m].
+            bend: of the bristles [m].
             speed: of sliding [m/s].
             friction: coefficient of sliding.
         """
         ratio = speed / cls.stribeck
         limit = friction * (1.0 + (cls.static_ratio - 1.0) * falling(ratio * ratio))
-        # Without friction the brushes have nothing to lean on.
+        # Without friction the bristles have nothing to lean on.
         some = select(limit > 0.0, limit, 1.0)
         rate = speed - cls.stiffness * abs(speed) * bend / some
         force = cls.stiffness * bend + cls.damping * rate + cls.viscosity * speed

@@ -247,12 +247,12 @@ def misses(simulation: Simulation, goals: Array) -> Array:
     Raises:
         InvalidValueError: a run diverged, or the targets are not as many as the goals.
     """
-    times = np.array(simulation.task.path.targets)
+    times = np.array(simulation.scenario.path.targets)
     if len(times) != len(goals):
         raise InvalidValueError(f"expected one target for each of {len(goals)} goals, got {len(times)}")
     if np.any(simulation.status != Status.FINISHED):
         raise InvalidValueError(
-            f"{simulation.task.linkage.name}: the simulation diverged; the path cannot be corrected"
+            f"{simulation.scenario.linkage.name}: the simulation diverged; the path cannot be corrected"
         )
     return np.asarray(tip_at(simulation, times) - goals, dtype=np.float64)
 

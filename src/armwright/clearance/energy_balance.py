@@ -39,7 +39,7 @@ class EnergyBalance:
 
 def energy_balance(simulation: Simulation) -> EnergyBalance:
     """Return the energy ledger of a simulation."""
-    linkage = simulation.task.linkage
+    linkage = simulation.scenario.linkage
     q, qd = ([x[..., i] for i in range(x.shape[-1])] for x in (simulation.q, simulation.qd))
     placement = Placement(linkage, q, qd)
     K = contact_stiffness(linkage, simulation.clearances)

@@ -30,7 +30,7 @@ SLIP_SPEEDS: tuple[SlipSpeed, ...] = ("surface", "centre")
 WORKS = ("driven", "impact loss", "friction loss")
 # A journal nearer to the middle of its bearing has no direction [m].
 _TINY = 1e-12
-# Brushes that nothing bends straighten in this time [s].
+# Bristles that nothing bends straighten in this time [s].
 _STRAIGHTENING = 1e-3
 _SLIP: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {"linear": linear_slip, "tanh": smooth_slip}
 
@@ -72,7 +72,7 @@ class ContactMemory(NamedTuple):
     Attributes:
         touching: 1 where they touched at the start of the step, else 0.
         speed: with which they came [m/s].
-        bend: of the brushes of LuGre [m]; 0 for other laws.
+        bend: of the bristles of LuGre [m]; 0 for other laws.
     """
 
     touching: Scalar
@@ -104,7 +104,7 @@ class PinContact(NamedTuple):
         normal: force with which they press on one another [N].
         sliding: speed of the surfaces on one another [m/s].
         touch: what to keep.
-        bending: rate of the brushes of LuGre [m/s]; 0 for other laws.
+        bending: rate of the bristles of LuGre [m/s]; 0 for other laws.
         pushes: generalised forces, by coordinate.
         losses: power lost in the impact and in sliding [W].
         stored: energy of the indentation [J].
@@ -342,7 +342,7 @@ def _pressed(
     bending = 0.0
     if rubbing.law == "lugre":
         coefficient, bending = Bristles.step(touch.bend, slip, contact.friction)
-        # In flight nothing bends the brushes: they straighten.
+        # In flight nothing bends the bristles: they straighten.
         bending = select(depth > 0.0, bending, touch.bend * (-1.0 / _STRAIGHTENING))
     else:
         coefficient = contact.friction * _SLIP[rubbing.law](slip, contact.threshold)

@@ -81,12 +81,12 @@ class Layout:
 
     @property
     def bends(self) -> int:
-        """The number of bends of brushes that are part of the state."""
+        """The number of bends of bristles that are part of the state."""
         return self.pins if self.rubbing.law == "lugre" else 0
 
     @property
     def states(self) -> int:
-        """Coordinates, speeds, bends of brushes, works."""
+        """Coordinates, speeds, bends of bristles, works."""
         return 2 * self.n + self.bends + len(WORKS)
 
     @property

@@ -56,12 +56,12 @@ def perturbed(clearances: Array, count: int = TWINS) -> Array:
 
 
 def with_outlook(
-    task: Scenario, clearances: Array, *, friction: float | None = None, threads: int | None = None
+    scenario: Scenario, clearances: Array, *, friction: float | None = None, threads: int | None = None
 ) -> tuple[Simulation, Outlook]:
     """Return a run, its bits as ``simulate`` has them alone, and until when it is a prediction.
 
     Args:
-        task: the path, made ready.
+        scenario: the path, made ready.
         clearances: (p,) of the pins [m].
         friction: coefficient of friction; that of the material when left out.
         threads: how many cores to use.
@@ -70,13 +70,13 @@ def with_outlook(
         InvalidValueError: see ``simulate``.
     """
     rows = perturbed(np.asarray(clearances, dtype=np.float64))
-    own = simulate(task, rows, frictions=friction, threads=threads)
+    own = simulate(scenario, rows, frictions=friction, threads=threads)
     finer = []
     for parts in PARTS:
-        settings = attrs.evolve(task.settings, step=task.h / parts, sample=task.stride * task.h)
+        settings = attrs.evolve(scenario.settings, step=scenario.h / parts, sample=scenario.stride * scenario.h)
         # There may be more steps than are ever made.
         with contextlib.suppress(InvalidValueError):
-            again = prepare(task.linkage, task.path, settings, guess=task.ideal.q[0])
+            again = prepare(scenario.linkage, scenario.path, settings, guess=scenario.ideal.q[0])
             finer.append(simulate(again, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
     known = len(finer) == len(PARTS) and all(error.shape == own.error.shape for error in finer)
     return taken(own, 0), _outlook(own.time, own.error, np.concatenate(finer) if known else None)

@@ -42,7 +42,7 @@ class Simulation:
     """What a linkage with play did; the leading axes are those of clearances and frictions together.
 
     Attributes:
-        task: what it was to do.
+        scenario: what it was to do.
         clearances: (..., p) [m].
         frictions: (...) coefficients of friction.
         time: (s,) of the samples [s].
@@ -57,7 +57,7 @@ class Simulation:
         status: (...) how each run ended.
     """
 
-    task: Scenario
+    scenario: Scenario
     clearances: Array
     frictions: Array
     time: Array
@@ -79,7 +79,7 @@ class Simulation:
     @property
     def gaps(self) -> Array:
         """(..., s, p, 2) from the middle of each bearing to that of its journal [m]."""
-        return gaps_of(self.task.linkage, self.q)
+        return gaps_of(self.scenario.linkage, self.q)
 
     @property
     def depths(self) -> Array:
@@ -97,7 +97,7 @@ class Record(NamedTuple):
 
 
 def simulate(
-    task: Scenario,
+    scenario: Scenario,
     clearances: ArrayLike | None = None,
     *,
     frictions: ArrayLike | None = None,
@@ -106,7 +106,7 @@ def simulate(
     """Let a linkage with play do what one without would need for its path.
 
     Args:
-        task: the path, made ready; see ``prepare``.
+        scenario: the path, made ready; see ``prepare``.
         clearances: (..., p) of the pins [m]; those of the linkage when left out.
         frictions: (...) coefficients of friction; that of the material when left out.
         threads: how many cores to use; all when left out. The bits do not depend on it.
@@ -115,35 +115,35 @@ def simulate(
         InvalidValueError: a clearance is not above 0, or the step is too long for the contacts.
         ShapeError: the clearances are not one per pin, or the leading axes do not fit.
     """
-    linkage, settings = task.linkage, task.settings
+    linkage, settings = scenario.linkage, scenario.settings
     c, mu = _parameters(linkage, clearances, frictions)
     lead = mu.shape
     K = contact_stiffness(linkage, c)
     check_step(linkage, settings, K)
     layout = Layout(linkage=linkage, rubbing=settings.friction, control=settings.control, located=settings.located)
     start = np.zeros((*lead, layout.states))
-    start[..., : layout.n] = initial_coordinates(task, c, K)
-    start[..., layout.n : 2 * layout.n] = task.ideal.qd[0]
+    start[..., : layout.n] = initial_coordinates(scenario, c, K)
+    start[..., layout.n : 2 * layout.n] = scenario.ideal.qd[0]
     chi = damping(settings.impact, linkage.material.restitution)
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
-    record = _run(task, layout, start.reshape(mu.size, layout.states), contacts, threads)
-    return _told(task, layout, c, mu, record)
+    record = _run(scenario, layout, start.reshape(mu.size, layout.states), contacts, threads)
+    return _told(scenario, layout, c, mu, record)
 
 
-def initial_coordinates(task: Scenario, clearances: Array, K: Array) -> Array:
+def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Array:
     """Return (..., n) the coordinates from which runs start.
 
     Args:
-        task: what is to be done.
+        scenario: what is to be done.
         clearances: (..., p) [m].
         K: (..., p) stiffness of the contacts [N/m^1.5].
     """
-    ideal = task.ideal.q[0]
-    if task.settings.start == "centred":
+    ideal = scenario.ideal.q[0]
+    if scenario.settings.start == "centred":
         return np.broadcast_to(ideal, (*clearances.shape[:-1], len(ideal)))
-    elastic = None if task.settings.start == "rigid" else K
-    return at_rest(task.linkage, ideal, clearances, elastic).q
+    elastic = None if scenario.settings.start == "rigid" else K
+    return at_rest(scenario.linkage, ideal, clearances, elastic).q
 
 
 def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: ArrayLike | None) -> tuple[Array, Array]:
@@ -165,21 +165,21 @@ def _parameters(linkage: Linkage, clearances: ArrayLike | None, frictions: Array
     return np.broadcast_to(c, (*lead, len(own))), np.broadcast_to(mu, lead)
 
 
-def _run(task: Scenario, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
+def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, threads: int | None) -> Record:
     """Run the compiled simulation, blocks of lanes on several cores."""
-    runs, pins, rows = len(start), layout.pins, len(task.table)
-    marks = task.marks[: rows + 1]
-    kept = np.where((marks >= 0) & (marks % task.stride == 0), marks // task.stride, -1)
+    runs, pins, rows = len(start), layout.pins, len(scenario.table)
+    marks = scenario.marks[: rows + 1]
+    kept = np.where((marks >= 0) & (marks % scenario.stride == 0), marks // scenario.stride, -1)
     record = Record(
-        samples=np.full((runs, task.steps // task.stride + 1, layout.sampled), np.nan),
+        samples=np.full((runs, scenario.steps // scenario.stride + 1, layout.sampled), np.nan),
         impacts=np.zeros((runs, pins), dtype=np.int64),
         peaks=np.zeros((runs, pins)),
     )
-    gains = np.tile(task.settings.gains, (runs, len(task.linkage.drives) if layout.gains else 0))
-    run = _simulator(layout, task.settings.integrator)
-    lengths = task.lengths[:rows]
+    gains = np.tile(scenario.settings.gains, (runs, len(scenario.linkage.drives) if layout.gains else 0))
+    run = _simulator(layout, scenario.settings.integrator)
+    lengths = scenario.lengths[:rows]
     on_cores_for_long(
-        lambda a, b, called_off: run(a, b, start, contacts, gains, task.table, lengths, kept, *record, called_off),
+        lambda a, b, called_off: run(a, b, start, contacts, gains, scenario.table, lengths, kept, *record, called_off),
         runs,
         threads,
     )
@@ -221,23 +221,23 @@ def _compiled(shape: _Shape, rubbing: FrictionModel, control: Control, located: 
     return compiled(source, "simulate", f"the simulation of {shape.linkage.name}")
 
 
-def _told(task: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
+def _told(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
     """Return a record in the terms of the linkage."""
-    n, lead, linkage = layout.n, mu.shape, task.linkage
+    n, lead, linkage = layout.n, mu.shape, scenario.linkage
     samples = record.samples.reshape(*lead, *record.samples.shape[1:])
     q = samples[..., :n]
-    number = np.arange(samples.shape[-2]) * task.stride
+    number = np.arange(samples.shape[-2]) * scenario.stride
     # What became infinite has no sine.
     with np.errstate(invalid="ignore", over="ignore"):
         tip = tip_of(linkage, q)
-        error = tip - tip_of(linkage, task.ideal.q[number])
+        error = tip - tip_of(linkage, scenario.ideal.q[number])
         lost = ~np.all(np.abs(error) < _LOST, axis=(-1, -2))
     first = 2 * n + layout.bends
     return Simulation(
-        task=task,
+        scenario=scenario,
         clearances=c,
         frictions=mu,
-        time=np.asarray(number * task.h, dtype=np.float64),
+        time=np.asarray(number * scenario.h, dtype=np.float64),
         q=q,
         qd=samples[..., n : 2 * n],
         tip=tip,

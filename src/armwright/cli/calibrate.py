@@ -57,7 +57,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.arrays import one_core
-    from armwright.calibration.assess import assess_calibration
+    from armwright.calibration.assessment import assess_calibration
     from armwright.calibration.measurements import read_measurements
     from armwright.report.calibration_files import calibration_files
 

@@ -176,7 +176,7 @@ def _files(
     from armwright.clearance.paths import named_path
     from armwright.report.clearance_figures import paths
 
-    path = list(runs.values())[-1].task.path
+    path = list(runs.values())[-1].scenario.path
     times = np.linspace(0.0, path.duration, 1001)
     told, wanted = path.at(times), named_path(name)
     rows = np.column_stack([times, told.at * 1e3, told.velocity * 1e3, told.acceleration * 1e3])

@@ -2,14 +2,14 @@
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from armwright.cli.completing import paths, setting
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
-from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
+from armwright.cli.printing import command_line, print_json, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from armwright.clearance.scenario import Scenario
     from armwright.clearance.settings import Settings
     from armwright.clearance.simulation import Simulation
-    from armwright.report.rattling import Run
 
 # Samples of a run, and the time between two of them at most [s].
 _SAMPLES, _SAMPLE = 2500, 1e-4
@@ -86,15 +85,15 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     """Let a linkage with play follow a path: its drives do what it would need without play.
 
     Prints what became of the path, of every pin and of the energy, and until when all this is a prediction. With -o,
-    report.html shows the linkage moving, its journals rattling in their bearings, and error, forces and energy over
+    report.html shows the linkage moving, its journals in their bearings, and error, forces and energy over
     time. The first run of a linkage compiles it.
 
     **Example:** `armwright clearance simulate five-bar --path y1 --clearance J2=0.3 -o out/rattling`
 
     **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --turns 2 --start centred --step 2e-6`
     """
+    from armwright.clearance.assessment import ClearanceRun
     from armwright.clearance.reader import load_linkage
-    from armwright.report.rattling import Run, summary
 
     model = with_clearances(load_linkage(linkage), clearance or [], clearance_mm)
     way = _path(model, path, speed_rpm, turns)
@@ -110,15 +109,21 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         start=start,
         located=locate,
     )
-    run = Run.of(*_simulated(model, way, settings, friction, watched=not (quiet or as_json)))
-    told = {"command": command_line(), **summary(run)}
-    text = json_text(told)
+    run = ClearanceRun.of(*_simulated(model, way, settings, friction, watched=not (quiet or as_json)))
     if output is not None:
-        write_results(output, _files(run, text))
+        from armwright.report.clearance_run_files import clearance_run_files
+
+        write_results(output, clearance_run_files(run, command=command_line()))
     if as_json:
-        print_json(told)
+        print_json({"command": command_line(), **run.as_data()})
     elif not quiet:
-        _print(run, told)
+        data = run.as_data()
+        how = data["settings"]
+        print(
+            f"{data['linkage']}, {data['path']}: {data['status']} after {data['sound_until']:.4g} s; "
+            f"{how['integrator']}, steps of {how['step']:.3g} s, friction {how['friction']:g}"
+        )
+        print_result(run)
         if output is not None:
             print(f"report: {output / 'report.html'}")
 
@@ -175,51 +180,3 @@ def _simulated(
     with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
         task: Scenario = prepare(model, way, settings)
         return with_outlook(task, np.array(list(model.clearances.values())), friction=friction)
-
-
-def _files(run: "Run", text: str) -> dict[str, Any]:
-    """Return the files of a run by name."""
-    from armwright.report.five_bar_figure import workspace_of
-    from armwright.report.rattling import samples_csv
-    from armwright.report.rattling_figures import rattling_figures
-    from armwright.report.rattling_page import rattling_page
-
-    task = run.simulation.task
-    drawn, title = rattling_figures(run), f"{task.linkage.name}: {task.path.name}"
-    space = workspace_of(task)
-    drawn += [space] if space else []
-    return {
-        "summary.json": text + "\n",
-        "samples.csv": samples_csv(run),
-        "report.html": rattling_page(run, drawn, title=title, command=command_line()),
-        **{f"{one.name}.svg": one.svg for one in drawn},
-    }
-
-
-def _print(run: "Run", told: dict[str, Any]) -> None:
-    from armwright.report.rattling import newtons, notes
-
-    console = plain_console()
-    error, energy, how = told["error"], told["energy"], told["settings"]
-    console.print(
-        f"{told['linkage']}, {told['path']}: {told['status']} after {told['sound_until']:.4g} s; {how['integrator']}, "
-        f"steps of {how['step']:.3g} s, friction {how['friction']:g}"
-    )
-    pins = (
-        (name, f"{pin['clearance'] * 1e3:.4g}", newtons(pin["peak_force"]), f"{pin['mean_force']:.4g}",
-         str(pin["impacts"]), f"{100 * pin['flight']:.3g}")
-        for name, pin in told["pins"].items()
-    )  # fmt: skip
-    print_table(console, table(("pin", "clearance mm", "peak N", "mean N", "impacts", "in flight %"), pins))
-    targets = (
-        (f"{one['time']:.4g} s", *(f"{one[key] * 1e3:z.4f}" for key in ("error_x", "error_y", "distance")))
-        for one in told["targets"]
-    )
-    print_table(console, table(("error at", "x mm", "y mm", "distance mm"), targets))
-    console.print(f"error: {error['largest'] * 1e3:.4g} mm at most, {error['mean'] * 1e3:.4g} mm on average")
-    console.print(
-        f"energy: {energy['driven']:.4g} J from the drives, {energy['impact_loss']:.3g} J lost in impacts, "
-        f"{energy['friction_loss']:.3g} J in friction, {energy['imbalance']:.2g} J not explained"
-    )
-    for note in notes(run):
-        console.print(f"note: {note}")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armwright.arm.write import toml_text
-from armwright.calibration.assess import CalibrationAssessment
+from armwright.calibration.assessment import CalibrationAssessment
 from armwright.calibration.correction import corrected_arm, corrected_tables, corrected_urdf
 from armwright.report.figures import Drawing, empty_figure, plain_axes, svg_text
 from armwright.report.plain_page import plain_page

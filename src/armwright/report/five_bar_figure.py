@@ -62,15 +62,15 @@ def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = 
     return Drawing("workspace", caption, svg_text(figure))
 
 
-def workspace_of(task: Scenario) -> Drawing | None:
-    """Return the workspace of the five-bar that does a task, with its path; None where it is no five-bar."""
+def workspace_of(scenario: Scenario) -> Drawing | None:
+    """Return the workspace of the five-bar that does a scenario, with its path; None where it is no five-bar."""
     try:
-        bar = FiveBar.of(task.linkage)
+        bar = FiveBar.of(scenario.linkage)
     except InvalidValueError:
         return None
-    tips = tip_of(task.linkage, task.ideal.q)
+    tips = tip_of(scenario.linkage, scenario.ideal.q)
     for mode, angles in inverse_all(bar, tips[0]).items():
-        if np.abs(np.sin((configuration(task.linkage, angles) - task.ideal.q[0]) / 2)).max() < _SAME:
+        if np.abs(np.sin((configuration(scenario.linkage, angles) - scenario.ideal.q[0]) / 2)).max() < _SAME:
             return workspace_figure(bar, mode, [tips[:: max(1, len(tips) // _DRAWN)]])
     raise AssertionError("a five-bar stands in one of four modes")
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.correction import Correction
 from armwright.clearance.features import WINDOW, spectrum
 from armwright.clearance.ideal import tip_of
@@ -10,9 +11,8 @@ from armwright.clearance.paths import Path, PickAndPlace, named_path
 from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.report.clearance_figures import lines_of_spectrum, marked_curves, paths, surface
+from armwright.report.clearance_run_figures import clearance_run_figures
 from armwright.report.figures import curves
-from armwright.report.rattling import Run
-from armwright.report.rattling_figures import rattling_figures
 from armwright.study import five_bar_clearance as study
 
 _TIME, _ERROR = "time, s", "error, mm"
@@ -29,7 +29,7 @@ def _single_run() -> dict[str, str | bytes]:
     run = _half("y1")
     files: dict[str, str | bytes] = {"figure4.06.svg": _torques("Figure 4.6: drives on path y1", named_path("y1"))}
     wanted = {"path": "4.07", "bearings": "4.08", "error": "4.09"}
-    for one in rattling_figures(Run.of(run)):
+    for one in clearance_run_figures(ClearanceRun.of(run)):
         if one.name in wanted:
             files[f"figure{wanted[one.name]}.svg"] = one.svg
     return files
@@ -54,7 +54,7 @@ def _curves() -> dict[str, str | bytes]:
         first.time,
         {name: run.distance * 1e3 for name, run in x.items()},
         labels=(_TIME, _ERROR),
-        spans=[tuple(first.task.path.knots[1:3])],
+        spans=[tuple(first.scenario.path.knots[1:3])],
     )
     spectra = {name: spectrum(run.distance) * 1e3 for name, run in x.items()}
     frequencies = np.arange(len(spectra["x2"])) / (len(first.time) * (first.time[1] - first.time[0]))
@@ -111,8 +111,8 @@ def _corrected(correction: Correction) -> dict[str, str | bytes]:
     both = {"path as it is": PickAndPlace().path(), "path corrected": correction.path}
     targets = np.array(PickAndPlace().nodes) * 1e3
     runs = {name: _simulated(path, study.ARMS["A"]) for name, path in both.items()}
-    wanted = tip_of(study.arm(), runs["path as it is"].task.ideal.q) * 1e3
-    told = {name: tip_of(study.arm(), run.task.ideal.q) * 1e3 for name, run in runs.items()}
+    wanted = tip_of(study.arm(), runs["path as it is"].scenario.ideal.q) * 1e3
+    told = {name: tip_of(study.arm(), run.scenario.ideal.q) * 1e3 for name, run in runs.items()}
     files: dict[str, str | bytes] = {
         "figure5.10.svg": paths(
             "Figure 5.10: the path, and the path corrected",

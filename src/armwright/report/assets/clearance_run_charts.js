@@ -101,7 +101,7 @@ function saidAt(t, { curves, digits, unit }) {
   return [make("b", { textContent: `${number(data.t[row] * 1000, 2)} ms` }), ...curves.map(line)];
 }
 
-function rattlingChart(said) {
+function clearanceChart(said) {
   const { title, unit, curves, powers = false, bands = false } = said;
   const span = spanOf(curves, powers);
   const names = curves.map(({ name }, i) => make("span", {}, swatch(i), name));

@@ -50,7 +50,7 @@ function start() {
   fillStrip();
   startView();
   startBearings();
-  startCharts(chartsOf().map(rattlingChart));
+  startCharts(chartsOf().map(clearanceChart));
   listeners.push(showClock, drawView, drawBearings);
   const step = data.duration / Math.max(1, data.t.length - 1);
   startClock({

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import tip_of
 from armwright.report.figures import Drawing, empty_figure, literal, plain_axes, spread, svg_text
-from armwright.report.rattling import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,11 +28,11 @@ _TIES = 31
 _HIGHEST = 200.0
 
 
-def rattling_figures(run: Run) -> list[Drawing]:
+def clearance_run_figures(run: ClearanceRun) -> list[Drawing]:
     """Return the figures of a run: path, bearings, error, forces, energy, spectrum."""
     drawn = []
     times = magnification(run)
-    pins = len(run.simulation.task.linkage.pins)
+    pins = len(run.simulation.scenario.linkage.pins)
     for name, draw, size, caption in (
         ("path", _path, (6.4, 5.2), f"The path without play and the path taken, its error magnified {times:g} times"),
         ("bearings", _bearings, (3.1 * pins + 1.0, 3.6), "Middles of the journals in their bearings; circles: walls"),
@@ -47,9 +47,9 @@ def rattling_figures(run: Run) -> list[Drawing]:
     return drawn
 
 
-def magnification(run: Run) -> float:
+def magnification(run: ClearanceRun) -> float:
     """Return a round number by which errors are magnified so that one sees them beside the path."""
-    path = tip_of(run.simulation.task.linkage, run.simulation.task.ideal.q)
+    path = tip_of(run.simulation.scenario.linkage, run.simulation.scenario.ideal.q)
     size, largest = float(np.ptp(path, axis=0).max()), float(run.distance.max())
     return round_number(_SHOWN * size / largest) if largest > 0 else 1.0
 
@@ -62,7 +62,7 @@ def round_number(x: float) -> float:
     return max(digit * power for digit in (1, 2, 5) if digit * power <= x)
 
 
-def _path(figure: "Figure", run: Run) -> None:
+def _path(figure: "Figure", run: ClearanceRun) -> None:
     simulation, times = run.simulation, magnification(run)
     some = spread(run.rows, _DRAWN)
     ideal = (simulation.tip[: run.rows] - run.error)[some] * 1e3
@@ -83,11 +83,11 @@ def _path(figure: "Figure", run: Run) -> None:
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
 
 
-def _bearings(figure: "Figure", run: Run) -> None:
+def _bearings(figure: "Figure", run: ClearanceRun) -> None:
     from matplotlib.collections import LineCollection  # noqa: PLC0415
     from matplotlib.patches import Circle  # noqa: PLC0415
 
-    pins, some = run.simulation.task.linkage.pins, spread(run.rows, _DRAWN)
+    pins, some = run.simulation.scenario.linkage.pins, spread(run.rows, _DRAWN)
     panels = figure.subplots(1, len(pins), squeeze=False)[0]
     # Each piece begins where the one before it ends.
     cuts = np.unique(np.linspace(0, len(some) - 1, _PIECES + 1).astype(int))
@@ -109,13 +109,13 @@ def _bearings(figure: "Figure", run: Run) -> None:
     figure.colorbar(lines, ax=panels, label="time, ms", shrink=0.8)
 
 
-def _error(figure: "Figure", run: Run) -> None:
+def _error(figure: "Figure", run: ClearanceRun) -> None:
     axis, some = plain_axes(figure, "time, s", "error, mm"), spread(run.rows, _DRAWN)
     t = run.time[some]
     lines = (("E", run.distance, "-", "C0"), ("x", run.error[:, 0], "--", "C1"), ("y", run.error[:, 1], "-.", "C2"))
     for name, values, style, colour in lines:
         axis.plot(t, values[some] * 1e3, style, color=colour, linewidth=1.3, label=name)
-    for knot in run.simulation.task.path.knots[1:-1]:
+    for knot in run.simulation.scenario.path.knots[1:-1]:
         axis.axvline(knot, color="0.6", linewidth=0.8, linestyle=":")
     if run.outlook is not None and not run.outlook.to_the_end:
         axis.axvline(run.outlook.until, color="C3", linewidth=1.0, linestyle="--", label="predictable until")
@@ -123,7 +123,7 @@ def _error(figure: "Figure", run: Run) -> None:
     axis.legend(fontsize="small")
 
 
-def _spectrum(figure: "Figure", run: Run) -> None:
+def _spectrum(figure: "Figure", run: ClearanceRun) -> None:
     axis = plain_axes(figure, "frequency, Hz", "amplitude, mm")
     waves = spectrum(run.distance) * 1e3
     per_line = 1.0 / (len(run.time) * (run.time[1] - run.time[0])) if len(run.time) > 1 else 1.0
@@ -135,9 +135,9 @@ def _spectrum(figure: "Figure", run: Run) -> None:
     axis.set_title(f"constant part, counted twice: {waves[0]:.4g} mm", fontsize="medium")
 
 
-def _forces(figure: "Figure", run: Run) -> None:
+def _forces(figure: "Figure", run: ClearanceRun) -> None:
     axis, some = plain_axes(figure, "time, s", "force, N"), spread(run.rows, _DRAWN)
-    for i, pin in enumerate(run.simulation.task.linkage.pins):
+    for i, pin in enumerate(run.simulation.scenario.linkage.pins):
         forces = run.simulation.forces[: run.rows, i][some]
         axis.plot(
             run.time[some],
@@ -151,7 +151,7 @@ def _forces(figure: "Figure", run: Run) -> None:
     axis.legend(fontsize="small")
 
 
-def _energy(figure: "Figure", run: Run) -> None:
+def _energy(figure: "Figure", run: ClearanceRun) -> None:
     axis, some, energy = plain_axes(figure, "time, s", "energy, J"), spread(run.rows, _DRAWN), run.energy
     for name, track, style in (
         ("lost in impacts", energy.impact_loss, "-"),

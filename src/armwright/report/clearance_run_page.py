@@ -1,4 +1,4 @@
-"""The page of a linkage with play: the arm along its path, its journals rattling, and everything over time.
+"""The page of a clearance run: the linkage along its path, its journals in their bearings, and everything over time.
 
 The page is one HTML file that needs no other. Its arrays carry their unit in their name.
 """
@@ -11,24 +11,22 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array
+from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_of
 from armwright.clearance.linkage import GROUND, Guide, Linkage, Pin, Place
+from armwright.report.clearance_run_figures import round_number
 from armwright.report.elements import badge, facts, figures, pairs, table
 from armwright.report.elements import notes as shown_notes
 from armwright.report.figures import Drawing
 from armwright.report.markup import asset, page_html
-from armwright.report.rattling import Run, newtons, notes, summary
-from armwright.report.rattling_figures import round_number
 from armwright.version import __version__
 
 # Rows that a page carries at most, and the largest error on the screen as a part of the size of the linkage.
 _ROWS, _SHOWN = 2600, 0.09
-_SCRIPTS = ("plane.js", "bearings.js", "charts.js", "rattling_charts.js", "rattling.js")
+_SCRIPTS = ("plane.js", "bearings.js", "charts.js", "clearance_run_charts.js", "clearance_run.js")
 _MICRO = 1e6
 # Figures that the page has no chart of its own for.
 _PRINTED = ("path", "bearings", "spectrum", "workspace")
-_PIN_HEADS = ("Pin", "Clearance mm", "Peak N", "Mean N", "Impacts", "In flight %", "Deepest µm")
-_TARGET_HEADS = ("Error at", "x mm", "y mm", "Distance mm", "Nearest approach mm")
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -74,15 +72,15 @@ class Film:
     magnification: float
 
 
-def film(run: Run) -> Film:
+def film(run: ClearanceRun) -> Film:
     """Return what the page shows of a run, with as many rows as a screen can tell apart."""
-    simulation, linkage = run.simulation, run.simulation.task.linkage
+    simulation, linkage = run.simulation, run.simulation.scenario.linkage
     stride = max(1, -(-run.rows // _ROWS))
     rows = np.arange(0, run.rows, stride)
     rows = rows if rows[-1] == run.rows - 1 else np.append(rows, run.rows - 1)
     places = [Place(body.name, point) for body in linkage.bodies for point in body.points]
     q = simulation.q[rows]
-    ideal_q = simulation.task.ideal.q[rows * simulation.task.stride]
+    ideal_q = simulation.scenario.ideal.q[rows * simulation.scenario.stride]
     with_play = np.stack([point_of(linkage, place, q) for place in places], axis=1)
     without = np.stack([point_of(linkage, place, ideal_q) for place in places], axis=1)
     energy = run.energy
@@ -112,7 +110,7 @@ def film(run: Run) -> Film:
     )
 
 
-def rattling_page(run: Run, drawn: Sequence[Drawing], *, title: str, command: str) -> str:
+def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: str, command: str) -> str:
     """Return the whole text of the page.
 
     Args:
@@ -124,20 +122,21 @@ def rattling_page(run: Run, drawn: Sequence[Drawing], *, title: str, command: st
     Returns:
         HTML text; write it as UTF-8.
     """
-    told = summary(run)
+    data = run.as_data()
+    pins, targets, totals = run.tables()
     return page_html(
         title=title,
-        badge=badge(told["status"], good=run.finished),
-        facts=facts(_facts(told, command)),
-        notes=shown_notes(notes(run)),
-        main=Template(asset("rattling.html")).substitute(
-            pins=table(_PIN_HEADS, _pin_rows(told), numbers=range(1, 7)),
-            targets=table(_TARGET_HEADS, _target_rows(told), numbers=range(1, 5)),
-            totals=pairs(_totals(told)),
-            settings=pairs(_settings(told)),
+        badge=badge(data["status"], good=run.finished),
+        facts=facts(_facts(data, command)),
+        notes=shown_notes(run.notes),
+        main=Template(asset("clearance_run.html")).substitute(
+            pins=table(pins.heads, pins.rows, numbers=pins.numbers),
+            targets=table(targets.heads, targets.rows, numbers=targets.numbers),
+            totals=pairs((name, f"{value} {unit}") for name, value, unit in totals.rows),
+            settings=pairs(_settings(data)),
             figures=figures(one for one in drawn if one.name in _PRINTED),
         ),
-        styles=("rattling.css",),
+        styles=("clearance_run.css",),
         scripts=_SCRIPTS,
         data=film(run),
         generated=f"armwright {__version__}: {command}",
@@ -147,9 +146,9 @@ def rattling_page(run: Run, drawn: Sequence[Drawing], *, title: str, command: st
 # ---- the film ------------------------------------------------------------------------------------------------------
 
 
-def _pins(run: Run, places: Sequence[Place]) -> list[dict[str, Any]]:
+def _pins(run: ClearanceRun, places: Sequence[Place]) -> list[dict[str, Any]]:
     """Return the pins; a bearing or journal on the ground has no number, but a place."""
-    linkage = run.simulation.task.linkage
+    linkage = run.simulation.scenario.linkage
     found = []
     for i, pin in enumerate(linkage.pins):
         ends = {
@@ -189,49 +188,17 @@ def _magnification(points: Array, shifts: Array) -> float:
 # ---- the words -----------------------------------------------------------------------------------------------------
 
 
-def _facts(told: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
-    yield "Linkage", told["linkage"]
-    yield "Path", f"{told['path']}, {told['duration']:.4g} s"
-    yield "Clearance", ", ".join(f"{name} {pin['clearance'] * 1e3:.4g} mm" for name, pin in told["pins"].items())
-    if told["predictable_until"] is not None:
-        yield "Predictable until", f"{told['predictable_until']:.4g} s"
+def _facts(data: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
+    yield "Linkage", data["linkage"]
+    yield "Path", f"{data['path']}, {data['duration']:.4g} s"
+    yield "Clearance", ", ".join(f"{name} {pin['clearance'] * 1e3:.4g} mm" for name, pin in data["pins"].items())
+    if data["predictable_until"] is not None:
+        yield "Predictable until", f"{data['predictable_until']:.4g} s"
     yield "Command", command
 
 
-def _pin_rows(told: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    for name, pin in told["pins"].items():
-        yield (
-            name,
-            f"{pin['clearance'] * 1e3:.4g}",
-            newtons(pin["peak_force"]),
-            f"{pin['mean_force']:.4g}",
-            f"{pin['impacts']}",
-            f"{100 * pin['flight']:.3g}",
-            f"{pin['deepest'] * 1e6:.3g}",
-        )
-
-
-def _target_rows(told: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    for one in told["targets"]:
-        lengths = (one["error_x"], one["error_y"], one["distance"], one["nearest"])
-        yield f"{one['time']:.4g} s", *("" if length is None else f"{length * 1e3:z.4f}" for length in lengths)
-
-
-def _totals(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    error, energy = told["error"], told["energy"]
-    yield "Largest error", f"{error['largest'] * 1e3:.4g} mm"
-    yield "in x", f"{error['largest_x'] * 1e3:.4g} mm"
-    yield "in y", f"{error['largest_y'] * 1e3:.4g} mm"
-    yield "Mean error", f"{error['mean'] * 1e3:.4g} mm"
-    yield "Largest wave of the error", f"{error['amp_ac'] * 1e3:.4g} mm"
-    yield "Work of the drives", f"{energy['driven']:.4g} J"
-    yield "Lost in impacts", f"{energy['impact_loss']:.4g} J"
-    yield "Lost in friction", f"{energy['friction_loss']:.4g} J"
-    yield "Not explained by the books", f"{energy['imbalance']:.2g} J"
-
-
-def _settings(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    how = told["settings"]
+def _settings(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    how = data["settings"]
     located = ", impacts located" if how["located"] else ""
     yield "Integrator", f"{how['integrator']}, step {how['step']:.3g} s{located}, sampled every {how['sample']:.3g} s"
     gains = f", {how['gains'][0]:g} N m/rad and {how['gains'][1]:g} N m s/rad" if "gains" in how else ""
@@ -244,4 +211,4 @@ def _settings(told: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "Material", f"E {how['young'] / 1e9:g} GPa, ν {how['poisson']:g}"
     radii = ", ".join(f"{name} {radius * 1e3:g}" for name, radius in how["journal_radius"].items())
     yield "Radius of the journals", f"{radii} mm"
-    yield "Versions", ", ".join(f"{name} {version}" for name, version in told["versions"].items())
+    yield "Versions", ", ".join(f"{name} {version}" for name, version in data["versions"].items())

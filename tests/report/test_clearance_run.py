@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.five_bar import FiveBar
 from armwright.clearance.ideal import tip_of
 from armwright.clearance.linkage import Pin, Place
@@ -18,10 +19,10 @@ from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Simulation, Status, simulate
 from armwright.errors import ShapeError
+from armwright.report.clearance_run_figures import clearance_run_figures, magnification, round_number
+from armwright.report.clearance_run_files import samples_csv
+from armwright.report.clearance_run_page import clearance_run_page, film
 from armwright.report.five_bar_figure import workspace_figure, workspace_of
-from armwright.report.rattling import Run, notes, samples_csv, summary
-from armwright.report.rattling_figures import magnification, rattling_figures, round_number
-from armwright.report.rattling_page import film, rattling_page
 
 # The page writes five significant digits.
 FIVE_DIGITS = 0.5e-4
@@ -41,42 +42,44 @@ def simulation(task: Scenario) -> Simulation:
 
 
 @pytest.fixture(scope="module")
-def run(simulation: Simulation) -> Run:
-    return Run.of(simulation)
+def run(simulation: Simulation) -> ClearanceRun:
+    return ClearanceRun.of(simulation)
 
 
 @pytest.fixture(scope="module")
-def cranked() -> dict[str, Run]:
+def cranked() -> dict[str, ClearanceRun]:
     """Return runs of the linkages of which one drive turns, half a turn each."""
     found = {}
     for name, speed in (("slider-crank", 60.0), ("four-bar", 12.0)):
         linkage = load_linkage(name)
         at = linkage.assembly[linkage.drives[0].body]
         path = turning("half a turn", at, speed, np.pi / speed)
-        found[name] = Run.of(simulate(prepare(linkage, path, Settings(start="centred"))))
+        found[name] = ClearanceRun.of(simulate(prepare(linkage, path, Settings(start="centred"))))
     return found
 
 
-def diverged(simulation: Simulation) -> Run:
+def diverged(simulation: Simulation) -> ClearanceRun:
     """Return a run whose numbers became infinite after 500 samples."""
     q = simulation.q.copy()
     q[500:] = np.nan
     error = np.where(np.isnan(q[:, :1]), np.nan, simulation.error)
     peaks = np.array([np.inf, *simulation.peaks[1:]])
-    return Run.of(attrs.evolve(simulation, q=q, error=error, peaks=peaks, status=np.array(Status.DIVERGED)))
+    return ClearanceRun.of(attrs.evolve(simulation, q=q, error=error, peaks=peaks, status=np.array(Status.DIVERGED)))
 
 
 @cache
-def page_of(run: Run) -> str:
-    return rattling_page(run, rattling_figures(run), title="A & B", command="armwright clearance simulate <x>")
+def page_of(run: ClearanceRun) -> str:
+    return clearance_run_page(
+        run, clearance_run_figures(run), title="A & B", command="armwright clearance simulate <x>"
+    )
 
 
 # ---- numbers -------------------------------------------------------------------------------------------------------
 
 
-def test_summary(run: Run) -> None:
+def test_summary(run: ClearanceRun) -> None:
     """The summary has the error of the thesis' start, the peaks of the run, and books that close."""
-    told = summary(run)
+    told = run.as_data()
 
     start = told["targets"][0]
     # Table of the thesis: 0.2893 mm to the side; straight down by statics.
@@ -90,16 +93,16 @@ def test_summary(run: Run) -> None:
     assert energy["driven"] == pytest.approx(held + lost, abs=BOOKS)
     assert energy["imbalance"] < BOOKS
     assert told["error"]["amp_dc"] == pytest.approx(2 * told["error"]["mean"], rel=1e-9)
-    assert notes(run) == []
+    assert run.notes == []
 
 
-def test_nearest_approach(run: Run) -> None:
+def test_nearest_approach(run: ClearanceRun) -> None:
     """No target is nearer at its time than at the nearest approach."""
-    for one in summary(run)["targets"]:
+    for one in run.as_data()["targets"]:
         assert one["nearest"] <= one["distance"] + 1e-12
 
 
-def test_peak_lies_in_the_wall(run: Run) -> None:
+def test_peak_lies_in_the_wall(run: ClearanceRun) -> None:
     """Where a journal presses it is in the wall, and where it flies it presses on nothing."""
     forces = run.simulation.forces
 
@@ -107,7 +110,7 @@ def test_peak_lies_in_the_wall(run: Run) -> None:
     assert np.all(forces[run.depths < 0] == 0)
 
 
-def test_samples_table(run: Run) -> None:
+def test_samples_table(run: ClearanceRun) -> None:
     """The table has a row per sample, and every column but none of its numbers tells its unit."""
     rows = list(csv.reader(samples_csv(run)))
 
@@ -124,12 +127,12 @@ def test_diverged_run(simulation: Simulation) -> None:
     """A run that diverged is told as far as it is sound, and the reader is told so."""
     run = diverged(simulation)
 
-    assert summary(run)["status"] == "diverged"
-    assert summary(run)["pins"]["J2"]["peak_force"] is None
+    assert run.as_data()["status"] == "diverged"
+    assert run.as_data()["pins"]["J2"]["peak_force"] is None
     assert len(list(samples_csv(run))) == 1 + 500
-    assert "shown until" in notes(run)[0]
+    assert "shown until" in run.notes[0]
     assert "diverged" in page_of(run)
-    assert len(rattling_figures(run)) == 6
+    assert len(clearance_run_figures(run)) == 6
 
 
 def test_books_that_do_not_close(simulation: Simulation) -> None:
@@ -139,7 +142,7 @@ def test_books_that_do_not_close(simulation: Simulation) -> None:
         "impact loss": simulation.works["impact loss"] + np.linspace(0, 1, len(simulation.time)),
     }
 
-    said = notes(Run.of(attrs.evolve(simulation, works=works)))
+    said = ClearanceRun.of(attrs.evolve(simulation, works=works)).notes
 
     assert len(said) == 1
     assert said[0].startswith("the energy balance lacks 1 J beside ")
@@ -150,22 +153,22 @@ def test_many_runs_are_refused(task: Scenario) -> None:
     """A report is of one run: of several one is to be taken out."""
     both = simulate(task, [[5e-4] * 3, [4e-4] * 3])
     with pytest.raises(ShapeError, match=r"expected one run, got \(2,\)"):
-        Run.of(both)
+        ClearanceRun.of(both)
 
 
 # ---- figures -------------------------------------------------------------------------------------------------------
 
 
-def test_figures(run: Run) -> None:
+def test_figures(run: ClearanceRun) -> None:
     """Path, bearings, error, spectrum, forces and energy are drawn, the same for the same run."""
-    drawn = rattling_figures(run)
+    drawn = clearance_run_figures(run)
 
     assert [one.name for one in drawn] == ["path", "bearings", "error", "spectrum", "forces", "energy"]
     assert all(one.svg.startswith("<?xml") and len(one.caption) > 20 for one in drawn)
-    assert [one.svg for one in rattling_figures(run)] == [one.svg for one in drawn]
+    assert [one.svg for one in clearance_run_figures(run)] == [one.svg for one in drawn]
 
 
-def test_magnification(run: Run) -> None:
+def test_magnification(run: ClearanceRun) -> None:
     """The error is magnified by a round number that keeps it below a fifth of the path."""
     times = magnification(run)
 
@@ -179,14 +182,14 @@ def test_round_numbers(x: float, round_one: float) -> None:
     assert round_number(x) == round_one
 
 
-def test_workspace(task: Scenario, run: Run, cranked: dict[str, Run]) -> None:
+def test_workspace(task: Scenario, run: ClearanceRun, cranked: dict[str, ClearanceRun]) -> None:
     """The workspace of a five-bar is drawn in the mode in which it stands, of no other linkage at all."""
-    assert run.simulation.task is task
+    assert run.simulation.scenario is task
     drawn = workspace_of(task)
 
     assert drawn is not None
     assert "elbows out" in drawn.caption
-    assert workspace_of(cranked["four-bar"].simulation.task) is None
+    assert workspace_of(cranked["four-bar"].simulation.scenario) is None
     for mode in ("left", "in"):
         assert workspace_figure(FiveBar.symmetric(0.45, 0.3, 0.4), mode).svg != drawn.svg
 
@@ -194,7 +197,7 @@ def test_workspace(task: Scenario, run: Run, cranked: dict[str, Run]) -> None:
 # ---- the film ------------------------------------------------------------------------------------------------------
 
 
-def test_film(run: Run) -> None:
+def test_film(run: ClearanceRun) -> None:
     """The film puts every point where the linkage has it: without play on the path, with play off by the error."""
     shown = film(run)
 
@@ -217,9 +220,11 @@ def test_long_runs_are_thinned(simulation: Simulation) -> None:
     }  # fmt: skip
     works = {name: np.concatenate([track] * times) for name, track in simulation.works.items()}
     time = np.linspace(0, times * 0.25, len(long["q"]))
-    ideal = attrs.evolve(simulation.task.ideal, q=np.concatenate([simulation.task.ideal.q] * (times + 1)))
-    run = Run.of(
-        attrs.evolve(simulation, **long, works=works, time=time, task=attrs.evolve(simulation.task, ideal=ideal))
+    ideal = attrs.evolve(simulation.scenario.ideal, q=np.concatenate([simulation.scenario.ideal.q] * (times + 1)))
+    run = ClearanceRun.of(
+        attrs.evolve(
+            simulation, **long, works=works, time=time, scenario=attrs.evolve(simulation.scenario, ideal=ideal)
+        )
     )
 
     shown = film(run)
@@ -229,7 +234,7 @@ def test_long_runs_are_thinned(simulation: Simulation) -> None:
     assert np.array_equal(shown.forces_N.max(axis=0), simulation.forces.max(axis=0))
 
 
-def test_page_carries_all(run: Run) -> None:
+def test_page_carries_all(run: ClearanceRun) -> None:
     """The page names no address, no text on it is taken for HTML, and it stays below three megabytes."""
     page = page_of(run)
 
@@ -238,12 +243,12 @@ def test_page_carries_all(run: Run) -> None:
     assert "<h1>A &amp; B</h1>" in page
     for scheme in ("http://", "https://", "//cdn"):
         assert scheme not in page
-    for name in run.simulation.task.linkage.clearances:
+    for name in run.simulation.scenario.linkage.clearances:
         assert f"<td>{name}</td>" in page
 
 
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar"])
-def test_other_linkages(cranked: dict[str, Run], name: str) -> None:
+def test_other_linkages(cranked: dict[str, ClearanceRun], name: str) -> None:
     """A slider-crank has a rail and a four-bar none; both have one motor on the ground and one bearing."""
     run = cranked[name]
     shown = film(run)
@@ -251,11 +256,11 @@ def test_other_linkages(cranked: dict[str, Run], name: str) -> None:
     assert len(shown.rails) == (1 if name == "slider-crank" else 0)
     assert shown.motors == [[0.0, 0.0]]
     assert len(shown.pins) == 1
-    task = run.simulation.task
+    task = run.simulation.scenario
     ideal = tip_of(task.linkage, task.ideal.q)[:: task.stride]
     np.testing.assert_allclose(shown.path_m[[0, -1]], ideal[[0, -1]], atol=1e-12)
     # Its path has no goal of the tip but the start.
-    assert [one["time"] for one in summary(run)["targets"]] == [0.0]
+    assert [one["time"] for one in run.as_data()["targets"]] == [0.0]
 
 
 def test_bearing_in_the_ground() -> None:
@@ -266,12 +271,12 @@ def test_bearing_in_the_ground() -> None:
     other = attrs.evolve(linkage, joints=joints, pins=[pin])
     path = turning("a little", linkage.assembly["crank"], 12.0, 0.05)
 
-    run = Run.of(simulate(prepare(other, path, Settings(start="centred"))))
+    run = ClearanceRun.of(simulate(prepare(other, path, Settings(start="centred"))))
 
     (shown,) = film(run).pins
     assert shown["bearing"] == [0.3, 0.0]
     assert isinstance(shown["journal"], int)
-    assert all(one.svg for one in rattling_figures(run))
+    assert all(one.svg for one in clearance_run_figures(run))
 
 
 # ---- in a browser --------------------------------------------------------------------------------------------------
@@ -280,7 +285,7 @@ def test_bearing_in_the_ground() -> None:
 class Opened:
     """An opened page, and everything it complained about or asked the network for."""
 
-    def __init__(self, browser: Any, file: Path, run: Run) -> None:
+    def __init__(self, browser: Any, file: Path, run: ClearanceRun) -> None:
         file.write_text(page_of(run), encoding="utf-8")
         self.said: list[str] = []
         self.page = browser.new_page(viewport={"width": 1280, "height": 900})
@@ -305,7 +310,7 @@ class Opened:
 
 
 @pytest.fixture
-def opened(browser: Any, tmp_path: Path, run: Run) -> Any:
+def opened(browser: Any, tmp_path: Path, run: ClearanceRun) -> Any:
     shown = Opened(browser, tmp_path / "report.html", run)
     yield shown
     shown.page.close()
@@ -322,7 +327,7 @@ def test_opens_from_the_disk(opened: Opened) -> None:
 @pytest.mark.browser
 @pytest.mark.parametrize("t", [0.0, 0.1, 0.2213, 0.25])
 @pytest.mark.drawn(0.5)
-def test_shows_the_moment(opened: Opened, run: Run, t: float) -> None:
+def test_shows_the_moment(opened: Opened, run: ClearanceRun, t: float) -> None:
     """At every moment the page shows the error, the gaps and what flies as the simulation has it."""
     opened.seek(t)
     seen = opened.state()
@@ -388,7 +393,7 @@ def test_charts_lead(opened: Opened) -> None:
 @pytest.mark.browser
 @pytest.mark.parametrize("name", ["slider-crank", "four-bar"])
 @pytest.mark.drawn(0.5)
-def test_other_pages(browser: Any, tmp_path: Path, cranked: dict[str, Run], name: str) -> None:
+def test_other_pages(browser: Any, tmp_path: Path, cranked: dict[str, ClearanceRun], name: str) -> None:
     """The pages of slider-crank and four-bar open, and end where their runs end."""
     shown = Opened(browser, tmp_path / f"{name}.html", cranked[name])
     shown.page.keyboard.press("End")
