@@ -74,10 +74,10 @@ from armwright.report.figures import curves
 
 arm = armwright.load_arm("puma560")
 through = np.radians([[0, -40, 20, 0, 40, 0], [50, -80, 60, 40, 60, 30], [100, -30, 0, 0, 30, 90]])
-slow = armwright.cubic_through([0, 2, 4], through)
-fast = armwright.time_optimal(arm, slow).trajectory
+slow = armwright.motion.cubic_through([0, 2, 4], through)
+fast = armwright.motion.time_optimal(arm, slow).trajectory
 t = np.linspace(0, fast.duration, 800)
-efforts = armwright.inverse_dynamics(arm, fast(t), fast(t, 1), fast(t, 2))
+efforts = armwright.dynamics.inverse_dynamics(arm, fast(t), fast(t, 1), fast(t, 2))
 used = {
     "acceleration of joint 1": abs(fast(t, 2))[:, 0] / arm.limits.acceleration[0],
     "acceleration of joint 2": abs(fast(t, 2))[:, 1] / arm.limits.acceleration[1],

@@ -4,6 +4,7 @@ import posixpath
 import re
 import tomllib
 from collections.abc import Iterator
+from inspect import ismodule
 from pathlib import Path
 from typing import Any
 
@@ -60,13 +61,20 @@ def api_page(folder: Path) -> str:
 
 
 def public_page() -> str:
-    """Return the page of what can be had from the package itself."""
-    lines = ["# armwright\n", armwright.__doc__ or "", "\n| Name | What |\n|---|---|"]
-    for name in armwright.__all__:
-        if not name.startswith("_"):
-            thing = getattr(armwright, name)
-            what = (thing.__doc__ or "").strip().partition("\n")[0].replace("|", "\\|")
-            lines.append(f"| [`{name}`][{thing.__module__}.{thing.__qualname__}] | {what} |")
+    """Return the page of what can be had from the package and its namespaces."""
+    lines = ["# armwright\n", armwright.__doc__ or ""]
+    doors = [armwright, *(thing for name in armwright.__all__ if ismodule(thing := getattr(armwright, name)))]
+    for door in doors:
+        lines += [
+            f"\n## {door.__name__}\n",
+            door.__doc__ or "" if door is not armwright else "",
+            "\n| Name | What |\n|---|---|",
+        ]
+        for name in getattr(door, "__all__", []):
+            thing = getattr(door, name)
+            if not name.startswith("_") and not ismodule(thing):
+                what = (thing.__doc__ or "").strip().partition("\n")[0].replace("|", "\\|")
+                lines.append(f"| [`{name}`][{thing.__module__}.{thing.__qualname__}] | {what} |")
     for module in house():
         if (PACKAGE / f"{module}.py").exists():
             lines += [f"\n## {module}\n", f"::: armwright.{module}\n"]

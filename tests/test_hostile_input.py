@@ -151,11 +151,11 @@ def test_one_posture_only(door: str) -> None:
         (lambda a, b: tool_twist(PUMA, a, b), "q, qd"),
         (lambda a, b: damped_rates(PUMA, a, b), "q, twist"),
         (lambda a, b: differential_inverse(PUMA, a, b), "q, twist"),
-        (lambda a, b: armwright.inverse_dynamics(PUMA, a, b, Q), "q, qd, qdd"),
-        (lambda a, b: armwright.inverse_dynamics(PUMA, a, Q, Q, wrench=b), "q, qd, qdd, wrench"),
-        (lambda a, b: armwright.forward_dynamics(PUMA, a, Q, b), "q, qd, tau"),
+        (lambda a, b: armwright.dynamics.inverse_dynamics(PUMA, a, b, Q), "q, qd, qdd"),
+        (lambda a, b: armwright.dynamics.inverse_dynamics(PUMA, a, Q, Q, wrench=b), "q, qd, qdd, wrench"),
+        (lambda a, b: armwright.dynamics.forward_dynamics(PUMA, a, Q, b), "q, qd, tau"),
         (lambda a, b: toacc(PUMA, a, b, Q), "q, qd, tau"),
-        (lambda a, b: armwright.terms(PUMA, a, b, Q), "q, qd, qdd"),
+        (lambda a, b: armwright.dynamics.terms(PUMA, a, b, Q), "q, qd, qdd"),
         (lambda a, b: kinetic_energy(PUMA, a, b), "q, qd"),
         (bejczy_efforts, "q, qdd"),
     ],
@@ -167,21 +167,21 @@ def test_leading_axes_that_do_not_fit(call: Callable[[Any, Any], Any], said: str
 
 
 NO_ARM: dict[str, Door] = {
-    "forward": lambda arm: armwright.forward(arm, Q),
-    "link_poses": lambda arm: armwright.link_poses(arm, Q),
-    "jacobian": lambda arm: armwright.jacobian(arm, Q),
-    "singularities": lambda arm: armwright.singularities(arm, Q),
+    "forward": lambda arm: armwright.kinematics.forward(arm, Q),
+    "link_poses": lambda arm: armwright.kinematics.link_poses(arm, Q),
+    "jacobian": lambda arm: armwright.kinematics.jacobian(arm, Q),
+    "singularities": lambda arm: armwright.kinematics.singularities(arm, Q),
     "singularity_factors": lambda arm: singularity_factors(arm, Q),
     "differential_inverse": lambda arm: differential_inverse(arm, Q, Q),
-    "inverse_dynamics": lambda arm: armwright.inverse_dynamics(arm, Q, Q, Q),
-    "mass_matrix": lambda arm: armwright.mass_matrix(arm, Q),
-    "forward_dynamics": lambda arm: armwright.forward_dynamics(arm, Q, Q, Q),
-    "terms": lambda arm: armwright.terms(arm, Q, Q, Q),
-    "simulate": lambda arm: armwright.simulate(arm, Q, duration=1.0),
-    "inverse": lambda arm: armwright.inverse(arm, np.eye(4)),
-    "inverse_branches": lambda arm: armwright.inverse_branches(arm, np.eye(4)),
-    "payload": lambda arm: armwright.payload(arm, 1.0),
-    "point_to_point": lambda arm: armwright.point_to_point(arm, Q, OTHER),
+    "inverse_dynamics": lambda arm: armwright.dynamics.inverse_dynamics(arm, Q, Q, Q),
+    "mass_matrix": lambda arm: armwright.dynamics.mass_matrix(arm, Q),
+    "forward_dynamics": lambda arm: armwright.dynamics.forward_dynamics(arm, Q, Q, Q),
+    "terms": lambda arm: armwright.dynamics.terms(arm, Q, Q, Q),
+    "simulate": lambda arm: armwright.simulation.simulate(arm, Q, duration=1.0),
+    "inverse": lambda arm: armwright.kinematics.inverse(arm, np.eye(4)),
+    "inverse_branches": lambda arm: armwright.kinematics.inverse_branches(arm, np.eye(4)),
+    "payload": lambda arm: armwright.dynamics.payload(arm, 1.0),
+    "point_to_point": lambda arm: armwright.motion.point_to_point(arm, Q, OTHER),
     "gravity_compensation": gravity_compensation,
     "fitted": lambda arm: fitted(arm, [Q] * 20),
 }
@@ -196,7 +196,7 @@ def test_what_is_no_arm(door: str, value: object) -> None:
         NO_ARM[door](value)
 
 
-X = armwright.forward(PUMA, Q)
+X = armwright.kinematics.forward(PUMA, Q)
 MIRROR = np.diag((1.0, 1.0, -1.0, 1.0))
 POSES: dict[str, tuple[Any, type[ArmwrightError], str]] = {
     "a text": ("here", KindError, "expected numbers, got 'here'"),
@@ -216,7 +216,7 @@ POSES: dict[str, tuple[Any, type[ArmwrightError], str]] = {
 
 
 @pytest.mark.parametrize("what", POSES)
-@pytest.mark.parametrize("ask", [armwright.inverse, armwright.inverse_branches])
+@pytest.mark.parametrize("ask", [armwright.kinematics.inverse, armwright.kinematics.inverse_branches])
 def test_what_is_no_pose(ask: Callable[..., object], what: str) -> None:
     """What is no pose is refused before any posture is sought, alone or among others, and what is wrong is told."""
     value, kind, said = POSES[what]
@@ -230,26 +230,26 @@ def test_one_pose_only() -> None:
         with pytest.raises(
             ShapeError, match=r"pose: expected one pose, shape \(4, 4\), got .* inverse_branches takes many"
         ):
-            armwright.inverse(PUMA, poses)
-    q, singular = armwright.inverse_branches(PUMA, np.zeros((0, 4, 4)))
+            armwright.kinematics.inverse(PUMA, poses)
+    q, singular = armwright.kinematics.inverse_branches(PUMA, np.zeros((0, 4, 4)))
     assert (q.shape, singular.shape) == ((0, 8, 6), (0, 8))
 
 
 NUMBERS: dict[str, Door] = {
-    "duration": lambda x: armwright.simulate(PUMA, Q, duration=x),
-    "period": lambda x: armwright.simulate(PUMA, Q, duration=1.0, period=x),
+    "duration": lambda x: armwright.simulation.simulate(PUMA, Q, duration=x),
+    "period": lambda x: armwright.simulation.simulate(PUMA, Q, duration=1.0, period=x),
     "Gill: length": lambda x: Gill(length=x),
     "Adaptive: rtol": lambda x: Adaptive(rtol=x),
-    "threshold": lambda x: armwright.singularities(PUMA, Q, threshold=x),
+    "threshold": lambda x: armwright.kinematics.singularities(PUMA, Q, threshold=x),
     "length": lambda x: manipulability(PUMA, Q, length=x),
     "damping": lambda x: damped_rates(PUMA, Q, Q, damping=x),
-    "speed": lambda x: armwright.point_to_point(PUMA, Q, OTHER, x),
-    "duration of a quintic": lambda x: armwright.quintic(Q, OTHER, x),
-    "factor": lambda x: armwright.quintic(Q, OTHER, 1.0).slowed(x),
+    "speed": lambda x: armwright.motion.point_to_point(PUMA, Q, OTHER, x),
+    "duration of a quintic": lambda x: armwright.motion.quintic(Q, OTHER, x),
+    "factor": lambda x: armwright.motion.quintic(Q, OTHER, 1.0).slowed(x),
     "joint: theta": lambda x: Joint(kind="revolute", theta=x),
     "limits: lower": lambda x: Limits(lower=x),
     "link: mass": lambda x: Link(mass=x),
-    "link: mass of a load": lambda x: armwright.payload(PUMA, x),
+    "link: mass of a load": lambda x: armwright.dynamics.payload(PUMA, x),
     "motor: viscous": lambda x: Motor(viscous=x),
     "arm 'a': reach": lambda x: Arm(name="a", joints=PUMA.joints, reach=x),
     "brake: start": lambda x: Brake(joint=0, start=x),
@@ -278,26 +278,46 @@ def test_numbers_without_a_meaning(door: str, value: float) -> None:
     [
         (lambda: armwright.load_arm(3), KindError, "name: expected the name of an arm or the path of a file, got 3"),
         (lambda: armwright.load_arm("pumma560"), UnknownNameError, "no arm 'pumma560'. Did you mean 'puma560'?"),
-        (lambda: armwright.jacobian(PUMA, Q, "world"), InvalidValueError, "frame: expected 'base' or 'tool'"),
-        (lambda: armwright.jacobian(PUMA, Q, ["base"]), InvalidValueError, "got ['base']"),
+        (
+            lambda: armwright.kinematics.jacobian(PUMA, Q, "world"),
+            InvalidValueError,
+            "frame: expected 'base' or 'tool'",
+        ),
+        (lambda: armwright.kinematics.jacobian(PUMA, Q, ["base"]), InvalidValueError, "got ['base']"),
         (lambda: tool_twist(PUMA, Q, Q, np.ones(2)), InvalidValueError, "frame: expected 'base' or 'tool'"),
         (lambda: manipulability(PUMA, Q, "yoshikava"), UnknownNameError, "Did you mean 'yoshikawa'?"),
         (lambda: manipulability(PUMA, Q, motion=["all"]), UnknownNameError, "no motion '['all']'."),
         (lambda: differential_inverse(PUMA, Q, Q, way=np.ones(2)), UnknownNameError, "no way '[1. 1.]'."),
         (lambda: Adaptive(method="RK4"), UnknownNameError, "no method 'RK4'"),
-        (lambda: armwright.terms(PUMA, Q, Q, Q, load=2.0), KindError, "load: expected a Link, got 2.0"),
-        (lambda: armwright.payload(PUMA, -1.0), InvalidValueError, "mass must be 0 or more, got -1"),
-        (lambda: armwright.payload(PUMA, 1.0, [0, 0]), ShapeError, "com: expected a shape ending in (3,), got (2,)"),
-        (lambda: armwright.payload(PUMA, 1.0, inertia=np.eye(2)), ShapeError, "inertia: expected a shape ending in"),
-        (lambda: armwright.inverse_dynamics(PUMA, Q, Q, Q, base_acceleration=9.8), ShapeError, "base_acceleration: "),
-        (lambda: armwright.quintic(Q, OTHER, 1e-30), InvalidValueError, "duration: expected more than 0 s, 1e-09 s"),
-        (lambda: armwright.quintic(0.0, 1.0, 1.0), ShapeError, "q_start: expected shape (n,), got ()"),
-        (lambda: armwright.xspline([0, 1], 3.0), ShapeError, "X-spline: expected k times and (k, n) knots"),
-        (lambda: armwright.xspline([0, 1], [[], []]), ShapeError, "X-spline: expected k times and (k, n) knots"),
-        (lambda: armwright.xspline([0, 0], [Q, Q]), InvalidValueError, "times must rise, got 0 s and then 0 s"),
-        (lambda: armwright.xspline([1, 2], [Q, Q]), InvalidValueError, "times: expected to begin at 0"),
-        (lambda: armwright.quintic(Q, OTHER, 1.0)("x"), KindError, "t: expected numbers, got 'x'"),
-        (lambda: armwright.quintic(Q, OTHER, 1.0)(0.5, 1.5), KindError, "order: expected a whole number from 0"),
+        (lambda: armwright.dynamics.terms(PUMA, Q, Q, Q, load=2.0), KindError, "load: expected a Link, got 2.0"),
+        (lambda: armwright.dynamics.payload(PUMA, -1.0), InvalidValueError, "mass must be 0 or more, got -1"),
+        (
+            lambda: armwright.dynamics.payload(PUMA, 1.0, [0, 0]),
+            ShapeError,
+            "com: expected a shape ending in (3,), got (2,)",
+        ),
+        (
+            lambda: armwright.dynamics.payload(PUMA, 1.0, inertia=np.eye(2)),
+            ShapeError,
+            "inertia: expected a shape ending in",
+        ),
+        (
+            lambda: armwright.dynamics.inverse_dynamics(PUMA, Q, Q, Q, base_acceleration=9.8),
+            ShapeError,
+            "base_acceleration: ",
+        ),
+        (
+            lambda: armwright.motion.quintic(Q, OTHER, 1e-30),
+            InvalidValueError,
+            "duration: expected more than 0 s, 1e-09 s",
+        ),
+        (lambda: armwright.motion.quintic(0.0, 1.0, 1.0), ShapeError, "q_start: expected shape (n,), got ()"),
+        (lambda: armwright.motion.xspline([0, 1], 3.0), ShapeError, "X-spline: expected k times and (k, n) knots"),
+        (lambda: armwright.motion.xspline([0, 1], [[], []]), ShapeError, "X-spline: expected k times and (k, n) knots"),
+        (lambda: armwright.motion.xspline([0, 0], [Q, Q]), InvalidValueError, "times must rise, got 0 s and then 0 s"),
+        (lambda: armwright.motion.xspline([1, 2], [Q, Q]), InvalidValueError, "times: expected to begin at 0"),
+        (lambda: armwright.motion.quintic(Q, OTHER, 1.0)("x"), KindError, "t: expected numbers, got 'x'"),
+        (lambda: armwright.motion.quintic(Q, OTHER, 1.0)(0.5, 1.5), KindError, "order: expected a whole number from 0"),
         (lambda: armwright.Trajectory(times=[0, 1], coefficients=Q), ShapeError, "coefficients: expected (segments,"),
         (lambda: fitted(armwright.load_arm("stanford"), Q), ShapeError, "q: expected (m, 6) postures"),
         (lambda: pd(PUMA, standing(Q), -1.0, 1.0), InvalidValueError, "kp: expected 0 or more for every joint"),
@@ -336,7 +356,7 @@ def test_simulations_that_cannot_be(call: Callable[[], object], kind: type[Armwr
 
 
 def simulated(**options: Any) -> Any:
-    return armwright.simulate(PUMA, Q, **{"duration": 0.01, **options})
+    return armwright.simulation.simulate(PUMA, Q, **{"duration": 0.01, **options})
 
 
 def tired(t: float, _q: object, _qd: object) -> list[float]:
@@ -353,7 +373,9 @@ def test_runaway_is_a_status(integrator: Gill | Adaptive, effort: Callable[[Any]
     def controller(t: float, _q: object, qd: Any) -> Any:
         return effort(qd) if t > 0 else qd * 0
 
-    found = armwright.simulate(block, [1.0], [1.0], duration=5.0, controller=controller, integrator=integrator)
+    found = armwright.simulation.simulate(
+        block, [1.0], [1.0], duration=5.0, controller=controller, integrator=integrator
+    )
 
     assert found.status in {Status.DIVERGED, Status.IMPRECISE}
     assert np.isfinite(found.q).all()
@@ -363,10 +385,10 @@ def test_runaway_is_a_status(integrator: Gill | Adaptive, effort: Callable[[Any]
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda arm: armwright.forward_dynamics(arm, [0.1, 0.2], [0, 0], [0, 0]),
-        lambda arm: armwright.forward_dynamics(arm, [[0.1, 0.2]] * 3, [0, 0], [0, 0]),
+        lambda arm: armwright.dynamics.forward_dynamics(arm, [0.1, 0.2], [0, 0], [0, 0]),
+        lambda arm: armwright.dynamics.forward_dynamics(arm, [[0.1, 0.2]] * 3, [0, 0], [0, 0]),
         lambda arm: toacc(arm, [0.1, 0.2], [0, 0], [0, 0]),
-        lambda arm: armwright.simulate(arm, [0.1, 0.2], duration=1.0),
+        lambda arm: armwright.simulation.simulate(arm, [0.1, 0.2], duration=1.0),
     ],
 )
 def test_a_hand_without_inertia(ask: Door) -> None:

@@ -14,20 +14,20 @@ from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.differential import differential_inverse
 from doors import OTHER, PUMA, Q
 
-RUN = armwright.Trace(places=((0, 0), (1, 0)), times=(0, 1), angles=((0,), (1,)))
+RUN = armwright.accuracy.Trace(places=((0, 0), (1, 0)), times=(0, 1), angles=((0,), (1,)))
 RESULTS: dict[str, Callable[[], Any]] = {
-    "inverse": lambda: armwright.inverse(PUMA, armwright.forward(PUMA, Q)),
-    "inverse out of reach": lambda: armwright.inverse(PUMA, np.eye(4) + 9 * np.eye(4, k=3)),
-    "singularities": lambda: armwright.singularities(PUMA, [0.0] * 6),
+    "inverse": lambda: armwright.kinematics.inverse(PUMA, armwright.kinematics.forward(PUMA, Q)),
+    "inverse out of reach": lambda: armwright.kinematics.inverse(PUMA, np.eye(4) + 9 * np.eye(4, k=3)),
+    "singularities": lambda: armwright.kinematics.singularities(PUMA, [0.0] * 6),
     "damped_rates": lambda: damped_rates(PUMA, [Q, OTHER], Q),
     "differential_inverse": lambda: differential_inverse(PUMA, Q, OTHER),
-    "terms": lambda: armwright.terms(PUMA, Q, Q, Q),
-    "simulate": lambda: armwright.simulate(PUMA, Q, duration=2e-3),
-    "quintic": lambda: armwright.quintic(Q, OTHER, 1.0),
-    "sampled": lambda: armwright.quintic(Q, OTHER, 1.0).sampled(0.1),
-    "continuity": lambda: armwright.continuity(armwright.quintic(Q, OTHER, 1.0)),
-    "pose_repeatability": lambda: armwright.pose_repeatability(np.eye(3), few=True),
-    "path_deviation": lambda: armwright.path_deviation(RUN, [RUN, RUN], few=True),
+    "terms": lambda: armwright.dynamics.terms(PUMA, Q, Q, Q),
+    "simulate": lambda: armwright.simulation.simulate(PUMA, Q, duration=2e-3),
+    "quintic": lambda: armwright.motion.quintic(Q, OTHER, 1.0),
+    "sampled": lambda: armwright.motion.quintic(Q, OTHER, 1.0).sampled(0.1),
+    "continuity": lambda: armwright.motion.continuity(armwright.motion.quintic(Q, OTHER, 1.0)),
+    "pose_repeatability": lambda: armwright.accuracy.pose_repeatability(np.eye(3), few=True),
+    "path_deviation": lambda: armwright.accuracy.path_deviation(RUN, [RUN, RUN], few=True),
     "trace": lambda: RUN,
 }
 
@@ -70,7 +70,7 @@ def test_copies(name: str, copied: Callable[[Any], Any]) -> None:
 
 def test_equal_postures_hash_equal() -> None:
     """Two solutions of one pose are equal, hash equal, and so do their branches."""
-    one, two = (armwright.inverse(PUMA, armwright.forward(PUMA, Q)) for _ in range(2))
+    one, two = (armwright.kinematics.inverse(PUMA, armwright.kinematics.forward(PUMA, Q)) for _ in range(2))
 
     assert one == two
     assert hash(one) == hash(two)

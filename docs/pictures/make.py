@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from armwright import forward, inverse, link_poses, load_arm, simulate
+from armwright.arm import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.calibration.assessment import assess_calibration
@@ -20,10 +20,12 @@ from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import Simulation as Rattling
 from armwright.clearance.simulation import simulate as simulate_play
+from armwright.kinematics import forward, inverse, link_poses
 from armwright.kinematics.inverse_kinematics.solution import Branch
 from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.report.calibration_files import distances_figure
 from armwright.report.svg import alike, steady
+from armwright.simulation import simulate
 from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import Event, JointState, Simulation
 from armwright.spatial.poses import pose

@@ -56,7 +56,7 @@ def test_one_warning_for_many_postures() -> None:
     rows[:, 2, 3], rows[7, 2, 3], rows[:, :, 4] = 30.0, -170.0, 80.0
 
     with pytest.warns(UnitWarning, match="joint 4 of 'puma560-seed' stands at -170 rad, 27.1 turns") as caught:
-        armwright.forward(PUMA, rows)
+        armwright.kinematics.forward(PUMA, rows)
 
     assert len(caught) == 1
 
@@ -66,24 +66,24 @@ def test_joints_that_turn_so_far() -> None:
     turns = Joint(kind="revolute", limits=Limits(lower=-50.0, upper=50.0))
     winch = Arm(name="winch", joints=[turns])
 
-    armwright.forward(winch, [49.0])
+    armwright.kinematics.forward(winch, [49.0])
     with pytest.warns(UnitWarning, match="stands at 90 rad"):
-        armwright.forward(winch, [90.0])
+        armwright.kinematics.forward(winch, [90.0])
     with pytest.warns(UnitWarning, match="stands at 49 rad"):
-        armwright.forward(Arm(name="free", joints=[Joint(kind="revolute")]), [49.0])
+        armwright.kinematics.forward(Arm(name="free", joints=[Joint(kind="revolute")]), [49.0])
 
 
 def test_slides_are_no_angles() -> None:
     """A slide of many metres is long, and no angle; a whole turn, but for rounding, is none too many."""
-    armwright.forward(Arm(name="crane", joints=[Joint(kind="prismatic")]), [100.0])
-    armwright.forward(armwright.load_arm("ur5"), [2 * np.pi, -2 * np.pi * (1 + 1e-12), 0, 0, 0, 0])
+    armwright.kinematics.forward(Arm(name="crane", joints=[Joint(kind="prismatic")]), [100.0])
+    armwright.kinematics.forward(armwright.load_arm("ur5"), [2 * np.pi, -2 * np.pi * (1 + 1e-12), 0, 0, 0, 0])
 
 
 def test_what_the_package_asks_itself() -> None:
     """A shaft that spins many turns is simulated, and followed by a controller of ours, without a warning."""
     shaft = Arm(name="shaft", joints=[Joint(kind="revolute", a=0.1)], links=[Link(mass=1.0)])
 
-    found = armwright.simulate(shaft, [0.0], [100.0], duration=0.5, controller=gravity_compensation(shaft))
+    found = armwright.simulation.simulate(shaft, [0.0], [100.0], duration=0.5, controller=gravity_compensation(shaft))
 
     assert found.q[-1, 0] > 2 * np.pi
     assert np.isfinite(found.energy).all()
@@ -91,8 +91,8 @@ def test_what_the_package_asks_itself() -> None:
 
 def test_silenced(recwarn: pytest.WarningsRecorder) -> None:
     """The warning is of a category of its own, which can be silenced."""
-    warnings.simplefilter("ignore", armwright.UnitWarning)
+    warnings.simplefilter("ignore", armwright.errors.UnitWarning)
 
-    armwright.forward(PUMA, DEGREES)
+    armwright.kinematics.forward(PUMA, DEGREES)
 
     assert not len(recwarn)

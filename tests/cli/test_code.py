@@ -67,7 +67,7 @@ def test_code_that_does_not_fit_together(tmp_path: Path) -> None:
     result = armwright("run", path, "--cell", CELL)
 
     assert result.returncode == 4
-    assert result.stderr.startswith(f"armwright: {path}: ")
+    assert result.stderr.startswith(f"armwright: {path}:")
     assert "Traceback" not in result.stderr
 
 

@@ -15,7 +15,6 @@ from armwright.cell.reader import read_cell
 from armwright.clearance.estimation.measured import RestMeasured, read_measured
 from armwright.clearance.reader import read_linkage
 from armwright.cli.app import app
-from armwright.cli.programs import translate_file
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
 from armwright.files import limits, reading
 from armwright.files.document import Document
@@ -24,6 +23,7 @@ from armwright.files.lines import longest_dotted_key
 from armwright.files.reading import read_lines, read_text, read_typed_program
 from armwright.files.rows import read_rows
 from armwright.motion.poses_file import read_poses
+from armwright.program import compile as compile_program
 from armwright.program.diagnostics.render import render
 from armwright.program.language_server.cell_lookup import Cells
 
@@ -48,7 +48,7 @@ def urdf(links: int) -> str:
 # For each limit, the number that it is set to, a text just beyond it, and who reads it.
 BEYOND: dict[str, tuple[int, str, Callable[[Path], object]]] = {
     "file_mb": (1, "x = 1\n" * 200_000, read_text),
-    "program_mb": (1, " " * 1_000_001, translate_file),
+    "program_mb": (1, " " * 1_000_001, compile_program),
     "table_mb": (1, "a,b\n" * 300_000, lambda path: [*read_lines(path)]),
     "table_rows": (2, "a,b\n1,2\n1,2\n1,2\n", lambda path: [*read_rows(path)[1]]),
     "table_columns": (2, "a,b,c\n1,2,3\n", read_rows),
@@ -121,7 +121,7 @@ def test_imports(tmp_path: Path) -> None:
     program.write_text("".join(f'IMPORT "{i}.toml" ;\n' for i in range(3)) + "BEGIN PAUSE 1 END.\n")
 
     def notes() -> list[str]:
-        return [note for one in translate_file(program).diagnostics if one.code == "E228" for note in one.notes]
+        return [note for one in compile_program(program).diagnostics if one.code == "E228" for note in one.notes]
 
     assert notes() == []
     with raised(imports=2):
@@ -187,7 +187,7 @@ def test_what_a_program_imports(strange: tuple[str, str], tmp_path: Path) -> Non
     program = tmp_path / "a.rlo"
     program.write_text(f'IMPORT "{path}" ;\nBEGIN PAUSE 1\nEND.\n')
 
-    compiled = translate_file(program)
+    compiled = compile_program(program)
 
     assert f"expected a file, got {kind}" in render(compiled.diagnostics, compiled.source)
     assert f"expected a file, got {kind}" in refused(lambda: Cells().imported(tmp_path, path))
@@ -295,7 +295,7 @@ def test_every_file_is_read_in_one_place() -> None:
         "files/output.py",
         "report/movie.py",
         "report/markup.py",
-        "explanations/explaining.py",
+        "program/diagnostics/index.py",
         "sweep/folder.py",
         "files/store.py",
         "tracing/",

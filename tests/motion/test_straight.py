@@ -247,4 +247,4 @@ def test_bad_manner() -> None:
 
 def test_public_name() -> None:
     """The planner can be had from the package."""
-    assert armwright.straight_line is straight_line
+    assert armwright.motion.straight_line is straight_line

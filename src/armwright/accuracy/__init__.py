@@ -1,1 +1,5 @@
-"""What measured poses and paths say of a robot's quality, by the definitions of ISO 9283; knows poses, no arms."""
+"""Pose and path characteristics of ISO 9283, from measured positions."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

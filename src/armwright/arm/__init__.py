@@ -1,1 +1,5 @@
-"""What an arm is: joints, links, motors, limits, base, tool, gravity; read from files, kept in a catalogue."""
+"""The model of an arm: joints, links, motors, limits; arm files, URDF, and the catalogue."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -127,7 +127,7 @@ def ask_for_degrees(arm: Arm, q: Array, what: str, callers: int) -> None:
     if found:
         warnings.warn(
             f"{what}: {found}: give numpy.deg2rad(...). A joint that really turns so far has limits that say so; or "
-            "silence this: warnings.simplefilter('ignore', armwright.UnitWarning)",
+            "silence this: warnings.simplefilter('ignore', armwright.errors.UnitWarning)",
             UnitWarning,
             stacklevel=callers + 2,
         )

@@ -1,1 +1,5 @@
-"""A better arm from measured points: which of its parameters a measurement tells, what they are, and how well."""
+"""Calibration: better geometry of an arm from measured positions, with what is identifiable and how well."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

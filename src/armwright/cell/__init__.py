@@ -1,1 +1,5 @@
-"""What a program acts on: the tree of frames, the arms, the hand, tools, camera and sensors of a cell."""
+"""What a program acts on: frames, arms, devices, camera; cell files; the kinematic simulator."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,1 +1,5 @@
-"""Mechanisms with play: planar linkages whose pins rattle in their bearings, what that costs, and how to undo it."""
+"""Linkages with joint clearance: simulate, estimate, correct."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -60,10 +60,11 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code`
     """
-    from armwright.cli.programs import given_cell, in_its_cell
+    from armwright.cli.programs import given_cell
+    from armwright.program import compile as compile_program
 
     paths, given = _found(programs), given_cell(cell)
-    compiled = [in_its_cell(path, given, strict=strict, std=std)[0] for path in paths]
+    compiled = [compile_program(path, given, strict=strict, std=std) for path in paths]
     if as_json or output_format is Format.JSON:
         several = [_as_data(one, emit) for one in compiled]
         print_json(several[0] if len(several) == 1 else _together(several, paths))

@@ -51,13 +51,14 @@ def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> 
         FileFormatError: the file cannot be read, or its code makes no sense.
         typer.Exit: the program has errors.
     """
-    from armwright.cli.programs import given_cell, in_its_cell, print_diagnostics
+    from armwright.cli.programs import given_cell, print_diagnostics
     from armwright.files.reading import read_program
+    from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
 
     if path.suffix == CODE_SUFFIX:
         return assemble(read_program(path), str(path))
-    compiled, _ = in_its_cell(path, given_cell(cell), strict=strict, std=std)
+    compiled = compile_program(path, given_cell(cell), strict=strict, std=std)
     if compiled.diagnostics:
         print_diagnostics(compiled.diagnostics, compiled.source, to_errors=True)
     if compiled.code is None:

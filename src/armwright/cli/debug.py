@@ -70,8 +70,9 @@ def load(launch: "Launch") -> "Loaded":
         LoadError: it has errors, or no cell to run in.
         FileFormatError: a file cannot be read.
     """
-    from armwright.cli.programs import given_cell, imported_files, in_its_cell
+    from armwright.cli.programs import given_cell, imported_files
     from armwright.files.reading import read_program
+    from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
     from armwright.program.debugger.dap_session import Loaded, LoadError
     from armwright.program.diagnostics.render import render
@@ -87,7 +88,8 @@ def load(launch: "Launch") -> "Loaded":
     if given is None:
         around = Cells().around(launch.program.parent, read_program(launch.program), None).file
         given = None if around is None else around.cell
-    compiled, place = in_its_cell(launch.program, given, strict=launch.strict, std=launch.std)
+    compiled = compile_program(launch.program, given, strict=launch.strict, std=launch.std)
+    place = compiled.cell
     if compiled.code is None:
         raise LoadError(
             count_line(compiled.diagnostics, compiled.source), render(compiled.diagnostics, compiled.source)

@@ -74,9 +74,9 @@ def fix(
 
 def _translator(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":
     """Return what finds out what is wrong with a program: in a cell, or in the one it IMPORTs."""
-    from armwright.cli.programs import import_reader
     from armwright.program import compile as translate
     from armwright.program import known_cell
+    from armwright.program.api import import_reader
 
     def find(source: "Source") -> "Compilation":
         read = import_reader(folder)

@@ -44,9 +44,10 @@ def repl(
 
     **Example:** `armwright repl --cell examples/stanford_cell.toml`
     """
-    from armwright.cli.programs import given_cell, import_reader
+    from armwright.cli.programs import given_cell
     from armwright.cli.repl_commands import COMMANDS, Commands
     from armwright.cli.repl_lines import Script, Terminal, editing
+    from armwright.program.api import import_reader
     from armwright.program.repl.session import Session
 
     session = Session(given_cell(cell), std, import_reader(Path()))

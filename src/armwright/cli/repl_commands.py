@@ -183,20 +183,23 @@ class Commands:
         return Reply(lines=(f"report: {folder / 'report.html'}",))
 
     def _report(self, folder: Path) -> None:
-        from armwright.cell.simulator import Simulator
-        from armwright.cli.programs import imported_files, in_its_cell
+        from armwright.cli.programs import imported_files
         from armwright.files.output import write_folder
-        from armwright.program.language.source import Source
-        from armwright.program.vm.interpreter import interpret, warnings
+        from armwright.program import Source, run
+        from armwright.program import compile as compile_program
+        from armwright.program.api import import_reader
+        from armwright.program.vm.interpreter import warnings
         from armwright.report.files import Origin, result_files, run_record
 
         session, program = self._session, folder / _PROGRAM
         text = self._program(program)
-        source = Source(program.name, text)
-        compiled, place = in_its_cell(program, session.state.cell, strict=False, std=session.std, source=source)
-        assert compiled.code is not None  # noqa: S101 - the session was checked piece by piece
-        assert place is not None  # noqa: S101 - it was given
-        recording = interpret(compiled.code, place, Simulator(place))
+        compiled = compile_program(
+            Source(program.name, text),
+            session.state.cell,
+            std=session.std,
+            read_import=import_reader(folder),
+        )
+        recording = run(compiled)
         diagnostics = (*compiled.diagnostics, *warnings(recording))
         command = ["armwright", "run", str(program), *(["--cell", str(self._cell)] if self._cell else [])]
         origin = Origin(
@@ -207,6 +210,7 @@ class Commands:
             options={"std": session.std.value},
             text=text,
         )
+        assert compiled.code is not None  # noqa: S101 - it has run
         made = (recording, compiled.code, diagnostics, origin)
         write_folder(folder, {_PROGRAM: text, **result_files(*made)}, run_record(*made))
 

@@ -167,20 +167,21 @@ def _translated(
     program: Path, given: "Cell | None", *, strict: bool, std: Standard, as_json: bool
 ) -> "tuple[Code, Cell, tuple[Diagnostic, ...], tuple[Path, ...]]":
     """Return the code of a program, its cell, what was said of it, and the files that it imports."""
-    from armwright.cli.programs import imported_files, in_its_cell
+    from armwright.cli.programs import imported_files
     from armwright.files.reading import read_program
+    from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
 
     if program.suffix == CODE_SUFFIX:
         if given is None:
             _no_cell(program)
         return assemble(read_program(program), str(program)), given, (), ()
-    compiled, place = in_its_cell(program, given, strict=strict, std=std)
+    compiled = compile_program(program, given, strict=strict, std=std)
     if compiled.code is None:
         _refuse(compiled.source, compiled.diagnostics, as_json=as_json)
-    if place is None:
+    if compiled.cell is None:
         _no_cell(program)
-    return compiled.code, place, compiled.diagnostics, imported_files(program, compiled)
+    return compiled.code, compiled.cell, compiled.diagnostics, imported_files(program, compiled)
 
 
 def _no_cell(program: Path) -> NoReturn:

@@ -1,1 +1,5 @@
-"""The kernels of an arm: the laws of kinematics and dynamics, traced for that arm and compiled."""
+"""Kernels of one arm, compiled: the same equations for one configuration or for millions."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

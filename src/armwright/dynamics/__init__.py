@@ -1,1 +1,5 @@
-"""What it takes to move an arm, and how it moves when it is pushed."""
+"""Dynamics: inverse and forward dynamics, mass matrix, terms of the equation of motion, energies, payloads."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,1 +1,5 @@
-"""Where the hand is for given joint positions, how it moves, and which joint positions put it somewhere."""
+"""Kinematics: tool poses, Jacobians, inverse kinematics with all branches, singularities."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

@@ -1,1 +1,5 @@
-"""How an arm goes from here to there: profiles in time, paths in space, and what they ask of the joints."""
+"""Motions: profiles, splines, straight lines with certificates, moves, time-optimal paths."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

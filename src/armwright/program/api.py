@@ -1,14 +1,20 @@
-"""The whole way from a text to code, in one call."""
+"""Compile a program, and run it in a cell: each in one call."""
 
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
+from pathlib import Path
 
 import attrs
 
-from armwright.errors import ArmwrightError, InvalidValueError
+from armwright.cell.hardware import Hardware
+from armwright.cell.model import Cell
+from armwright.cell.reader import read_cell
+from armwright.cell.simulator import Simulator
+from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, counted
 from armwright.files.limits import beyond, limit
+from armwright.files.reading import read_program, regular
 from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis
@@ -23,6 +29,9 @@ from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind, scan
 from armwright.program.syntax.line_numbers import without_numbers
 from armwright.program.syntax.parser import parse
+from armwright.program.vm.interpreter import Progress, interpret
+from armwright.program.vm.machine import Limits
+from armwright.program.vm.recording import Recording
 
 
 @attrs.frozen(kw_only=True)
@@ -40,6 +49,8 @@ class Compilation:
         flow: the arms of its statements; None where the syntax is wrong.
         diagnostics: what is wrong or odd, in the order of the text.
         code: what it does; None when there are errors.
+        cell: the cell that it was compiled for, or the first that it IMPORTs and that has arms, with all frames that
+            it imports; None where there is none, or only its names are known.
     """
 
     source: Source
@@ -52,31 +63,126 @@ class Compilation:
     flow: Flow | None
     diagnostics: tuple[Diagnostic, ...]
     code: Code | None
+    cell: Cell | None = None
+
+
+class ProgramError(ArmwrightError, ValueError):
+    """A program has errors, and cannot be run.
+
+    Attributes:
+        compilation: with all diagnostics.
+    """
+
+    exit_status = ExitStatus.PROGRAM_ERRORS
+
+    def __init__(self, compilation: Compilation) -> None:
+        """Say the first error, and how many there are."""
+        self.compilation = compilation
+        errors = [one for one in compilation.diagnostics if one.is_error]
+        first, source = errors[0], compilation.source
+        more = f" (and {counted(len(errors) - 1, 'more error')})" if len(errors) > 1 else ""
+        super().__init__(f"{source.name}:{source.line(first.span.start)}: {first.code}: {first.message}{more}")
 
 
 def compile(  # noqa: A001 - what a translator does
-    source: Source,
-    cell: KnownCell | None = None,
+    program: str | Path | Source,
+    cell: str | Path | Cell | KnownCell | None = None,
     *,
     strict: bool = False,
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
 ) -> Compilation:
-    """Translate a program.
+    """Compile a program.
 
     Args:
-        source: the text.
-        cell: what the program will act on; without one, the first that it IMPORTs and that has arms, or else some
-            questions stay open.
+        program: the path of its file, or its text as a ``Source``.
+        cell: what the program will act on, or the path of its file; without one, the first that the program IMPORTs
+            and that has arms, or else some questions stay open.
         strict: whether an AFFIX that is only implied is an error.
         std: the language: RLO-2, or RLO-83 with nothing more than the report has.
-        read_import: how to read what an IMPORT names; without it, imports stay unknown.
+        read_import: how to read what an IMPORT names; of a file, the files beside it unless something else is given;
+            of a text, imports stay unknown without it.
 
     Returns:
         Tree, diagnostics and, where there are no errors, code. A wrong program raises nothing.
+
+    Raises:
+        FileFormatError: a file cannot be read, or is not text, or is no cell.
     """
+    if isinstance(program, Source):
+        source = program
+    else:
+        path = Path(program)
+        source, read_import = Source(path.name, read_program(path)), read_import or import_reader(path.parent)
+    place = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
+    known = known_cell(place) if isinstance(place, Cell) else place
     with no_collection():
-        return _compile(source, cell, strict=strict, std=std, read_import=read_import)
+        compiled = _compile(source, known, strict=strict, std=std, read_import=read_import)
+    if place is None:
+        place = next((one.cell for one in compiled.imports if one.cell and one.cell.arms), None)
+    return attrs.evolve(compiled, cell=_with_imports(place, compiled) if isinstance(place, Cell) else None)
+
+
+def run(
+    program: str | Path | Source | Compilation,
+    cell: str | Path | Cell | None = None,
+    *,
+    strict: bool = False,
+    std: Standard = Standard.RLO_2,
+    hardware: Hardware | None = None,
+    limits: Limits | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """Compile a program and run it in a cell.
+
+    Args:
+        program: the path of its file, its text as a ``Source``, or what ``compile`` gave.
+        cell: what it acts on, or the path of its file; without one, the first that it IMPORTs and that has arms.
+        strict: whether an AFFIX that is only implied is an error.
+        std: the language it is written in.
+        hardware: the cell at work; simulated unless something else is given.
+        limits: when the program is taken to run for ever.
+        progress: told before each statement: the time on the cell's clock [s] and the line.
+
+    Returns:
+        All that happened, tick by tick.
+
+    Raises:
+        FileFormatError: a file cannot be read, or is not text, or is no cell.
+        ProgramError: the program has errors.
+        InvalidValueError: there is no cell.
+        RunError: the program could not go on; it has the recording up to there.
+
+    Example:
+        ``armwright.program.run("examples/stacking.rlo", "examples/stanford_cell.toml").duration``
+    """
+    compiled = program if isinstance(program, Compilation) else compile(program, cell, strict=strict, std=std)
+    if compiled.code is None:
+        raise ProgramError(compiled)
+    if compiled.cell is None:
+        raise InvalidValueError(f"{compiled.source.name} needs a cell to run in, and IMPORTs none")
+    return interpret(
+        compiled.code, compiled.cell, hardware or Simulator(compiled.cell), progress=progress, limits=limits
+    )
+
+
+def import_reader(folder: Path) -> ReadImport:
+    """Return what reads the files that a program of this folder IMPORTs."""
+
+    def read(name: str) -> Imported:
+        cell = read_cell(regular(folder / name), arms_needed=False)
+        return Imported(frames={frame: node.parent for frame, node in cell.frames.items()}, cell=cell)
+
+    return read
+
+
+def _with_imports(cell: Cell, compiled: Compilation) -> Cell:
+    """Return a cell with the frames that a program imports; a frame of the cell itself stays as it is."""
+    frames = dict(cell.frames)
+    for imported in compiled.imports:
+        if imported.cell is not None:
+            frames = {**imported.cell.frames, **frames}
+    return attrs.evolve(cell, frames=frames)
 
 
 @contextmanager

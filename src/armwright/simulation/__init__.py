@@ -1,1 +1,5 @@
-"""How an arm moves under its drives: the plant, its controllers, the integration over time and what comes of it."""
+"""Simulation of arms: plant with friction and stops, integrators, controllers."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

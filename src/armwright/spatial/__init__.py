@@ -1,1 +1,5 @@
-"""Rotations and poses, as arrays: ``X_AB`` is the pose of frame B seen from frame A, (..., 4, 4)."""
+"""Positions and orientations: poses, rotations, Euler angles, quaternions."""
+
+from armwright.doors import attach
+
+__getattr__, __dir__, __all__ = attach(__name__, __file__)

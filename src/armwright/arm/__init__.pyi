@@ -1,0 +1,23 @@
+from .load import (
+    arm_names as arm_names,
+    load_arm as load_arm,
+)
+from .model import (
+    Arm as Arm,
+    Joint as Joint,
+    Limits as Limits,
+    Link as Link,
+    Motor as Motor,
+)
+from .urdf.reader import (
+    load_urdf as load_urdf,
+)
+from .urdf.writer import (
+    urdf_text as urdf_text,
+)
+from .write import (
+    toml_text as toml_text,
+)
+from .uncertainty import (
+    Uncertainty as Uncertainty,
+)

@@ -1,0 +1,4 @@
+from .arm import (
+    compile_arm as compile_arm,
+    CompiledArm as CompiledArm,
+)

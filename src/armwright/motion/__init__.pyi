@@ -1,0 +1,74 @@
+from .blends import (
+    blend_timing as blend_timing,
+    blended as blended,
+    via_deviations as via_deviations,
+    via_distances as via_distances,
+)
+from .braking import (
+    brake as brake,
+)
+from .certificate import (
+    Certificate as Certificate,
+)
+from .continuity_report import (
+    Continuity as Continuity,
+    continuity as continuity,
+)
+from .cubic_polynomials import (
+    cubic as cubic,
+    cubic_through as cubic_through,
+)
+from .detour import (
+    Detour as Detour,
+    line_or_detour as line_or_detour,
+)
+from .efforts import (
+    effort_peaks as effort_peaks,
+    slowing_for_efforts as slowing_for_efforts,
+)
+from .limit_utilization import (
+    limit_use as limit_use,
+    slowing_for_limits as slowing_for_limits,
+)
+from .moves import (
+    cartesian_move as cartesian_move,
+    joint_move as joint_move,
+    Move as Move,
+    stopping_move as stopping_move,
+)
+from .online import (
+    OnlineError as OnlineError,
+    replace_goal as replace_goal,
+    retarget as retarget,
+)
+from .quintic_polynomials import (
+    point_to_point as point_to_point,
+    quintic as quintic,
+)
+from .straight import (
+    Line as Line,
+    straight_line as straight_line,
+)
+from .through import (
+    through_frames as through_frames,
+)
+from .time_optimal_path import (
+    time_optimal as time_optimal,
+    TimeOptimal as TimeOptimal,
+)
+from .trajectory import (
+    hold as hold,
+    join as join,
+    Samples as Samples,
+    Trajectory as Trajectory,
+)
+from .trapezoidal_profile import (
+    trapezoid as trapezoid,
+)
+from .xspline_online import (
+    xspline_kernel as xspline_kernel,
+)
+from .xspline_path import (
+    xspline as xspline,
+    xspline_along as xspline_along,
+)

@@ -1,0 +1,35 @@
+from .api import (
+    Compilation as Compilation,
+    compile as compile,
+    ProgramError as ProgramError,
+    run as run,
+)
+from .bytecode.instructions import (
+    Code as Code,
+)
+from .bytecode.verifier import (
+    CodeError as CodeError,
+)
+from .language.diagnostic import (
+    Diagnostic as Diagnostic,
+)
+from .language.source import (
+    Source as Source,
+)
+from .language.words import (
+    Standard as Standard,
+)
+from .semantics.cell_symbols import (
+    known_cell as known_cell,
+    KnownCell as KnownCell,
+)
+from .vm.interpreter import (
+    interpret as interpret,
+)
+from .vm.machine import (
+    Limits as Limits,
+    RunError as RunError,
+)
+from .vm.recording import (
+    Recording as Recording,
+)

@@ -1,0 +1,24 @@
+from .controllers import (
+    computed_torque as computed_torque,
+    Controller as Controller,
+    gravity_compensation as gravity_compensation,
+    no_effort as no_effort,
+    pd as pd,
+    pd_with_gravity as pd_with_gravity,
+)
+from .integrators import (
+    Adaptive as Adaptive,
+    Gill as Gill,
+)
+from .plant import (
+    Plant as Plant,
+)
+from .result import (
+    Event as Event,
+    JointState as JointState,
+    Simulation as Simulation,
+    Status as Status,
+)
+from .time_stepping import (
+    simulate as simulate,
+)
