@@ -1,9 +1,13 @@
 from .hardware import (
     DeviceError as DeviceError,
+)
+from .hardware import (
     Hardware as Hardware,
 )
 from .model import (
     Cell as Cell,
+)
+from .model import (
     CellArm as CellArm,
 )
 from .reader import (

@@ -1,4 +1,6 @@
 from .arm import (
-    compile_arm as compile_arm,
     CompiledArm as CompiledArm,
+)
+from .arm import (
+    compile_arm as compile_arm,
 )

@@ -1,7 +1,13 @@
 from .api import (
     Compilation as Compilation,
-    compile as compile,
+)
+from .api import (
     ProgramError as ProgramError,
+)
+from .api import (
+    compile as compile,
+)
+from .api import (
     run as run,
 )
 from .bytecode.instructions import (
@@ -20,14 +26,18 @@ from .language.words import (
     Standard as Standard,
 )
 from .semantics.cell_symbols import (
-    known_cell as known_cell,
     KnownCell as KnownCell,
+)
+from .semantics.cell_symbols import (
+    known_cell as known_cell,
 )
 from .vm.interpreter import (
     interpret as interpret,
 )
 from .vm.machine import (
     Limits as Limits,
+)
+from .vm.machine import (
     RunError as RunError,
 )
 from .vm.recording import (
