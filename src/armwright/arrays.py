@@ -3,6 +3,7 @@
 And how many cores work on them.
 """
 
+import operator
 import os
 import sys
 from collections.abc import Callable, Mapping
@@ -66,6 +67,24 @@ def number(value: float, what: str) -> float:
         raise InvalidValueError(
             f"{what}: expected a number no larger than {_ANY:.3g}, got one of many digits"
         ) from error
+
+
+def integer(value: int, what: str, *, least: int) -> int:
+    """Return a whole number.
+
+    Raises:
+        KindError: the value is something else than a whole number.
+        InvalidValueError: it is below ``least``.
+    """
+    try:
+        whole = operator.index(value)
+    except TypeError as error:
+        raise KindError(f"{what}: expected a whole number, got {shown(value)}") from error
+    if isinstance(value, bool):
+        raise KindError(f"{what}: expected a whole number, got {value}")
+    if whole < least:
+        raise InvalidValueError(f"{what}: expected a whole number not below {least}, got {whole}")
+    return whole
 
 
 def of_shape(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float = _ANY) -> Array:

@@ -115,7 +115,7 @@ def test_said_beforehand(task: FeatureSweep) -> None:
     check_task(both, both.parameters)
     told = [*Features._fields, "peak"]
     told += [f"{name}_spread" for name in told] + ["until"]
-    assert set(rows.values) == {f"{path}_{name}" for path in ("y1", "x2") for name in told}
+    assert {*rows.dtype.names} - {"status", "message"} == {f"{path}_{name}" for path in ("y1", "x2") for name in told}
     units = {name: one.units for name, one in both.outputs.items()}
     assert (units["x2_slope"], units["x2_slope_spread"], units["x2_until"]) == ("m/s", "m/s", "s")
     plain = json.loads(json.dumps(dict(both.settings)))
@@ -208,7 +208,7 @@ def test_stopped_and_begun_again(task: FeatureSweep, design: Design, tmp_path: P
         run(task, design, tmp_path / "out", block=8, workers=1, progress=stop)
     again = run(task, design, tmp_path / "out", block=8, workers=1, progress=seen.append)
 
-    assert (seen[0].found, seen[-1].done) == (16, 24)
+    assert (seen[0].resumed, seen[-1].done) == (16, 24)
     assert bits(again) == bits(run(task, design, tmp_path / "whole", workers=1))
 
 

@@ -3,11 +3,11 @@
 import pytest
 
 from armwright.cli.progress import counting, parts, progress_text, sweep_bar, waiting
-from armwright.sweep.progress import Counter, Progress
+from armwright.sweep.progress import Progress
 
 
 def progress(**changes: float) -> Progress:
-    told = {"runs": 729, "done": 129, "found": 29, "failed": 0, "seconds": 50.0}
+    told = {"runs": 729, "done": 129, "resumed": 29, "failed": 0, "seconds": 50.0}
     return Progress(**{**told, **changes})
 
 
@@ -84,14 +84,3 @@ def test_person_waits(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
     assert out == ""
     for text in ("compiling", "line 7", "drawing the film", "30/90", "simulating", "25%", "learning"):
         assert text in shown
-
-
-def test_counter() -> None:
-    """What an earlier start had done counts as done."""
-    counter = Counter(100, 40, 1)
-    counter.add(10, 2)
-
-    now = counter.now()
-
-    assert (now.runs, now.done, now.found, now.failed) == (100, 50, 40, 3)
-    assert now.seconds >= 0.0

@@ -21,7 +21,7 @@ from armwright.errors import ExitStatus, FileFormatError, OutputError
 from armwright.sweep import folder as folder_module
 from armwright.sweep.designs import Design, full_factorial
 from armwright.sweep.errors import SweepError
-from armwright.sweep.folder import held
+from armwright.sweep.folder import locked_folder
 from armwright.sweep.progress import Progress
 from armwright.sweep.results import load
 from armwright.sweep.run import run
@@ -60,7 +60,7 @@ def runs_on(process: int) -> bool:
 
 
 def blocks(out: Path) -> list[Path]:
-    return sorted((out / "blocks").glob("??????.npz"))
+    return sorted((out / "blocks").glob("???????.npy"))
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="asks Linux which processes are alive")
@@ -90,7 +90,7 @@ def test_kill(how: signal.Signals, workers: int, speeds: Design, tmp_path: Path)
     results = run(Fall(calls=calls), speeds, out, block=40, workers=1, progress=told.append)
 
     assert 3 <= len(kept) < 20
-    assert told[0].found == 2 * len(kept)
+    assert told[0].resumed == 2 * len(kept)
     rows = [row for _, row in calls_of(calls)]
     for number in range(20):
         times = rows.count((2.0 * number, 2.0 * number + 1))
@@ -107,7 +107,7 @@ def test_finished_sweep(speeds: Design, tmp_path: Path) -> None:
 
     assert again.identical(first)
     assert not (tmp_path / "calls").exists()
-    assert [(now.done, now.found) for now in told] == [(40, 40)]
+    assert [(now.done, now.resumed) for now in told] == [(40, 40)]
 
 
 class Stop(Exception):  # noqa: N818 - it is no error
@@ -146,34 +146,37 @@ def cut(path: Path) -> None:
 
 
 def flip(path: Path) -> None:
-    """Change one digit of a number, and the checksum of the archive with it."""
-    with np.load(path) as file:
-        arrays = dict(file)
-    arrays["output_depth"][3] += 1e-12
-    np.savez(path, **arrays)
+    """Change one digit of a number, and nothing else."""
+    rows = np.load(path)
+    checksum = path.read_bytes()[-32:]
+    rows["depth"][3] += 1e-12
+    with path.open("wb") as file:
+        np.save(file, rows)
+        file.write(checksum)
 
 
 def swap(path: Path) -> None:
     """The wrong block."""
-    path.write_bytes(path.with_name("000002.npz").read_bytes())
+    path.write_bytes(path.with_name("0000002.npy").read_bytes())
 
 
 def change(path: Path) -> None:
     """A dimension of an array, where what is read is checked."""
     data = path.read_bytes()
+    assert b"'shape': (8,)" in data
     path.write_bytes(data.replace(b"'shape': (8,)", b"'shape': (9,)", 1))
 
 
 @pytest.mark.parametrize("damage", [cut, flip, swap, change, lambda path: path.write_bytes(b"")])
 def test_damaged_block(damage: Callable[[Path], Any], half: Path, speeds: Design, tmp_path: Path) -> None:
     """A block that was damaged on the disk is named and stays as it is; nothing is done before it has gone."""
-    block = half / "blocks" / "000001.npz"
+    block = half / "blocks" / "0000001.npy"
     damage(block)
     broken = block.read_bytes()
 
     for _ in range(2):
         with pytest.raises(
-            FileFormatError, match=r"000001.npz: damaged: .*move it away .*its runs, 8 to 15,"
+            FileFormatError, match=r"0000001.npy: damaged: .*move it away .*its runs, 8 to 15,"
         ) as caught:
             run(Fall(calls=tmp_path / "calls"), speeds, half, workers=1)
         assert caught.value.exit_status == ExitStatus.FILE
@@ -183,30 +186,30 @@ def test_damaged_block(damage: Callable[[Path], Any], half: Path, speeds: Design
 
 def test_block_that_cannot_be_read(half: Path, speeds: Design) -> None:
     """A folder in the place of a block is named like any other damage."""
-    (half / "blocks" / "000001.npz").unlink()
-    (half / "blocks" / "000001.npz").mkdir()
+    (half / "blocks" / "0000001.npy").unlink()
+    (half / "blocks" / "0000001.npy").mkdir()
 
-    with pytest.raises(FileFormatError, match=r"000001.npz: damaged: it is not a file"):
+    with pytest.raises(FileFormatError, match=r"0000001.npy: damaged: it is not a file"):
         run(Fall(), speeds, half, workers=1)
 
 
 def test_block_that_was_moved_away(half: Path, speeds: Design, tmp_path: Path) -> None:
     """A block that has gone is done again, and only that."""
-    (half / "blocks" / "000001.npz").unlink()
+    (half / "blocks" / "0000001.npy").unlink()
     told: list[Progress] = []
 
     results = run(Fall(calls=tmp_path / "calls"), speeds, half, workers=1, progress=told.append)
 
     assert [row[0] for _, row in calls_of(tmp_path / "calls")] == [8.0, 24.0, 32.0]
-    assert told[0].found == 16
+    assert told[0].resumed == 16
     np.testing.assert_array_equal(results.depth, run(Fall(), speeds, tmp_path / "whole", workers=1).depth)
 
 
 def test_halves_are_removed(half: Path, speeds: Design) -> None:
     """What a killed process had half written is gone after the next start."""
-    for path in (half / "blocks" / "000004.npz.tmp.npz", half / "results.nc.tmp"):
+    for path in (half / "blocks" / "0000004.npy.tmp", half / "results.nc.tmp"):
         path.write_bytes(b"half")
-    mine = half / "blocks" / "000004-of-mine.npz.tmp.npz"
+    mine = half / "blocks" / "0000004-of-mine.npy.tmp"
     mine.write_bytes(b"half")
 
     run(Fall(), speeds, half, workers=1)
@@ -250,9 +253,9 @@ MADE = '{"date": "", "armwright": ""}'
 @pytest.mark.parametrize(
     "text",
     [
-        *("", "{", "[]", '{"format": 1}', f'{{"format": 7, "sweep": {{}}, "made": {MADE}, "block": 1}}'),
-        *(f'{{"format": 1, "sweep": {{}}, "made": {MADE}, "block": {block}}}' for block in ("0", "1.5", "true", "1e9")),
-        *(f'{{"format": 1, "sweep": {{}}, "made": {made}, "block": 1}}' for made in ("{}", '{"date": 1}')),
+        *("", "{", "[]", '{"format": 2}', f'{{"format": 1, "sweep": {{}}, "made": {MADE}, "block": 1}}'),
+        *(f'{{"format": 2, "sweep": {{}}, "made": {MADE}, "block": {block}}}' for block in ("0", "1.5", "true", "1e9")),
+        *(f'{{"format": 2, "sweep": {{}}, "made": {made}, "block": 1}}' for made in ("{}", '{"date": 1}')),
     ],
 )
 def test_damaged_manifest(text: str, half: Path, speeds: Design) -> None:
@@ -315,7 +318,7 @@ def test_folder_of_other_things(speeds: Design, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-@pytest.mark.parametrize("name", ["notes.tmp.txt", "draft.npz.tmp.npz", "sweep.json.old"])
+@pytest.mark.parametrize("name", ["notes.tmp.txt", "draft.npy.tmp", "sweep.json.old"])
 def test_files_with_names_like_ours(name: str, speeds: Design, tmp_path: Path) -> None:
     """A file whose name only resembles those of a sweep is somebody else's."""
     (tmp_path / name).write_text("draft")
@@ -365,11 +368,12 @@ def test_manifest_that_never_ends(speeds: Design, tmp_path: Path) -> None:
 
 def test_compressed_block(half: Path, speeds: Design) -> None:
     """A compressed block, which may be huge once it is unpacked, is not unpacked."""
-    block = half / "blocks" / "000001.npz"
-    with np.load(block) as file:
-        np.savez_compressed(block, **dict(file))
+    block = half / "blocks" / "0000001.npy"
+    rows = np.load(block)
+    with block.open("wb") as file:
+        np.savez_compressed(file, rows=rows)
 
-    with pytest.raises(FileFormatError, match=r"damaged: .*compressed"):
+    with pytest.raises(FileFormatError, match=r"damaged: its checksum is not that of its numbers"):
         run(Fall(), speeds, half, workers=1)
 
 
@@ -384,7 +388,7 @@ def test_folder_that_is_a_file(speeds: Design, tmp_path: Path) -> None:
 def test_two_in_one_process(speeds: Design, tmp_path: Path) -> None:
     """Two threads of one process are kept apart too."""
     with (
-        held(tmp_path / "out", Fall(), speeds, 8),
+        locked_folder(tmp_path / "out", Fall(), speeds, 8),
         pytest.raises(SweepError, match=f"in use: process {os.getpid()} on"),
     ):
         run(Fall(), speeds, tmp_path / "out", workers=1)

@@ -150,7 +150,7 @@ def test_points_are_read_only(tmp_path: Path) -> None:
 
 WRONG: list[tuple[Any, type[ArmwrightError], str]] = [
     (Told(returned=lambda _: 1), SweepError, "task 'told' returned 1; expected outputs by name"),
-    (Told(returned=lambda x: {"z": x[:, 0]}), SweepError, "returned z; it said it would return y"),
+    (Told(returned=lambda x: {"z": x[:, 0]}), SweepError, "returned z; its outputs are y"),
     (Told(returned=lambda x: {"y": x}), SweepError, r"'y': expected shape \(3,\), got \(3, 1\)"),
     (Told(returned=lambda x: {"y": ["a"] * len(x)}), SweepError, "'y': expected numbers"),
     (Told(returned=lambda x: {"y": x[:, 0], "failure": [""]}), SweepError, "expected 3 texts, one per run, got 1"),
@@ -234,9 +234,9 @@ def test_progress(speeds: Design, tmp_path: Path) -> None:
     run(Fall(raises_above=38.5), speeds, tmp_path / "out", block=16, workers=1, progress=told.append)
 
     assert [(now.done, now.failed) for now in told] == [(0, 0), (16, 0), (32, 0), (40, 1)]
-    assert told[0].left is None
-    assert told[1].left == pytest.approx(24 / told[1].rate)
-    assert told[-1].left == 0.0
+    assert told[0].remaining is None
+    assert told[1].remaining == pytest.approx(24 / told[1].rate)
+    assert told[-1].remaining == 0.0
 
 
 def test_silence(speeds: Design, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -20,7 +20,6 @@ from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
 from armwright.errors import InvalidValueError, one_of
-from armwright.sweep.designs import whole
 from armwright.sweep.task import FAILURE, Axis, Output
 
 # What a path's features and largest force mean, and in what they are told.
@@ -70,7 +69,7 @@ class FeatureSweep:
 
     def __attrs_post_init__(self) -> None:
         """Refuse paths that there are not, or that stand there twice, and more twins than fill a vector."""
-        if whole(self.twins, "twins", least=0) > TWINS:
+        if integer(self.twins, "twins", least=0) > TWINS:
             raise InvalidValueError(f"twins: expected 0 to {TWINS}, got {self.twins}")
         for path in self.paths:
             one_of("test path", path, TEST_PATHS)

@@ -148,11 +148,12 @@ def _plan(
     """Return which clearances [m] are simulated, and with which coefficients of friction."""
     import numpy as np
 
+    from armwright.arrays import integer
     from armwright.errors import one_of
-    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol, whole
+    from armwright.sweep.designs import full_factorial, latin_hypercube, sobol
 
     one_of("design", design, ("factorial", "lhs", "sobol"))
-    whole(levels, "levels", least=2)
+    integer(levels, "levels", least=2)
     bounds = dict.fromkeys(task.parameters, clearances)
     units = dict.fromkeys(task.parameters, "m")
     if to_friction is not None:

@@ -106,8 +106,8 @@ def progress_text(now: "Progress") -> str:
     words = []
     if now.rate > 0:
         words.append(f"{now.rate:.3g} runs/s")
-    if now.left:
-        minutes, seconds = divmod(round(now.left), 60)
+    if now.remaining:
+        minutes, seconds = divmod(round(now.remaining), 60)
         words.append(f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d} left")
     if now.failed:
         words.append(f"{now.failed} failed")

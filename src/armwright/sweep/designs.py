@@ -1,17 +1,17 @@
-"""Which runs a sweep is made of: full factorial, Latin hypercube, Sobol, or points given by hand.
+"""Designs of experiments: full factorial, Latin hypercube, Sobol, or any table of points.
 
-A design is the table of its points, one row per run, and tells how it was made. The same call makes the same points,
+A design is the table of its points, one row per run, and records how it was made. The same call makes the same points,
 bit for bit.
 """
 
-import operator
 from collections.abc import Mapping, Sequence
+from math import prod
 from typing import Any
 
 import attrs
 import numpy as np
 
-from armwright.arrays import LARGEST, Array, array_key, floats, reduce_by_fields
+from armwright.arrays import LARGEST, Array, array_key, floats, integer, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, one_of, shown
 
 KINDS = ("given", "full factorial", "latin hypercube", "sobol")
@@ -26,9 +26,8 @@ def _names(value: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         if not isinstance(name, str) or not name.isidentifier():
             raise InvalidValueError(f"names: expected a word of letters, digits and _, got {shown(name)}")
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidValueError(f"names: '{twice}' stands there twice")
+        if names.count(name) > 1:
+            raise InvalidValueError(f"names: '{name}' stands there twice")
     return names
 
 
@@ -38,28 +37,27 @@ def _points(value: Any) -> Array:
         raise ShapeError(
             f"points: expected one row per run and one column per parameter, neither empty, got shape {points.shape}"
         )
-    points.setflags(write=False)
-    return points
+    return read_only(points)
 
 
-def _table(value: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
+def _ranges(value: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
     return {name: tuple(float(number) for number in numbers) for name, numbers in value.items()}
 
 
 def _seed(value: int | None) -> int | None:
-    return None if value is None else whole(value, "seed", least=0)
+    return None if value is None else integer(value, "seed", least=0)
 
 
 @attrs.frozen(kw_only=True)
 class Design:
-    """The runs of a sweep. A design made by hand is of the kind ``given``.
+    """The points of the runs of a sweep. A table of the caller's own is of the kind ``given``.
 
     Attributes:
-        names: k parameters.
-        points: (n, k) their values, one row per run.
+        names: of the k parameters.
+        points: (n, k) values of the parameters, one row per run.
         units: of every parameter; "1" where there is none.
         kind: how the points were made, one of ``KINDS``.
-        seed: what chance they were made with.
+        seed: of the random numbers that the points were made with.
         ranges: by parameter, the levels of a full factorial or the two bounds of the others; empty for ``given``.
     """
 
@@ -68,12 +66,12 @@ class Design:
     units: Mapping[str, str] = attrs.field(factory=dict, hash=False)
     kind: str = "given"
     seed: int | None = attrs.field(default=None, converter=_seed)
-    ranges: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, converter=_table, hash=False)
+    ranges: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, converter=_ranges, hash=False)
 
     __reduce__ = reduce_by_fields
 
     def __attrs_post_init__(self) -> None:
-        """Refuse a column without a name, and what is told of a parameter that there is not."""
+        """Refuse a column without a name, and units or ranges of an unknown parameter."""
         if len(self.names) != self.points.shape[1]:
             raise ShapeError(f"design: {len(self.names)} names, but points of {self.points.shape[1]} parameters")
         one_of("kind of design", self.kind, KINDS)
@@ -97,19 +95,16 @@ def full_factorial(levels: Mapping[str, Sequence[float]], *, units: Mapping[str,
         InvalidValueError: there is no parameter, one has no level or the same one twice, a level is not finite, or
             there are more than ten million combinations.
         KindError: a level is no number.
-        UnknownNameError: a unit is told of something that is no parameter.
+        UnknownNameError: ``units`` names something that is no parameter.
     """
-    _refuse_none(levels, "levels")
+    _check_mapping(levels, "levels")
     columns = {name: floats(values, f"levels of {name}") for name, values in levels.items()}
     for name, column in columns.items():
         if column.ndim != 1 or not column.size:
             raise ShapeError(f"levels of {name}: expected one level or more, got {shown(levels[name])}")
         if len(np.unique(column)) < column.size:
             raise InvalidValueError(f"levels of {name}: a level stands there twice: {shown(levels[name])}")
-    runs = 1
-    for column in columns.values():
-        runs *= column.size
-    _refuse_many(runs)
+    _check_runs(prod(column.size for column in columns.values()))
     grids = np.meshgrid(*columns.values(), indexing="ij")
     points = np.stack([grid.ravel() for grid in grids], axis=-1)
     ranges = {name: tuple(column.tolist()) for name, column in columns.items()}
@@ -119,12 +114,12 @@ def full_factorial(levels: Mapping[str, Sequence[float]], *, units: Mapping[str,
 def latin_hypercube(
     bounds: Mapping[str, tuple[float, float]], n: int, seed: int, *, units: Mapping[str, str] | None = None
 ) -> Design:
-    """Return n points of which every parameter has one in each n-th of its range.
+    """Return n points: cut the range of any parameter into n equal parts, and each part has one of them.
 
     Args:
         bounds: by parameter, the lower and the upper bound.
         n: how many points.
-        seed: what chance they are made with; the same seed makes the same points.
+        seed: of the random numbers; the same seed makes the same points.
         units: by parameter, where it has one.
 
     Raises:
@@ -132,18 +127,12 @@ def latin_hypercube(
             out of range.
         KindError: a bound is no number, or ``n`` or ``seed`` no whole number.
         ShapeError: there are not two bounds.
-        UnknownNameError: a unit is told of something that is no parameter.
+        UnknownNameError: ``units`` names something that is no parameter.
 
     Source:
         McKay, Beckman & Conover (1979), as in ``scipy.stats.qmc.LatinHypercube``.
     """
-    from scipy.stats import qmc  # noqa: PLC0415 - slow to load, and only designs by chance need it
-
-    lower, upper = _bounds(bounds)
-    n, seed = whole(n, "n", least=1), whole(seed, "seed", least=0)
-    _refuse_many(n)
-    unit = qmc.LatinHypercube(len(bounds), rng=np.random.default_rng(seed)).random(n)
-    return _scaled("latin hypercube", bounds, lower + (upper - lower) * unit, seed, units)
+    return _sampled("latin hypercube", bounds, integer(n, "n", least=1), seed, units)
 
 
 def sobol(
@@ -154,7 +143,7 @@ def sobol(
     Args:
         bounds: by parameter, the lower and the upper bound.
         n: how many points, a power of two: with another number the sequence is out of balance.
-        seed: what it is scrambled with; the same seed makes the same points.
+        seed: of the scrambling; the same seed makes the same points.
         units: by parameter, where it has one.
 
     Raises:
@@ -162,35 +151,37 @@ def sobol(
             no power of two, or ``seed`` is below 0.
         KindError: a bound is no number, or ``n`` or ``seed`` no whole number.
         ShapeError: there are not two bounds.
-        UnknownNameError: a unit is told of something that is no parameter.
+        UnknownNameError: ``units`` names something that is no parameter.
 
     Source:
         Sobol (1967), scrambled after Matousek (1998), as in ``scipy.stats.qmc.Sobol``.
     """
-    from scipy.stats import qmc  # noqa: PLC0415 - slow to load, and only designs by chance need it
+    n = integer(n, "n", least=1)
+    below = 1 << n.bit_length() - 1
+    if n != below:
+        raise InvalidValueError(
+            f"n: a Sobol design has a power of two of points, got {n}; the nearest are {below} and {2 * below}"
+        )
+    return _sampled("sobol", bounds, n, seed, units)
+
+
+def _sampled(
+    kind: str, bounds: Mapping[str, tuple[float, float]], n: int, seed: int, units: Mapping[str, str] | None
+) -> Design:
+    """Return a sample of the unit cube, scaled to the bounds."""
+    from scipy.stats import qmc  # noqa: PLC0415 - slow to load, and full factorials do without
 
     lower, upper = _bounds(bounds)
-    n, seed = whole(n, "n", least=1), whole(seed, "seed", least=0)
-    _refuse_many(n)
-    exponent = n.bit_length() - 1
-    if n != 2**exponent:
-        raise InvalidValueError(
-            f"n: a Sobol design has a power of two of points, got {n}; the nearest are {2**exponent} and "
-            f"{2 ** (exponent + 1)}"
-        )
-    unit = qmc.Sobol(len(bounds), rng=np.random.default_rng(seed)).random_base2(exponent)
-    return _scaled("sobol", bounds, lower + (upper - lower) * unit, seed, units)
-
-
-def _scaled(
-    kind: str, bounds: Mapping[str, tuple[float, float]], points: Array, seed: int, units: Mapping[str, str] | None
-) -> Design:
+    rng = np.random.default_rng(integer(seed, "seed", least=0))
+    _check_runs(n)
+    sampler = (qmc.Sobol if kind == "sobol" else qmc.LatinHypercube)(len(bounds), rng=rng)
+    points = lower + (upper - lower) * sampler.random(n)
     return Design(names=tuple(bounds), points=points, units=units or {}, kind=kind, seed=seed, ranges=bounds)
 
 
 def _bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
     """Return the lower and the upper bounds, (k,) each."""
-    _refuse_none(bounds, "bounds")
+    _check_mapping(bounds, "bounds")
     pairs = []
     for name, pair in bounds.items():
         ends = floats(pair, f"bounds of {name}", LARGEST)
@@ -198,33 +189,20 @@ def _bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
             raise ShapeError(f"bounds of {name}: expected a lower and an upper one, got {shown(pair)}")
         lower, upper = ends
         if not lower < upper:
-            turned = "they are reversed" if lower > upper else "they are equal"
-            raise InvalidValueError(f"bounds of {name}: {turned}: from {lower:g} to {upper:g}")
+            what = "reversed" if lower > upper else "equal"
+            raise InvalidValueError(f"bounds of {name}: they are {what}: from {lower:g} to {upper:g}")
         pairs.append(ends)
     lower, upper = np.transpose(pairs)
     return lower, upper
 
 
-def _refuse_none(table: Mapping[str, Any], what: str) -> None:
-    if not isinstance(table, Mapping):
-        raise KindError(f"{what}: expected numbers by parameter, {{'name': (...)}}, got {shown(table)}")
-    if not table:
+def _check_mapping(value: Mapping[str, Any], what: str) -> None:
+    if not isinstance(value, Mapping):
+        raise KindError(f"{what}: expected numbers by parameter, {{'name': (...)}}, got {shown(value)}")
+    if not value:
         raise InvalidValueError(f"{what}: expected one parameter or more, got none")
 
 
-def _refuse_many(runs: int) -> None:
+def _check_runs(runs: int) -> None:
     if runs > MOST_RUNS:
         raise InvalidValueError(f"design: {runs} runs are more than {MOST_RUNS}; take fewer levels or points")
-
-
-def whole(value: int, what: str, *, least: int) -> int:
-    """Return a whole number not below ``least``."""
-    try:
-        number = operator.index(value)
-    except TypeError as error:
-        raise KindError(f"{what}: expected a whole number, got {shown(value)}") from error
-    if isinstance(value, bool):
-        raise KindError(f"{what}: expected a whole number, got {value}")
-    if number < least:
-        raise InvalidValueError(f"{what}: expected a whole number not below {least}, got {number}")
-    return number

@@ -5,19 +5,6 @@ from types import ModuleType
 
 from armwright.errors import MissingExtraError
 
-# What reads results, and what keeps the linear algebra to one thread.
-NEEDED = ("xarray", "threadpoolctl")
-
-
-def check_extras() -> None:
-    """Import what every sweep needs.
-
-    Raises:
-        MissingExtraError: one of them is not installed.
-    """
-    for name in NEEDED:
-        extra(name)
-
 
 def extra(name: str) -> ModuleType:
     """Import a library of the extra ``sweep``.
@@ -29,3 +16,9 @@ def extra(name: str) -> ModuleType:
         return import_module(name)
     except ImportError as error:
         raise MissingExtraError(f'a sweep needs {name}; install it by: pip install "armwright[sweep]"') from error
+
+
+def check_extras() -> None:
+    """Import what every sweep needs, on a cluster or not; see ``extra``."""
+    extra("xarray")
+    extra("threadpoolctl")

@@ -1,30 +1,28 @@
-"""The folder of a sweep: what it is of, the blocks that are finished, and one process at a time.
+"""The folder of a sweep: its identity, the finished blocks, and one process at a time.
 
-    sweep.json          what the sweep is of, and with which versions it was begun
-    blocks/000007.npz   the rows of one block, with a checksum
-    results.nc          the results, made of the blocks when all are finished
-    run.json            the SHA-256 hash of the results
-    lock                held by the process at work
+    sweep.json            what the sweep is of, and with which versions it was begun
+    blocks/0000007.npy    the rows of one block, and a checksum behind them
+    results.nc            the results, made of the blocks when all are finished
+    run.json              the SHA-256 hash of the results
+    lock                  held by the process at work
 
-Every file is written under another name and moved when it is whole and on the disk. What is read back is checked; what
-is damaged is named and left as it is, for its numbers may have taken hours.
+Every file is written under another name and moved when it is whole and on the disk. Everything is checked when it is
+read back; a damaged file is named and not changed, for its numbers may have taken hours.
 """
 
 import contextlib
 import errno
 import fcntl
 import hashlib
+import io
 import json
 import os
 import platform
-import re
-import stat
 import sys
-import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import attrs
 import numpy as np
@@ -38,42 +36,44 @@ from armwright.sweep.errors import SweepError
 from armwright.sweep.task import Rows, Task
 from armwright.version import __version__
 
-_FORMAT = 1
+_FORMAT = 2
 MANIFEST, _BLOCKS, RESULTS, _LOCK = "sweep.json", "blocks", "results.nc", "lock"
-_HALF = ".tmp"
-# What a process that was killed may have left half written. Other names in the folder are not ours.
-_HALVES = (*(f"{name}{_HALF}" for name in (MANIFEST, RESULTS, RECORD)), f"{_BLOCKS}/*.npz{_HALF}.npz")
-_HALF_BLOCK = re.compile(rf"[0-9]{{6,}}\.npz{re.escape(_HALF)}\.npz")
+# The name under which a file is written ends with this.
+_PARTIAL = ".tmp"
 # What the lock says begins with this; an empty one was just made.
 _HOLDER = "process "
-_LONGEST_HOLDER = 1000
 
 
 def identity(task: Task, design: Design) -> dict[str, Any]:
-    """Return what a sweep is known by, as JSON holds it: two sweeps of which this is equal have equal results.
+    """Return the identity of a sweep as JSON holds it: two sweeps of which this is equal have equal results.
 
     Raises:
         KindError: a setting of the task is nothing that JSON holds.
     """
-    told = {
+    plain: dict[str, Any] = {
         "armwright": __version__,
         "task": task.name,
-        "settings": {name: _as_json(value, f"setting '{name}'") for name, value in task.settings.items()},
-        "outputs": {name: [list(one.dims), one.units, one.description] for name, one in task.outputs.items()},
+        "settings": dict(task.settings),
+        "outputs": {name: [output.dims, output.units, output.description] for name, output in task.outputs.items()},
         "axes": {
-            name: [axis.values.size, axis.units, axis.description, _digest(axis.values.tobytes())]
+            name: [axis.values.size, axis.units, axis.description, _sha256(axis.values.tobytes()).hex()]
             for name, axis in task.axes.items()
         },
         "design": {
             "kind": design.kind,
             "runs": len(design),
             "seed": design.seed,
-            "ranges": {name: list(numbers) for name, numbers in design.ranges.items()},
-            "parameters": [[name, design.units[name]] for name in design.names],
-            "points": _digest(design.points.tobytes()),
+            "ranges": dict(design.ranges),
+            "parameters": list(design.units.items()),
+            "points": _sha256(design.points.tobytes()).hex(),
         },
     }
-    return dict(json.loads(json.dumps(told)))
+    for name, value in plain["settings"].items():
+        try:
+            json.dumps(value, allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise KindError(f"setting '{name}': expected what JSON holds, got {shown(value)}: {error}") from error
+    return dict(json.loads(json.dumps(plain)))
 
 
 @attrs.frozen(kw_only=True)
@@ -81,105 +81,85 @@ class Folder:
     """A folder that this process holds.
 
     Attributes:
-        path: where it is.
-        sweep: what it is of; see ``identity``.
+        path: of the folder.
+        task: what is done; its outputs are what blocks hold.
+        design: the points.
+        sweep: see ``identity``.
         block: rows per block.
         made: when and with which versions it was begun.
-        task: what is done; its outputs are what blocks hold.
-        runs: of the whole sweep.
     """
 
     path: Path
+    task: Task
+    design: Design
     sweep: Mapping[str, Any]
     block: int
     made: Mapping[str, str]
-    task: Task
-    runs: int
-    _key: bytes = attrs.field(
-        init=False, default=attrs.Factory(lambda self: json.dumps(self.sweep, sort_keys=True).encode(), takes_self=True)
-    )
 
-    @property
-    def results(self) -> Path:
-        """Where the results are, or will be."""
-        return self.path / RESULTS
+    def blocks(self) -> Iterator[tuple[int, slice]]:
+        """Return the blocks of the whole sweep: their numbers and runs."""
+        for number, start in enumerate(range(0, len(self.design), self.block)):
+            yield number, slice(start, min(start + self.block, len(self.design)))
 
-    @property
-    def blocks(self) -> int:
-        """The number of blocks of the whole sweep."""
-        return -(-self.runs // self.block)
-
-    def rows_of(self, number: int) -> slice:
-        """Return the runs of a block."""
-        return slice(number * self.block, min((number + 1) * self.block, self.runs))
-
-    def keep(self, number: int, rows: Rows) -> None:
+    def write_block(self, number: int, rows: Rows) -> None:
         """Write a block.
 
         Raises:
             OutputError: it cannot be written.
         """
-        arrays: dict[str, Any] = {f"output_{name}": value for name, value in rows.values.items()}
-        arrays |= {"status": rows.status, "message": np.array(rows.message, dtype=np.str_)}
-        arrays["checksum"] = np.array(self._checksum(number, arrays))
+        file = io.BytesIO()
+        np.save(file, rows, allow_pickle=False)
+        data = file.getvalue()
+        write_whole(self._file(number), lambda partial: partial.write_bytes(data + self._checksum(number, data)))
 
-        def write(half: Path) -> None:
-            np.savez(half, **arrays)
-
-        write_whole(self._block(number), write, suffix=f"{_HALF}.npz")
-
-    def kept(self, number: int) -> Rows | None:
-        """Return a block as it was written; None if it is not there.
+    def read_block(self, number: int) -> Rows | None:
+        """Return a block as it was written; None if there is none.
 
         Raises:
-            FileFormatError: it is damaged; its file stays as it is.
+            FileFormatError: it is damaged; its file is not changed.
         """
-        path = self._block(number)
-        if path.exists() and not path.is_file():
+        path = self._file(number)
+        if not path.exists():
+            return None
+        if not path.is_file():
             raise self._damaged(number, "it is not a file")
         try:
-            with path.open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                _refuse_compressed(file.zip)
-                arrays = {name: file[name] for name in file.files}
-            checksum = str(arrays.pop("checksum"))
-        except FileNotFoundError:
-            return None
-        except Exception as error:  # zip files and arrays fail in many ways
-            raise self._damaged(number, shown(error)) from error
-        if checksum != self._checksum(number, arrays):
+            file = path.read_bytes()
+        except OSError as error:
+            raise self._damaged(number, error.strerror or str(error)) from error
+        data, checksum = file[:-32], file[-32:]
+        if checksum != self._checksum(number, data):
             raise self._damaged(number, "its checksum is not that of its numbers, or of another block")
-        values = {name: arrays[f"output_{name}"] for name in self.task.outputs}
-        return Rows(values, arrays["status"], tuple(arrays["message"].tolist()))
+        rows: Rows = np.load(io.BytesIO(data), allow_pickle=False)
+        return rows
 
     def _damaged(self, number: int, why: str) -> FileFormatError:
-        rows = self.rows_of(number)
+        first = number * self.block
+        last = min(first + self.block, len(self.design)) - 1
         return FileFormatError(
-            self._block(number),
+            self._file(number),
             None,
             "",
-            f"damaged: {why}; it stays as it is; move it away or delete it and start again: only its runs, "
-            f"{rows.start} to {rows.stop - 1}, are done again",
+            f"damaged: {why}; it stays as it is; move it away or delete it and start again: only its runs, {first} to "
+            f"{last}, are done again",
         )
 
-    def _block(self, number: int) -> Path:
-        return self.path / _BLOCKS / f"{number:06d}.npz"
+    def _file(self, number: int) -> Path:
+        return self.path / _BLOCKS / f"{number:07d}.npy"
 
-    def _checksum(self, number: int, arrays: Mapping[str, Any]) -> str:
-        """Return a checksum of a block that no block of another sweep or place has."""
-        parts = [self._key, f"block {number} of {self.block}".encode()]
-        for name in sorted(arrays):
-            parts += [f"{name} {arrays[name].dtype.str} {arrays[name].shape}".encode(), arrays[name].tobytes()]
-        return _digest(*parts)
+    def _checksum(self, number: int, data: bytes) -> bytes:
+        """Return a checksum of a block that no other block, and none of another sweep, has."""
+        return _sha256(json.dumps(self.sweep, sort_keys=True).encode(), f"{number} of {self.block}".encode(), data)
 
 
 @contextlib.contextmanager
-def held(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]:
+def locked_folder(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]:
     """Hold the folder of a sweep, begun now or earlier, while other processes are kept out.
 
     Args:
         path: made where it is missing, with its parents.
         task: what is done.
-        design: where.
+        design: the points.
         block: rows per block; a folder that was begun earlier keeps its own.
 
     Raises:
@@ -192,81 +172,62 @@ def held(path: Path, task: Task, design: Design, block: int) -> Iterator[Folder]
     path = path.absolute()
     try:
         path.mkdir(parents=True, exist_ok=True)
-        lock = _lock(path)
+        _check_files(path)
+        handle = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+        lock = os.fdopen(handle, "r+", encoding="utf-8", errors="replace")
     except OSError as error:
         reason = "it is a file, and a folder is needed" if path.is_file() else error.strerror or error
         raise OutputError(f"cannot write to '{path}': {reason}") from error
     with lock:
-        _take(lock, path)
-        told = _begun(path, sweep, block)
-        folder = Folder(
-            path=path, sweep=sweep, block=told["block"], made=told["made"], task=task, runs=design.points.shape[0]
-        )
-        for half in _halves(path):
-            half.unlink(missing_ok=True)
-        yield folder
+        holder = lock.read(1000).strip()
+        if holder and not holder.startswith(_HOLDER):
+            raise SweepError(f"'{path / _LOCK}' is not the lock of a sweep; give the sweep a folder of its own")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # it ends with the process, however that ends
+        except BlockingIOError as error:
+            holder = holder or "another process"
+            raise SweepError(f"'{path}' is in use: {holder} works on it; wait until it is done") from error
+        lock.seek(0)
+        lock.truncate()
+        lock.write(f"{_HOLDER}{os.getpid()} on {platform.node()}, since {_now()}\n")
+        lock.flush()
+        manifest = _manifest(path, sweep, block)
+        for partial in _partial_files(path):
+            partial.unlink(missing_ok=True)
+        yield Folder(path=path, task=task, design=design, **manifest)
 
 
-def _begun(path: Path, sweep: dict[str, Any], block: int) -> dict[str, Any]:
-    """Return what the manifest says; write it if there is none."""
-    manifest = path / MANIFEST
-    if manifest.exists():
-        told = _read_manifest(manifest)
-        _compare(path, told["sweep"], sweep)
-        return told
-    told = {"format": _FORMAT, "block": block, "made": _versions(), "sweep": sweep}
-    write_text_whole(manifest, json.dumps(told, indent=2, ensure_ascii=False) + "\n")
-    return told
-
-
-def write_text_whole(path: Path, text: str) -> None:
-    """Write a text whole and onto the disk, or leave what was there before.
-
-    Raises:
-        OutputError: it cannot be written; the text says why.
-    """
-
-    def write(half: Path) -> None:
-        half.write_text(text, encoding="utf-8")
-
-    write_whole(path, write)
-
-
-def write_whole(path: Path, write: Callable[[Path], None], suffix: str = _HALF) -> None:
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Write a file whole and onto the disk, or leave what was there before.
 
     Args:
         path: the file; its folder is made where it is missing.
-        write: writes what belongs there to another path.
-        suffix: of that other path.
+        write: writes the file to another path.
 
     Raises:
         OutputError: it cannot be written; the text says why.
     """
-    half = path.with_name(path.name + suffix)
+    partial = path.with_name(path.name + _PARTIAL)
     try:
         try:
             path.parent.mkdir(exist_ok=True)
-            half.unlink(missing_ok=True)  # a link of that name would be written through
-            write(half)
-            _onto_disk(half)
-            half.replace(path)
-            _onto_disk(path.parent)
+            partial.unlink(missing_ok=True)  # a link of that name would be written through
+            write(partial)
+            _sync(partial)
+            partial.replace(path)
+            _sync(path.parent)
         except BaseException:
             with contextlib.suppress(OSError):
-                half.unlink(missing_ok=True)
+                partial.unlink(missing_ok=True)
             raise
     except OSError as error:
-        full = " Make room and start again: it goes on from there." if _is_full(error) else ""
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        advice = " Make room and start again: it goes on from there." if full else ""
         reason = error.strerror or str(error)
-        raise OutputError(f"cannot write '{path}': {reason}; what was finished before stays.{full}") from error
+        raise OutputError(f"cannot write '{path}': {reason}; what was finished before stays.{advice}") from error
 
 
-def _is_full(error: OSError) -> bool:
-    return error.errno in (errno.ENOSPC, errno.EDQUOT)
-
-
-def _onto_disk(path: Path) -> None:
+def _sync(path: Path) -> None:
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -274,105 +235,34 @@ def _onto_disk(path: Path) -> None:
         os.close(handle)
 
 
-def _lock(path: Path) -> IO[str]:
-    """Open the lock of a folder, which holds a sweep or nothing; a link or a file of somebody else's is left alone."""
-    _refuse_other_things(path)
-    handle = os.open(path / _LOCK, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
-    lock = os.fdopen(handle, "r+", encoding="utf-8", errors="replace")
-    says = lock.read(_LONGEST_HOLDER) if stat.S_ISREG(os.fstat(handle).st_mode) else None
-    if says is None or (says and not says.startswith(_HOLDER)):
-        lock.close()
-        raise SweepError(f"'{path / _LOCK}' is not the lock of a sweep; give the sweep a folder of its own")
-    return lock
+def _partial_files(path: Path) -> list[Path]:
+    """Return the files that a killed process left half written. Files of other names are somebody else's."""
+    files = [path / f"{name}{_PARTIAL}" for name in (MANIFEST, RESULTS, RECORD)]
+    files += (path / _BLOCKS).glob(f"{'[0-9]' * 7}.npy{_PARTIAL}")
+    return [file for file in files if file.is_symlink() or file.is_file()]
 
 
-def _take(lock: IO[str], path: Path) -> None:
-    """Lock a folder for this process; the lock ends with the process, however it ends."""
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        lock.seek(0)
-        holder = lock.read(_LONGEST_HOLDER).strip() or "another process"
-        raise SweepError(f"'{path}' is in use: {holder} works on it; wait until it is done") from error
-    lock.seek(0)
-    lock.truncate()
-    lock.write(f"{_HOLDER}{os.getpid()} on {platform.node()}, since {_now()}\n")
-    lock.flush()
-
-
-def _halves(path: Path) -> list[Path]:
-    """Return the files that a process left half written."""
-    found = [half for pattern in _HALVES for half in path.glob(pattern) if half.is_symlink() or half.is_file()]
-    return [half for half in found if half.parent == path or _HALF_BLOCK.fullmatch(half.name)]
-
-
-def _refuse_other_things(path: Path) -> None:
-    ours = {path / _LOCK, path / MANIFEST, *_halves(path)}
-    strange = sorted(one.name for one in path.iterdir() if one not in ours)
-    if strange and not (path / MANIFEST).exists():
+def _check_files(path: Path) -> None:
+    known = {path / _LOCK, path / MANIFEST, *_partial_files(path)}
+    others = sorted(file.name for file in path.iterdir() if file not in known)
+    if others and not (path / MANIFEST).exists():
         raise SweepError(
-            f"'{path}' holds no sweep, but other things ('{strange[0]}'); give the sweep a folder of its own"
+            f"'{path}' holds no sweep, but other things ('{others[0]}'); give the sweep a folder of its own"
         )
 
 
-def _read_manifest(path: Path) -> dict[str, Any]:
-    try:
-        told = json.loads(read_text(regular(path)))
-        sound = isinstance(told["sweep"], dict) and type(told["block"]) is int and told["block"] >= 1
-        sound = sound and all(isinstance(told["made"][name], str) for name in ("date", "armwright"))
-        form = told["format"]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        if isinstance(error, FileFormatError):
-            raise
-        raise FileFormatError(path, None, "", f"damaged: {shown(error)}") from error
-    if form != _FORMAT:
-        raise FileFormatError(path, None, "format", f"expected {_FORMAT}, got {shown(form)}")
-    if not sound:
-        raise FileFormatError(path, None, "", "damaged: block, made or sweep is not as a sweep writes it")
-    return dict(told)
-
-
-def _compare(path: Path, there: Any, here: Any) -> None:
-    differences = list(_differences("", there, here))
-    if differences:
-        more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
-        raise SweepError(
-            f"'{path}' holds another sweep: {'; '.join(differences[:3])}{more}. Give this one a folder of its own"
-        )
-
-
-def _differences(key: str, there: Any, here: Any) -> Iterator[str]:
-    """Say what differs, key by key."""
-    if isinstance(there, dict) and isinstance(here, dict):
-        for name in {**there, **here}:
-            yield from _differences(f"{key}.{name}" if key else name, there.get(name), here.get(name))
-    elif there != here:
-        yield f"{key} is {shown(there)} there, {shown(here)} here"
-
-
-def _refuse_compressed(file: zipfile.ZipFile) -> None:
-    """Refuse a compressed block: ours are not, and one of another origin may be huge once it is unpacked."""
-    if any(part.compress_type != zipfile.ZIP_STORED for part in file.infolist()):
-        raise ValueError("it is compressed, and blocks are not")
-
-
-def _as_json(value: Any, what: str) -> Any:
-    try:
-        return json.loads(json.dumps(value, allow_nan=False))
-    except (TypeError, ValueError) as error:
-        raise KindError(f"{what}: expected what JSON holds, got {shown(value)}: {error}") from error
-
-
-def _digest(*parts: bytes) -> str:
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(len(part).to_bytes(8, "little"))
-        digest.update(part)
-    return digest.hexdigest()
-
-
-def _versions() -> dict[str, str]:
-    return {
+def _manifest(path: Path, sweep: dict[str, Any], block: int) -> dict[str, Any]:
+    """Return the fields ``sweep``, ``block`` and ``made`` of a folder; begin it where there are none."""
+    manifest = path / MANIFEST
+    if manifest.exists():
+        fields = _read_manifest(manifest)
+        if differences := list(_differences("", fields["sweep"], sweep)):
+            more = f"; and {len(differences) - 3} more" if len(differences) > 3 else ""
+            raise SweepError(
+                f"'{path}' holds another sweep: {'; '.join(differences[:3])}{more}. Give this one a folder of its own"
+            )
+        return fields
+    made = {
         "date": _now(),
         "armwright": __version__,
         "python": platform.python_version(),
@@ -380,6 +270,43 @@ def _versions() -> dict[str, str]:
         "scipy": scipy.__version__,
         "machine": f"{sys.platform} {platform.machine()}",
     }
+    fields = {"block": block, "made": made, "sweep": sweep}
+    text = json.dumps({"format": _FORMAT, **fields}, indent=2, ensure_ascii=False) + "\n"
+    write_whole(manifest, lambda partial: partial.write_text(text, encoding="utf-8"))
+    return fields
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    text = read_text(regular(path))
+    try:
+        fields = json.loads(text)
+        version, block, made, sweep = (fields[name] for name in ("format", "block", "made", "sweep"))
+        sound = type(block) is int and block >= 1 and isinstance(sweep, dict)
+        sound = sound and all(isinstance(made[name], str) for name in ("date", "armwright"))
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise FileFormatError(path, None, "", f"damaged: {shown(error)}") from error
+    if version != _FORMAT:
+        raise FileFormatError(path, None, "format", f"expected {_FORMAT}, got {shown(version)}")
+    if not sound:
+        raise FileFormatError(path, None, "", "damaged: block, made or sweep is not as a sweep writes it")
+    return {"block": block, "made": made, "sweep": sweep}
+
+
+def _differences(key: str, there: Any, here: Any) -> Iterator[str]:
+    """Return what differs, key by key."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        for name in {**there, **here}:
+            yield from _differences(f"{key}.{name}" if key else name, there.get(name), here.get(name))
+    elif there != here:
+        yield f"{key} is {shown(there)} there, {shown(here)} here"
+
+
+def _sha256(*parts: bytes) -> bytes:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(len(part).to_bytes(8, "little"))
+        digest.update(part)
+    return digest.digest()
 
 
 def _now() -> str:

@@ -2,28 +2,24 @@
 
 import json
 from collections.abc import Iterator
-from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from armwright.errors import FileFormatError, InvalidValueError, shown
+from armwright.errors import FileFormatError, shown
 from armwright.files.output import RECORD, record_text, recorded, sha256
 from armwright.files.reading import regular
-from armwright.sweep.designs import Design
 from armwright.sweep.errors import SweepError
 from armwright.sweep.extras import extra
-from armwright.sweep.folder import MANIFEST, RESULTS, Folder, write_text_whole, write_whole
-from armwright.sweep.netcdf import LONGEST, Variable, Writer
-from armwright.sweep.task import Rows, Status, Task, shapes
+from armwright.sweep.folder import MANIFEST, RESULTS, Folder, write_whole
+from armwright.sweep.task import Rows, Status
 
 if TYPE_CHECKING:
     import xarray
 
-# The axis of the bytes of a message, which xarray makes one text again.
-_LETTERS = "letter"
+# Where the header of the file counts the records, with big-endian bytes (NASA ESDS-RFC-011v2.0, 2011).
+_RECORD_COUNT = slice(4, 8)
 
 
 def load(folder: Path | str) -> "xarray.Dataset":
@@ -34,7 +30,7 @@ def load(folder: Path | str) -> "xarray.Dataset":
 
     Returns:
         dataset: over the dimension ``run`` the parameters as coordinates, the outputs, and of every run ``status``
-            (a ``Status``) and ``message``; with units, descriptions and where they come from as attributes.
+            (a ``Status``) and ``message``; with units, descriptions and provenance as attributes.
 
     Raises:
         FileFormatError: the file is damaged, or its ``run.json`` is missing.
@@ -47,10 +43,10 @@ def load(folder: Path | str) -> "xarray.Dataset":
     if not path.exists():
         state = "is not finished; run it again to go on" if path.with_name(MANIFEST).exists() else "is not there"
         raise SweepError(f"'{folder}': the sweep {state}")
-    told, found = recorded(path.parent).get(RESULTS), sha256(regular(path))
-    if told is None:
+    expected, actual = recorded(path.parent).get(RESULTS), sha256(regular(path))
+    if expected is None:
         raise FileFormatError(path, None, "", f"cannot be checked: no {RECORD} beside it tells its hash; {damaged}")
-    if told != found:
+    if expected != actual:
         raise FileFormatError(path, None, "", f"damaged: its hash is not that in {RECORD}; {damaged}")
     try:
         # Units such as "hours" are those of a quantity, not of a calendar.
@@ -62,26 +58,11 @@ def load(folder: Path | str) -> "xarray.Dataset":
     return dataset
 
 
-def refuse_too_long(task: Task, runs: int) -> None:
-    """Refuse a sweep whose results are longer than a file can hold.
-
-    Raises:
-        InvalidValueError: an output has more than 4 GiB.
-    """
-    for name, shape in shapes(task).items():
-        if 8 * prod(shape) * runs > LONGEST:
-            raise InvalidValueError(
-                f"output '{name}': {runs} runs of {prod(shape)} numbers are more than the 4 GiB that a file holds of "
-                "one output; take fewer numbers of a run, or cut the design in two"
-            )
-
-
-def gather(folder: Folder, design: Design) -> None:
+def write_results(folder: Folder) -> None:
     """Write the results of a sweep whose blocks are all there, block by block.
 
     Args:
         folder: of the sweep, held by this process.
-        design: the points.
 
     Raises:
         OutputError: they cannot be written; the blocks stay.
@@ -89,78 +70,71 @@ def gather(folder: Folder, design: Design) -> None:
         SweepError: a block has gone since it was done.
     """
 
-    def write(half: Path) -> None:
-        _write(folder, design, half)
-        # The record comes first: results that it does not fit are never found, results without it could not be checked.
-        text = record_text({RESULTS: sha256(half) or ""}, {"versions": dict(folder.made)})
-        write_text_whole(folder.path / RECORD, text)
+    def write(partial: Path) -> None:
+        _write(folder, partial)
+        # The record comes first: results without it could not be checked, and one without results harms nobody.
+        text = record_text({RESULTS: sha256(partial) or ""}, {"versions": dict(folder.made)})
+        write_whole(folder.path / RECORD, lambda record: record.write_text(text, encoding="utf-8"))
 
-    write_whole(folder.results, write)
+    write_whole(folder.path / RESULTS, write)
 
 
-def _write(folder: Folder, design: Design, path: Path) -> None:
-    task = folder.task
-    letters = max(1, *(len(text.encode()) for _, rows in _blocks(folder) for text in rows.message))
-    sizes = {"run": len(design), **{name: axis.values.size for name, axis in task.axes.items()}, _LETTERS: letters}
+def _write(folder: Folder, path: Path) -> None:
+    """Write block after block, so that the results may be larger than the memory.
+
+    The runs are the records of the file, which stand one after the other behind its header. So the file is that of the
+    first block, followed by the records of the others, with their number corrected.
+    """
+    letters = max(len(text.encode()) for _, rows in _blocks(folder) for text in rows["message"].tolist())
     with path.open("wb") as file:
-        writer = Writer(file, sizes, _provenance(folder, task), _variables(task, design))
-        writer.put("run", np.arange(len(design)))
-        for name, axis in task.axes.items():
-            writer.put(name, axis.values)
-        for name, column in zip(design.names, design.points.T, strict=True):
-            writer.put(name, column)
-        for first, rows in _blocks(folder):
-            for name, values in rows.values.items():
-                writer.put(name, values, first)
-            writer.put("status", rows.status, first)
-            texts = b"".join(text.encode().ljust(letters, b"\0") for text in rows.message)
-            writer.put("message", np.frombuffer(texts, dtype="S1").reshape(-1, letters), first)
+        header = 0
+        for start, rows in _blocks(folder):
+            file.write(_netcdf(folder, start, rows, letters)[header:])
+            header = header or len(_netcdf(folder, start, rows[:0], letters))
+        file.seek(_RECORD_COUNT.start)
+        file.write(len(folder.design).to_bytes(_RECORD_COUNT.stop - _RECORD_COUNT.start, "big"))
 
 
 def _blocks(folder: Folder) -> Iterator[tuple[int, Rows]]:
     """Read the blocks with the number of the first run of each."""
-    for number in range(folder.blocks):
-        rows = folder.kept(number)
+    for number, runs in folder.blocks():
+        rows = folder.read_block(number)
         if rows is None:
             raise SweepError(f"'{folder.path}': block {number} has gone just now; start again to go on")
-        yield number * folder.block, rows
+        yield runs.start, rows
 
 
-def _variables(task: Task, design: Design) -> list[Variable]:
-    """Return what the file has, with units and descriptions."""
-    variables = [Variable(name="run", dims=("run",), kind="i4", attributes={"long_name": "number of the run"})]
+def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
+    """Return a file of some runs, as classic netCDF with 64-bit offsets."""
+    task, design = folder.task, folder.design
+    runs = np.arange(start, start + len(rows), dtype=np.int32)
+    coordinates: dict[str, Any] = {"run": ("run", runs, {"long_name": "number of the run"})}
     for name, axis in task.axes.items():
-        told = {"long_name": axis.description, "units": axis.units}
-        variables.append(Variable(name=name, dims=(name,), kind="f8", attributes=told))
-    variables += [
-        Variable(name=name, dims=("run",), kind="f8", attributes={"units": design.units[name]}) for name in design.names
-    ]
-    among = {"coordinates": " ".join(design.names)}
-    for name, one in task.outputs.items():
-        told = {"long_name": one.description, "units": one.units, **among}
-        variables.append(Variable(name=name, dims=("run", *one.dims), kind="f8", attributes=told))
-    flags: dict[str, str | npt.NDArray[np.int8]] = {
-        "long_name": "what became of the run",
+        coordinates[name] = (name, axis.values, {"long_name": axis.description, "units": axis.units})
+    for name, column in zip(design.names, design.points.T, strict=True):
+        coordinates[name] = ("run", column[runs], {"units": design.units[name]})
+    flags = {
+        "long_name": "how the run ended",
         "flag_values": np.array(list(Status), dtype=np.int8),
         "flag_meanings": " ".join(status.name.lower() for status in Status),
-        **among,
     }
-    why = {"long_name": "why the run failed", "_Encoding": "utf-8", **among}
-    return [
-        *variables,
-        Variable(name="status", dims=("run",), kind="i1", attributes=flags),
-        Variable(name="message", dims=("run", _LETTERS), kind="S1", attributes=why),
-    ]
-
-
-def _provenance(folder: Folder, task: Task) -> dict[str, str]:
-    """Return when, by what and with which settings the results were made."""
-    return {
+    # Every block has texts of the same length, in bytes.
+    messages = np.array([text.encode() for text in rows["message"].tolist()], dtype=f"S{max(letters, 1)}")
+    variables: dict[str, Any] = {
+        name: (("run", *output.dims), rows[name], {"long_name": output.description, "units": output.units})
+        for name, output in task.outputs.items()
+    }
+    variables["status"] = ("run", rows["status"], flags)
+    variables["message"] = ("run", messages, {"long_name": "why the run failed", "_Encoding": "utf-8"})
+    provenance = {
         "Conventions": "CF-1.11",
         "title": task.name,
         "source": f"armwright {folder.made['armwright']}",
         "date_created": folder.made["date"],
-        "versions": json.dumps(folder.made, ensure_ascii=False),
+        "versions": json.dumps(dict(folder.made), ensure_ascii=False),
         "settings": json.dumps(folder.sweep["settings"], ensure_ascii=False),
         "design": json.dumps(folder.sweep["design"], ensure_ascii=False),
     }
+    dataset = extra("xarray").Dataset(variables, coordinates, provenance)
+    encoding = {name: {"_FillValue": None} for name in dataset.variables} | {"message": {"char_dim_name": "letter"}}
+    return bytes(dataset.to_netcdf(engine="scipy", format="NETCDF3_64BIT", unlimited_dims=["run"], encoding=encoding))

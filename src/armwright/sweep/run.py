@@ -1,26 +1,30 @@
-"""Running a sweep: each block once, on cores or on a Dask cluster, with all that is finished on the disk."""
+"""Running a sweep: each block once, on cores or on a Dask cluster, with everything finished on the disk."""
 
+import time
 from collections.abc import Callable, Generator
-from contextlib import ExitStack, closing
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armwright.arrays import Array, cores
+import attrs
+import numpy as np
+
+from armwright.arrays import Array, cores, integer
 from armwright.errors import InvalidValueError, KindError
-from armwright.sweep.crew import alone, cluster, processes, together
-from armwright.sweep.designs import Design, whole
+from armwright.sweep.designs import Design
+from armwright.sweep.executors import cluster, parallel, processes, serial
 from armwright.sweep.extras import check_extras
-from armwright.sweep.folder import Folder, held
-from armwright.sweep.progress import Counter, Progress
-from armwright.sweep.results import gather, load, refuse_too_long
-from armwright.sweep.task import Rows, Task, check_task, failures
+from armwright.sweep.folder import RESULTS, Folder, locked_folder
+from armwright.sweep.progress import Progress
+from armwright.sweep.results import load, write_results
+from armwright.sweep.task import Rows, Task, check_task
 
 if TYPE_CHECKING:
     import xarray
 
 # Rows per block: some lanes of simulations side by side, and some seconds of work.
 BLOCK = 64
-# Processes of one machine; a number beyond is a slip.
+# Processes of one machine; a larger number is a slip.
 _MOST_WORKERS = 1000
 
 
@@ -34,96 +38,86 @@ def run(
     scheduler: str | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> "xarray.Dataset":
-    """Do a task at all points of a design, and keep the results in a folder.
+    """Do a task at all points of a design, and store the results in a folder.
 
     Every finished block of rows is on the disk at once. After a kill, a full disk or an interruption the same call
-    goes on with what is missing; after the end it returns the results. The numbers are the same bits whoever does
-    the work.
+    goes on with what is missing; after the end it returns the results. The numbers are the same bits on any workers.
 
     Args:
         task: what is done.
         design: its points.
         folder: of this sweep alone; made where it is missing.
-        block: rows that are done in one call of the task and kept in one file. A folder that was begun with another
+        block: rows that are done in one call of the task and stored in one file. A folder that was begun with another
             number keeps that.
         workers: processes of this machine; 1 is this process itself; as many as there are cores when left out.
         scheduler: address of a Dask scheduler whose workers do it instead, such as ``tcp://10.0.0.1:8786``.
-        progress: told how far it is, at the start and after every block.
+        progress: called at the start and after every block.
 
     Returns:
         dataset: see ``load``. A run that failed is a row of NaN with its ``status`` and ``message``.
 
     Raises:
-        FileFormatError: a file of the folder is damaged; it stays as it is, and the text says what to do.
-        InvalidValueError: a number is out of range, names of the task and the design are the same, or an output has
-            more than 4 GiB.
+        FileFormatError: a file of the folder is damaged; it is not changed, and the text says what to do.
+        InvalidValueError: a number is out of range, names of the task and the design are the same, or one run has more
+            than 2 GiB.
         KindError: an argument is of the wrong kind, or the task cannot be sent to workers.
         MissingExtraError: a library of the extra ``sweep`` is not installed.
-        OutputError: a file cannot be written, as on a full disk; what is finished stays.
+        OutputError: a file cannot be written, as on a full disk; finished blocks stay.
         SweepError: the folder is of another sweep or in use, the workers cannot do the task, or the task returns
-            something else than it said.
+            something else than its outputs.
     """
     check_extras()  # not after hours of work
     if not isinstance(design, Design):
         raise KindError(f"design: expected a Design, got {type(design).__name__}")
     check_task(task, design.names)
-    refuse_too_long(task, len(design))
-    block = whole(block, "block", least=1)
+    block = integer(block, "block", least=1)
     if workers is not None:
-        workers = whole(workers, "workers", least=1)
-        if workers > _MOST_WORKERS:
+        if integer(workers, "workers", least=1) > _MOST_WORKERS:
             raise InvalidValueError(
                 f"workers: expected at most {_MOST_WORKERS} processes of this machine, got {workers}"
             )
         if scheduler is not None:
             raise InvalidValueError("workers are processes of this machine, a scheduler has its own: give one of them")
-    with held(Path(folder), task, design, block) as sweep:
-        if sweep.results.exists():
+    with locked_folder(Path(folder), task, design, block) as sweep:
+        if (sweep.path / RESULTS).exists():
             if progress:
-                progress(Counter(sweep.runs, sweep.runs).now())
+                progress(Progress(runs=len(design), done=len(design), resumed=len(design), failed=0, seconds=0.0))
         else:
-            _finish(sweep, design, workers, scheduler, progress)
-            gather(sweep, design)
+            _finish(sweep, workers, scheduler, progress or (lambda _: None))
+            write_results(sweep)
     return load(folder)
 
 
-def _finish(
-    sweep: Folder,
-    design: Design,
-    workers: int | None,
-    scheduler: str | None,
-    progress: Callable[[Progress], None] | None,
-) -> None:
+def _finish(sweep: Folder, workers: int | None, scheduler: str | None, progress: Callable[[Progress], None]) -> None:
     """Do the blocks that are missing."""
-    missing, found, failed = [], 0, 0
-    for number in range(sweep.blocks):
-        rows = sweep.kept(number)
+    began = time.monotonic()
+    resumed = failed = 0
+    missing = []
+    for number, runs in sweep.blocks():
+        rows = sweep.read_block(number)
         if rows is None:
-            missing.append(number)
+            missing.append((number, sweep.design.points[runs]))
         else:
-            found, failed = found + len(rows.status), failed + failures(rows)
-    counter = Counter(sweep.runs, found, failed)
-    tell = progress or (lambda _: None)
-    tell(counter.now())
-    with closing(_done(sweep, missing, design.points, workers, scheduler)) as done:  # workers end on an error too
-        for number, rows in done:
-            sweep.keep(number, rows)
-            counter.add(len(rows.status), failures(rows))
-            tell(counter.now())
+            resumed, failed = resumed + len(rows), failed + int(np.count_nonzero(rows["status"]))
+    now = Progress(runs=len(sweep.design), done=resumed, resumed=resumed, failed=failed, seconds=0.0)
+    progress(now)
+    with closing(_evaluated(sweep.task, missing, workers, scheduler)) as blocks:  # workers end on an error too
+        for number, rows in blocks:
+            sweep.write_block(number, rows)
+            done, failed = now.done + len(rows), now.failed + int(np.count_nonzero(rows["status"]))
+            now = attrs.evolve(now, done=done, failed=failed, seconds=time.monotonic() - began)
+            progress(now)
 
 
-def _done(
-    sweep: Folder, missing: list[int], points: Array, workers: int | None, scheduler: str | None
+def _evaluated(
+    task: Task, blocks: list[tuple[int, Array]], workers: int | None, scheduler: str | None
 ) -> Generator[tuple[int, Rows]]:
-    """Do the missing blocks by whoever is asked to."""
-    pieces = ((number, points[sweep.rows_of(number)]) for number in missing)
-    workers = workers or min(cores(), len(missing))
-    if not missing:
+    """Evaluate blocks by the workers that were asked for."""
+    workers = workers or min(cores(), len(blocks))
+    if not blocks:
         return
-    with ExitStack() as stack:
-        if scheduler is not None:
-            yield from together(stack.enter_context(cluster(sweep.task, scheduler)), sweep.task, pieces)
-        elif workers == 1:
-            yield from alone(sweep.task, pieces)
-        else:
-            yield from together(stack.enter_context(processes(sweep.task, workers)), sweep.task, pieces)
+    if scheduler is None and workers == 1:
+        yield from serial(task, blocks)
+        return
+    with processes(task, workers) if scheduler is None else cluster(task, scheduler) as executor:
+        yield from parallel(executor, task, blocks)

@@ -1,34 +1,41 @@
-"""What a sweep does at each of its points: the task, what it returns, and what becomes of rows that fail."""
+"""The task of a sweep, the rows that it returns, and rows of runs that fail."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from enum import IntEnum
-from typing import Any, NamedTuple, Protocol
+from math import prod
+from typing import Any, Protocol, TypeAlias
 
 import attrs
 import numpy as np
 import numpy.typing as npt
 
-from armwright.arrays import Array, array_key, floats, reduce_by_fields
+from armwright.arrays import Array, array_key, floats, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError, shown
 from armwright.sweep.errors import SweepError
 
+# A structured array of m runs: a field per output, NaN where there is nothing; ``status``, a ``Status`` each; and
+# ``message``, empty where a run ended well.
+Rows: TypeAlias = npt.NDArray[np.void]
+
 # Under this name a task may return a text per row, empty where the row went well.
 FAILURE = "failure"
-# The names that every result has, or that mean something else.
-RESERVED = ("run", "status", "message", "letter", FAILURE)
-# Of what went wrong in a row, this many characters are kept.
+# Names that every result has, or that mean something else.
+_RESERVED = ("run", "status", "message", "letter", FAILURE)
+# Characters of a message that are kept.
 _LONGEST_MESSAGE = 300
+# NumPy counts the bytes of a row by 32 bits; the message and the status are in it too [bytes].
+_LARGEST_ROW = 2**31 - 2**16
 
 
 class Status(IntEnum):
-    """What became of a run."""
+    """How a run ended."""
 
     DONE = 0
     """It ended well."""
     FAILED = 1
-    """The task raised an error, or said that the run failed."""
+    """The task raised an error, or reported that the run failed."""
     KILLED = 2
-    """The worker that ran it died, every time it was tried."""
+    """The worker died each time the run was tried."""
 
 
 @attrs.frozen(kw_only=True)
@@ -38,7 +45,7 @@ class Output:
     Attributes:
         description: what it is, in a line.
         units: "1" where there is none.
-        dims: the axes of what one run returns; none for one number.
+        dims: the axes of what one run returns; none for a scalar.
     """
 
     description: str = ""
@@ -50,16 +57,15 @@ def _values(value: Any) -> Array:
     values = floats(value, "values of an axis")
     if values.ndim != 1 or not values.size:
         raise ShapeError(f"values of an axis: expected a row of numbers, got shape {values.shape}")
-    values.setflags(write=False)
-    return values
+    return read_only(values)
 
 
 @attrs.frozen(kw_only=True)
 class Axis:
-    """An axis that outputs have beside that of the runs: times, places on a path, joints.
+    """An axis of outputs beside that of the runs: times, positions on a path, joints.
 
     Attributes:
-        values: (s,) where on it the numbers stand.
+        values: (s,) coordinates.
         units: "1" where there is none.
         description: what it is, in a line.
     """
@@ -78,13 +84,13 @@ class Task(Protocol):
 
     Attributes:
         name: of the task.
-        settings: all else its results depend on, as JSON can hold it; a part of what a sweep is known by.
+        settings: all else its results depend on, as JSON can hold it; they are a part of the identity of a sweep.
         outputs: by name, what it returns.
         axes: by name, the axes of those outputs.
     """
 
     @property
-    def name(self) -> str: ...  # noqa: D102 - told above
+    def name(self) -> str: ...  # noqa: D102 - described above
     @property
     def settings(self) -> Mapping[str, Any]: ...  # noqa: D102
     @property
@@ -95,128 +101,108 @@ class Task(Protocol):
     def __call__(self, points: Array) -> Mapping[str, Any]:
         """Return by name the outputs at (m, k) points, (m, ...) each.
 
-        A row that comes to nothing may be told by a text under ``failure``, of which there are then m. An error that
-        is raised makes the rows be tried one by one.
+        Under ``failure`` it may return m texts, which say why a row failed. An error that is raised makes the rows be
+        tried one by one.
         """
         ...
 
 
-class Rows(NamedTuple):
-    """What became of m runs.
-
-    Attributes:
-        values: by output, (m, ...); NaN where there is nothing.
-        status: (m,) a ``Status`` each.
-        message: m texts, empty where a run ended well.
-    """
-
-    values: dict[str, Array]
-    status: npt.NDArray[np.int8]
-    message: tuple[str, ...]
-
-
 def check_task(task: Task, parameters: Sequence[str]) -> None:
-    """Refuse a task whose outputs cannot be told from one another or have an axis that is not there.
+    """Check that the names of a task are distinct, that the axes of its outputs exist, and that a run has a row.
 
     Raises:
-        InvalidValueError: it has no output, or two things have the same name, or a reserved one.
+        InvalidValueError: it has no output, two things have the same name, or a reserved one, or the outputs of a run
+            have more than 2 GiB.
     """
     if not task.outputs:
         raise InvalidValueError(f"task '{task.name}': expected one output or more, got none")
-    taken = dict.fromkeys(RESERVED, "a name that every result has")
-    kinds: tuple[tuple[str, Iterable[str]], ...] = (
-        ("a parameter of the design", parameters),
-        ("an output of the task", task.outputs),
-        ("an axis of the task", task.axes),
-    )
-    for kind, names in kinds:
+    used = dict.fromkeys(_RESERVED, "a name that every result has")
+    kinds: Mapping[str, Iterable[str]] = {
+        "a parameter of the design": parameters,
+        "an output of the task": task.outputs,
+        "an axis of the task": task.axes,
+    }
+    for kind, names in kinds.items():
         for name in names:
             if not name.isidentifier():
                 raise InvalidValueError(f"'{name}' as {kind}: expected a word of letters, digits and _")
-            if name in taken:
-                raise InvalidValueError(f"'{name}' cannot be {kind}: it is {taken[name]}")
-            taken[name] = kind
+            if name in used:
+                raise InvalidValueError(f"'{name}' cannot be {kind}: it is {used[name]}")
+            used[name] = kind
     for name, output in task.outputs.items():
         for dim in output.dims:
             if dim not in task.axes:
                 known = ", ".join(task.axes) or "none"
                 raise InvalidValueError(f"output '{name}': the task has no axis '{dim}'. Known: {known}.")
+    numbers = sum(map(prod, _shapes(task).values()))
+    if 8 * numbers > _LARGEST_ROW:
+        raise InvalidValueError(f"outputs: a run of {numbers} numbers has more than 2 GiB; take fewer numbers of a run")
 
 
 def evaluate(task: Task, points: Array) -> Rows:
-    """Run a task at some points; what it raises becomes the status of the rows that it fails at.
+    """Run a task at some points; an error that it raises becomes the status of the rows that it fails at.
 
     Args:
         task: what is done.
         points: (m, k) one row per run.
 
     Raises:
-        SweepError: what it returned does not fit what it said it would.
+        SweepError: the task returned something else than its outputs.
     """
-    points = np.array(points, dtype=np.float64, order="C")
-    points.setflags(write=False)
+    points = read_only(np.ascontiguousarray(points, dtype=np.float64))
     try:
         returned = task(points)
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a run, the sweep goes on
         if len(points) == 1:
-            return lost(task, Status.FAILED, f"{type(error).__name__}: {error}")
-        return stacked([evaluate(task, points[i : i + 1]) for i in range(len(points))])
+            return failed_row(task, Status.FAILED, f"{type(error).__name__}: {error}")
+        return np.concatenate([evaluate(task, points[i : i + 1]) for i in range(len(points))])
     return _checked(task, returned, len(points))
 
 
-def failures(rows: Rows) -> int:
-    """Return how many of the runs failed."""
-    return int(np.count_nonzero(rows.status != Status.DONE))
+def failed_row(task: Task, status: Status, message: str) -> Rows:
+    """Return the row of a run without results: NaN everywhere."""
+    return _rows(task, dict.fromkeys(task.outputs, np.nan), [status], [_short(message)])
 
 
-def stacked(parts: Sequence[Rows]) -> Rows:
-    """Put rows below one another."""
-    return Rows(
-        values={name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values},
-        status=np.concatenate([part.status for part in parts]),
-        message=tuple(text for part in parts for text in part.message),
-    )
+def _rows(task: Task, values: Mapping[str, Any], status: Sequence[int], messages: Sequence[str]) -> Rows:
+    kinds = [(name, np.float64, shape) for name, shape in _shapes(task).items()]
+    longest = max(1, *map(len, messages))
+    rows = np.empty(len(status), np.dtype([*kinds, ("status", np.int8), ("message", f"U{longest}")]))
+    for name, value in {**values, "status": status, "message": messages}.items():
+        rows[name] = value
+    return rows
 
 
-def lost(task: Task, status: Status, message: str) -> Rows:
-    """Return the row of a run that came to nothing: NaN everywhere."""
-    values = {name: np.full((1, *shape), np.nan) for name, shape in shapes(task).items()}
-    return Rows(values, np.array([status], dtype=np.int8), (_short(message),))
-
-
-def shapes(task: Task) -> dict[str, tuple[int, ...]]:
+def _shapes(task: Task) -> dict[str, tuple[int, ...]]:
     """Return by output the shape of what one run returns."""
     return {name: tuple(len(task.axes[dim].values) for dim in output.dims) for name, output in task.outputs.items()}
 
 
 def _checked(task: Task, returned: Mapping[str, Any], runs: int) -> Rows:
-    """Return what a task returned as rows, if it is what the task said it would be."""
+    """Return the outputs of a task as rows, if they are those that it declares."""
     if not isinstance(returned, Mapping):
         raise SweepError(f"task '{task.name}' returned {shown(returned)}; expected outputs by name")
-    expected = shapes(task)
-    told = {name for name in returned if name != FAILURE}
-    if told != set(expected):
+    names = {name for name in returned if name != FAILURE}
+    if names != set(task.outputs):
         raise SweepError(
-            f"task '{task.name}' returned {', '.join(sorted(told)) or 'nothing'}; it said it would return "
-            f"{', '.join(sorted(expected))}"
+            f"task '{task.name}' returned {', '.join(sorted(names)) or 'nothing'}; its outputs are "
+            f"{', '.join(sorted(task.outputs))}"
         )
     values = {}
-    for name, shape in expected.items():
+    for name, shape in _shapes(task).items():
         try:
-            value = np.array(returned[name], dtype=np.float64)
+            values[name] = np.array(returned[name], dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise SweepError(f"task '{task.name}': output '{name}': expected numbers, got {error}") from error
-        if value.shape != (runs, *shape):
+        if values[name].shape != (runs, *shape):
             raise SweepError(
-                f"task '{task.name}': output '{name}': expected shape {(runs, *shape)}, got {value.shape}; the first "
-                "axis is that of the runs"
+                f"task '{task.name}': output '{name}': expected shape {(runs, *shape)}, got {values[name].shape}; the "
+                "first axis is that of the runs"
             )
-        values[name] = value
-    texts = tuple(_short(str(text)) for text in returned.get(FAILURE, ("",) * runs))
-    if len(texts) != runs:
-        raise SweepError(f"task '{task.name}': '{FAILURE}': expected {runs} texts, one per run, got {len(texts)}")
-    status = np.array([Status.FAILED if text else Status.DONE for text in texts], dtype=np.int8)
-    return Rows(values, status, texts)
+    messages = [_short(str(text)) for text in returned.get(FAILURE, ("",) * runs)]
+    if len(messages) != runs:
+        raise SweepError(f"task '{task.name}': '{FAILURE}': expected {runs} texts, one per run, got {len(messages)}")
+    return _rows(task, values, [Status.FAILED if text else Status.DONE for text in messages], messages)
 
 
 def _short(text: str) -> str:

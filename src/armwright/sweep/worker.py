@@ -19,8 +19,8 @@ from armwright.version import __version__
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
-def settle(alive: Connection) -> None:
-    """Make a process of this machine a worker: one thread of its own, and it ends with who started it.
+def initialize(alive: Connection) -> None:
+    """Prepare a process of this machine: one thread for its work, and it ends with the process that started it.
 
     Args:
         alive: nothing is ever sent over it; it ends when the process that sweeps closes it or dies, even by kill -9.
@@ -29,20 +29,16 @@ def settle(alive: Connection) -> None:
     os.environ.update(_ONE_THREAD)
     if "numba" in sys.modules:  # loaded already, by the script that sweeps
         sys.modules["numba"].set_num_threads(1)
-    threading.Thread(target=_end_with, args=(alive,), daemon=True).start()
+
+    def watch() -> None:
+        wait([alive])
+        os._exit(0)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
-def _end_with(alive: Connection) -> None:
-    wait([alive])
-    os._exit(0)
-
-
-def ready(version: str, payload: bytes) -> None:
-    """Find out whether a worker can do a task at all.
-
-    Raises:
-        SweepError: it has another armwright, or cannot load the task.
-    """
+def check_worker(version: str, payload: bytes) -> None:
+    """Check that a worker can do a task at all; see ``work``."""
     if version != __version__:
         raise SweepError(f"a worker has armwright {__version__}, here it is {version}; results could differ")
     _loaded(payload)
@@ -57,9 +53,10 @@ def work(version: str, payload: bytes, points: Array) -> Rows:
         points: (m, k) one row per run.
 
     Raises:
-        SweepError: this worker has another armwright, cannot load the task, or the task does not do as it says.
+        SweepError: this worker has another armwright, cannot load the task, or the task returned something else than
+            its outputs.
     """
-    ready(version, payload)
+    check_worker(version, payload)
     extra("threadpoolctl").threadpool_limits(1)  # in this process from now on; what was loaded meanwhile too
     return evaluate(_loaded(payload), points)
 

@@ -1,15 +1,15 @@
-"""Who does the work: how much is in work at a time, and on how many threads."""
+"""Executors: how many blocks are at work at a time, and on how many threads."""
 
-from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Collection, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from armwright.sweep.crew import together
 from armwright.sweep.designs import Design
+from armwright.sweep.executors import parallel
 from armwright.sweep.run import run
 from armwright.sweep.task import Rows, evaluate
 from sweep_tasks import Fall, Threads
@@ -19,9 +19,9 @@ pytest.importorskip("distributed")
 
 
 class Threaded:
-    """A crew of three threads."""
+    """An executor of three threads."""
 
-    again = 0
+    died = BrokenExecutor
 
     def __init__(self) -> None:
         self.pool = ThreadPoolExecutor(3)
@@ -31,10 +31,14 @@ class Threaded:
         return 3
 
     def submit(self, points: np.ndarray) -> Future[Rows]:
-        """Begin a piece."""
+        """Begin a block."""
         return self.pool.submit(evaluate, Fall(), points)
 
-    def renew(self) -> None:
+    def wait(self, futures: Collection[Future[Rows]]) -> Collection[Future[Rows]]:
+        """Wait until some are done."""
+        return wait(futures, return_when=FIRST_COMPLETED).done
+
+    def restart(self) -> None:
         """Not asked for: no thread dies."""
         raise AssertionError
 
@@ -43,16 +47,16 @@ def test_few_blocks_at_a_time() -> None:
     """However long a sweep is, no more than two blocks per worker are begun and not yet handed on."""
     begun: list[int] = []
 
-    def pieces() -> Iterator[tuple[int, np.ndarray]]:
+    def blocks() -> Iterator[tuple[int, np.ndarray]]:
         for number in range(500):
             begun.append(number)
             yield number, np.array([[float(number)]])
 
     handed = []
-    for number, rows in together(Threaded(), Fall(), pieces()):
+    for number, rows in parallel(Threaded(), Fall(), blocks()):
         handed.append(number)
         assert len(begun) - len(handed) < 2 * 3
-        assert rows.values["depth"].tolist() == [4.905 - number]
+        assert rows["depth"].tolist() == [4.905 - number]
 
     assert sorted(handed) == list(range(500))
 
