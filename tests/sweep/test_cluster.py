@@ -14,7 +14,7 @@ from armwright.sweep.errors import SweepError
 from armwright.sweep.progress import Progress
 from armwright.sweep.run import run
 from armwright.sweep.task import Status
-from armwright.sweep.worker import check_worker
+from armwright.sweep.worker import work
 from sweep_tasks import Fall, calls_of
 
 pytest.importorskip("xarray")
@@ -161,7 +161,7 @@ def test_cluster_without_workers(speeds: Design, tmp_path: Path, monkeypatch: py
 def test_worker_of_another_version() -> None:
     """A worker with another armwright refuses to work: its bits could differ."""
     with pytest.raises(SweepError, match=r"a worker has armwright .*, here it is 0.0.1; results could differ"):
-        check_worker("0.0.1", b"")
+        work("0.0.1", b"", np.zeros((1, 1)))
 
 
 def test_worker_that_cannot_load_the_task() -> None:
@@ -169,4 +169,4 @@ def test_worker_that_cannot_load_the_task() -> None:
     from armwright.version import __version__
 
     with pytest.raises(SweepError, match=r"a worker cannot load the task: ModuleNotFoundError.*imports? a task from"):
-        check_worker(__version__, b"cno_such_module\nTask\n.")
+        work(__version__, b"cno_such_module\nTask\n.", np.zeros((1, 1)))

@@ -58,7 +58,7 @@ def test_run_that_fits_into_no_row(speeds: Design) -> None:
     """A run of more than 2 GiB is refused before it is begun: 268 500 000 numbers are 2.148 GB."""
     time = np.broadcast_to(0.0, 1000)
     check_task(Fall(samples=1000), speeds.names)
-    many = attrs.evolve(Fall().outputs["height"], dims=("time", "place", "part"))
+    many = attrs.evolve(Fall().outputs["height"], dims=("x", "y", "z"))
 
     class Long(Fall):
         outputs = {"height": many}  # noqa: RUF012

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from armwright.arrays import Array, Flags
+from armwright.arrays import Array, Flags, integer
 from armwright.clearance.features import UNITS, features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path

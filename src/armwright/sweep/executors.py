@@ -7,20 +7,21 @@ died is done again row by row, with nothing else at work, so that the row that k
 import asyncio
 import concurrent.futures
 import multiprocessing
+import os
 import pickle
 from collections.abc import Callable, Collection, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import closing, contextmanager
 from typing import Any
 
 import numpy as np
 
 from armwright.arrays import Array
-from armwright.errors import KindError, shown
+from armwright.errors import ArmwrightError, KindError, shown
 from armwright.sweep.errors import SweepError
 from armwright.sweep.extras import extra
 from armwright.sweep.task import Rows, Status, Task, evaluate, failed_row
-from armwright.sweep.worker import check_worker, initialize, work
+from armwright.sweep.worker import initialize, work
 from armwright.version import __version__
 
 # Time for a Dask cluster to answer, and to have a worker [s].
@@ -95,14 +96,14 @@ class Processes:
     """Worker processes of this machine, each with one thread."""
 
     died = BrokenExecutor
-    """The error of a future, or of submitting, whose worker died."""
+    """The error of submitting, or of a future, whose worker died."""
 
     def __init__(self, task: Task, workers: int) -> None:
         """Start the processes.
 
         Raises:
             KindError: the task cannot be pickled.
-            SweepError: they do not start, or cannot load the task.
+            SweepError: they do not start.
         """
         self._payload = _pickled(task, pickle.dumps)
         self._workers = workers
@@ -115,9 +116,9 @@ class Processes:
             self._workers, mp_context=context, initializer=initialize, initargs=(self._watched,)
         )
         try:
-            self._pool.submit(check_worker, __version__, self._payload).result()
+            self._pool.submit(os.getpid).result()
         except BaseException as error:
-            self.stop()
+            self.close()
             if isinstance(error, BrokenExecutor):
                 raise SweepError(
                     "worker processes do not start. A script that starts a sweep does so below "
@@ -130,65 +131,37 @@ class Processes:
         return self._workers
 
     def submit(self, points: Array) -> Future[Rows]:
-        """Begin a block."""
+        """Begin a block of (m, k) points and return the future of its rows."""
         return self._pool.submit(work, __version__, self._payload, points)
 
     def wait(self, futures: Collection[Future[Rows]]) -> Collection[Future[Rows]]:
         """Wait until some of the futures are done, and return those."""
-        return concurrent.futures.wait(futures, return_when=concurrent.futures.FIRST_COMPLETED).done
+        return concurrent.futures.wait(futures, return_when=FIRST_COMPLETED).done
 
     def restart(self) -> None:
         """Start all processes again: a pool that lost one does no more."""
-        self.stop()
+        self.close()
         self._start()
 
-    def stop(self) -> None:
+    def close(self) -> None:
         """End the processes, in the midst of their work if need be."""
         self._alive.close()
         self._pool.shutdown(cancel_futures=True)
         self._watched.close()
 
 
-@contextmanager
-def processes(task: Task, workers: int) -> Iterator[Processes]:
-    """Have worker processes of this machine; see ``Processes``."""
-    executor = Processes(task, workers)
-    try:
-        yield executor
-    finally:
-        executor.stop()
-
-
 class Cluster:
-    """The workers of a Dask cluster."""
+    """The workers of a Dask cluster, which replaces those that die."""
 
     def __init__(self, client: Any, task: Task) -> None:
-        """Take the client of a cluster.
+        """Use a cluster by its client.
 
         Raises:
             KindError: the task cannot be pickled.
         """
         self._client, self._distributed = client, extra("distributed")
         self._payload = _pickled(task, extra("cloudpickle").dumps)  # workers need not have the script that sweeps
-
-    @property
-    def died(self) -> type[Exception]:
-        """The error of a future whose workers died, more often than the cluster allows."""
-        kind: type[Exception] = self._distributed.KilledWorker
-        return kind
-
-    def check(self) -> None:
-        """Check that a worker can do the task.
-
-        Raises:
-            SweepError: it cannot.
-        """
-        try:
-            self._client.submit(check_worker, __version__, self._payload, pure=False).result()
-        except SweepError:
-            raise
-        except Exception as error:
-            raise SweepError(f"the Dask workers cannot load armwright {__version__}: {shown(error)}") from error
+        self.died: type[Exception] = self._distributed.KilledWorker
 
     def size(self) -> int:
         """Return the number of threads of all workers, which may come and go."""
@@ -196,17 +169,17 @@ class Cluster:
         return max(1, sum(threads.values()))
 
     def submit(self, points: Array) -> Any:
-        """Begin a block."""
+        """Begin a block; see ``Processes.submit``."""
         return self._client.submit(work, __version__, self._payload, points, pure=False)
 
     def wait(self, futures: Collection[Any]) -> Collection[Any]:
         """Wait until some of the futures are done, and return those. Their rows are fetched when they are asked for."""
         with self._client.as_current():
-            done: Collection[Any] = self._distributed.wait(list(futures), return_when="FIRST_COMPLETED").done
+            done: Collection[Any] = self._distributed.wait(list(futures), return_when=FIRST_COMPLETED).done
         return done
 
     def restart(self) -> None:
-        """Do nothing: a cluster replaces its own workers."""
+        """Do nothing: the cluster does."""
 
 
 @contextmanager
@@ -215,8 +188,7 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
 
     Raises:
         KindError: the task cannot be pickled.
-        SweepError: nobody answers at the address, or what answers is no scheduler; it has no worker, or one that cannot
-            do the task; the cluster goes away.
+        SweepError: no scheduler answers at the address, it has no worker, or the cluster cannot go on.
     """
     # The client is closed here whatever happens, also while it is being made. One that is left to the collector is
     # closed by it, in the midst of anything: where that holds the lock that closing takes (another client or a cluster
@@ -225,21 +197,17 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
     _check_scheduler(address)
     # Where the workers are threads of this process, its threads are theirs.
     with closing(kind.__new__(kind)) as client, extra("threadpoolctl").threadpool_limits(1):
+        failure = f"no Dask scheduler answers at '{address}'"
         try:
             client.__init__(address, timeout=PATIENCE, set_as_default=False)
-        except OSError as error:
-            raise SweepError(f"no Dask scheduler answers at '{address}': {shown(error)}") from error
-        try:
+            failure = f"the Dask scheduler at '{address}' has had no worker for {PATIENCE:g} s"
             client.wait_for_workers(1, timeout=PATIENCE)
-        except TimeoutError as error:
-            raise SweepError(f"the Dask scheduler at '{address}' has had no worker for {PATIENCE:g} s") from error
-        executor = Cluster(client, task)
-        executor.check()
-        try:
-            yield executor
-        except (concurrent.futures.CancelledError, asyncio.CancelledError, OSError) as error:
-            text = f"the Dask cluster at '{address}' went away: {shown(error)}; start again to go on"
-            raise SweepError(text) from error
+            failure = f"the Dask cluster at '{address}' cannot go on; finished blocks stay"
+            yield Cluster(client, task)
+        except ArmwrightError:
+            raise
+        except (Exception, asyncio.CancelledError) as error:
+            raise SweepError(f"{failure}: {shown(error)}") from error
 
 
 def _check_scheduler(address: str) -> None:

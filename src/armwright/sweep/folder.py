@@ -50,30 +50,30 @@ def identity(task: Task, design: Design) -> dict[str, Any]:
     Raises:
         KindError: a setting of the task is nothing that JSON holds.
     """
-    plain: dict[str, Any] = {
+    settings = dict(task.settings)
+    for name, value in settings.items():
+        try:
+            settings[name] = json.loads(json.dumps(value, allow_nan=False))
+        except (TypeError, ValueError) as error:
+            raise KindError(f"setting '{name}': expected what JSON holds, got {shown(value)}: {error}") from error
+    return {
         "armwright": __version__,
         "task": task.name,
-        "settings": dict(task.settings),
-        "outputs": {name: [output.dims, output.units, output.description] for name, output in task.outputs.items()},
+        "settings": settings,
+        "outputs": {name: [list(item.dims), item.units, item.description] for name, item in task.outputs.items()},
         "axes": {
-            name: [axis.values.size, axis.units, axis.description, _sha256(axis.values.tobytes()).hex()]
-            for name, axis in task.axes.items()
+            name: [item.values.size, item.units, item.description, _sha256(item.values.tobytes()).hex()]
+            for name, item in task.axes.items()
         },
         "design": {
             "kind": design.kind,
             "runs": len(design),
             "seed": design.seed,
-            "ranges": dict(design.ranges),
-            "parameters": list(design.units.items()),
+            "ranges": {name: list(numbers) for name, numbers in design.ranges.items()},
+            "parameters": [list(parameter) for parameter in design.units.items()],
             "points": _sha256(design.points.tobytes()).hex(),
         },
     }
-    for name, value in plain["settings"].items():
-        try:
-            json.dumps(value, allow_nan=False)
-        except (TypeError, ValueError) as error:
-            raise KindError(f"setting '{name}': expected what JSON holds, got {shown(value)}: {error}") from error
-    return dict(json.loads(json.dumps(plain)))
 
 
 @attrs.frozen(kw_only=True)
@@ -96,10 +96,10 @@ class Folder:
     block: int
     made: Mapping[str, str]
 
-    def blocks(self) -> Iterator[tuple[int, slice]]:
-        """Return the blocks of the whole sweep: their numbers and runs."""
-        for number, start in enumerate(range(0, len(self.design), self.block)):
-            yield number, slice(start, min(start + self.block, len(self.design)))
+    @property
+    def starts(self) -> range:
+        """The first run of each block of the whole sweep."""
+        return range(0, len(self.design), self.block)
 
     def write_block(self, number: int, rows: Rows) -> None:
         """Write a block.
@@ -134,15 +134,10 @@ class Folder:
         return rows
 
     def _damaged(self, number: int, why: str) -> FileFormatError:
-        first = number * self.block
-        last = min(first + self.block, len(self.design)) - 1
-        return FileFormatError(
-            self._file(number),
-            None,
-            "",
-            f"damaged: {why}; it stays as it is; move it away or delete it and start again: only its runs, {first} to "
-            f"{last}, are done again",
-        )
+        runs = range(len(self.design))[number * self.block :][: self.block]
+        advice = "it stays as it is; move it away or delete it and start again"
+        text = f"damaged: {why}; {advice}: only its runs, {runs[0]} to {runs[-1]}, are done again"
+        return FileFormatError(self._file(number), None, "", text)
 
     def _file(self, number: int) -> Path:
         return self.path / _BLOCKS / f"{number:07d}.npy"

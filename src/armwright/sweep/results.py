@@ -97,11 +97,11 @@ def _write(folder: Folder, path: Path) -> None:
 
 def _blocks(folder: Folder) -> Iterator[tuple[int, Rows]]:
     """Read the blocks with the number of the first run of each."""
-    for number, runs in folder.blocks():
+    for number, start in enumerate(folder.starts):
         rows = folder.read_block(number)
         if rows is None:
             raise SweepError(f"'{folder.path}': block {number} has gone just now; start again to go on")
-        yield runs.start, rows
+        yield start, rows
 
 
 def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:

@@ -12,7 +12,7 @@ import numpy as np
 from armwright.arrays import Array, cores, integer
 from armwright.errors import InvalidValueError, KindError
 from armwright.sweep.designs import Design
-from armwright.sweep.executors import cluster, parallel, processes, serial
+from armwright.sweep.executors import Processes, cluster, parallel, serial
 from armwright.sweep.extras import check_extras
 from armwright.sweep.folder import RESULTS, Folder, locked_folder
 from armwright.sweep.progress import Progress
@@ -93,10 +93,10 @@ def _finish(sweep: Folder, workers: int | None, scheduler: str | None, progress:
     began = time.monotonic()
     resumed = failed = 0
     missing = []
-    for number, runs in sweep.blocks():
+    for number, start in enumerate(sweep.starts):
         rows = sweep.read_block(number)
         if rows is None:
-            missing.append((number, sweep.design.points[runs]))
+            missing.append((number, sweep.design.points[start : start + sweep.block]))
         else:
             resumed, failed = resumed + len(rows), failed + int(np.count_nonzero(rows["status"]))
     now = Progress(runs=len(sweep.design), done=resumed, resumed=resumed, failed=failed, seconds=0.0)
@@ -119,5 +119,5 @@ def _evaluated(
     if scheduler is None and workers == 1:
         yield from serial(task, blocks)
         return
-    with processes(task, workers) if scheduler is None else cluster(task, scheduler) as executor:
+    with closing(Processes(task, workers)) if scheduler is None else cluster(task, scheduler) as executor:
         yield from parallel(executor, task, blocks)

@@ -37,13 +37,6 @@ def initialize(alive: Connection) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def check_worker(version: str, payload: bytes) -> None:
-    """Check that a worker can do a task at all; see ``work``."""
-    if version != __version__:
-        raise SweepError(f"a worker has armwright {__version__}, here it is {version}; results could differ")
-    _loaded(payload)
-
-
 def work(version: str, payload: bytes, points: Array) -> Rows:
     """Do a task at some points.
 
@@ -56,9 +49,11 @@ def work(version: str, payload: bytes, points: Array) -> Rows:
         SweepError: this worker has another armwright, cannot load the task, or the task returned something else than
             its outputs.
     """
-    check_worker(version, payload)
+    if version != __version__:
+        raise SweepError(f"a worker has armwright {__version__}, here it is {version}; results could differ")
+    task = _loaded(payload)
     extra("threadpoolctl").threadpool_limits(1)  # in this process from now on; what was loaded meanwhile too
-    return evaluate(_loaded(payload), points)
+    return evaluate(task, points)
 
 
 @lru_cache(maxsize=4)
