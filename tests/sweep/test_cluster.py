@@ -91,6 +91,32 @@ def test_killed_worker(tmp_path: Path) -> None:
         np.testing.assert_allclose(results.depth[:5], 4.905 - np.arange(5.0))
 
 
+def test_cluster_that_goes_away(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the scheduler goes away in the midst of a sweep, nobody waits for it, and finished blocks stay."""
+    monkeypatch.setattr(executors, "PATIENCE", 2.0)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0"
+    ) as cluster:
+
+        def close(now: Progress) -> None:
+            if now.done:
+                cluster.close()
+
+        with pytest.raises(SweepError, match=r"the Dask cluster at 'inproc://.*' cannot go on; finished blocks stay: "):
+            run(
+                Fall(seconds=0.2),
+                speeds,
+                tmp_path / "out",
+                block=8,
+                scheduler=cluster.scheduler_address,
+                progress=close,
+            )
+
+    reports: list[Progress] = []
+    run(Fall(), speeds, tmp_path / "out", workers=1, progress=reports.append)
+    assert reports[0].resumed >= 8
+
+
 def test_nobody_answers(speeds: Design, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no scheduler it is said which address did not answer."""
     monkeypatch.setattr(executors, "PATIENCE", 0.3)

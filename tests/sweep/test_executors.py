@@ -22,6 +22,7 @@ class Threaded:
     """An executor of three threads."""
 
     died = BrokenExecutor
+    attempts = 1
 
     def __init__(self) -> None:
         self.pool = ThreadPoolExecutor(3)

@@ -28,8 +28,6 @@ from armwright.version import __version__
 PATIENCE = 20.0
 # Blocks waiting or at work, per worker: no worker waits, and memory does not grow with the sweep.
 _PER_WORKER = 2
-# Attempts at a row whose worker dies, alone; the sweep goes on without it afterwards.
-_ATTEMPTS = 2
 _KILLED = "the worker process died each time it was tried"
 
 
@@ -82,7 +80,7 @@ def parallel(
 
 def _alone(executor: "Processes | Cluster", task: Task, point: Array) -> Rows:
     """Evaluate a row of a block whose worker died, with nothing else at work."""
-    for _ in range(_ATTEMPTS):
+    for _ in range(executor.attempts):
         try:
             rows: Rows = executor.submit(point).result()
         except executor.died:
@@ -97,6 +95,8 @@ class Processes:
 
     died = BrokenExecutor
     """The error of submitting, or of a future, whose worker died."""
+    attempts = 2
+    """How often a row of a block whose worker died is tried, alone."""
 
     def __init__(self, task: Task, workers: int) -> None:
         """Start the processes.
@@ -153,6 +153,8 @@ class Processes:
 class Cluster:
     """The workers of a Dask cluster, which replaces those that die."""
 
+    attempts = 1  # of the scheduler, each of which means several workers
+
     def __init__(self, client: Any, task: Task) -> None:
         """Use a cluster by its client.
 
@@ -207,7 +209,7 @@ def cluster(task: Task, address: str) -> Iterator[Cluster]:
         except ArmwrightError:
             raise
         except (Exception, asyncio.CancelledError) as error:
-            raise SweepError(f"{failure}: {shown(error)}") from error
+            raise SweepError(f"{failure}: {' '.join(str(error).split()) or shown(error)}") from error
 
 
 def _check_scheduler(address: str) -> None:
