@@ -8,6 +8,7 @@ import pytest
 from scipy.io import netcdf_file
 
 from armwright.errors import InvalidValueError
+from armwright.sweep import results
 from armwright.sweep.designs import Design, full_factorial
 from armwright.sweep.run import run
 from armwright.sweep.task import check_task
@@ -28,10 +29,12 @@ class Complaining(Fall):
         return {**super().__call__(points), "failure": reasons}
 
 
-@pytest.mark.parametrize("block", [1, 3, 11, 50])
+@pytest.mark.parametrize("chunk", [1, 200, 1_000_000])
+@pytest.mark.parametrize("block", [1, 3, 50])
 @pytest.mark.parametrize("length", [1, 2, 3, 4, 5])
-def test_against_scipy(length: int, block: int, tmp_path: Path) -> None:
-    """SciPy reads what was written block by block, however odd the lengths of outputs, texts and blocks are."""
+def test_against_scipy(length: int, block: int, chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """SciPy reads what was written bit by bit, however odd the lengths of outputs, texts and blocks are."""
+    monkeypatch.setattr(results, "_CHUNK", chunk)
     design = full_factorial({"speed": np.arange(11.0)}, units={"speed": "m/s"})
     task = Complaining(samples=length, letters=length)
     run(task, design, tmp_path / "out", block=block, workers=1).close()

@@ -21,6 +21,7 @@ import platform
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,10 @@ class Folder:
     block: int
     made: Mapping[str, str]
 
+    @cached_property
+    def _key(self) -> bytes:
+        return json.dumps(self.sweep, sort_keys=True).encode()
+
     @property
     def starts(self) -> range:
         """The first run of each block of the whole sweep."""
@@ -144,7 +149,7 @@ class Folder:
 
     def _checksum(self, number: int, data: bytes) -> bytes:
         """Return a checksum of a block that no other block, and none of another sweep, has."""
-        return _sha256(json.dumps(self.sweep, sort_keys=True).encode(), f"{number} of {self.block}".encode(), data)
+        return _sha256(self._key, f"{number} of {self.block}".encode(), data)
 
 
 @contextlib.contextmanager

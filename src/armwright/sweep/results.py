@@ -18,6 +18,8 @@ from armwright.sweep.task import Rows, Status
 if TYPE_CHECKING:
     import xarray
 
+# At least so much is written at a time, where there is so much [bytes].
+_CHUNK = 1_000_000
 # Where the header of the file counts the records, with big-endian bytes (NASA ESDS-RFC-011v2.0, 2011).
 _RECORD_COUNT = slice(4, 8)
 
@@ -80,28 +82,33 @@ def write_results(folder: Folder) -> None:
 
 
 def _write(folder: Folder, path: Path) -> None:
-    """Write block after block, so that the results may be larger than the memory.
+    """Write some blocks at a time, so that the results may be larger than the memory.
 
     The runs are the records of the file, which stand one after the other behind its header. So the file is that of the
-    first block, followed by the records of the others, with their number corrected.
+    first blocks, followed by the records of the others, with their number corrected.
     """
-    letters = max(len(text.encode()) for _, rows in _blocks(folder) for text in rows["message"].tolist())
+    letters = max(len(text.encode()) for _, rows in _chunks(folder) for text in rows["message"].tolist())
     with path.open("wb") as file:
         header = 0
-        for start, rows in _blocks(folder):
+        for start, rows in _chunks(folder):
             file.write(_netcdf(folder, start, rows, letters)[header:])
             header = header or len(_netcdf(folder, start, rows[:0], letters))
         file.seek(_RECORD_COUNT.start)
         file.write(len(folder.design).to_bytes(_RECORD_COUNT.stop - _RECORD_COUNT.start, "big"))
 
 
-def _blocks(folder: Folder) -> Iterator[tuple[int, Rows]]:
-    """Read the blocks with the number of the first run of each."""
+def _chunks(folder: Folder) -> Iterator[tuple[int, Rows]]:
+    """Read the blocks, some at a time, with the number of the first run of them."""
+    first, size, blocks = 0, 0, []
     for number, start in enumerate(folder.starts):
         rows = folder.read_block(number)
         if rows is None:
             raise SweepError(f"'{folder.path}': block {number} has gone just now; start again to go on")
-        yield start, rows
+        blocks.append(rows)
+        size += rows.nbytes
+        if size >= _CHUNK or start == folder.starts[-1]:
+            yield first, np.concatenate(blocks)
+            first, size, blocks = start + len(rows), 0, []
 
 
 def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
@@ -118,7 +125,7 @@ def _netcdf(folder: Folder, start: int, rows: Rows, letters: int) -> bytes:
         "flag_values": np.array(list(Status), dtype=np.int8),
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
-    # Every block has texts of the same length, in bytes.
+    # All records have texts of the same length, in bytes.
     messages = np.array([text.encode() for text in rows["message"].tolist()], dtype=f"S{max(letters, 1)}")
     variables: dict[str, Any] = {
         name: (("run", *output.dims), rows[name], {"long_name": output.description, "units": output.units})
