@@ -1,15 +1,12 @@
 """Places in texts, as editors and as programs count them."""
 
-import random
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
-from armwright.program.language.text_edits import Edit, apply_edits
-from armwright.program.language_server.edit_map import NO_DRIFT, drift
+from armwright.program.language.text_edits import Edit, apply_edits, smallest_edit
 
 TEXTS = st.text(st.sampled_from(["a", "b", " ", "\n", "\r", "é", "€", "🤖", "\u2028", "\f"]), max_size=30)
 ENCODINGS = st.sampled_from(["utf-8", "utf-16", "utf-32"])
@@ -45,36 +42,14 @@ def test_places_that_are_not_there(line: int, column: int, offset: int) -> None:
     assert PositionCodec("ab\r\n🤖a").offset(line, column) == offset
 
 
-@given(text=TEXTS, new=TEXTS, data=st.data())
-def test_ruler_of_a_changed_text(text: str, new: str, data: st.DataObject) -> None:
-    """A ruler that has followed a change is the ruler of the changed text."""
-    start = data.draw(st.integers(0, len(text)))
-    end = data.draw(st.integers(start, len(text)))
-    changed = PositionCodec(text).changed(start, end, new)
+@given(before=TEXTS, after=TEXTS)
+def test_smallest_edit(before: str, after: str) -> None:
+    """The change of one stretch makes the one text out of the other, and what it replaces differs at both ends."""
+    edit = smallest_edit(before, after)
+    gone = before[edit.span.start : edit.span.end]
 
-    assert changed.text == text[:start] + new + text[end:]
-    assert changed.starts == PositionCodec(changed.text).starts
-
-
-@given(text=TEXTS, seed=st.integers(0, 1000))
-def test_drift_over_several_changes(text: str, seed: int) -> None:
-    """However often a text changes: what is outside of the drift is the same, and found again."""
-    chance = random.Random(seed)
-    now, change = text, NO_DRIFT
-    for _ in range(4):
-        start = chance.randint(0, len(now))
-        end = chance.randint(start, len(now))
-        new = "x" * chance.randint(0, 3)
-        now = now[:start] + new + now[end:]
-        change = change.then(start, end, len(new))
-
-    for found in (change, drift(text, now)):
-        assert text[: found.start] == now[: found.start]
-        assert text[found.old_end :] == now[found.new_end :]
-        assert found.start <= min(found.old_end, found.new_end)
-        for offset in range(len(now) + 1):
-            before = found.old(offset)
-            assert before is None or found.new(before) == offset or before == found.start
+    assert apply_edits(before, (edit,)) == after
+    assert not gone or not edit.text or (gone[0] != edit.text[0] and gone[-1] != edit.text[-1])
 
 
 def test_edits() -> None:

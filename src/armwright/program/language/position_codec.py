@@ -3,7 +3,6 @@
 import re
 from bisect import bisect_right
 from functools import cached_property
-from itertools import takewhile
 
 import attrs
 
@@ -33,21 +32,6 @@ class PositionCodec:
     def _plain(self) -> bool:
         """Whether every character takes one column."""
         return self.encoding == UTF_32 or self.text.isascii()
-
-    def changed(self, start: int, end: int, new: str) -> "PositionCodec":
-        """Return the ruler of the text with ``new`` in the place of a stretch of it: lines far from that are known."""
-        text = self.text[:start] + new + self.text[end:]
-        ruler = PositionCodec(text, self.encoding)
-        # The two halves of a line end may come together, or apart, at the edges of the change.
-        first = max(0, self.line_of(start) - 1)
-        last = min(self.line_of(end) + 2, len(self.starts))
-        grown = len(text) - len(self.text)
-        low = self.starts[first]
-        high = self.starts[last] + grown if last < len(self.starts) else len(text)
-        between = (match.end() for match in _LINE_END.finditer(text, low))
-        middle = list(takewhile(lambda at: at < high, between)) if last < len(self.starts) else list(between)
-        ruler.__dict__["starts"] = [*self.starts[: first + 1], *middle, *(at + grown for at in self.starts[last:])]
-        return ruler
 
     def line_of(self, offset: int) -> int:
         """Return the line of an offset."""

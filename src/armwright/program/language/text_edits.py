@@ -21,3 +21,12 @@ def apply_edits(text: str, edits: tuple[Edit, ...]) -> str:
             pieces += [text[done : edit.span.start], edit.text]
             done = edit.span.end
     return "".join((*pieces, text[done:]))
+
+
+def smallest_edit(before: str, after: str) -> Edit:
+    """Return the change of one stretch that makes one text out of another."""
+    shorter = min(len(before), len(after))
+    start = next((at for at in range(shorter) if before[at] != after[at]), shorter)
+    rest = shorter - start
+    same = next((at for at in range(rest) if before[-1 - at] != after[-1 - at]), rest)
+    return Edit(Span(start, len(before) - same), after[start : len(after) - same])

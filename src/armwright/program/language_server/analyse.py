@@ -71,7 +71,6 @@ def analyse(name: str, text: str, folder: Path | None, cells: Cells, settings: S
         files.append(around.file)
     whole = _whole(cell, compiled)
     analysis = Analysis(compiled=compiled, cell=whole, frames=_frames(whole, around.file), files=_places(files))
-    analysis.prepare()
     return Analysed(analysis=analysis, problem=around.problem)
 
 

@@ -1,19 +1,26 @@
 """What can be written at a place of a program: words of the language, names of the right kind, whole statements."""
 
 import enum
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import takewhile
 
 import attrs
 
 from armwright.program.language.kinds import VariableKind, VariableType
 from armwright.program.language.names import is_arm
-from armwright.program.language.source import Span
-from armwright.program.language_server.analysis import Before, View
-from armwright.program.language_server.expected import Wanted, wanted
+from armwright.program.language.source import Source, Span
+from armwright.program.language.units import DECLARABLE
+from armwright.program.language.words import CLOSING, SENSORS, VOCABULARIES, Standard
+from armwright.program.language_server.analysis import Analysis, Before, before
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import explained
+from armwright.program.language_server.signature_help import open_call
+from armwright.program.semantics.builtins import AXES, FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
-from armwright.program.semantics.symbols import PREDECLARED
+from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
+from armwright.program.syntax.expected import Expected
+from armwright.program.syntax.lexer import Token, TokenKind
+from armwright.program.syntax.parser import expected
 
 
 class Sort(enum.Enum):
@@ -88,27 +95,167 @@ _SORTS = {
 _TYPES = frozenset((*VariableKind, "ARRAY"))
 
 
-def completions(view: View, offset: int) -> list[Completion]:
-    """Return what can be written at a place, the likeliest first."""
-    if view.in_comment(offset):
+# Ways that exclude each other, for one clause each.
+_EXCLUDES: Mapping[str, frozenset[str]] = {
+    "DIRECTLY": frozenset(("STRAIGHTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
+    "STRAIGHTLY": frozenset(("DIRECTLY", "VIA", "APPROACH", "DEPARTURE", "BLEND")),
+    **dict.fromkeys(("VIA", "APPROACH", "DEPARTURE", "BLEND"), frozenset(("DIRECTLY", "STRAIGHTLY"))),
+    "SPEED": frozenset(("DURATION",)),
+    "DURATION": frozenset(("SPEED",)),
+}
+
+
+@attrs.frozen(kw_only=True)
+class _Operand:
+    """What may stand for a value or a name.
+
+    Attributes:
+        kinds: of variables; an array of elements of the kind may stand there too.
+        arms: whether an arm may.
+        devices: whether a device may.
+        functions: which functions of the language may.
+        words: other words with a meaning at this place.
+    """
+
+    kinds: frozenset[VariableKind] = frozenset()
+    arms: bool = False
+    devices: bool = False
+    functions: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()
+
+
+_STEPS = ("XYZ", "ROTX", "ROTY", "ROTZ", "INV")
+_MEASURES = ("DIST", "FORCE")
+_FRAME, _SCALAR = frozenset((VariableKind.FRAME,)), frozenset((VariableKind.SCALAR,))
+_NOTHING = _Operand()
+_ANYTHING = _Operand(kinds=frozenset(VariableKind) - {VariableKind.EVENT}, arms=True, functions=tuple(FUNCTIONS))
+_NUMBER = _Operand(kinds=_SCALAR, functions=_MEASURES)
+_PLACE = _Operand(kinds=_FRAME, arms=True)
+_TRANS = _Operand(kinds=frozenset((VariableKind.TRANS,)), functions=_STEPS)
+_STEP = _Operand(kinds=frozenset((VariableKind.TRANS, VariableKind.FRAME)), arms=True, functions=_STEPS)
+_EVENT = _Operand(kinds=frozenset((VariableKind.EVENT,)))
+_OF_KIND = {
+    VariableKind.SCALAR: _NUMBER,
+    VariableKind.TRANS: _STEP,
+    VariableKind.FRAME: _PLACE,
+    VariableKind.EVENT: _EVENT,
+}
+# By what the parser calls it in its messages.
+_OPERANDS: Mapping[str, _Operand] = {
+    "a value or a text": _ANYTHING,
+    "a condition": attrs.evolve(_NUMBER, words=("NOT",)),
+    **dict.fromkeys(("a number", "a number of seconds", "a width"), _NUMBER),
+    **dict.fromkeys(("an index", "the name of a SCALAR"), _Operand(kinds=_SCALAR)),
+    **dict.fromkeys(("a place", "the name of a FRAME or an arm"), _PLACE),
+    "a TRANS": _TRANS,
+    "the name of a FRAME": _Operand(kinds=_FRAME),
+    "the name of an EVENT": _EVENT,
+    "the name of a variable": _Operand(kinds=frozenset(VariableKind)),
+    "the name of a device": _Operand(devices=True),
+    "an arm such as ARM_1": _Operand(arms=True),
+    "a sensor": _Operand(words=SENSORS),
+    "a unit": _Operand(words=DECLARABLE),
+}
+# What functions take.
+_TAKEN: Mapping[str, _Operand] = {
+    "FORCE": _Operand(words=AXES),
+    "DIST": _PLACE,
+    "INV": _STEP,
+    **dict.fromkeys(("XYZ", "ROTX", "ROTY", "ROTZ"), _NUMBER),
+}
+
+
+def completions(text: str, analysis: Analysis, offset: int) -> list[Completion]:
+    """Return what can be written at a place, the likeliest first: what the parser would accept there.
+
+    Args:
+        text: the program as it is now.
+        analysis: of the program, or of what it was before, for its names.
+        offset: the place.
+    """
+    compiled = analysis.compiled
+    around = before(text, offset, compiled.standard)
+    if around is None:
         return []
-    before = view.before(offset)
-    compiled = view.analysis.compiled
-    asked = wanted(before, compiled.symbols, compiled.standard)
-    maker = _Maker(view, before)
-    found = [*maker.arms(asked), *maker.names(asked)] if not asked.starts else []
-    found += [*maker.devices(asked), *maker.functions(asked), *maker.words(asked)]
-    if asked.starts:
-        found += [*maker.procedures(asked), *maker.names(asked)]
+    end = Token(TokenKind.END, "", "", around.word.start, around.word.start)
+    source = Source(compiled.source.name, text)
+    asked = expected(source, (*around.tokens, end), compiled.standard, declared=compiled.symbols.types)
+    procedure = asked.procedure if asked.procedure in compiled.symbols.procedures else None
+    maker = _Maker(analysis, around.word, compiled.symbols.scope(procedure))
+    operand = _NOTHING if asked.operand is None else _operand(asked, around.tokens, maker.scope)
+    words = (*operand.words, *_words(asked, around, compiled.standard))
+    if not asked.starts:
+        found = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand), *maker.functions(operand)]
+        return [*found, *maker.words(words)]
+    found = [*maker.words(words, starts=True)]
+    if "MOVE" not in words and "HALT" not in words:
+        return found
+    kinds = frozenset(VariableKind) - {VariableKind.EVENT}
+    return [*found, *maker.procedures(), *maker.names(kinds, starts=True)]
+
+
+def _operand(asked: Expected, tokens: Sequence[Token], scope: Scope) -> _Operand:
+    """Return what may stand for the value or name that is looked for."""
+    assert asked.operand is not None  # noqa: S101 - the caller has looked
+    wants, where = asked.operand
+    found = _OPERANDS.get(wants)
+    call = open_call(tokens)
+    if call is not None and wants not in ("an index", "the name of a FRAME", "an arm such as ARM_1"):
+        found = _argument(*call, scope.symbols)
+    elif where in ("after SPEED =", "after BLEND =", "after DURATION ="):
+        found = _NUMBER
+    elif found is None:
+        kind = scope.type(asked.target)
+        # Behind a comma stands a number of a matrix.
+        found = _NUMBER if tokens[-1].key == "," else _ANYTHING if kind is None else _OF_KIND[kind.kind]
+    if tokens and tokens[-1].key == "*":
+        # Behind `*` stands a step.
+        if VariableKind.FRAME in found.kinds:
+            return _STEP
+        return _TRANS if VariableKind.TRANS in found.kinds else found
     return found
+
+
+def _argument(name: Token, number: int, symbols: Symbols) -> _Operand:
+    procedure = symbols.procedures.get(name.key)
+    if procedure is None:
+        return _TAKEN.get(name.key, _NOTHING)
+    if number >= len(procedure.parameters):
+        return _NOTHING
+    kind = procedure.types.get(procedure.parameters[number])
+    return _ANYTHING if kind is None else _OF_KIND[kind.kind]
+
+
+def _words(asked: Expected, around: Before, std: Standard) -> Iterator[str]:
+    """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
+    vocabulary = VOCABULARIES[std]
+    clauses = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *VOCABULARIES[Standard.RLO_2].with_clauses))
+    given = asked.given | {token.key for token in takewhile(lambda one: not _ends(one), around.behind)}
+    # What ends a stretch of statements is not offered behind each of them, unless it is being written.
+    unasked = frozenset() if asked.starts or around.word.start < around.word.end else frozenset(CLOSING | {"RECOVER"})
+    for word in dict.fromkeys(asked.words):
+        last = word.rpartition(" ")[2]
+        # The action of ON is over in front of the place, or behind it.
+        excluded = last in clauses and (
+            last in given or _EXCLUDES[last] & given or (last == "BLEND" and "VIA" not in given)
+        )
+        if last in vocabulary.reserved - unasked and not excluded and (word != "RETRY" or asked.recovering):
+            yield word
+
+
+def _ends(token: Token) -> bool:
+    return token.key == ";" or (token.kind is TokenKind.KEYWORD and token.key in _STOPS)
+
+
+_STOPS = frozenset((*VOCABULARIES[Standard.RLO_2].closing, *VOCABULARIES[Standard.RLO_2].statements))
 
 
 class _Maker:
     """Makes completions for one place."""
 
-    def __init__(self, view: View, before: Before) -> None:
-        self._analysis, self._span, self._scope = view.analysis, before.word, before.scope
-        self._lower = view.analysis.lower
+    def __init__(self, analysis: Analysis, span: Span, scope: Scope) -> None:
+        self.scope = scope
+        self._analysis, self._span, self._lower = analysis, span, analysis.lower
 
     def _one(self, label: str, sort: Sort, text: str = "", detail: str = "", documentation: str = "") -> Completion:
         return Completion(
@@ -125,9 +272,9 @@ class _Maker:
         """Return words of the language as this program writes them; what is to be filled in stays."""
         return text.lower() if self._lower else text
 
-    def words(self, asked: Wanted) -> Iterator[Completion]:
-        """Give words of the language, and statements that begin with them."""
-        for word in (*asked.words, *asked.fixed):
+    def words(self, words: Iterable[str], *, starts: bool = False) -> Iterator[Completion]:
+        """Give words of the language and, where a statement starts, statements that begin with them."""
+        for word in words:
             last = word.rpartition(" ")[2]
             meaning = explained(last, "MOVE")
             form, text = (meaning.form, meaning.text) if meaning else ("", "")
@@ -135,7 +282,7 @@ class _Maker:
             written = (f"WITH {written}" if word != last else written) if written else ""
             sort = Sort.TYPE if word in _TYPES else Sort.WORD
             yield self._one(self._cased(word), sort, self._snippet(written) or self._cased(word), form, text)
-            if asked.starts:
+            if starts:
                 for label, snippet in _SNIPPETS.get(word, ()):
                     yield self._one(self._cased(label), Sort.SNIPPET, self._snippet(snippet), form, text)
 
@@ -145,17 +292,17 @@ class _Maker:
         # A choice of types is a choice of words; names to be filled in are lower case anyway.
         return text.lower()
 
-    def names(self, asked: Wanted) -> Iterator[Completion]:
+    def names(self, kinds: frozenset[VariableKind], *, starts: bool = False) -> Iterator[Completion]:
         """Give the variables that can be seen and are of the right kind."""
-        symbols, local = self._scope.symbols, self._scope.procedure
+        symbols, local = self.scope.symbols, self.scope.procedure
         own = {} if local is None else local.types
         others = [(key, kind) for key, kind in symbols.types.items() if key not in own]
         # What the program declares comes before what there is without it.
         others.sort(key=lambda one: one[0] not in symbols.declared)
         for key, kind in (*own.items(), *others):
-            if kind is None or kind.kind not in asked.kinds or (asked.starts and key == WORLD):
+            if kind is None or kind.kind not in kinds or (starts and key == WORLD):
                 continue
-            declared = self._scope.declared(key)
+            declared = self.scope.declared(key)
             name = declared.text if declared else self._cased(key)
             where = "predeclared" if declared is None and key in PREDECLARED else "imported" if declared is None else ""
             where = f"of {local.node.name.text}" if local is not None and key in own else where
@@ -164,11 +311,11 @@ class _Maker:
 
     def _place(self, key: str, kind: VariableType) -> str:
         frames = self._analysis.frames
-        if kind != VariableType(VariableKind.FRAME) or frames is None or key not in frames or self._scope.is_local(key):
+        if kind != VariableType(VariableKind.FRAME) or frames is None or key not in frames or self.scope.is_local(key):
             return ""
         return f"hangs on {frames.parent(key)} in the cell"
 
-    def arms(self, asked: Wanted) -> Iterator[Completion]:
+    def arms(self, asked: _Operand) -> Iterator[Completion]:
         """Give the arms of the cell, or those of the program where there is none."""
         if not asked.arms:
             return
@@ -181,23 +328,22 @@ class _Maker:
         for name in sorted(used | {"ARM_1"}):
             yield self._one(name, Sort.ARM, "", "arm")
 
-    def devices(self, asked: Wanted) -> Iterator[Completion]:
+    def devices(self, asked: _Operand) -> Iterator[Completion]:
         """Give the devices of the cell."""
         if asked.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):
                 yield self._one(self._cased(name), Sort.DEVICE, "", "device")
 
-    def functions(self, asked: Wanted) -> Iterator[Completion]:
+    def functions(self, asked: _Operand) -> Iterator[Completion]:
         """Give functions of the language."""
         for name in asked.functions:
             meaning = explained(name)
             form, text = (meaning.form, meaning.text) if meaning else ("", "")
             yield self._one(self._cased(name), Sort.FUNCTION, f"{self._cased(name)}($1)", form, text)
 
-    def procedures(self, asked: Wanted) -> Iterator[Completion]:
+    def procedures(self) -> Iterator[Completion]:
         """Give the procedures of the program."""
-        if asked.procedures:
-            for procedure in self._scope.symbols.procedures.values():
-                name = procedure.node.name.text
-                text = f"{name}($1) ;" if procedure.parameters else f"{name}() ;"
-                yield self._one(name, Sort.PROCEDURE, text, signature(procedure.node)[0])
+        for procedure in self.scope.symbols.procedures.values():
+            name = procedure.node.name.text
+            text = f"{name}($1) ;" if procedure.parameters else f"{name}() ;"
+            yield self._one(name, Sort.PROCEDURE, text, signature(procedure.node)[0])

@@ -6,17 +6,16 @@ from lsprotocol import types as lsp
 
 from armwright.errors import ArmwrightError
 from armwright.program.formatter.partial import formatted_around
-from armwright.program.language.source import Source, Span
-from armwright.program.language.text_edits import Edit
+from armwright.program.language.source import Source
+from armwright.program.language.text_edits import smallest_edit
 from armwright.program.language_server import lsp_types
 from armwright.program.language_server.code_actions import all_fixes, quickfixes
 from armwright.program.language_server.completions import completions
-from armwright.program.language_server.edit_map import drift
 from armwright.program.language_server.hover import hover
 from armwright.program.language_server.inlay_hints import hints
 from armwright.program.language_server.outline import folds, outline
 from armwright.program.language_server.rename import nameable, rename
-from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS, Stretch, difference, encoded, patched
+from armwright.program.language_server.semantic_tokens import KINDS, MODIFIERS, Stretch, difference, encoded
 from armwright.program.language_server.server import RloServer, refusal
 from armwright.program.language_server.signature_help import signature_at
 from armwright.program.language_server.symbol_index import Occurrence
@@ -44,29 +43,27 @@ def _at_a_place(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_HOVER)
     async def on_hover(params: lsp.HoverParams) -> lsp.Hover | None:
         document = server.document(params.text_document.uri)
-        known, view = await document.known()
-        place = view.old(lsp_types.offset_of(document.ruler, params.position))
-        found = None if place is None else hover(known.analysis, place)
-        span = None if found is None else view.span(found.span)
-        if found is None or span is None:
+        found = hover(await document.analysis(), lsp_types.offset_of(document.codec, params.position))
+        if found is None:
             return None
         markdown = lsp.MarkupKind.Markdown in (server.can("text_document", "hover", "content_format") or ())
-        return lsp_types.hover(found, document.ruler, span, markdown=markdown)
+        return lsp_types.hover(found, document.codec, markdown=markdown)
 
     @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "(", "=", ","]))
     async def on_completion(params: lsp.CompletionParams) -> lsp.CompletionList:
         document = server.document(params.text_document.uri)
-        _, view = await document.known()
-        found = completions(view, lsp_types.offset_of(document.ruler, params.position))
+        # Names may be those from before the last words, which are read anew in any case.
+        analysis = document.last or await document.analysis()
+        found = completions(document.text, analysis, lsp_types.offset_of(document.codec, params.position))
         snippets = bool(server.can("text_document", "completion", "completion_item", "snippet_support"))
-        return lsp_types.completion(found, document.ruler, snippets=snippets)
+        return lsp_types.completion(found, document.codec, snippets=snippets)
 
     @server.feature(lsp.TEXT_DOCUMENT_SIGNATURE_HELP, lsp.SignatureHelpOptions(trigger_characters=["(", ","]))
     async def on_signature(params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
         document = server.document(params.text_document.uri)
-        _, view = await document.known()
-        found = signature_at(view, lsp_types.offset_of(document.ruler, params.position))
-        return None if found is None else lsp_types.signature(found, server.office.encoding)
+        analysis = document.last or await document.analysis()
+        found = signature_at(document.text, analysis, lsp_types.offset_of(document.codec, params.position))
+        return None if found is None else lsp_types.signature(found, server.encoding)
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------
@@ -76,29 +73,25 @@ def _of_names(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_DEFINITION)
     async def on_definition(params: lsp.DefinitionParams) -> lsp.Location | None:
         document = server.document(params.text_document.uri)
-        known, view = await document.known()
-        place = view.old(lsp_types.offset_of(document.ruler, params.position))
-        one = None if place is None else known.analysis.at(place)
+        analysis = await document.analysis()
+        one = analysis.at(lsp_types.offset_of(document.codec, params.position))
         if one is None:
             return None
-        declared = known.analysis.declaration(one)
+        declared = analysis.declaration(one)
         if declared is not None:
-            span = view.span(declared.span)
-            return None if span is None else lsp.Location(document.uri, lsp_types.span_range(document.ruler, span))
-        if one.key not in known.analysis.files:
+            return lsp.Location(document.uri, lsp_types.span_range(document.codec, declared.span))
+        if one.key not in analysis.files:
             return None
-        uri, line = known.analysis.files[one.key]
+        uri, line = analysis.files[one.key]
         start = lsp.Position(line - 1, 0)
         return lsp.Location(uri, lsp.Range(start, start))
 
     async def same(uri: str, position: lsp.Position) -> list[tuple[Occurrence, lsp.Range]]:
         document = server.document(uri)
-        known, view = await document.known()
-        place = view.old(lsp_types.offset_of(document.ruler, position))
-        one = None if place is None else known.analysis.at(place)
-        others = () if one is None else known.analysis.same(one)
-        spans = ((other, view.span(other.span)) for other in others)
-        return [(other, lsp_types.span_range(document.ruler, span)) for other, span in spans if span is not None]
+        analysis = await document.analysis()
+        one = analysis.at(lsp_types.offset_of(document.codec, position))
+        others = () if one is None else analysis.same(one)
+        return [(other, lsp_types.span_range(document.codec, other.span)) for other in others]
 
     @server.feature(lsp.TEXT_DOCUMENT_REFERENCES)
     async def on_references(params: lsp.ReferenceParams) -> list[lsp.Location]:
@@ -119,25 +112,23 @@ def _renames(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_PREPARE_RENAME)
     async def on_prepare_rename(params: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder:
         document = server.document(params.text_document.uri)
-        known, _ = await document.known(exact=True)
+        analysis = await document.analysis()
         try:
-            one = nameable(known.analysis, lsp_types.offset_of(document.ruler, params.position))
+            one = nameable(analysis, lsp_types.offset_of(document.codec, params.position))
         except ArmwrightError as error:
             raise refusal(str(error)) from error
-        where = lsp_types.span_range(document.ruler, one.span)
+        where = lsp_types.span_range(document.codec, one.span)
         return lsp.PrepareRenamePlaceholder(where, document.text[one.start : one.end])
 
     @server.feature(lsp.TEXT_DOCUMENT_RENAME, lsp.RenameOptions(prepare_provider=True))
     async def on_rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit:
         document = server.document(params.text_document.uri)
-        known, _ = await document.known(exact=True)
+        analysis = await document.analysis()
         try:
-            edits = rename(
-                known.analysis, lsp_types.offset_of(document.ruler, params.position), params.new_name.strip()
-            )
+            edits = rename(analysis, lsp_types.offset_of(document.codec, params.position), params.new_name.strip())
         except ArmwrightError as error:
             raise refusal(str(error)) from error
-        return lsp.WorkspaceEdit(changes={document.uri: lsp_types.text_edits(document.ruler, edits)})
+        return lsp.WorkspaceEdit(changes={document.uri: lsp_types.text_edits(document.codec, edits)})
 
 
 # ---- changes -------------------------------------------------------------------------------------------------------
@@ -149,8 +140,8 @@ def _changes(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=kinds))
     async def on_code_action(params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
         document = server.document(params.text_document.uri)
-        known, _ = await document.known(exact=True)
-        ruler, uri = document.ruler, document.uri
+        analysis = await document.analysis()
+        codec, uri = document.codec, document.uri
         actions: list[lsp.CodeAction] = []
 
         def wanted(kind: str) -> bool:
@@ -159,20 +150,20 @@ def _changes(server: RloServer) -> None:
 
         if wanted(_word(lsp.CodeActionKind.QuickFix)):
             told = {(one.code, _place(one.range)): one for one in params.context.diagnostics}
-            for one in quickfixes(known.analysis, lsp_types.span_of(ruler, params.range)):
-                diagnostic = told.get((one.diagnostic.code, _place(lsp_types.span_range(ruler, one.diagnostic.span))))
+            for one in quickfixes(analysis, lsp_types.span_of(codec, params.range)):
+                diagnostic = told.get((one.diagnostic.code, _place(lsp_types.span_range(codec, one.diagnostic.span))))
                 actions.append(
                     lsp.CodeAction(
                         title=one.title,
                         kind=lsp.CodeActionKind.QuickFix,
                         diagnostics=None if diagnostic is None else [diagnostic],
                         is_preferred=bool(one.diagnostic.fixes),
-                        edit=lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(ruler, one.edits)}),
+                        edit=lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(codec, one.edits)}),
                     )
                 )
-        every = all_fixes(known.analysis.compiled.diagnostics)
+        every = all_fixes(analysis.compiled.diagnostics)
         if every and wanted(_FIX_ALL_HERE):
-            edit = lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(ruler, every)})
+            edit = lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(codec, every)})
             actions.append(lsp.CodeAction(title="fix all that is certain", kind=_FIX_ALL_HERE, edit=edit))
         return actions
 
@@ -181,16 +172,12 @@ def _changes(server: RloServer) -> None:
         document = server.document(params.text_document.uri)
         before = document.text
         try:
-            after = formatted_around(Source(document.name, before), std=server.office.settings.std)
+            after = formatted_around(Source(document.name, before), std=server.settings.std)
         except ArmwrightError as error:
             raise refusal(str(error)) from error
         if "\r\n" in before:
             after = after.replace("\n", "\r\n")
-        change = drift(before, after)
-        if change.none:
-            return []
-        edit = Edit(Span(change.start, change.old_end), after[change.start : change.new_end])
-        return lsp_types.text_edits(document.ruler, (edit,))
+        return [] if after == before else lsp_types.text_edits(document.codec, (smallest_edit(before, after),))
 
 
 def _word(kind: lsp.CodeActionKind | str) -> str:
@@ -208,26 +195,18 @@ def _of_the_whole(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
     async def on_symbols(params: lsp.DocumentSymbolParams) -> list[lsp.DocumentSymbol]:
         document = server.document(params.text_document.uri)
-        known, view = await document.known()
-        return lsp_types.symbols(outline(known.analysis), view, document.ruler)
+        return lsp_types.symbols(outline(await document.analysis()), document.codec)
 
     @server.feature(lsp.TEXT_DOCUMENT_FOLDING_RANGE)
     async def on_folding(params: lsp.FoldingRangeParams) -> list[lsp.FoldingRange]:
-        document = server.document(params.text_document.uri)
-        known, view = await document.known()
-        return lsp_types.folding(folds(known.analysis), len(document.ruler.starts) - 1) if view.fresh else []
+        return lsp_types.folding(folds(await server.document(params.text_document.uri).analysis()))
 
     @server.feature(lsp.TEXT_DOCUMENT_INLAY_HINT)
     async def on_hints(params: lsp.InlayHintParams) -> list[lsp.InlayHint]:
         document = server.document(params.text_document.uri)
-        known, view = await document.known()
-        if not view.fresh:
-            server.guessed()
-        asked = lsp_types.span_of(document.ruler, params.range)
-        start, end = view.old(asked.start), view.old(asked.end)
-        # A place that was not there before stands for the change it lies in.
-        old = Span(view.drift.start if start is None else start, view.drift.old_end if end is None else end)
-        return lsp_types.inlay_hints(hints(known.analysis, old), view, document.ruler)
+        analysis = await document.analysis()
+        found = hints(analysis, lsp_types.span_of(document.codec, params.range))
+        return lsp_types.inlay_hints(found, document.codec)
 
 
 # ---- colours -------------------------------------------------------------------------------------------------------
@@ -236,12 +215,6 @@ def _of_the_whole(server: RloServer) -> None:
 def _colours(server: RloServer) -> None:
     sent: dict[str, tuple[str, Sequence[list[Stretch]]]] = {}
     number = iter(range(1, 1 << 60))
-
-    async def stretches(uri: str) -> Sequence[list[Stretch]]:
-        known, view = await server.document(uri).known()
-        if not view.fresh:
-            server.guessed()
-        return patched(view, known.stretches, server.office.encoding)
 
     def keep(uri: str, lines: Sequence[list[Stretch]]) -> str:
         for closed in set(sent) - set(server.documents):
@@ -252,13 +225,13 @@ def _colours(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, _LEGEND)
     async def on_full(params: lsp.SemanticTokensParams) -> lsp.SemanticTokens:
         uri = params.text_document.uri
-        lines = await stretches(uri)
+        lines = await server.document(uri).stretches()
         return lsp.SemanticTokens(encoded(lines), keep(uri, lines))
 
     @server.feature(lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL_DELTA, _LEGEND)
     async def on_delta(params: lsp.SemanticTokensDeltaParams) -> lsp.SemanticTokens | lsp.SemanticTokensDelta:
         uri = params.text_document.uri
-        lines = await stretches(uri)
+        lines = await server.document(uri).stretches()
         before, old = sent.get(uri, ("", ()))
         result = keep(uri, lines)
         if before != params.previous_result_id:
@@ -270,4 +243,4 @@ def _colours(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_RANGE, _LEGEND)
     async def on_range(params: lsp.SemanticTokensRangeParams) -> lsp.SemanticTokens:
         first, last = params.range.start.line, params.range.end.line
-        return lsp.SemanticTokens(encoded(await stretches(params.text_document.uri), first, last))
+        return lsp.SemanticTokens(encoded(await server.document(params.text_document.uri).stretches(), first, last))

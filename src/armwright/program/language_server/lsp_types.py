@@ -8,7 +8,7 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import Edit
-from armwright.program.language_server.analysis import Analysis, View
+from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.completions import Completion, Sort
 from armwright.program.language_server.hover import Hover
 from armwright.program.language_server.inlay_hints import Hint
@@ -37,53 +37,53 @@ _SYMBOLS = {
 }
 
 
-def span_range(ruler: PositionCodec, span: Span) -> lsp.Range:
+def span_range(codec: PositionCodec, span: Span) -> lsp.Range:
     """Return a stretch of text as lines and columns."""
-    start, end = ruler.place(span.start), ruler.place(span.end)
+    start, end = codec.place(span.start), codec.place(span.end)
     return lsp.Range(lsp.Position(*start), lsp.Position(*end))
 
 
-def offset_of(ruler: PositionCodec, position: lsp.Position) -> int:
+def offset_of(codec: PositionCodec, position: lsp.Position) -> int:
     """Return the offset of a place."""
-    return ruler.offset(position.line, position.character)
+    return codec.offset(position.line, position.character)
 
 
-def span_of(ruler: PositionCodec, asked: lsp.Range) -> Span:
+def span_of(codec: PositionCodec, asked: lsp.Range) -> Span:
     """Return the stretch of text between two places."""
-    start = offset_of(ruler, asked.start)
-    return Span(start, max(start, offset_of(ruler, asked.end)))
+    start = offset_of(codec, asked.start)
+    return Span(start, max(start, offset_of(codec, asked.end)))
 
 
-def text_edits(ruler: PositionCodec, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
+def text_edits(codec: PositionCodec, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
     """Return changes of a text."""
-    return [lsp.TextEdit(span_range(ruler, edit.span), edit.text) for edit in edits]
+    return [lsp.TextEdit(span_range(codec, edit.span), edit.text) for edit in edits]
 
 
 # ---- what is wrong -------------------------------------------------------------------------------------------------
 
 
-def diagnostics(analysis: Analysis, ruler: PositionCodec, uri: str, *, related: bool) -> list[lsp.Diagnostic]:
+def diagnostics(analysis: Analysis, codec: PositionCodec, uri: str, *, related: bool) -> list[lsp.Diagnostic]:
     """Return what is wrong with a program.
 
     Args:
         analysis: of the program.
-        ruler: of its text.
+        codec: of its text.
         uri: of its document.
         related: whether the editor shows other places beside the first.
     """
-    return [_diagnostic(one, ruler, uri, related=related) for one in analysis.compiled.diagnostics]
+    return [_diagnostic(one, codec, uri, related=related) for one in analysis.compiled.diagnostics]
 
 
-def _diagnostic(one: Diagnostic, ruler: PositionCodec, uri: str, *, related: bool) -> lsp.Diagnostic:
+def _diagnostic(one: Diagnostic, codec: PositionCodec, uri: str, *, related: bool) -> lsp.Diagnostic:
     severity = lsp.DiagnosticSeverity.Error if one.is_error else lsp.DiagnosticSeverity.Warning
     if one.code.startswith("L"):
         severity = lsp.DiagnosticSeverity.Information
     places = [
-        lsp.DiagnosticRelatedInformation(lsp.Location(uri, span_range(ruler, label.span)), label.text)
+        lsp.DiagnosticRelatedInformation(lsp.Location(uri, span_range(codec, label.span)), label.text)
         for label in one.secondary
     ]
     return lsp.Diagnostic(
-        range=span_range(ruler, one.span),
+        range=span_range(codec, one.span),
         message=message_of(one),
         severity=severity,
         code=one.code,
@@ -102,7 +102,7 @@ def message_of(one: Diagnostic) -> str:
 # ---- at a place ----------------------------------------------------------------------------------------------------
 
 
-def hover(found: Hover, ruler: PositionCodec, span: Span, *, markdown: bool) -> lsp.Hover:
+def hover(found: Hover, codec: PositionCodec, *, markdown: bool) -> lsp.Hover:
     """Return what there is to say about a stretch of text."""
     if markdown:
         code = f"```rlo\n{found.code}\n```"
@@ -111,10 +111,10 @@ def hover(found: Hover, ruler: PositionCodec, span: Span, *, markdown: bool) -> 
     else:
         text = "\n".join((found.code, *found.lines)).replace("`", "")
         content = lsp.MarkupContent(lsp.MarkupKind.PlainText, text)
-    return lsp.Hover(content, span_range(ruler, span))
+    return lsp.Hover(content, span_range(codec, found.span))
 
 
-def completion(found: Sequence[Completion], ruler: PositionCodec, *, snippets: bool) -> lsp.CompletionList:
+def completion(found: Sequence[Completion], codec: PositionCodec, *, snippets: bool) -> lsp.CompletionList:
     """Return what can be written; whole statements only for an editor that leads from gap to gap."""
     items = []
     for number, one in enumerate(found):
@@ -131,7 +131,7 @@ def completion(found: Sequence[Completion], ruler: PositionCodec, *, snippets: b
                 insert_text_format=lsp.InsertTextFormat.Snippet
                 if one.snippet and snippets
                 else lsp.InsertTextFormat.PlainText,
-                text_edit=lsp.TextEdit(span_range(ruler, one.span), text),
+                text_edit=lsp.TextEdit(span_range(codec, one.span), text),
             )
         )
     return lsp.CompletionList(is_incomplete=False, items=items)
@@ -139,9 +139,9 @@ def completion(found: Sequence[Completion], ruler: PositionCodec, *, snippets: b
 
 def signature(found: Signature, encoding: str) -> lsp.SignatureHelp:
     """Return what a call takes."""
-    ruler = PositionCodec(found.label, encoding)
+    codec = PositionCodec(found.label, encoding)
     parameters = [
-        lsp.ParameterInformation((ruler.width(0, start), ruler.width(0, end))) for start, end in found.parameters
+        lsp.ParameterInformation((codec.width(0, start), codec.width(0, end))) for start, end in found.parameters
     ]
     one = lsp.SignatureInformation(
         label=found.label,
@@ -155,49 +155,39 @@ def signature(found: Signature, encoding: str) -> lsp.SignatureHelp:
 # ---- of the whole --------------------------------------------------------------------------------------------------
 
 
-def inlay_hints(found: Iterable[Hint], view: View, ruler: PositionCodec) -> list[lsp.InlayHint]:
+def inlay_hints(found: Iterable[Hint], codec: PositionCodec) -> list[lsp.InlayHint]:
     """Return words between the words of a program."""
-    hints = []
-    for one in found:
-        place = view.span(Span(one.place, one.place))
-        if place is not None:
-            kind = lsp.InlayHintKind.Parameter if one.parameter else lsp.InlayHintKind.Type
-            hints.append(
-                lsp.InlayHint(
-                    position=lsp.Position(*ruler.place(place.start)),
-                    label=one.text,
-                    kind=kind,
-                    tooltip=one.tooltip,
-                    padding_left=not one.parameter,
-                    padding_right=one.parameter,
-                )
-            )
-    return hints
+    return [
+        lsp.InlayHint(
+            position=lsp.Position(*codec.place(one.place)),
+            label=one.text,
+            kind=lsp.InlayHintKind.Parameter if one.parameter else lsp.InlayHintKind.Type,
+            tooltip=one.tooltip,
+            padding_left=not one.parameter,
+            padding_right=one.parameter,
+        )
+        for one in found
+    ]
 
 
-def symbols(entries: Iterable[Entry], view: View, ruler: PositionCodec) -> list[lsp.DocumentSymbol]:
+def symbols(entries: Iterable[Entry], codec: PositionCodec) -> list[lsp.DocumentSymbol]:
     """Return what a program declares."""
-    found = []
-    for entry in entries:
-        span, place = view.span(entry.span), view.span(entry.place)
-        if span is not None and place is not None:
-            found.append(
-                lsp.DocumentSymbol(
-                    name=entry.name or "?",
-                    kind=_SYMBOLS[entry.part],
-                    range=span_range(ruler, span),
-                    selection_range=span_range(ruler, place),
-                    detail=entry.detail or None,
-                    children=symbols(entry.inside, view, ruler) or None,
-                )
-            )
-    return found
+    return [
+        lsp.DocumentSymbol(
+            name=entry.name or "?",
+            kind=_SYMBOLS[entry.part],
+            range=span_range(codec, entry.span),
+            selection_range=span_range(codec, entry.place),
+            detail=entry.detail or None,
+            children=symbols(entry.inside, codec) or None,
+        )
+        for entry in entries
+    ]
 
 
-def folding(folds: Iterable[Fold], last: int) -> list[lsp.FoldingRange]:
-    """Return what can be folded away in a text of ``last`` + 1 lines."""
+def folding(folds: Iterable[Fold]) -> list[lsp.FoldingRange]:
+    """Return what can be folded away."""
     return [
         lsp.FoldingRange(fold.first - 1, fold.last - 1, kind=lsp.FoldingRangeKind.Comment if fold.comment else None)
         for fold in folds
-        if fold.last - 1 <= last
     ]

@@ -1,17 +1,15 @@
-"""Colours by meaning: what each word of a program is, line by line, so that a change touches its lines alone."""
+"""Colours by meaning: what each word of a program is, line by line, so that only lines that differ are sent again."""
 
 from collections.abc import Sequence
 
 from armwright.program.language.kinds import VariableKind
 from armwright.program.language.position_codec import PositionCodec
-from armwright.program.language.source import Source, Span
+from armwright.program.language.source import Span
 from armwright.program.language.units import UNITS
 from armwright.program.language.words import LATER_TYPES, TYPES
-from armwright.program.language_server.analysis import Analysis, View
-from armwright.program.language_server.edit_map import EditMap
-from armwright.program.language_server.symbol_index import Occurrence, What, occurrences
-from armwright.program.syntax.lexer import Token, TokenKind, scan
-from armwright.program.syntax.line_numbers import without_numbers
+from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.symbol_index import Occurrence, What
+from armwright.program.syntax.lexer import Token, TokenKind
 
 KINDS = (
     *("keyword", "type", "variable", "parameter", "event", "function"),
@@ -54,78 +52,9 @@ def line_stretches(analysis: Analysis, encoding: str) -> list[list[Stretch]]:
     return lines
 
 
-def patched(view: View, known: Sequence[list[Stretch]], encoding: str) -> Sequence[list[Stretch]]:
-    """Return the stretches of a text that has changed: the lines that have are read anew, the others are known.
-
-    A comment that was opened or closed shows its effect on other lines when all is worked out again.
-    """
-    if view.fresh:
-        return known
-    change = _whole_line_ends(view)
-    old, new = PositionCodec(view.analysis.text, encoding), PositionCodec(view.text, encoding)
-    first, last = new.line_of(change.start), new.line_of(change.new_end)
-    above, below = known[: old.line_of(change.start)], known[old.line_of(change.old_end) + 1 :]
-    start, end = new.starts[first], new.line_end(last)
-    if _in_comment(view, change, old):
-        lengths = (new.width(new.starts[line], new.line_end(line)) for line in range(first, last + 1))
-        return (*above, *([(0, length, _COMMENT, 0)] for length in lengths), *below)
-    text = view.text[start:end]
-    blanked, _ = without_numbers(Source("", text)) if _numbered(view.text) else (text, [])
-    scanned = scan(Source("", text), blanked, view.analysis.compiled.standard)
-    names = occurrences(scanned.tokens, view.analysis.extents, place=view.old(start) or change.start)
-    lines: list[list[Stretch]] = [[] for _ in range(first, last + 1)]
-    _put(lines, _Part(new, start, first), scanned.tokens, names, view.analysis)
-    for comment in scanned.comments:
-        _put_comment(lines, _Part(new, start, first), comment)
-    for line in lines:
-        line.sort()
-    return (*above, *lines, *below)
-
-
-def _whole_line_ends(view: View) -> EditMap:
-    """Return what has changed, with the other half of a line end that the change begins or ends in."""
-    change, text = view.drift, view.text
-    halved = text[change.start - 1 : change.start] == "\r"
-    more = text[change.new_end : change.new_end + 1] == "\n"
-    return EditMap(change.start - halved, change.old_end + more, change.new_end + more)
-
-
-def _in_comment(view: View, change: EditMap, old: PositionCodec) -> bool:
-    """Whether the lines that have changed lie in one comment, which goes on above and below them."""
-    start = old.starts[old.line_of(change.start)]
-    end = old.line_end(old.line_of(change.old_end))
-    if "}" in view.text[change.start : change.new_end]:
-        return False
-    return any(comment.start < start and end < comment.end for comment in view.analysis.compiled.comments)
-
-
-class _Part:
-    """A ruler for some lines of a text: offsets and lines count from their start."""
-
-    def __init__(self, whole: PositionCodec, start: int, line: int) -> None:
-        self._whole, self._start, self._line = whole, start, line
-
-    def place(self, offset: int) -> tuple[int, int]:
-        line, column = self._whole.place(offset + self._start)
-        return line - self._line, column
-
-    def line_of(self, offset: int) -> int:
-        return self._whole.line_of(offset + self._start) - self._line
-
-    def line_end(self, line: int) -> int:
-        return self._whole.line_end(line + self._line) - self._start
-
-    def width(self, start: int, end: int) -> int:
-        return self._whole.width(start + self._start, end + self._start)
-
-
-def _numbered(text: str) -> bool:
-    return text[:200].lstrip("\ufeff \t\r\n")[:1].isdigit()
-
-
 def _put(
     lines: list[list[Stretch]],
-    ruler: "PositionCodec | _Part",
+    ruler: PositionCodec,
     tokens: Sequence[Token],
     names: Sequence[Occurrence],
     analysis: Analysis,
@@ -181,7 +110,7 @@ def _named(one: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
     return KINDS.index(word), bits
 
 
-def _put_comment(lines: list[list[Stretch]], ruler: "PositionCodec | _Part", comment: Span) -> None:
+def _put_comment(lines: list[list[Stretch]], ruler: PositionCodec, comment: Span) -> None:
     """Add a comment to each of its lines."""
     start = comment.start
     for line in range(ruler.line_of(comment.start), ruler.line_of(comment.end) + 1):

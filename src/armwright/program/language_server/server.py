@@ -17,23 +17,22 @@ from armwright.errors import InvalidValueError
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.words import Standard
 from armwright.program.language_server import lsp_types
-from armwright.program.language_server.analyse import Settings
+from armwright.program.language_server.analyse import Settings, analyse
 from armwright.program.language_server.analysis import Analysis
-from armwright.program.language_server.documents import Changed, Document, Known, Office
+from armwright.program.language_server.cell_lookup import Cells
+from armwright.program.language_server.documents import Changed, Document
 from armwright.program.language_server.message_limits import Incoming
 from armwright.version import __version__
 
 SECTION = "armwright"
 # What the protocol calls a request that cannot be granted.
 _REQUEST_FAILED = -32803
-# How long the thread that looks at programs may keep others waiting [s].
-_TURN = 5e-4
 # Columns are counted so where the editor says nothing.
 _USUAL = "utf-16"
 
 
 class _Protocol(LanguageServerProtocol):
-    """The protocol without a second copy of the texts, whose lines would end elsewhere than those of the language."""
+    """The protocol without pygls' copy of the texts, whose lines end at form feeds and U+2028 too."""
 
     @lsp_method(lsp.TEXT_DOCUMENT_DID_CHANGE)
     def lsp_text_document__did_change(self, params: lsp.DidChangeTextDocumentParams) -> Any:
@@ -60,13 +59,14 @@ class RloServer(LanguageServer):
         """Wait for an editor."""
         super().__init__("armwright", __version__, protocol_cls=_Protocol)
         self.documents: dict[str, Document] = {}
-        self.office = Office(_USUAL, self._said, self._found_out, self._failed)
+        self.settings = Settings()
+        self.encoding = _USUAL
+        self.cells = Cells()
         self._left = False
         self._told = ""
-        self._guessed = False
 
     def shutdown(self) -> None:
-        """End at once: what is being read or looked at is for nobody any more, and is not waited for."""
+        """End at once: what is being read is for nobody any more, and is not waited for."""
         if self._stop_event is not None:
             self._stop_event.set()
 
@@ -102,38 +102,39 @@ class RloServer(LanguageServer):
             raise refusal(f"{uri} is not open") from None
 
     def outdate(self) -> None:
-        """Look at all documents again: what they depend on has changed."""
+        """Take the analyses of all documents for old: what they depend on has changed."""
         for document in self.documents.values():
             document.outdate()
 
-    def guessed(self) -> None:
-        """Take note that an answer was given of an earlier text: the editor shall ask again."""
-        self._guessed = True
+    def saved(self, uri: str) -> None:
+        """Analyse a document that has been saved; others may depend on what has been saved beside it."""
+        self.outdate()
+        if uri in self.documents:
+            self.documents[uri].analyse()
 
-    def _said(self, analysis: Analysis, ruler: PositionCodec, uri: str) -> list[lsp.Diagnostic]:
+    def analyse(self, document: Document) -> Analysis:
+        """Analyse a document as it is now, and tell the editor what is wrong with it."""
+        folder = None if document.path is None else document.path.parent
+        problem = ""
+        try:
+            done = analyse(document.name, document.text, folder, self.cells, self.settings)
+            analysis, problem = done.analysis, done.problem
+        except Exception as error:  # noqa: BLE001 - a conversation goes on, whatever happens in it
+            text = f"armwright: this should not happen: {type(error).__name__}: {error}"
+            self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Error, text))
+            # Of a program without words nothing is known, and nothing is wrong with what is known.
+            return analyse(document.name, "", None, self.cells, Settings()).analysis
+        if self.documents.get(document.uri, document) is not document:
+            return analysis
         related = bool(self.can("text_document", "publish_diagnostics", "related_information"))
-        return lsp_types.diagnostics(analysis, ruler, uri, related=related)
-
-    def _found_out(self, document: Document, known: Known) -> None:
+        said = lsp_types.diagnostics(analysis, document.codec, document.uri, related=related)
         self.text_document_publish_diagnostics(
-            lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=known.said, version=document.version)
+            lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=said, version=document.version)
         )
-        if known.problem and known.problem != self._told:
-            self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {known.problem}"))
-        self._told = known.problem
-        if self._guessed:
-            self._guessed = False
-            self._ask_again()
-
-    def _ask_again(self) -> None:
-        if self.can("workspace", "semantic_tokens", "refresh_support"):
-            self.workspace_semantic_tokens_refresh(None)
-        if self.can("workspace", "inlay_hint", "refresh_support"):
-            self.workspace_inlay_hint_refresh(None)
-
-    def _failed(self, error: Exception) -> None:
-        text = f"armwright: this should not happen: {type(error).__name__}: {error}"
-        self.window_log_message(lsp.LogMessageParams(lsp.MessageType.Error, text))
+        if problem and problem != self._told:
+            self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {problem}"))
+        self._told = problem
+        return analysis
 
     # ---- settings
 
@@ -147,8 +148,8 @@ class RloServer(LanguageServer):
             std=Standard(std) if std in set(Standard) else Standard.RLO_2,
             strict=values.get("strict") is True,
         )
-        if settings != self.office.settings:
-            self.office.settings = settings
+        if settings != self.settings:
+            self.settings = settings
             self.outdate()
 
     def _path(self, text: str) -> Path:
@@ -191,13 +192,11 @@ def serve() -> int:
     """Talk to an editor over standard input and output until it says goodbye.
 
     Returns:
-        The exit status. Threads may be at work still, for nobody.
+        The exit status. The thread that reads may be at work still, for nobody.
 
     Raises:
         InvalidValueError: it sent a message that is larger than the limit; the connection is over.
     """
-    # Questions are answered while a program is looked at beside them: they get their turn soon.
-    sys.setswitchinterval(_TURN)
     incoming = Incoming(sys.stdin.buffer)
     # Of its own: the protocol closes it at its end, and whatever else is printed must not get into it.
     outgoing = os.fdopen(os.dup(1), "wb")
@@ -215,7 +214,7 @@ def _conversation(server: RloServer) -> None:
     @server.feature(lsp.INITIALIZE)
     def initialize(params: lsp.InitializeParams) -> None:
         encoding = server.workspace.position_encoding or _USUAL
-        server.office.encoding = encoding.value if isinstance(encoding, lsp.PositionEncodingKind) else encoding
+        server.encoding = encoding.value if isinstance(encoding, lsp.PositionEncodingKind) else encoding
         server.take_settings(params.initialization_options)
 
     @server.feature(lsp.INITIALIZED)
@@ -230,7 +229,11 @@ def _conversation(server: RloServer) -> None:
         if (before := server.documents.get(item.uri)) is not None:
             before.close()
         server.documents[item.uri] = Document(
-            server.office, item.uri, None if path is None else Path(path), item.text, item.version
+            item.uri,
+            None if path is None else Path(path),
+            PositionCodec(item.text, server.encoding),
+            item.version,
+            server.analyse,
         )
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
@@ -240,8 +243,8 @@ def _conversation(server: RloServer) -> None:
             document.change([_changed(one) for one in params.content_changes], params.text_document.version)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
-    def did_save(_: lsp.DidSaveTextDocumentParams) -> None:
-        server.outdate()
+    def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
+        server.saved(params.text_document.uri)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
     def did_close(params: lsp.DidCloseTextDocumentParams) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import attrs
 
-from armwright.program.language_server.analysis import View
+from armwright.program.language_server.analysis import Analysis, before
 from armwright.program.language_server.hover import signature
 from armwright.program.language_server.keyword_docs import explained
 from armwright.program.semantics.builtins import FUNCTIONS
@@ -37,14 +37,20 @@ class Signature:
     text: str = ""
 
 
-def signature_at(view: View, offset: int) -> Signature | None:
-    """Return what the call takes whose arguments are being written at a place; None where there is none."""
-    before = view.before(offset)
-    found = open_call(before.tokens)
+def signature_at(text: str, analysis: Analysis, offset: int) -> Signature | None:
+    """Return what the call takes whose arguments are being written at a place; None where there is none.
+
+    Args:
+        text: the program as it is now.
+        analysis: of the program, or of what it was before.
+        offset: the place.
+    """
+    around = before(text, offset, analysis.compiled.standard)
+    found = None if around is None else open_call(around.tokens)
     if found is None:
         return None
     name, active = found
-    procedure = view.analysis.compiled.symbols.procedures.get(name.key)
+    procedure = analysis.compiled.symbols.procedures.get(name.key)
     if procedure is not None:
         return _of_procedure(procedure.node, active)
     word = explained(name.key) if name.key in FUNCTIONS else None

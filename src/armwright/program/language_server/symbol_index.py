@@ -106,13 +106,12 @@ def extents_of(symbols: Symbols) -> Extents:
     )
 
 
-def occurrences(tokens: Sequence[Token], extents: Extents, *, place: int | None = None) -> tuple[Occurrence, ...]:
+def occurrences(tokens: Sequence[Token], extents: Extents) -> tuple[Occurrence, ...]:
     """Return the names among some tokens.
 
     Args:
         tokens: in order.
         extents: where the procedures stand.
-        place: where all of the tokens are taken to be; each where it stands when left out.
     """
     found: list[Occurrence] = []
     in_units = in_read = False
@@ -123,8 +122,7 @@ def occurrences(tokens: Sequence[Token], extents: Extents, *, place: int | None 
         kind, key = token.kind, token.key
         if kind is _NAME or kind is _ARM:
             if not start <= token.start < end:
-                here = token.start if place is None else place
-                scope, start, end = _seen_from(extents, here, token)
+                scope, start, end = _seen_from(extents, token.start)
             follows = tokens[at + 1].key if at + 1 < len(tokens) else ""
             if kind is _ARM:
                 found.append(Occurrence(token.start, token.end, key, What.ARM))
@@ -144,13 +142,13 @@ def occurrences(tokens: Sequence[Token], extents: Extents, *, place: int | None 
     return tuple(found)
 
 
-def _seen_from(extents: Extents, here: int, token: Token) -> tuple[Scope, int, int]:
+def _seen_from(extents: Extents, here: int) -> tuple[Scope, int, int]:
     """Return the names seen from a place, and the stretch of text that sees the same."""
     at = bisect_right(extents.starts, here) - 1
     if at >= 0 and here < extents.ends[at]:
         return extents.symbols.scope(extents.keys[at]), extents.starts[at], extents.ends[at]
     following = extents.starts[at + 1] if at + 1 < len(extents.starts) else here + (1 << 40)
-    return Scope(symbols=extents.symbols), token.start, following
+    return Scope(symbols=extents.symbols), here, following
 
 
 def _name(token: Token, scope: Scope, before: str, follows: str, *, in_units: bool) -> Occurrence:

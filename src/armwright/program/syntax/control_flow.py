@@ -50,7 +50,9 @@ def part(tokens: Tokens, wants: str, where: str, *ends: str) -> tree.Expression:
     start, depth = tokens.now, tokens.depth
     try:
         found = expression(tokens, wants, where)
-        while wants is _CONDITION and _misspelt_joint(tokens):
+        if wants == _CONDITION:
+            tokens.offer("AND", "OR")
+        while wants == _CONDITION and _misspelt_joint(tokens):
             sign = tokens.take()
             right = expression(tokens, wants, "")
             found = tree.Binary(tokens.since(start), sign.key, found, right)
@@ -214,6 +216,7 @@ def for_(tokens: Tokens) -> tree.For:
 def _counter(tokens: Tokens) -> tree.Name | tree.Poison:
     """Read the variable of FOR."""
     token = tokens.now
+    tokens.want("the name of a SCALAR", "after FOR")
     if token.kind is TokenKind.NAME and tokens.ahead().key != "[":
         tokens.take()
         return tree.Name(token.span, token.text, token.key)
@@ -236,6 +239,7 @@ def cobegin(tokens: Tokens) -> tree.Cobegin:
     found: list[tree.Branch] = []
     depth, level = tokens.depth, len(tokens.waiting)
     tokens.waiting.append(("COEND", "PRIORITY"))
+    tokens.offer("BEGIN", "PRIORITY", "COEND", starts=True)
     while not (tokens.done or tokens.sees("COEND", "UNTIL", "RECOVER")):
         at = tokens.at
         if tokens.sees("END") and not _needless_end(tokens):
@@ -243,6 +247,8 @@ def cobegin(tokens: Tokens) -> tree.Cobegin:
         try:
             found.append(_branch(tokens))
             _between(tokens)
+            if tokens.before.key == ";":
+                tokens.offer("BEGIN", "PRIORITY", "COEND", starts=True)
         except TooDeepError:
             raise
         except LostError:
@@ -274,6 +280,7 @@ def _branch(tokens: Tokens) -> tree.Branch:
         tokens.expect(":", "after the priority", statement=True)
     else:
         head = start.span
+    tokens.offer("BEGIN", starts=True)
     body = block(tokens) if tokens.sees("BEGIN") else _bare(tokens)
     return tree.Branch(tokens.since(start), head, priority, body)
 
@@ -349,7 +356,11 @@ def try_(tokens: Tokens) -> tree.Try:
     recovery: tuple[tree.Statement, ...] = ()
     recover, end = close(tokens, "RECOVER", start), None
     if recover:
-        recovery = statements(tokens, "END")
+        tokens.recovering += 1
+        try:
+            recovery = statements(tokens, "END")
+        finally:
+            tokens.recovering -= 1
         end = close(tokens, "END", start)
     elif tokens.sees("END") and tokens.ahead().key != ".":
         tokens.take()

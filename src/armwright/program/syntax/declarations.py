@@ -140,6 +140,7 @@ def type_name(tokens: Tokens) -> tree.TypeName:
         LostError: there is none.
     """
     start = tokens.now
+    tokens.offer(*tokens.words.types)
     sizes = _sizes(tokens) if tokens.accept("ARRAY") else ()
     token = tokens.now
     types, offered = tokens.words.types, tokens.offered.types

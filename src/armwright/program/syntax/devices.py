@@ -28,6 +28,7 @@ def grasp(tokens: Tokens) -> tree.Grasp:
     """Read one GRASP."""
     start = tokens.take()
     kind = tokens.now.kind
+    tokens.want(_ARM, "after GRASP")
     arm = None
     near = kind is TokenKind.ARM or (kind is TokenKind.NAME and tokens.same_line())
     if near and not _starts_another(tokens):
@@ -56,6 +57,7 @@ def read(tokens: Tokens) -> tree.ReadVisions | tree.ReadSystem:
     """Read one READ."""
     start = tokens.take()
     word = tokens.now
+    tokens.want("a sensor", "after READ")
     sensor = word.key if tokens.sees_word(*SENSORS) else None
     if sensor is None and word.kind is TokenKind.NAME:
         sensor = closest(word.text, SENSORS)

@@ -48,7 +48,9 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
     Raises:
         LostError: there is none, or it is too deep.
     """
-    start = tokens.now
+    start, outer = tokens.now, tokens.asked
+    if wants != "a value" or where not in ("", "here"):
+        tokens.asked = wants, where
     left = _unary(tokens, wants, where, lowest)
     last = 0
     while (strength := _STRENGTH.get(tokens.now.key, 0)) >= lowest or (tokens.now.key in FOREIGN and _foreign(tokens)):
@@ -74,6 +76,7 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
             left = tree.Binary(tokens.since(start), "AND", left, right)
         else:
             left = tree.Binary(tokens.since(start), sign.key, left, right)
+    tokens.asked = outer
     return left
 
 
@@ -110,6 +113,7 @@ def _unary(tokens: Tokens, wants: str, where: str, lowest: int) -> tree.Expressi
     if token.key == "(":
         return _parenthesised(tokens)
     if token.key not in ("-", "+", "NOT"):
+        tokens.want(*tokens.asked)
         return _no_value(tokens, wants, where)
     misplaced = token.key == "NOT" and lowest > _NOT
     if misplaced:
@@ -206,6 +210,7 @@ def mobile(tokens: Tokens, wants: str, where: str) -> tree.Mobile:
 def _lvalue(tokens: Tokens, wants: str, where: str) -> tree.Variable:
     token = tokens.now
     if token.kind is not _NAME:
+        tokens.want(wants, where)
         return _no_value(tokens, wants, where)
     tokens.take()
     name = tree.Name(Span(token.start, token.end), token.text, token.key)
@@ -302,6 +307,7 @@ def _unparenthesised(
     """Read a list without its opening parenthesis; say so once."""
     closing = _CLOSING[opening]
     gap = tokens.gap()
+    tokens.guess()
     items = [item(tokens, wants, where)]
     while tokens.now.key == "," and tokens.ahead().kind in _OPERANDS:
         tokens.take()

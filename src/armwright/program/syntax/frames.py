@@ -20,6 +20,7 @@ def assign(tokens: Tokens) -> tree.Assign:
     else:
         written = tokens.source.slice(tokens.since(token))
         equals(tokens, f"`{written}`", written)
+    tokens.target = token.key
     value = expression(tokens, "a value", "")
     return tree.Assign(tokens.since(token), target, value)
 
@@ -70,6 +71,7 @@ def unfix(tokens: Tokens) -> tree.Unfix:
     """Read one UNFIX."""
     start = tokens.take()
     child = mobile(tokens, _FRAME, "after UNFIX")
+    tokens.offer("FROM")
     over = tokens.done or tokens.now.key in (";", *tokens.words.closing)
     if over or (tokens.now.key != "FROM" and (tokens.now.kind is TokenKind.KEYWORD or not tokens.same_line())):
         return tree.Unfix(tokens.since(start), child, None)

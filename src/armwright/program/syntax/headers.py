@@ -23,6 +23,7 @@ def head(tokens: Tokens) -> list[tree.Header]:
     found: list[tree.Header] = []
     while True:
         _semicolons(tokens)
+        tokens.offer(*tokens.words.headers, "BEGIN", starts=True)
         token, after = tokens.now, tokens.ahead()
         if token.kind is TokenKind.KEYWORD and token.key in tokens.words.headers:
             found += header(tokens)
@@ -130,10 +131,12 @@ def _import(tokens: Tokens) -> list[tree.Header]:
 # units = "UNITS" unitname { "," unitname } ";" ;
 def _units(tokens: Tokens) -> list[tree.Header]:
     start = tokens.take()
+    tokens.want("a unit")
     units = [_unit(tokens)]
     while tokens.now.key == "," or (tokens.now.kind is TokenKind.NAME and tokens.ahead().key in (",", ";")):
         if not tokens.accept(","):
             tokens.insert(",", "between two units")
+        tokens.want("a unit")
         units.append(_unit(tokens))
     span = tokens.since(start)
     _semicolon(tokens, "after the units")
@@ -158,13 +161,15 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
     above = tokens.since(start)
     _no_result(tokens)
     _semicolon(tokens, "after the head of the procedure")
+    tokens.offer("VAR", "BEGIN", starts=True)
     own = var_part(tokens) if tokens.sees("VAR") else []
     while tokens.sees("VAR"):
         again = tokens.now
         fix = Fix(again.span, "")
         tokens.found.say("E118", "a procedure has one VAR part", again.span, "leave the word out", fixes=(fix,))
         own += var_part(tokens)
-    body = _body(tokens, above)
+    tokens.offer("BEGIN", starts=True)
+    body = _body(tokens, above, name)
     found = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
     if tokens.sees("END") and tokens.ahead().key != ".":
         tokens.say_once("E127", "`END` without BEGIN", tokens.now.span, "the procedure has ended before")
@@ -255,7 +260,7 @@ def _another(tokens: Tokens) -> bool:
     return False
 
 
-def _body(tokens: Tokens, above: Span) -> tree.Block:
+def _body(tokens: Tokens, above: Span, name: tree.Name) -> tree.Block:
     """Read the statements of a procedure, also where BEGIN or END is missing."""
     token = tokens.now
     if token.kind is TokenKind.NAME and token.key not in tokens.declared and closest(token.text, ("BEGIN",)):
@@ -267,9 +272,9 @@ def _body(tokens: Tokens, above: Span) -> tree.Block:
         tokens.say_once("E115", "the procedure has no BEGIN", gap, "expected `BEGIN` here", fixes=fixes)
         if not fixes:
             return tree.Block(gap, (), gap)
-    tokens.in_procedure = True
+    tokens.in_procedure = name.key or "?"
     found = block(tokens)
-    tokens.in_procedure = False
+    tokens.in_procedure = ""
     return _without_main(tokens, above, found)
 
 

@@ -16,6 +16,7 @@ from armwright.program.syntax.statement_list import nested
 from armwright.program.syntax.token_stream import Tokens, shown
 
 _ACTIONS = (tree.Block, tree.Assign, tree.Call, tree.Halt, tree.Signal, tree.Print, tree.Poison)
+_ACTION_WORDS = ("HALT", "SIGNAL", "PRINT", "BEGIN")
 _VALUES: dict[str, Callable[[Span, tree.Expression], tree.Clause]] = {
     "APPROACH": tree.Approach,
     "DEPARTURE": tree.Departure,
@@ -35,13 +36,21 @@ def move(tokens: Tokens) -> tree.Move:
     clauses: list[tree.Clause] = []
     while tokens.now.key != ";":
         comma = tokens.accept(",")
+        if tokens.done:
+            words = (f"WITH {word}" for word in tokens.words.with_clauses)
+            tokens.offer(*tokens.words.plain_clauses, *words, given=_words(clauses))
         if not _starts_clause(tokens):
             if comma:
                 tokens.lost("expected a clause after `,`", f"found {shown(tokens.now)}")
             break
-        if (clause := _clause(tokens)) is not None:
+        if (clause := _clause(tokens, clauses)) is not None:
             clauses.append(clause)
     return tree.Move(tokens.since(start), moved, goal, tuple(clauses))
+
+
+def _words(clauses: list[tree.Clause]) -> frozenset[str]:
+    """Return the words by which clauses begin, behind WITH."""
+    return frozenset(type(one).__name__.upper() for one in clauses)
 
 
 def _starts_clause(tokens: Tokens) -> bool:
@@ -66,8 +75,8 @@ def _starts_clause(tokens: Tokens) -> bool:
 #        | "VIA" "(" expr { "," expr } ")"
 #        | "WITH" ( "APPROACH" | "DEPARTURE" | "SPEED" | "BLEND" | "DURATION" ) "=" expr
 #        | "ON" expr "DO" action ;
-def _clause(tokens: Tokens) -> tree.Clause | None:
-    """Read one clause; None when it has been reported and passed over."""
+def _clause(tokens: Tokens, others: list[tree.Clause]) -> tree.Clause | None:
+    """Read one clause behind others; None when it has been reported and passed over."""
     token = tokens.now
     if token.kind is TokenKind.NAME:
         if not _meant(tokens, token):
@@ -79,6 +88,7 @@ def _clause(tokens: Tokens) -> tree.Clause | None:
         return _guard(tokens)
     tokens.take()
     if key == "WITH":
+        tokens.offer(*tokens.words.with_clauses, given=_words(others))
         return _with(tokens, token)
     if key in tokens.words.with_clauses:
         gap = Span(token.start, token.start)
@@ -179,7 +189,7 @@ def _guard(tokens: Tokens) -> tree.On:
     head = tokens.since(start)
     tokens.expect("DO", "after the condition", statement=True)
     word = tokens.now
-    action = nested(tokens, "DO")
+    action = nested(tokens, "DO", *_ACTION_WORDS)
     if not isinstance(action, _ACTIONS):
         opening, closing = Span(word.start, word.start), tokens.gap()
         certain = not isinstance(action, tree.Move) or not action.clauses

@@ -10,6 +10,7 @@ from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.syntax import control_flow, devices, frames, output, rlo83, tree
+from armwright.program.syntax.expected import Expected
 from armwright.program.syntax.headers import head, late
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.move import move
@@ -77,6 +78,20 @@ def parse(
     return found, [*torn, *slips]
 
 
+def expected(
+    source: Source, tokens: Sequence[Token], standard: Standard = Standard.RLO_2, *, declared: Collection[str] = ()
+) -> Expected:
+    """Return what may stand behind the last token of a text; the arguments are those of ``parse``."""
+    tokens, _ = joined(source, tokens, declared)
+    if standard is Standard.RLO_83:
+        tokens = rlo83.reserve(tokens, {*declared, *declared_names(tokens)})
+    cursor = Tokens(source, tokens, _RULES, standard)
+    cursor.expected = Expected()
+    cursor.declared.update(declared)
+    program(cursor)
+    return cursor.expected
+
+
 # program = { header } block "." ;
 # block   = "BEGIN" statements "END" ;
 def program(tokens: Tokens) -> tree.Program:
@@ -90,6 +105,8 @@ def program(tokens: Tokens) -> tree.Program:
             found += _statements(tokens)
     elif not tokens.silent:
         begun = tokens.before.key == "BEGIN"
+        if begun:
+            tokens.offer(*tokens.words.statements, "END", starts=True)
         at = tokens.gap() if headers or begun else Span(0, 0)
         text = "the program has no statements" if headers else "there is no program here"
         text, expected = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")

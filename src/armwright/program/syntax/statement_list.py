@@ -9,10 +9,11 @@ from armwright.program.language.source import Span
 from armwright.program.language.words import ABSENT, CLOSING, ELSEWHERE, OPENING
 from armwright.program.syntax import tree
 from armwright.program.syntax.lexer import Token, TokenKind
-from armwright.program.syntax.token_stream import DEEPEST, LostError, Tokens, TooDeepError, shown
+from armwright.program.syntax.token_stream import ANY_VALUE, DEEPEST, LostError, Tokens, TooDeepError, shown
 
 _Read = TypeVar("_Read")
 _NAME, _KEYWORD, _ARM, _NUMBER = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.ARM, TokenKind.NUMBER
+_BEFORE_STATEMENTS = frozenset((";", "BEGIN", "TRY", "RECOVER", "REPEAT"))
 # What stands behind a name that is given a value.
 ASSIGNING = ("=", ":=", "==")
 # What opens the stretch that a word ends, for one that ends none.
@@ -36,6 +37,8 @@ def statements(tokens: Tokens, *closing: str) -> tuple[tree.Statement, ...]:
     while True:
         while tokens.now.key == ";":
             tokens.take()
+        starts = tokens.before.key in _BEFORE_STATEMENTS
+        tokens.offer(*(tokens.words.statements if starts else ()), *closing, starts=starts)
         if tokens.done or _ends_here(tokens):
             break
         if _ends_nothing(tokens):
@@ -71,7 +74,7 @@ def _ends_here(tokens: Tokens) -> bool:
     if token.key in tokens.words.closing:
         return token.key == "END" or any(token.key in words for words in tokens.waiting)
     # A procedure cannot hold another, so its own END is missing.
-    return tokens.in_procedure and token.key in tokens.words.headers and token.key != "VAR"
+    return bool(tokens.in_procedure) and token.key in tokens.words.headers and token.key != "VAR"
 
 
 def _ends_nothing(tokens: Tokens) -> bool:
@@ -120,6 +123,7 @@ def statement(tokens: Tokens) -> tree.Statement:
         LostError: there is none.
     """
     token = tokens.now
+    tokens.asked, tokens.target = ANY_VALUE, ""
     if token.kind is _KEYWORD and token.key in tokens.rules:
         if tokens.ahead().key in ASSIGNING:
             return _reserved(tokens)
@@ -207,9 +211,16 @@ def _value_missing(tokens: Tokens) -> NoReturn:
     tokens.lost(f"`{name}` needs `=` and a value", "a name alone is no statement", code="E109", helps=helps)
 
 
-def nested(tokens: Tokens, behind: str) -> tree.Statement:
-    """Read the one statement behind a word such as THEN; one that makes no sense is passed over."""
+def nested(tokens: Tokens, behind: str, *words: str) -> tree.Statement:
+    """Read the one statement behind a word such as THEN; one that makes no sense is passed over.
+
+    Args:
+        tokens: behind the word.
+        behind: the word.
+        words: those that the statement may begin with; all without them.
+    """
     token = tokens.now
+    tokens.offer(*(words or tokens.words.statements), starts=True)
     if tokens.done or token.key == ";" or (token.kind is _KEYWORD and token.key in tokens.words.closing):
         gap = tokens.gap()
         tokens.say_once("E111", f"expected a statement after {behind}", gap, "expected a statement here")

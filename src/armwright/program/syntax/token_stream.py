@@ -9,10 +9,14 @@ from armwright.program.language.diagnostic import Findings, Fix, Label
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard, is_later
 from armwright.program.syntax import tree
+from armwright.program.syntax.expected import Expected
 from armwright.program.syntax.lexer import Token, TokenKind
 
 # How deep statements, parentheses and operations may lie in one another.
 DEEPEST = 100
+
+# What an expression is for where nothing more is known.
+ANY_VALUE = ("a value", "")
 
 _NAME, _KEYWORD, _SYMBOL, _END = TokenKind.NAME, TokenKind.KEYWORD, TokenKind.SYMBOL, TokenKind.END
 
@@ -48,7 +52,11 @@ class Tokens:
         declared: the names declared so far.
         procedures: the names of the procedures read so far.
         missed: the words whose absence has been reported.
-        in_procedure: whether the place lies in one.
+        in_procedure: the key of the procedure that the place lies in; empty outside of all.
+        recovering: how many TRYs the place lies in the second part of.
+        target: the key of the variable that the statement gives a value; empty where it gives none.
+        asked: what the expression is for that is being read, in the words of messages, and where.
+        expected: what may stand at the end of the text, where somebody asks for that.
         spare: how many ENDs have been reported that close nothing but the program.
     """
 
@@ -76,7 +84,12 @@ class Tokens:
         self.declared: set[str] = set()
         self.procedures: set[str] = set()
         self.missed: set[str] = set()
-        self.in_procedure = False
+        self.in_procedure = self.target = ""
+        self.recovering = 0
+        self.asked = ANY_VALUE
+        self.expected: Expected | None = None
+        # How much was wrong in front of the last token; what is looked for after a mistake there is guessed.
+        self._wrong_before = 0
         self.spare = 0
         self._refused: set[str] = set()
         self._silent = -1
@@ -102,6 +115,8 @@ class Tokens:
             self.at += 1
             self.before = token
             self.now = self.tokens[self.at]
+            if self.at == self._last - 1:
+                self._wrong_before = len(self.found)
         return token
 
     def back(self, at: int) -> None:
@@ -129,11 +144,39 @@ class Tokens:
         token = self.now
         if token.key in keys and (token.kind is _SYMBOL or token.kind is _KEYWORD):
             return self.take()
+        if token.kind is _END:
+            self.offer(*keys)
         return None
 
-    def accept_word(self, *keys: str) -> Token | None:
-        """Read the next token if it is a name that reads so."""
-        return self.take() if self.sees_word(*keys) else None
+    def offer(self, *keys: str, starts: bool = False, given: frozenset[str] = frozenset()) -> None:
+        """Take note that these words may stand at the end of the text, if that is where the parser has come to.
+
+        Args:
+            keys: keywords; signs are passed over.
+            starts: whether they start a statement or a part of the program.
+            given: the clauses of a MOVE that there are already, by their words.
+        """
+        if self.expected is not None and self._at_cursor():
+            self.expected.given |= given
+            self.expected.words += (key for key in keys if key[0].isalpha())
+            self.expected.starts |= starts
+
+    def want(self, wants: str, where: str = "") -> None:
+        """Take note that a value or name may stand at the end of the text; the arguments are those of ``mobile``."""
+        if self.expected is not None and self._at_cursor():
+            self.expected.operand = wants, where
+
+    def guess(self) -> None:
+        """Take what is looked for from here on for guessed: at the end of the text none of it is to be offered."""
+        if self.now.kind is _END:
+            self._wrong_before = -1
+
+    def _at_cursor(self) -> bool:
+        if self.now.kind is not _END or len(self.found) != self._wrong_before or self.expected is None:
+            return False
+        self.expected.target, self.expected.procedure = self.target, self.in_procedure
+        self.expected.recovering = self.recovering > 0
+        return True
 
     def replace(self, key: str) -> None:
         """Put the keyword that was meant in the place of the next token, which has been reported."""

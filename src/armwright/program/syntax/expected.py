@@ -1,0 +1,26 @@
+"""What the parser would have accepted where a text is cut off, which is what can be written there."""
+
+import attrs
+
+
+@attrs.define
+class Expected:
+    """What may stand behind the last token of a text; the parser takes note of it where it looks for it.
+
+    Attributes:
+        words: of the language, the likeliest first.
+        operand: the value or name that is looked for, in the words of messages, and where; None where none is.
+        starts: whether a statement or a part of the program starts here.
+        recovering: whether the place lies in the second part of a TRY.
+        given: the words of the clauses that a MOVE has in front of the place.
+        target: the key of the variable that gets the value; empty where none does.
+        procedure: the key of the procedure around the place; empty in the program itself.
+    """
+
+    words: list[str] = attrs.field(factory=list)
+    operand: tuple[str, str] | None = None
+    starts: bool = False
+    recovering: bool = False
+    given: frozenset[str] = frozenset()
+    target: str = ""
+    procedure: str = ""
