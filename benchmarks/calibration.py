@@ -20,7 +20,7 @@ from armwright.arrays import Flags
 from armwright.calibration.cross_validation import cross_validate
 from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.measurements import Measurements, read_measurements
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 FOLDER = Path(os.environ.get("ARMWRIGHT_DATA", Path(__file__).parents[2] / "shared" / "data"))
 FILES = {"UR5": "3D_UR5_uncalibrated_grid_cleaned.csv", "WAM": "3D_WAM_uncalibrated_grid_cleaned.csv"}
@@ -38,8 +38,8 @@ def arms() -> dict[str, Arm]:
     """Return the two arms with the tools that were measured."""
     wam = [Joint(kind="revolute", d=d, a=a, alpha=alpha) for d, a, alpha in WAM_TABLE]
     return {
-        "UR5": attrs.evolve(load_arm("ur5"), tool=pose(np.eye(3), (0, 0, 0.031))),
-        "WAM": Arm(name="wam", joints=tuple(wam), tool=pose(np.eye(3), (0, 0, 0.044))),
+        "UR5": attrs.evolve(load_arm("ur5"), tool=homogeneous(np.eye(3), (0, 0, 0.031))),
+        "WAM": Arm(name="wam", joints=tuple(wam), tool=homogeneous(np.eye(3), (0, 0, 0.044))),
     }
 
 

@@ -12,7 +12,7 @@ from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.singularity_analysis import determinant_factors, factor_names
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
 ARMS = ("puma560", "stanford", "ur5")
@@ -204,7 +204,7 @@ def _out_of_reach(arm: Arm, rng: np.random.Generator) -> EdgeSet:
         else:
             rho = side - short
             wrist = np.array((rho * np.cos(turn), rho * np.sin(turn), height + rng.uniform(-0.5, 0.5)))
-        poses.append(pose(R, wrist + hand * R[:, 2]))
+        poses.append(homogeneous(R, wrist + hand * R[:, 2]))
     X = np.array(poses)
     return EdgeSet(
         name="out of reach by 0.01 to 80 mm", arm=arm, q=np.zeros((len(X), 6)), X=X, reachable=False, own=False

@@ -16,14 +16,14 @@ from armwright.arm.load import load_arm
 from armwright.calibration.chain import chain_of
 from armwright.calibration.experiment_design import plan_poses
 from armwright.calibration.joint_errors import compliances
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
 POSES, REPEATED, CYCLES, CHECKED = 60, 6, 5, 12
 LENGTH, ANGLE = 3e-4, 1.5e-3  # of the errors of the arm [m], [rad]
 SAG = {"joint2.sag": 1.2e-3, "joint3.sag": 0.8e-3}  # under the largest effort of gravity [rad]
 RETURN, TRACKER = 2e-5, 1e-5  # noise of a coordinate, of the arm and of the tracker [m]
-HALL = pose(rotation_from_vector((0.02, -0.01, 2.2)), (2.8, 1.1, -0.4))
+HALL = homogeneous(rotation_from_vector((0.02, -0.01, 2.2)), (2.8, 1.1, -0.4))
 
 
 def rows() -> Iterator[str]:

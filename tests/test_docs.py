@@ -19,7 +19,7 @@ from armwright.clearance.scenario import assembly_guess
 from armwright.errors import FileFormatError
 from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import JointState, Status
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study.stanford_torque import joint_table, torques
 from cli_calls import armwright as command
@@ -293,7 +293,9 @@ def test_postures_of_the_picture() -> None:
         rotation_from_vector(angle * axis) for angle, axis in zip(np.radians(turn), np.eye(3), strict=True)
     )
 
-    solution = armwright.kinematics.inverse(armwright.load_arm("puma560-seed"), pose(yaw @ pitch @ roll, place / 1e3))
+    solution = armwright.kinematics.inverse(
+        armwright.load_arm("puma560-seed"), homogeneous(yaw @ pitch @ roll, place / 1e3)
+    )
 
     assert len(solution.branches) == 8
     assert len({branch.label.rpartition(",")[0] for branch in solution.allowed}) == len(solution.allowed) == 4

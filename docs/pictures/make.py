@@ -28,7 +28,7 @@ from armwright.report.svg import alike, steady
 from armwright.simulation import simulate
 from armwright.simulation.integrators import Adaptive
 from armwright.simulation.result import Event, JointState, Simulation
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study import puma_moves
 
@@ -154,7 +154,7 @@ def postures() -> Figure:
     roll, pitch, yaw = (
         rotation_from_vector(angle * axis) for angle, axis in zip(np.radians(TURN), np.eye(3), strict=True)
     )
-    branches = {branch.label: branch for branch in inverse(arm, pose(yaw @ pitch @ roll, PLACE))}
+    branches = {branch.label: branch for branch in inverse(arm, homogeneous(yaw @ pitch @ roll, PLACE))}
     figure = Figure(figsize=(7.2, 5.45))
     edges = {"left": 0, "right": 1, "top": 0.95, "bottom": 0.085, "hspace": 0.33, "wspace": 0.05}
     rows = figure.subplots(2, 4, gridspec_kw=edges)
@@ -316,7 +316,7 @@ PATHS = (("the report's X-spline", "#d9822b", None), ("rounded corners", "#3d8fd
 def past_frames() -> Figure:
     """Draw both paths past a corner: off the leg behind it, and the speed of the hand."""
     arm = load_arm("ur5")
-    X = pose(np.diag((1.0, -1.0, -1.0)), CORNER)
+    X = homogeneous(np.diag((1.0, -1.0, -1.0)), CORNER)
     q = inverse(arm, X[0]).best.q
     figure = Figure(figsize=(8.6, 3.4), layout="constrained", facecolor="none")
     off, fast = figure.subplots(1, 2)

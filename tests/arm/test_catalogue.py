@@ -13,7 +13,7 @@ from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.solution import Outcome
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from oracles.arms import random_postures
 from samples import Sample
 
@@ -108,7 +108,7 @@ def test_tool_down_in_front(sample: Sample) -> None:
     allowed = {"puma560": 0, "puma560-seed": 0}
     reached = 0
     for rng in sample.cases(1000):
-        X = pose(np.diag((1.0, -1.0, -1.0)), rng.uniform((0.3, -0.4, -0.6), (0.8, 0.4, 0.4)))
+        X = homogeneous(np.diag((1.0, -1.0, -1.0)), rng.uniform((0.3, -0.4, -0.6), (0.8, 0.4, 0.4)))
         found = {name: inverse(load_arm(name), X) for name in allowed}
         reached += found["puma560"].outcome is not Outcome.OUT_OF_REACH
         for name, solution in found.items():

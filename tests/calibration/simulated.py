@@ -5,7 +5,7 @@ import numpy as np
 from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.calibration.chain import Chain
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
 # Errors of a good arm before it is calibrated [m], [rad].
@@ -32,7 +32,7 @@ def random_arm(rng: np.random.Generator, n: int, *, slides: bool = False) -> Arm
 
 def random_pose(rng: np.random.Generator, reach: float) -> Array:
     """Return a pose that is turned anyhow and somewhere within reach [m]."""
-    return pose(rotation_from_vector(rng.uniform(-1, 1, 3)), rng.uniform(-reach, reach, 3))
+    return homogeneous(rotation_from_vector(rng.uniform(-1, 1, 3)), rng.uniform(-reach, reach, 3))
 
 
 def random_errors(rng: np.random.Generator, chain: Chain, scale: float = 1.0) -> Array:

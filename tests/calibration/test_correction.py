@@ -21,7 +21,7 @@ from armwright.calibration.readings import readings
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
 
@@ -48,7 +48,7 @@ def test_corrected_arm(n: int, rng: np.random.Generator) -> None:
 def test_gravity_stays_where_it_was(rng: np.random.Generator) -> None:
     """A tracker that lies on its side turns the frame of the corrected arm, not the torques that hold the arm."""
     arm = load_arm("puma560")
-    chain = chain_of(arm, base=pose(rotation_from_vector([np.pi / 2, 0.0, 0.0]), (1.0, 2.0, 3.0)))
+    chain = chain_of(arm, base=homogeneous(rotation_from_vector([np.pi / 2, 0.0, 0.0]), (1.0, 2.0, 3.0)))
     q, none = postures(rng, arm, 60), np.zeros(len(chain.names))
 
     better = corrected_arm(calibrate_points(arm, q, seen(chain, q, none, 1e-7, rng), without=("beta",)))

@@ -8,7 +8,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.calibration.chain import Chain, chain_of
 from armwright.calibration.identifiability import Identifiability, select_identifiable
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from calibration.simulated import postures, random_arm
 
 # Noise so small that only geometry hides an error [m].
@@ -34,14 +34,14 @@ def skew(rng: np.random.Generator, n: int) -> Arm:
     """Return an arm of n turning joints none of which are parallel; base and tool are not turned."""
     arm = random_arm(rng, n)
     joints = [attrs.evolve(joint, alpha=rng.choice([-1, 1]) * rng.uniform(0.4, 1.4)) for joint in arm.joints]
-    return attrs.evolve(arm, joints=joints, base=np.eye(4), tool=pose(np.eye(3), (0.03, -0.02, 0.1)))
+    return attrs.evolve(arm, joints=joints, base=np.eye(4), tool=homogeneous(np.eye(3), (0.03, -0.02, 0.1)))
 
 
 def planar(n: int = 3) -> Arm:
     return Arm(
         name="planar",
         joints=[Joint(kind="revolute", a=0.4 - 0.1 * i) for i in range(n)],
-        tool=pose(np.eye(3), (0.05, 0.02, 0.1)),
+        tool=homogeneous(np.eye(3), (0.05, 0.02, 0.1)),
     )
 
 
@@ -179,7 +179,7 @@ def test_tool_on_the_last_axis(rng: np.random.Generator) -> None:
     """The last joint does not move a point on its axis; that the point is not quite there is told all the same."""
     arm = skew(rng, 4)
     last = attrs.evolve(arm.joints[-1], a=0.0, alpha=0.0)
-    arm = attrs.evolve(arm, joints=[*arm.joints[:-1], last], tool=pose(np.eye(3), (0.0, 0.0, 0.1)))
+    arm = attrs.evolve(arm, joints=[*arm.joints[:-1], last], tool=homogeneous(np.eye(3), (0.0, 0.0, 0.1)))
     chain = chain_of(arm)
 
     found = told(chain, postures(rng, arm, 60))

@@ -16,7 +16,7 @@ from armwright.arrays import Array
 from armwright.calibration.chain import chain_of
 from armwright.calibration.fitting import calibrate_points
 from armwright.kinematics.forward_kinematics import forward
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from calibration.simulated import postures, random_errors, seen
 
 # Both fits end at the same minimum; pybotics' least squares has derivatives by differences [m].
@@ -40,7 +40,7 @@ def skew_arm() -> Arm:
     return Arm(
         name="skew",
         joints=[Joint(kind="revolute", d=d, a=a, alpha=alpha) for d, a, alpha in LINKS],
-        tool=pose(np.eye(3), (0.04, 0.02, 0.1)),
+        tool=homogeneous(np.eye(3), (0.04, 0.02, 0.1)),
     )
 
 

@@ -16,7 +16,7 @@ from armwright.arrays import Array
 from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.measurements import Measurements, read_measurements
 from armwright.kinematics.forward_kinematics import forward
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 FOLDER = Path(os.environ.get("ARMWRIGHT_DATA", Path(__file__).parents[3] / "shared" / "data"))
 FOLDS = 5
@@ -35,7 +35,7 @@ def read(name: str, arm: Arm) -> Measurements:
 
 def ur5() -> Arm:
     """Return the UR5 of the catalogue with the tracker's reflector on its flange."""
-    return attrs.evolve(load_arm("ur5"), tool=pose(np.eye(3), (0.0, 0.0, 0.031)))
+    return attrs.evolve(load_arm("ur5"), tool=homogeneous(np.eye(3), (0.0, 0.0, 0.031)))
 
 
 def wam() -> Arm:
@@ -51,7 +51,7 @@ def wam() -> Arm:
         (0.06, 0.0, 0.0),
     )
     joints = [Joint(kind="revolute", d=d, a=a, alpha=alpha) for d, a, alpha in rows]
-    return Arm(name="wam", joints=joints, tool=pose(np.eye(3), (0.0, 0.0, 0.044)))
+    return Arm(name="wam", joints=joints, tool=homogeneous(np.eye(3), (0.0, 0.0, 0.044)))
 
 
 def held_out(arm: Arm, measured: Measurements) -> Array:

@@ -18,14 +18,14 @@ from armwright.program import compile as compile_program
 from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.interpreter import warnings as warnings_of
 from armwright.program.vm.recording import Recording
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from oracles.with_pinocchio import pinocchio_model, with_rotors
 
 AGREES = 1e-8  # [N m], of efforts up to some hundred
 STIFFNESS = 20_000.0
 # The part sticks out beside the hand, so that the plane turns the hand as well as it pushes it.
-PART = pose(np.eye(3), (0.03, -0.02, 0.05))
-TILTED = pose(Rotation.from_rotvec((0.2, -0.15, 0.7)).as_matrix(), (0.1, -0.2, 0.3))
+PART = homogeneous(np.eye(3), (0.03, -0.02, 0.05))
+TILTED = homogeneous(Rotation.from_rotvec((0.2, -0.15, 0.7)).as_matrix(), (0.1, -0.2, 0.3))
 DOWN = """
 VAR part, low : FRAME ;
 BEGIN

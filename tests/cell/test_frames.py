@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, FrameTree, Node
 from armwright.errors import InvalidValueError, UnknownNameError
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from oracles.arms import random_pose
 from samples import Sample
 
@@ -16,7 +16,7 @@ ROUNDING = 1e-9  # products of a dozen poses some metres long
 
 
 def step(x: float, y: float = 0.0, z: float = 0.0) -> Array:
-    return pose(np.eye(3), (x, y, z))
+    return homogeneous(np.eye(3), (x, y, z))
 
 
 @pytest.fixture

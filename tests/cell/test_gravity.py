@@ -37,13 +37,13 @@ from armwright.program.vm.interpreter import interpret
 from armwright.program.vm.interpreter import warnings as warnings_of
 from armwright.program.vm.recording import Recording
 from armwright.simulation.time_stepping import simulate
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from oracles.with_pinocchio import pinocchio_model, with_load, with_rotors
 from samples import Sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 ARMS = ("puma560", "stanford", "stanford-jpl", "ur5")
-HANGING = pose(np.diag((1.0, -1.0, -1.0)), (0.0, 0.0, 2.0))
+HANGING = homogeneous(np.diag((1.0, -1.0, -1.0)), (0.0, 0.0, 2.0))
 # How a base stands: turned on the floor, tilted, on a wall, from the ceiling, any way.
 STANDS = ("turned", "tilted", "wall", "hanging", "anyhow")
 AGREES = 1e-9  # [N m], of efforts up to some hundred
@@ -58,7 +58,7 @@ def base_of(rng: np.random.Generator, stand: str) -> Array:
     else:
         direction = rng.uniform(-np.pi, np.pi)
         R = Rotation.from_rotvec(lean[stand] * np.array((np.cos(direction), np.sin(direction), 0.0))) * about_z
-    return pose(R.as_matrix(), rng.uniform(-2, 2, size=3))
+    return homogeneous(R.as_matrix(), rng.uniform(-2, 2, size=3))
 
 
 def cell_of(arm: Arm, base: Array, gravity: Array = UPRIGHT_GRAVITY) -> Cell:
@@ -100,9 +100,10 @@ def test_efforts_of_every_stand(sample: Sample) -> None:
 def test_one_gravity_for_all(rng: np.random.Generator, stand: str) -> None:
     """Holding efforts, terms, payload, slowing, energy and simulation weigh an arm in a cell all alike."""
     arm = load_arm("puma560")
-    base = {"hanging": HANGING, "wall": pose(Rotation.from_euler("x", 90, degrees=True).as_matrix(), np.zeros(3))}.get(
-        stand, base_of(np.random.default_rng(3), "tilted")
-    )
+    base = {
+        "hanging": HANGING,
+        "wall": homogeneous(Rotation.from_euler("x", 90, degrees=True).as_matrix(), np.zeros(3)),
+    }.get(stand, base_of(np.random.default_rng(3), "tilted"))
     mine = cell_of(arm, base).arms["ARM_1"].arm
     q = rng.uniform(-1.5, 1.5, size=6)
     still = np.zeros(6)
@@ -193,7 +194,7 @@ def test_right_angles_are_exact() -> None:
     for turn in (0, 90, 180, 270):
         R = Rotation.from_euler("zx", (17, turn), degrees=True).as_matrix()
         felt = felt_gravity(
-            pose(R @ Rotation.from_euler("z", 40, degrees=True).as_matrix(), np.zeros(3)), UPRIGHT_GRAVITY
+            homogeneous(R @ Rotation.from_euler("z", 40, degrees=True).as_matrix(), np.zeros(3)), UPRIGHT_GRAVITY
         )
         assert abs(felt).max() <= STANDARD_GRAVITY + 1e-12
         if turn in {0, 180}:
@@ -205,7 +206,7 @@ def test_right_angles_are_exact() -> None:
 def test_kernels_by_direction() -> None:
     """Turned about the vertical an arm keeps its kernels; hung up, only those that weigh it are others."""
     arm = load_arm("puma560")
-    turned = pose(Rotation.from_euler("z", 33, degrees=True).as_matrix(), (1.0, 0.0, 0.0))
+    turned = homogeneous(Rotation.from_euler("z", 33, degrees=True).as_matrix(), (1.0, 0.0, 0.0))
     stands, turns, hangs = (cell_of(arm, base).arms["ARM_1"].arm for base in (np.eye(4), turned, HANGING))
     weigh = {"inverse_dynamics", "inverse_dynamics_with_wrench", "forward_dynamics", "mass_and_bias"}
     for name in ("forward", "jacobian", "mass_matrix", *sorted(weigh)):

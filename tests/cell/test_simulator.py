@@ -14,7 +14,7 @@ from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.quintic_polynomials import quintic
 from armwright.motion.trajectory import hold
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 BENCH = """name = "bench"
 [arms.ARM_1]
@@ -183,7 +183,7 @@ def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
     """A part that an arm has pressed on the plane presses on with any motion of the arm, until the fingers open."""
     cell = bench(tmp_path)
     arm, X_WB, start = (getattr(cell.arms["ARM_1"], name) for name in ("arm", "base", "start"))
-    X_HP = pose(np.eye(3), (0.0, 0.0, 0.05))
+    X_HP = homogeneous(np.eye(3), (0.0, 0.0, 0.05))
     ends = [start, start + np.array([0, 0, 0.1, 0, 0, 0])]
     ends.sort(key=lambda q: -(X_WB @ forward(arm, q) @ X_HP)[2, 3])
     motion = quintic(*ends, 1.0)

@@ -15,7 +15,7 @@ from armwright.kinematics.inverse_kinematics.solution import InverseSolution, Ou
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.singularity_analysis import singularity_factors
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from oracles.arms import random_postures
 from oracles.with_pinocchio import pinocchio_model
 from samples import Sample
@@ -345,7 +345,7 @@ def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Gene
         turn, rho = rng.uniform(-np.pi, np.pi), side - short
         # On the ring of the wrist's reach in every arm: half a metre up.
         wrist = np.array((rho * np.cos(turn), rho * np.sin(turn), height + 0.5))
-        X = pose(R, wrist + hand * R[:, 2])
+        X = homogeneous(R, wrist + hand * R[:, 2])
 
         solution = inverse(arm, X)
 

@@ -17,7 +17,7 @@ from armwright.kinematics.inverse_kinematics.recognise import closed_form_geomet
 from armwright.kinematics.inverse_kinematics.solution import Outcome
 from armwright.kinematics.inverse_kinematics.solve import BRANCHES, inverse, inverse_branches
 from armwright.kinematics.jacobians import jacobian
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.tracing.graph import Graph, evaluate
 from oracles.arms import random_arm, random_pose, random_postures
 
@@ -132,7 +132,7 @@ def test_a_shoulder_ahead_of_its_axis_reaches_farther() -> None:
     reach = 0.2 + 0.432 + math.hypot(0.02, 0.433)
 
     assert find_geometry(arm).max_reach == pytest.approx(reach)  # type: ignore[union-attr]
-    solution = inverse(arm, pose(np.eye(3), (reach + 0.5, 0.0, 0.0)))
+    solution = inverse(arm, homogeneous(np.eye(3), (reach + 0.5, 0.0, 0.0)))
     assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.5, abs=1e-9)
     np.testing.assert_allclose(solution.nearest_pose[:3, 3], (reach, 0, 0), atol=1e-6)  # flat at its least
@@ -165,7 +165,7 @@ def test_nearest_pose_is_nearest_for_any_build(family: str) -> None:
         way = X[:3, 3] - solution.nearest_pose[:3, 3]
         for step in rng.normal(size=(20, 3)) * 0.02:
             if np.linalg.norm(way - step) < 0.999 * np.linalg.norm(way):
-                nearer = pose(X[:3, :3], solution.nearest_pose[:3, 3] + step)
+                nearer = homogeneous(X[:3, :3], solution.nearest_pose[:3, 3] + step)
                 assert inverse(arm, nearer).outcome is Outcome.OUT_OF_REACH
     assert out >= 3
 
@@ -264,7 +264,7 @@ def test_ur5_straight_wrist_stays_in_reach(ur5: Arm) -> None:
 
 def test_ur5_out_of_reach(ur5: Arm) -> None:
     """Straight above its base axis the UR5's wrist cannot be: the plane of the arm runs 109.15 mm beside the axis."""
-    solution = inverse(ur5, pose(np.diag((1.0, -1.0, -1.0)), (0.0, 0.0, 0.3)))
+    solution = inverse(ur5, homogeneous(np.diag((1.0, -1.0, -1.0)), (0.0, 0.0, 0.3)))
 
     assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.10915, abs=1e-9)

@@ -10,7 +10,7 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.jacobians import jacobian
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
 from oracles.arms import random_postures
 from oracles.with_pinocchio import pinocchio_model
@@ -69,7 +69,7 @@ def test_poses_of_the_seed(name: str) -> None:
 def test_angles_of_the_seed(name: str) -> None:
     """The printed pose, its rotation made one, is solved by the printed angles to the digits it was typed with."""
     q, R, p = SEED_POSES[name]
-    X = pose(nearest_rotation(R), np.array(p) / 100)
+    X = homogeneous(nearest_rotation(R), np.array(p) / 100)
 
     best = inverse(load_arm("puma560-seed"), X, near=np.radians(q)).best
 

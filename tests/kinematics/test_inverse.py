@@ -14,7 +14,7 @@ from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Ou
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
 from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
 from armwright.kinematics.jacobians import jacobian
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from oracles.arms import random_postures
 
 ARMS = ("puma560-seed", "stanford", "stanford-jpl")
@@ -24,7 +24,7 @@ DOWN = np.diag((1.0, -1.0, -1.0))
 
 
 def _at(x: float, y: float, z: float) -> Array:
-    return pose(DOWN, (x, y, z))
+    return homogeneous(DOWN, (x, y, z))
 
 
 @pytest.mark.parametrize("name", ARMS)

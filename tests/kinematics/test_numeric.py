@@ -15,7 +15,7 @@ from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Ou
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.kinematics.jacobians import jacobian
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from oracles.arms import random_arm, random_postures
 from samples import Sample
 
@@ -135,11 +135,11 @@ def test_two_elbows_of_a_planar_arm(elbow: Arm) -> None:
 
 def test_out_of_reach_of_a_short_arm(elbow: Arm) -> None:
     """A pose straight ahead, 0.5 m beyond the stretched arm, is 500 mm out of reach, and stretched is the nearest."""
-    solution = inverse(elbow, pose(np.eye(3), (2.0, 0.0, 0.0)))
+    solution = inverse(elbow, homogeneous(np.eye(3), (2.0, 0.0, 0.0)))
 
     assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.5, abs=1e-6)
-    np.testing.assert_allclose(solution.nearest_pose, pose(np.eye(3), (1.5, 0, 0)), atol=1e-5)
+    np.testing.assert_allclose(solution.nearest_pose, homogeneous(np.eye(3), (1.5, 0, 0)), atol=1e-5)
     with pytest.raises(NoSolutionError, match=r"^the pose is 500\.0 mm out of reach of 'elbow'; the nearest in reach"):
         _ = solution.best
 

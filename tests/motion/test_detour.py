@@ -15,7 +15,7 @@ from armwright.kinematics.jacobians import jacobian
 from armwright.motion.detour import line_or_detour
 from armwright.motion.follow import PathError
 from armwright.motion.straight import straight_line
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from armwright.study.puma_moves import study_poses
 
@@ -147,11 +147,11 @@ def test_unknown_way() -> None:
 
 def test_no_crawling() -> None:
     """Lines past the wrist's singularity that would take a minute and more are gone round in seconds."""
-    arm = attrs.evolve(load_arm("puma560-seed"), tool=pose(np.eye(3), (0, 0, 0.12)))
+    arm = attrs.evolve(load_arm("puma560-seed"), tool=homogeneous(np.eye(3), (0, 0, 0.12)))
     level = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     crawls = 0
     for aside in (0.003, 0.004, 0.006):  # metres below the line is the place where forearm and hand are in line
-        X, Y = pose(level, (0.55, -0.05, aside - 0.3125)), pose(level, (0.55, 0.35, aside - 0.5125))
+        X, Y = homogeneous(level, (0.55, -0.05, aside - 0.3125)), homogeneous(level, (0.55, 0.35, aside - 0.5125))
         q = next(branch.q for branch in inverse(arm, X).allowed if branch.q[3] > 0)
         try:
             crawls += straight_line(arm, q, Y, deviation=2e-3).trajectory.duration > 60

@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.motion.blends import blended
 from armwright.motion.hand_path import HandPath, Orientation, hand_path, zyz_angles
 from armwright.spatial.euler import matlab_zyz
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_vector
 
 TIMES = np.array([0.0, 1.0, 1.7, 3.0])
@@ -25,7 +25,7 @@ orientations: st.SearchStrategy[Orientation] = st.sampled_from(["geodesic", "zyz
 def random_path(seed: int, ends: str, orientation: Orientation) -> tuple[HandPath, Array]:
     """Return a path through four random poses, and the poses."""
     rng = np.random.default_rng(seed)
-    poses = pose(Rotation.random(4, random_state=rng).as_matrix(), rng.normal(size=(4, 3)))
+    poses = homogeneous(Rotation.random(4, random_state=rng).as_matrix(), rng.normal(size=(4, 3)))
     return hand_path(poses, TIMES, BLENDS, ends=ends, orientation=orientation), poses  # type: ignore[arg-type]
 
 

@@ -19,7 +19,7 @@ from armwright.motion.stops import at_speed
 from armwright.motion.straight import straight_line
 from armwright.motion.time_optimal_path import time_optimal
 from armwright.program.vm.move_diagnostics import stopped
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
 NAMES = ("waist", "shoulder", "elbow", "roll", "bend", "flange")
@@ -63,8 +63,8 @@ def test_what_stops_a_line() -> None:
     straight = forward(PUMA, [0.0, 0.3, 0.2, 0.0, 0.0, 0.0])
     start, goal = (
         straight
-        @ pose(rotation_from_vector(np.array([turn, 0.0, 0.0])), np.array([turn / 10, 0.0, 0.0]))
-        @ pose(rotation_from_vector(np.array([0.0, 1e-3, 0.0])), np.zeros(3))
+        @ homogeneous(rotation_from_vector(np.array([turn, 0.0, 0.0])), np.array([turn / 10, 0.0, 0.0]))
+        @ homogeneous(rotation_from_vector(np.array([0.0, 1e-3, 0.0])), np.zeros(3))
         for turn in (0.3, -0.3)
     )
     with pytest.raises(PathError) as singular:

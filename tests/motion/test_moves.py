@@ -21,7 +21,7 @@ from armwright.motion.continuity_report import continuity
 from armwright.motion.follow import PathError
 from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import cartesian_move, exact_poses, joint_move, stopping_move
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, rotation_from_vector
 from samples import WHOLE, Sample
 
@@ -34,7 +34,7 @@ SEED_Q = np.radians(
         [0.0955, 65.7969, 14.3196, 15.3377, -20.1730, 29.5160],
     ]
 )
-SEED_POSES = pose(
+SEED_POSES = homogeneous(
     [
         [[0.64, 0.77, 0], [0.77, -0.64, 0], [0, 0, -1]],
         [[0.87, -0.1, 0.48], [0.29, 0.9, -0.34], [-0.4, 0.43, 0.81]],

@@ -13,7 +13,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.follow import TURN_PER_METRE, PathError, follow
 from armwright.motion.path import Path, closest_to_axis, place_knots, report_speed, report_step
 from armwright.motion.plan import Manner, StageError, StageGoal, plan
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, rotation_from_vector
 from oracles.arms import random_postures
 
@@ -22,7 +22,7 @@ POSE = 1e-9  # how well a knot is met, in m and rad
 
 
 def at(x: float, y: float, z: float, turn: float = 0.0) -> Array:
-    return pose(rotation_from_vector([0, 0, turn]) @ DOWN, (x, y, z))
+    return homogeneous(rotation_from_vector([0, 0, turn]) @ DOWN, (x, y, z))
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
     done = 0
     for q in random_postures(arm, rng, 60):
         A = forward(arm, q)
-        B = A @ pose(rotation_from_vector(rng.normal(scale=0.3, size=3)), rng.normal(scale=0.1, size=3))
+        B = A @ homogeneous(rotation_from_vector(rng.normal(scale=0.3, size=3)), rng.normal(scale=0.1, size=3))
         try:
             found = follow(arm, Path(poses=[A, B]), q, deviation=deviation, speed=100)
         except PathError:
@@ -102,7 +102,7 @@ def test_coarser_lines_are_no_slower(name: str, rng: np.random.Generator) -> Non
     arm, done = load_arm(name), 0
     for q in random_postures(arm, rng, 20):
         A = forward(arm, q)
-        B = A @ pose(np.eye(3), rng.normal(size=3) * 10 ** rng.uniform(-2, -0.7))
+        B = A @ homogeneous(np.eye(3), rng.normal(size=3) * 10 ** rng.uniform(-2, -0.7))
         try:
             runs = [follow(arm, Path(poses=[A, B]), q, deviation=d, speed=100) for d in (1e-3, 2e-3, 3e-3, 5e-3, 1.0)]
         except PathError:
@@ -196,8 +196,8 @@ def test_through_frames_without_a_stop(stanford: Arm) -> None:
 
 def test_limit_on_the_way(stanford: Arm) -> None:
     """A line pulled straight towards the base folds the boom to its lower limit; joint 3 and the place are named."""
-    A = pose(rotation_from_vector([0, np.pi / 2, 0]), (0.9, 0.15367, 0.4125))
-    B = pose(A[:3, :3], (0.35, 0.15367, 0.4125))
+    A = homogeneous(rotation_from_vector([0, np.pi / 2, 0]), (0.9, 0.15367, 0.4125))
+    B = homogeneous(A[:3, :3], (0.35, 0.15367, 0.4125))
 
     with pytest.raises(PathError, match=r"joint 3 would stand at .* mm beyond its limit 140\.0 mm") as caught:
         follow(stanford, Path(poses=[A, B]), start(stanford, A), deviation=1e-3, speed=100)
@@ -220,7 +220,7 @@ def test_line_past_a_singularity() -> None:
 
     def line(q5: float) -> tuple[Path, Array]:
         X = forward(free, [0.1, -0.5, 0.8, 0, q5, 0])
-        A, B = (pose(X[:3, :3], X[:3, 3] + side * aside) for side in (-1, 1))
+        A, B = (homogeneous(X[:3, :3], X[:3, 3] + side * aside) for side in (-1, 1))
         return Path(poses=[A, B]), inverse(free, A, [0.1, -0.5, 0.8, 0, q5, 0]).best.q
 
     with pytest.raises(
@@ -261,7 +261,7 @@ def test_another_posture_is_tried(rng: np.random.Generator) -> None:
     arm = load_arm("puma560-seed")
     for q in random_postures(arm, rng, 400):
         A = forward(arm, q)
-        B = A @ pose(np.eye(3), (0.0, 0.0, -0.25))
+        B = A @ homogeneous(np.eye(3), (0.0, 0.0, -0.25))
         path = Path(poses=[A, B])
         outcomes = []
         for branch in inverse(arm, A, q).allowed:
@@ -323,7 +323,7 @@ def test_a_posture_with_a_free_line_comes_before_a_way_round(rng: np.random.Gene
     tried = 0
     for q in random_postures(arm, rng, 400):
         A = forward(arm, q)
-        B = A @ pose(np.eye(3), (0.0, 0.0, -0.25))
+        B = A @ homogeneous(np.eye(3), (0.0, 0.0, -0.25))
         goals = [StageGoal(kind="PTP", poses=A[None]), StageGoal(kind="LINE", poses=B[None])]
         try:
             plan(arm, q, goals[1:], Manner())

@@ -10,7 +10,7 @@ from armwright.motion.continuity_report import continuity
 from armwright.motion.follow import PathError
 from armwright.motion.path import Path
 from armwright.motion.rounded import Rounded, rounded_move
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 ARM = load_arm("stanford")
 DOWN = np.diag((1.0, -1.0, -1.0))
@@ -20,12 +20,12 @@ DEVIATION = 1e-4
 def start() -> np.ndarray:
     from armwright.kinematics.inverse_kinematics.solve import inverse
 
-    return inverse(ARM, pose(DOWN, (0.45, 0.0, 0.25))).best.q
+    return inverse(ARM, homogeneous(DOWN, (0.45, 0.0, 0.25))).best.q
 
 
 def corner(blend: float, *places: tuple[float, float, float]) -> Rounded:
     q = start()
-    path = Path(poses=np.stack([forward(ARM, q), *(pose(DOWN, place) for place in places)]))
+    path = Path(poses=np.stack([forward(ARM, q), *(homogeneous(DOWN, place) for place in places)]))
     return rounded_move(ARM, path, q, blend=blend, deviation=DEVIATION, speed=100.0)
 
 

@@ -10,7 +10,7 @@ from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.follow import PathError
 from armwright.motion.through import through_frames
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 ARM = load_arm("stanford")
 START = np.array((0.1, 1.0, 0.5, 0.2, 0.9, 0.1))
@@ -19,7 +19,9 @@ START = np.array((0.1, 1.0, 0.5, 0.2, 0.9, 0.1))
 def frames() -> np.ndarray:
     """Three frames, 100 mm apart."""
     X = forward(ARM, START)
-    return np.stack([pose(X[:3, :3], X[:3, 3] + np.array(way) * 0.1) for way in ((1, 0, 0), (1, 1, 0), (1, 1, 1))])
+    return np.stack(
+        [homogeneous(X[:3, :3], X[:3, 3] + np.array(way) * 0.1) for way in ((1, 0, 0), (1, 1, 0), (1, 1, 1))]
+    )
 
 
 def test_through_without_a_stop() -> None:

@@ -18,7 +18,7 @@ from armwright.motion.continuity_report import continuity
 from armwright.motion.efforts import slowing_for_efforts
 from armwright.motion.plan import Manner, Stage, StageError, StageGoal, plan
 from armwright.motion.solver import solver_of
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 from oracles.legs import beside_legs, turns_beside_legs
 from samples import Sample
@@ -76,7 +76,7 @@ def random_way(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
             way = rng.normal(size=3)
             way *= np.exp(rng.uniform(*np.log(LENGTHS))) / np.linalg.norm(way)
             turn = rng.normal(size=3) * rng.choice((0.1, 0.5)) if turning else np.zeros(3)
-            Y = pose(X[-1][:3, :3] @ rotation_from_vector(turn), X[-1][:3, 3] + way)
+            Y = homogeneous(X[-1][:3, :3] @ rotation_from_vector(turn), X[-1][:3, 3] + way)
             if reached(arm, q, X[0], Y):
                 X.append(Y)
             if len(X) == vias + 2:
@@ -164,7 +164,7 @@ def test_wider_corners_are_no_slower(name: str, sample: Sample) -> None:
 def corner_of_ur5() -> tuple[Arm, Array, Array]:
     """The corner at which the report's spline swings, before a straight 300 mm."""
     arm = load_arm("ur5")
-    X = np.stack([pose(DOWN, p) for p in ((0.45, -0.3, 0.25), (0.45, -0.15, 0.45), (0.45, 0.15, 0.45))])
+    X = np.stack([homogeneous(DOWN, p) for p in ((0.45, -0.3, 0.25), (0.45, -0.15, 0.45), (0.45, 0.15, 0.45))])
     return arm, inverse(arm, X[0]).best.q, X
 
 
@@ -209,7 +209,7 @@ def test_tiny_legs_beside_long_ones() -> None:
     """A leg of a millimetre between long ones takes no longer without a stop, and neither do equal frames."""
     arm, q, X = corner_of_ur5()
     for shift in (0.0, 1e-10, 1e-6, 1e-4, 3e-4, 1e-3, 5e-3):
-        Y = np.stack([X[0], X[1], pose(DOWN, X[1, :3, 3] + (shift, 0, 0)), X[2]])
+        Y = np.stack([X[0], X[1], homogeneous(DOWN, X[1, :3, 3] + (shift, 0, 0)), X[2]])
         stage = by_via(arm, q, Y)
 
         assert stage.trajectory.duration <= with_stops(arm, q, Y)
@@ -223,7 +223,7 @@ def test_very_different_turns() -> None:
     """Legs that turn the hand by half a turn, a leg on the spot and legs that do not turn go into one another."""
     arm, q, X = corner_of_ur5()
     turned = [
-        pose(rotation_from_vector([0, 0, a]) @ DOWN, p)
+        homogeneous(rotation_from_vector([0, 0, a]) @ DOWN, p)
         for a, p in zip((0, 0, 2.0, 2.0), X[[0, 1, 1, 2], :3, 3], strict=True)
     ]
     Y = np.stack(turned)
@@ -264,7 +264,7 @@ def test_the_corner_is_what_was_asked(corner: float) -> None:
 def test_a_corner_past_a_turn_on_the_spot_is_told_as_it_is() -> None:
     """Beside a leg on which the hand hardly moves, as it turns, rates along the other leg are no distance from it."""
     arm, q, X = corner_of_ur5()
-    turned = pose(rotation_from_vector([0, 0, 0.6]) @ DOWN, X[1, :3, 3] + 0.25 * (X[1, :3, 3] - X[0, :3, 3]))
+    turned = homogeneous(rotation_from_vector([0, 0, 0.6]) @ DOWN, X[1, :3, 3] + 0.25 * (X[1, :3, 3] - X[0, :3, 3]))
     Y = np.stack([X[0], X[1], turned])
 
     stage = by_via(arm, q, Y)
@@ -306,7 +306,7 @@ def puma_beside_its_wrist(off: float) -> tuple[Arm, Array, Array]:
     arm = load_arm("puma560-seed")
     level = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     y = 0.149 + off
-    X = np.stack([pose(level, p) for p in ((0.48, y, -0.27), (0.48, y, -0.47), (0.48, y + 0.1, -0.47))])
+    X = np.stack([homogeneous(level, p) for p in ((0.48, y, -0.27), (0.48, y, -0.47), (0.48, y + 0.1, -0.47))])
     return arm, inverse(arm, X[0], np.zeros(6)).best.q, X
 
 
@@ -316,7 +316,7 @@ def test_a_start_beside_a_singularity() -> None:
     q = np.radians([20.0, -60.0, 80.0, -20.0, 0.2, 30.0])
     X = [forward(arm, q)]
     for way in ((0.0, 0.1, -0.05), (0.1, 0.0, 0.05)):
-        X.append(pose(X[-1][:3, :3], X[-1][:3, 3] + way))
+        X.append(homogeneous(X[-1][:3, :3], X[-1][:3, 3] + way))
 
     stage = by_via(arm, q, np.stack(X))
 

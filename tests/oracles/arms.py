@@ -5,12 +5,12 @@ import numpy as np
 
 from armwright.arm.model import Arm, Joint, Limits, Link, Motor
 from armwright.arrays import Array
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
 
 def random_pose(rng: np.random.Generator) -> Array:
-    return pose(rotation_from_vector(rng.normal(size=3)), rng.normal(size=3))
+    return homogeneous(rotation_from_vector(rng.normal(size=3)), rng.normal(size=3))
 
 
 def random_link(rng: np.random.Generator) -> Link:

@@ -14,7 +14,7 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.language.words import Standard
 from armwright.program.vm.interpreter import Limits, RunError, interpret
 from armwright.program.vm.recording import Recording
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 CORPUS = Path(__file__).parent / "corpus"
 EXACT = 1e-6  # the corpus gives positions to this
@@ -55,7 +55,7 @@ def corpus_text(name: str) -> str:
 
 def down(x: float, y: float, z: float) -> Array:
     """Return a place from above."""
-    return pose(DOWN, (x, y, z))
+    return homogeneous(DOWN, (x, y, z))
 
 
 def expect(recording: Recording, **frames: Array) -> None:

@@ -17,7 +17,7 @@ from armwright.program import known_cell
 from armwright.program.language.source import Source
 from armwright.program.vm.interpreter import RunError, interpret, warnings
 from armwright.program.vm.recording import Recording
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 EXACT = 1e-6  # the corpus gives positions to this
@@ -38,7 +38,7 @@ def run_example(name: str, old: str = "", new: str = "") -> Recording:
 
 
 def down(x: float, y: float, z: float) -> Array:
-    return pose(DOWN, (x, y, z))
+    return homogeneous(DOWN, (x, y, z))
 
 
 def expect(recording: Recording, **frames: Array) -> None:
@@ -117,7 +117,7 @@ def test_portable_bench() -> None:
 
     place = down(0.45, -0.12, 0.05)
     expect(as_written, OBJ1=place, OBJ2=place, ARM_1=place, APF1=down(0.45, -0.12, 0.13))
-    turned = pose(np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), (0.62, 0.05, 0.05))
+    turned = homogeneous(np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), (0.62, 0.05, 0.05))
     expect(moved, OBJ1=turned, OBJ2=turned, ARM_1=turned)
     assert as_written.trace() == moved.trace()
     assert "ARM_1 MOVE: PTP apf1; LINE obj1 @100" in moved.trace()

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
 from armwright.errors import KindError, ShapeError
-from armwright.spatial.poses import between, from_noap, inverse, pose, to_noap
+from armwright.spatial.poses import between, from_noap, homogeneous, inverse, to_noap
 from armwright.spatial.rotations import (
     angle_between,
     nearest_rotation,
@@ -100,7 +100,7 @@ def test_shape_is_checked() -> None:
     with pytest.raises(ShapeError, match=r"pose: expected a shape ending in \(4, 4\), got \(3,\)"):
         inverse(np.zeros(3))
     with pytest.raises(KindError, match="rotation: expected numbers, got 'abc'"):
-        pose("abc", np.zeros(3))
+        homogeneous("abc", np.zeros(3))
 
 
 def test_rotation_from_quaternion(rng: np.random.Generator) -> None:

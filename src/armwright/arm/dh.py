@@ -15,7 +15,7 @@ import numpy as np
 
 from armwright.arm.model import Joint, Link, exact_cosine, exact_sine
 from armwright.arrays import Array
-from armwright.spatial.poses import inverse, pose
+from armwright.spatial.poses import homogeneous, inverse
 
 
 def turn(axis: int, angle: float) -> Array:
@@ -29,7 +29,7 @@ def turn(axis: int, angle: float) -> Array:
 
 def twist(alpha: float, a: float) -> Array:
     """Return the pose Tx(a) Rx(alpha), (4, 4); the two may be swapped."""
-    return pose(turn(0, alpha), (a, 0.0, 0.0))
+    return homogeneous(turn(0, alpha), (a, 0.0, 0.0))
 
 
 def from_modified(joints: Sequence[Joint], links: Sequence[Link]) -> tuple[Array, list[Joint], list[Link]]:

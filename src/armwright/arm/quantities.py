@@ -9,7 +9,7 @@ from armwright.arm.dh import turn
 from armwright.arrays import Array
 from armwright.files.document import Table
 from armwright.spatial.euler import from_zyz
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error, rotation_from_quaternion
 
 # Factors to SI by the ending of the key.
@@ -63,7 +63,7 @@ def typed_pose(table: Table) -> TypedPose:
             R = _quaternion(table)
         case _:
             R = turn(2, rpy[2]) @ turn(1, rpy[1]) @ turn(0, rpy[0])
-    return TypedPose(pose(R, place), change)
+    return TypedPose(homogeneous(R, place), change)
 
 
 def pose_in(table: Table) -> Array:

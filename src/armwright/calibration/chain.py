@@ -17,7 +17,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array
 from armwright.errors import ShapeError
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 Kind: TypeAlias = Literal["translation", "rotation"]
 
@@ -195,7 +195,7 @@ def _elements(arm: Arm, target_rotation: Array) -> Iterator[Element]:
         if i + 1 < arm.n and np.linalg.norm(joint.behind[:2, 2]) < PARALLEL:
             yield Element("rotation", 1, 0.0, f"{name}.beta")
     yield from _fixed(arm.tool)
-    yield from _fixed(pose(target_rotation, np.zeros(3)))
+    yield from _fixed(homogeneous(target_rotation, np.zeros(3)))
     yield from _errors("tool")
 
 

@@ -18,7 +18,7 @@ from armwright.calibration.chain import Chain, Element, chain_of
 from armwright.calibration.fitting import Calibration
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.spatial.euler import to_rpy
-from armwright.spatial.poses import inverse, pose
+from armwright.spatial.poses import homogeneous, inverse
 from armwright.spatial.rotations import rotation_from_vector
 
 # The numbers of a link in the Denavit-Hartenberg convention.
@@ -118,7 +118,7 @@ def _corrected(calibration: Calibration) -> Arm:
         joints=tuple(joints),
         base=base @ arm.base,
         gravity=felt_gravity(inverse(base), arm.gravity),
-        tool=arm.tool @ pose(chain.target_rotation, np.zeros(3)) @ _pose_of(chain, by_name, "tool"),
+        tool=arm.tool @ homogeneous(chain.target_rotation, np.zeros(3)) @ _pose_of(chain, by_name, "tool"),
         title=f"{arm.title or arm.name}, calibrated",
     )
 
@@ -139,7 +139,11 @@ def _pose_of(chain: Chain, by_name: dict[str, float], part: str) -> Array:
 
 def _transform(element: Element, value: float) -> Array:
     along = value * np.eye(3)[element.axis]
-    return pose(np.eye(3), along) if element.kind == "translation" else pose(rotation_from_vector(along), np.zeros(3))
+    return (
+        homogeneous(np.eye(3), along)
+        if element.kind == "translation"
+        else homogeneous(rotation_from_vector(along), np.zeros(3))
+    )
 
 
 def _uncertainty(calibration: Calibration, corrected: Arm) -> Uncertainty:

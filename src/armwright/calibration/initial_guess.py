@@ -15,7 +15,7 @@ from armwright.calibration.chain import Chain, JointErrorModel, chain_of
 from armwright.calibration.measurement_model import MeasurementModel, Plane
 from armwright.calibration.readings import Readings
 from armwright.errors import ContradictionError, TooFewError
-from armwright.spatial.poses import one_pose, pose
+from armwright.spatial.poses import homogeneous, one_pose
 from armwright.spatial.rotations import nearest_rotation, rotation_vector
 
 # A measurement that no rigid motion brings so near to the arm is of another arm, or in other units [m].
@@ -101,7 +101,7 @@ def _rigid_motion(points: Array, goals: Array) -> Array:
     """
     a, b = points - points.mean(axis=0), goals - goals.mean(axis=0)
     R = nearest_rotation(b.T @ a)
-    return pose(R, goals.mean(axis=0) - R @ points.mean(axis=0))
+    return homogeneous(R, goals.mean(axis=0) - R @ points.mean(axis=0))
 
 
 def _refuse_other_units(chain: Chain, readings: Readings, first: Array) -> None:

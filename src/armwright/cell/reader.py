@@ -22,7 +22,7 @@ from armwright.files.limits import beyond, limit
 from armwright.files.reading import regular
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.spatial.poses import from_noap, pose
+from armwright.spatial.poses import from_noap, homogeneous
 from armwright.spatial.poses import inverse as inverse_pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
@@ -284,4 +284,4 @@ def _checked(table: Table, key: str, numbers: Array, index: int | None = None) -
         rows = np.allclose(by_rows, 1.0, atol=_TYPED_ROTATION)
         hint = "; they look like rows: write the columns n, o, a, p" if rows else ""
         raise table.error(key, f"the first nine numbers are no rotation (off by {error:.2g}){hint}", index)
-    return pose(nearest_rotation(X[:3, :3]), X[:3, 3])
+    return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])

@@ -69,7 +69,7 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
     import numpy as np
 
     from armwright.cli.numbers import numbers
-    from armwright.spatial.poses import from_noap, pose
+    from armwright.spatial.poses import from_noap, homogeneous
     from armwright.spatial.rotations import rotation_from_vector
 
     if (xyz is None) == (noap is None):
@@ -81,7 +81,7 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
     assert xyz is not None  # noqa: S101 - one of the two is given
     roll, pitch, yaw = np.radians(numbers("0,0,0" if rpy is None else rpy, 3, "--rpy"))
     turns = [rotation_from_vector(np.array(w)) for w in ((0, 0, yaw), (0, pitch, 0), (roll, 0, 0))]
-    return pose(turns[0] @ turns[1] @ turns[2], np.array(numbers(xyz, 3, "--xyz")) * 1e-3)
+    return homogeneous(turns[0] @ turns[1] @ turns[2], np.array(numbers(xyz, 3, "--xyz")) * 1e-3)
 
 
 def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:

@@ -20,8 +20,8 @@ def with_tool(model: "Arm", text: str | None) -> "Arm":
     import attrs
     import numpy as np
 
-    from armwright.spatial.poses import pose
+    from armwright.spatial.poses import homogeneous
 
     if text is None:
         return model
-    return attrs.evolve(model, tool=pose(np.eye(3), np.array(numbers(text, 3, "--tool-mm")) * 1e-3))
+    return attrs.evolve(model, tool=homogeneous(np.eye(3), np.array(numbers(text, 3, "--tool-mm")) * 1e-3))

@@ -7,7 +7,7 @@ import numpy as np
 from armwright.arm.model import Arm, Joint
 from armwright.arm.positions import positions
 from armwright.arrays import Array, ArrayLike
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.tracing.scalar import Scalar, cos, sin
 from armwright.tracing.vectors import Matrix, Vector, add, apply, product
 
@@ -114,4 +114,4 @@ def stack(scalars: Sequence[Scalar], lead: tuple[int, ...]) -> Array:
 
 def _stack_pose(frame: tuple[Matrix, Vector], lead: tuple[int, ...]) -> Array:
     R, p = frame
-    return pose(stack([x for row in R for x in row], lead).reshape(*lead, 3, 3), stack(p, lead))
+    return homogeneous(stack([x for row in R for x in row], lead).reshape(*lead, 3, 3), stack(p, lead))

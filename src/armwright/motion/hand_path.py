@@ -10,7 +10,7 @@ from armwright.arrays import Array, ArrayLike, floats
 from armwright.motion.blends import PEAK_ACCELERATION, BlendPlan, Ends, blend_plan, blended
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
 Orientation: TypeAlias = Literal["geodesic", "zyz"]
@@ -39,9 +39,9 @@ class HandPath:
         """Return poses (..., 4, 4) at times (...)."""
         t = floats(t, "t")
         if self.angles is not None:
-            return pose(from_zyz(self.angles(t)), self.place(t))
+            return homogeneous(from_zyz(self.angles(t)), self.place(t))
         assert self.turns is not None  # noqa: S101 - one of the two is there
-        return pose(self.turns(t), self.place(t))
+        return homogeneous(self.turns(t), self.place(t))
 
     def slowed(self, factor: float) -> "HandPath":
         """Return the same path run ``factor`` times slower."""

@@ -25,7 +25,7 @@ from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.postures import postures_at, postures_through
 from armwright.motion.solver import AnyArm, solver_of
 from armwright.motion.trajectory import Trajectory, join
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
 
 # A matrix this far from a rotation is not worth a warning.
@@ -295,7 +295,7 @@ def exact_poses(poses: ArrayLike) -> Array:
             RotationWarning,
             stacklevel=3,
         )
-    return pose(R, X[:, :3, 3])
+    return homogeneous(R, X[:, :3, 3])
 
 
 def _near(arm: Arm, near: ArrayLike | None) -> Array:

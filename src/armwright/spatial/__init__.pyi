@@ -1,3 +1,6 @@
+from .constructors import (
+    pose as pose,
+)
 from .euler import (
     from_zyz as from_zyz,
 )
@@ -14,10 +17,10 @@ from .poses import (
     from_noap as from_noap,
 )
 from .poses import (
-    inverse as inverse,
+    homogeneous as homogeneous,
 )
 from .poses import (
-    pose as pose,
+    inverse as inverse,
 )
 from .poses import (
     to_noap as to_noap,

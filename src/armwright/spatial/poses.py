@@ -23,7 +23,7 @@ def one_pose(value: ArrayLike, what: str = "pose") -> Array:
     return X
 
 
-def pose(R: ArrayLike, p: ArrayLike) -> Array:
+def homogeneous(R: ArrayLike, p: ArrayLike) -> Array:
     """Join a rotation (..., 3, 3) and a place (..., 3) [m] to a pose (..., 4, 4)."""
     R, p = of_shape(R, (3, 3), "rotation"), of_shape(p, (3,), "position")
     lead = np.broadcast_shapes(R.shape[:-2], p.shape[:-1])
@@ -38,7 +38,7 @@ def inverse(X_AB: ArrayLike) -> Array:
     """Return X_BA, (..., 4, 4), without solving: the rotation turned over, the place turned back."""
     X_AB = of_shape(X_AB, (4, 4), "pose")
     R_BA = np.swapaxes(X_AB[..., :3, :3], -1, -2)
-    return pose(R_BA, -(R_BA @ X_AB[..., :3, 3:])[..., 0])
+    return homogeneous(R_BA, -(R_BA @ X_AB[..., :3, 3:])[..., 0])
 
 
 def turned_over(X_AB: Array) -> Array:
@@ -54,7 +54,7 @@ def from_noap(numbers: ArrayLike) -> Array:
     """Return the pose (..., 4, 4) whose columns n, o, a, p are written out in (..., 12) numbers."""
     columns = of_shape(numbers, (12,), "n, o, a, p")
     columns = np.swapaxes(columns.reshape(*columns.shape[:-1], 4, 3), -1, -2)
-    return pose(columns[..., :3], columns[..., 3])
+    return homogeneous(columns[..., :3], columns[..., 3])
 
 
 def to_noap(X: ArrayLike) -> Array:
@@ -78,4 +78,4 @@ def between(X_A: ArrayLike, X_B: ArrayLike, s: ArrayLike) -> Array:
     turn = rotation_vector(X_A[:3, :3].T @ X_B[:3, :3])
     R = X_A[:3, :3] @ rotation_from_vector(s[..., None] * turn)
     p = X_A[:3, 3] + s[..., None] * (X_B[:3, 3] - X_A[:3, 3])
-    return pose(R, p)
+    return homogeneous(R, p)

@@ -28,7 +28,7 @@ from armwright.motion.solver import solver_of
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.euler import matlab_zyz
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, nearest_rotation
 
 Way: TypeAlias = Literal["joint", "seed", "zyz", "geodesic"]
@@ -60,7 +60,7 @@ SAMPLES = 501
 
 def study_poses() -> Array:
     """Return the poses A, B, C (3, 4, 4), their printed rotations made exact."""
-    return pose(nearest_rotation(PRINTED_ROTATIONS), np.array(PRINTED_PLACES_CM, dtype=np.float64) / 100)
+    return homogeneous(nearest_rotation(PRINTED_ROTATIONS), np.array(PRINTED_PLACES_CM, dtype=np.float64) / 100)
 
 
 def sample_times() -> Array:

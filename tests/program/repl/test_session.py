@@ -17,7 +17,7 @@ from armwright.program.repl.session import Answer, Session
 from armwright.program.semantics.cell_symbols import Imported
 from armwright.program.vm.interpreter import Limits, interpret
 from armwright.program.vm.machine import Machine
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from program.running import DOWN, EXACT, cell_of, code_of, corpus_text, down
 
 PROGRAMS = ("p01", "p02", "p03", "p04", "p05", "p06", "p07")
@@ -435,7 +435,7 @@ STEPS = (
 
 def _seeing() -> Cell:
     """Return a cell whose camera has two answers, with a torch."""
-    seen = (pose(DOWN, (0.4, 0.1, 0.1)), pose(DOWN, (0.5, 0.1, 0.1)))
+    seen = (homogeneous(DOWN, (0.4, 0.1, 0.1)), homogeneous(DOWN, (0.5, 0.1, 0.1)))
     return attrs.evolve(cell_of("cell1"), visions={"PART": seen}, devices=frozenset(("TORCH",)))
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from armwright.arm.dh import turn, twist
 from armwright.arrays import Array
-from armwright.spatial.poses import inverse, pose
+from armwright.spatial.poses import homogeneous, inverse
 
 # Angles this close to a right one, and lengths this close to 0 beside the size of the arm, are so: typed numbers of
 # twelve digits, multiplied a few times.
@@ -69,13 +69,13 @@ def frames_of(joints: Sequence[Array], axes: Sequence[Array], size: float) -> Fr
     Source:
         Denavit & Hartenberg (1955).
     """
-    first = X = pose(_first_turn(joints[0][:3, :3], axes[0]), joints[0][:3, 3])
+    first = X = homogeneous(_first_turn(joints[0][:3, :3], axes[0]), joints[0][:3, 3])
     rows, poses, leaning = [], [], []
     for joint, axis in zip(joints[1:], axes[1:], strict=True):
         row = _row(X, joint[:3, 3], axis, size * ROUNDING)
-        behind = X @ pose(turn(2, row.theta), (0.0, 0.0, row.d)) @ twist(row.alpha, row.a)
+        behind = X @ homogeneous(turn(2, row.theta), (0.0, 0.0, row.d)) @ twist(row.alpha, row.a)
         if np.linalg.norm(behind[:3, 3] - joint[:3, 3]) > size:
-            behind = pose(_turn_on(axis, X[:3, 2], joint[:3, :3]), joint[:3, 3])
+            behind = homogeneous(_turn_on(axis, X[:3, 2], joint[:3, :3]), joint[:3, 3])
             row = Row(fixed=cleared_pose(inverse(X) @ behind, size, _NOISE))
         lean = float(np.linalg.norm(np.cross(X[:3, 2], axis)))
         leaning.append(lean if lean > ROUNDING else 0.0)
@@ -98,7 +98,7 @@ def cleared_pose(X: Array, size: float, rounding: float = ROUNDING) -> Array:
     R = cleared(X[:3, :3], 1.0, rounding)
     alone = np.count_nonzero(R, axis=1) == 1
     R[alone] = np.sign(R[alone])
-    return pose(R, cleared(X[:3, 3], size, rounding))
+    return homogeneous(R, cleared(X[:3, 3], size, rounding))
 
 
 def _turn_on(axis: Array, before: Array, R: Array) -> Array:

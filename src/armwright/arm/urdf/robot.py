@@ -14,7 +14,7 @@ from armwright.arm.urdf.elements import Element, read_elements
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, InvalidValueError, closest, one_of
 from armwright.files.limits import beyond, limit
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
 # URDF has numbers only: a limit of this size or more says that there is none. Our own writer puts it there.
@@ -56,8 +56,8 @@ class UrdfJoint:
             return X
         axis = axis_of(self) * self.locked
         if self.element.text("type") == "prismatic":
-            return X @ pose(np.eye(3), axis)
-        return X @ pose(rotation_from_vector(axis), np.zeros(3))
+            return X @ homogeneous(np.eye(3), axis)
+        return X @ homogeneous(rotation_from_vector(axis), np.zeros(3))
 
     def require_serial(self) -> None:
         """Refuse a joint that is no part of a serial arm.
@@ -194,7 +194,7 @@ def origin_of(element: Element) -> Array:
     if origin is None:
         return np.eye(4)
     roll, pitch, yaw = origin.vector("rpy", (0.0, 0.0, 0.0))
-    return pose(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll), origin.vector("xyz", (0.0, 0.0, 0.0)))
+    return homogeneous(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll), origin.vector("xyz", (0.0, 0.0, 0.0)))
 
 
 def axis_of(joint: UrdfJoint) -> Array:

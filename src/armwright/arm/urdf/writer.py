@@ -16,7 +16,7 @@ from armwright.arm.urdf.robot import NO_LIMIT
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.spatial.euler import to_rpy
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 
 def urdf_text(arm: Arm, tilts: Sequence[float] | None = None) -> str:
@@ -100,11 +100,11 @@ def _robot(arm: Arm, tilts: Sequence[float]) -> Iterator[str]:
     origin = _origin(np.zeros(3), np.zeros(3))
     for i, (joint, motor) in enumerate(zip(arm.joints, arm.motors, strict=True), 1):
         yield from _joint(joint, motor, origin, (joints[i - 1], moving[i - 1], moving[i]))
-        X = pose(turn(2, joint.theta), (0.0, 0.0, joint.d)) @ joint.behind
+        X = homogeneous(turn(2, joint.theta), (0.0, 0.0, joint.d)) @ joint.behind
         origin = _origin(_rpy(joint, X), X[:3, 3])
         yield from _link(arm, i, X, moving[i])
         if tilts[i - 1]:
-            X = X @ pose(turn(1, tilts[i - 1]), np.zeros(3))
+            X = X @ homogeneous(turn(1, tilts[i - 1]), np.zeros(3))
             origin = _origin(to_rpy(X[:3, :3]), X[:3, 3])
     X = X @ arm.tool
     yield f"  <link name={_quoted(tool)}/>"

@@ -12,7 +12,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_frames, tool_frame
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 
 # Lines this close to a right angle, to one direction or to one point are so: typed numbers multiplied a few times
 # [rad] and [m].
@@ -43,7 +43,7 @@ def joint_axes(arm: Arm) -> Axes:
         kinds="".join("R" if joint.revolute else "P" for joint in arm.joints),
         points=np.array([p for _, p in frames[:-1]]),
         directions=np.array([[row[2] for row in R] for R, _ in frames[:-1]]),
-        X_BT=pose(*tool_frame(arm, frames[-1])),
+        X_BT=homogeneous(*tool_frame(arm, frames[-1])),
     )
 
 

@@ -11,7 +11,7 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solution import Branch, InverseSolution, Outcome, violations
 from armwright.kinematics.inverse_kinematics.wrapping import joint_distance, same_configuration
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, nearest_rotation, orthonormality_error
 
 # A pose typed with a few digits is turned into a rotation up to this error; beyond it is a mistake.
@@ -46,7 +46,7 @@ def exact_pose(X_BT: ArrayLike) -> Array:
     # A rotation that was computed is as exact as one can be; what is typed is off by far more.
     if float(orthonormality_error(X[:3, :3])) < _COMPUTED:
         return X
-    return pose(nearest_rotation(X[:3, :3]), X[:3, 3])
+    return homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
 
 
 def typed_poses(X_BT: ArrayLike) -> Array:

@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
 from armwright.kinematics.inverse_kinematics.axes import SAME, Axes, joint_axes, meeting, parallel, perpendicular
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Family, rotated_about_y
-from armwright.spatial.poses import pose
+from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
 
 # From a frame whose z, y, z turns the last three joints of a spherical wrist are, to one whose y, z, y turns those of
@@ -87,7 +87,7 @@ class _Seen:
         if float((centre - origin) @ y) < -SAME:
             y = -y
         R = nearest_rotation(np.stack([np.cross(y, z), y, z], axis=-1))
-        self.X_BS = pose(R, origin)
+        self.X_BS = homogeneous(R, origin)
         self.points = (p - origin) @ R
         self.directions = axes.directions @ R
         self.centre = (centre - origin) @ R

@@ -11,7 +11,7 @@ from armwright.arrays import Array
 from armwright.program.bytecode.instructions import Op
 from armwright.program.language.units import UnitSystem
 from armwright.program.syntax.pose_literals import EXACT, REPAIRABLE
-from armwright.spatial.poses import from_noap, inverse, pose
+from armwright.spatial.poses import from_noap, homogeneous, inverse
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # Numbers beyond this are a slip, and squares of them would overflow.
@@ -94,7 +94,7 @@ def matrix(numbers: Sequence[float], units: UnitSystem) -> Array:
     error = float(orthonormality_error(X[:3, :3]))
     if error > REPAIRABLE:
         raise ValueFault("E206", "the first nine numbers are not a rotation", f"off by {error:.2g}")
-    return X if error <= EXACT else pose(nearest_rotation(X[:3, :3]), X[:3, 3])
+    return X if error <= EXACT else homogeneous(nearest_rotation(X[:3, :3]), X[:3, 3])
 
 
 # Operations on values alone.
