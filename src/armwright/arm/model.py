@@ -21,6 +21,7 @@ from armwright.arm.tensors import ROUNDING, impossible_moments
 from armwright.arm.uncertainty import Uncertainty
 from armwright.arrays import LARGEST, Array, ArrayLike, array_key, exact_shape, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, ShapeError, counted, shown
+from armwright.notebook import html_table
 from armwright.spatial.poses import one_pose
 
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
@@ -403,3 +404,13 @@ class Arm:
         """Return one of the limits of all joints, (n,), by its name in ``limits``."""
         limit: Array = getattr(self.limits, name)
         return limit
+
+    def _repr_html_(self) -> str:
+        """Show the joints, their Denavit-Hartenberg parameters and their limits as a table."""
+        columns = ("", "joint", "kind", "theta", "d", "a", "alpha", "lower", "upper", "speed", "acceleration", "effort")
+        rows = []
+        for position, joint in enumerate(self.joints, 1):
+            limits = attrs.astuple(joint.limits)
+            own = ("",) * 4 if joint.fixed is not None else (joint.theta, joint.d, joint.a, joint.alpha)
+            rows.append((str(position), joint.name, str(joint.kind), *own, *limits))
+        return html_table(f"{self.name}: {self.title} (SI units, angles in rad)", columns, rows)

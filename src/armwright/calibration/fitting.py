@@ -41,6 +41,7 @@ from armwright.calibration.noise import (
 )
 from armwright.calibration.readings import Readings, readings
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError, UnknownNameError
+from armwright.notebook import html_table
 
 # Rounds of selecting errors and fitting them, and of reweighting within one fit.
 _ROUNDS, _REWEIGHTINGS = 8, 30
@@ -141,6 +142,12 @@ class Calibration:
         rows, columns = [i for i, _ in own], [j for _, j in own]
         J = self.chain.forward(q, self.arm_errors).position_jacobian[:, :, columns]
         return np.asarray(J @ self.covariance[np.ix_(rows, rows)] @ J.swapaxes(1, 2), dtype=np.float64)
+
+    def _repr_html_(self) -> str:
+        """Show every parameter deviation that was fitted, with its standard error."""
+        rows = zip(self.names, self.values.tolist(), self.standard_errors.tolist(), strict=True)
+        title = f"{len(self.names)} parameter deviations, {self.degrees_of_freedom} degrees of freedom (m, rad)"
+        return html_table(title, ("parameter", "estimate", "standard error"), rows)
 
 
 def calibrate_points(

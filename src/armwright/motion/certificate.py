@@ -9,6 +9,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, number
 from armwright.errors import InvalidValueError
+from armwright.notebook import html_lines
 
 LimitName: TypeAlias = Literal["speed", "acceleration", "effort"]
 # No bound closer than this can be certified: rounding and the solution of poses take up what is left [m].
@@ -92,6 +93,10 @@ class Certificate:
         if self.because is not None:
             lines.append(slower(self.arm, self.factor, self.because, " than the tool speed has it"))
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """Show what is kept, and how closely."""
+        return html_lines(str(self))
 
 
 def slower(arm: Arm, factor: float, because: tuple[LimitName, int], than: str = "") -> str:

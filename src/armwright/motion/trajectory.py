@@ -12,6 +12,7 @@ from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, read_onl
 from armwright.errors import InvalidValueError, KindError, ShapeError, shown
 from armwright.motion.knots import one_way
 from armwright.motion.polynomials import derivative, extremes, peaks, shifted
+from armwright.notebook import html_table
 
 # Nobody reads more samples than this; a shorter period is a slip of the unit.
 _MOST_SAMPLES = 100_000_000
@@ -222,6 +223,13 @@ class Trajectory:
         times = np.append(period * np.arange(before), self.duration)
         q, qd, qdd, jerk = (self(times, order) for order in range(4))
         return Samples(times=times, q=q, qd=qd, qdd=qdd, jerk=jerk)
+
+    def _repr_html_(self) -> str:
+        """Show start, end, range and peaks of every joint as a table."""
+        columns = ("joint", "start", "end", "lowest", "highest", "peak speed", "peak acceleration")
+        values = (self(0.0), self(self.duration), *self.extremes(), self.peaks(1), self.peaks(2))
+        rows = [(str(number), *row) for number, row in enumerate(np.stack(values, axis=-1).tolist(), 1)]
+        return html_table(f"{self.duration:.6g} s in {len(self.coefficients)} segments (SI units)", columns, rows)
 
 
 def hold(q: ArrayLike, duration: float) -> Trajectory:

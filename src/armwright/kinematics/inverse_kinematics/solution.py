@@ -9,6 +9,7 @@ import attrs
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, array_key, joint_array, read_only, reduce_by_fields
 from armwright.errors import ArmwrightError
+from armwright.notebook import html_table
 
 # A position this close to its limit, relative to the range of the joint, is at the limit and not beyond it.
 _AT_LIMIT = 1e-9
@@ -147,6 +148,12 @@ class InverseSolution:
         least = min(self.branches, key=_worst_violation)
         faults = "; ".join(str(violation) for violation in least.violations)
         return f"no posture of '{self.arm.name}' is inside the joint limits; in the closest, {faults}"
+
+    def _repr_html_(self) -> str:
+        """Show the outcome, and every branch with its configuration and what keeps it from being taken."""
+        columns = ("branch", *(f"q{number}" for number in range(1, self.arm.n + 1)), "outside its limits")
+        rows = [(branch.label, *branch.q.tolist(), "; ".join(map(str, branch.violations))) for branch in self.branches]
+        return html_table(f"{self.arm.name}: {self.outcome} (rad, m)", columns, rows)
 
 
 class NoSolutionError(ArmwrightError, ValueError):

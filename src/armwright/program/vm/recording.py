@@ -14,6 +14,7 @@ from armwright.cell.model import Cell, CellArm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.motion.plan import Stage
 from armwright.motion.trajectory import Trajectory
+from armwright.notebook import html_table
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Span
 
@@ -223,6 +224,11 @@ class Recording:
     def trace(self) -> list[str]:
         """Return the lines of the trace."""
         return [effect.text for effect in self.effects if effect.kind not in _SILENT]
+
+    def _repr_html_(self) -> str:
+        """Show what happened, effect by effect."""
+        rows = ((effect.t0, effect.t1, effect.process, effect.text) for effect in self.effects)
+        return html_table(f"{self.duration:.6g} s in {self.cell.name}", ("from s", "to s", "process", "effect"), rows)
 
 
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
