@@ -138,6 +138,12 @@ HEAD = (
         ("MOVE f TO g WITH APPROACH = |", ["ARM_1", "f", "g"]),
         ("MOVE f TO g STRAIGHTLY |", ["ON", "WITH SPEED", "WITH DURATION"]),
         ("MOVE f TO g | WITH DURATION = 3s", ["DIRECTLY", "STRAIGHTLY", "VIA", "ON", "WITH APPROACH"]),
+        ("MOVE f TO g ON n > 1 DO |", ["HALT", "SIGNAL", "PRINT", "BEGIN"]),
+        ("MOVE f TO g ON n > 1 |", ["AND", "OR", "DO"]),
+        ("f = (1, |", ["n", "DIST", "FORCE"]),
+        ("COBEGIN PRIORITY 2 : |", ["BEGIN"]),
+        ("n = 1 |", []),
+        ("MOVE f VIA |", []),
         ("OPEN ARM_1 ; // MOVE |", []),
         ('PRINT ("MOVE |', []),
     ],
@@ -182,6 +188,16 @@ def test_completion_in_front_of_begin() -> None:
     assert "MOVE" not in labels("VAR f : FRAME ; |")
     assert labels("UNITS |")[:2] == ["MM", "CM"]
     assert "WHILE" not in labels("BEGIN |", std=Standard.RLO_83)
+    assert labels("VAR t : TRANS ; f : FRAME ; BEGIN AFFIX f TO f AT |", std=Standard.RLO_83) == ["t"]
+
+
+def test_completion_of_words_that_end_statements() -> None:
+    """What ends statements is offered where the next one begins, and behind one when it is being written."""
+    assert "END" in labels(f"{HEAD}n = 1 ; |")
+    assert labels(f"{HEAD}n = 1 E|") == ["END"]
+    assert "UNTIL" in labels(f"{HEAD}REPEAT n = 1 ; |")
+    assert "RETRY" in labels(f"{HEAD}TRY n = 1 RECOVER IF n > 1 THEN BEGIN |")
+    assert "RETRY" not in labels(f"{HEAD}TRY |")
 
 
 def test_completion_keeps_the_case_of_the_program() -> None:

@@ -520,6 +520,20 @@ async def test_characters_beyond_the_basic_plane(editor: Editor) -> None:
 
 
 @pytest.mark.asyncio
+async def test_long_program(editor: Editor) -> None:
+    """A program of more than 2000 lines is analysed when nothing more is typed; a question waits for that."""
+    await editor.open("VAR n : SCALAR ;\nBEGIN\n" + "  n = 1 ;\n" * 2100 + "  PRINT(n) ;\nEND.\n")
+    for new in ("PRINT(m) ;", " "):
+        where = position(editor.text, "  PRINT(n)")
+        editor.change(lsp.Range(where, where), new)
+
+    assert await editor.labels(position(editor.text, "  PRINT(n)", behind=True)) == []
+    assert "n : SCALAR" in await editor.hover("n) ;")
+    assert {str(one.code) for one in await editor.told()} == {"E202"}
+    assert editor.client.published == [0, 2]
+
+
+@pytest.mark.asyncio
 async def test_whole_new_text(editor: Editor) -> None:
     """An editor may also send the whole text anew, and close and open a program again."""
     await editor.open("BEGIN MOVE ARM_1 TO g ; END.")

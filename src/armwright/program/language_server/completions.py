@@ -335,8 +335,8 @@ class _Maker:
                 yield self._one(self._cased(name), Sort.DEVICE, "", "device")
 
     def functions(self, asked: _Operand) -> Iterator[Completion]:
-        """Give functions of the language."""
-        for name in asked.functions:
+        """Give functions of the language, which RLO-83 has none of."""
+        for name in asked.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
             meaning = explained(name)
             form, text = (meaning.form, meaning.text) if meaning else ("", "")
             yield self._one(self._cased(name), Sort.FUNCTION, f"{self._cased(name)}($1)", form, text)

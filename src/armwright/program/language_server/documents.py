@@ -4,25 +4,18 @@ import asyncio
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import attrs
+from lsprotocol import types as lsp
 
 from armwright.program.language.position_codec import PositionCodec
+from armwright.program.language.source import Span
 from armwright.program.language_server.analysis import Analysis
+from armwright.program.language_server.lsp_types import span_of
 from armwright.program.language_server.semantic_tokens import Stretch, line_stretches
 
 # How many lines a program may have that is analysed at every change.
 SHORT_LINES = 2000
 # How long nothing has to be typed before a program is analysed though nobody asks: short ones and long ones [s].
 PAUSE, PAUSE_LONG = 0.02, 0.5
-
-
-@attrs.frozen
-class Changed:
-    """A change as an editor tells it: lines and columns from 0; without a start the text is all new."""
-
-    text: str
-    start: tuple[int, int] | None = None
-    end: tuple[int, int] = (0, 0)
 
 
 class Document:
@@ -68,13 +61,13 @@ class Document:
         """Whether it is analysed at every change."""
         return len(self.codec.starts) <= SHORT_LINES
 
-    def change(self, changes: Sequence[Changed], version: int | None) -> None:
-        """Make changes, one after the other."""
+    def change(self, changes: Sequence[lsp.TextDocumentContentChangeEvent], version: int | None) -> None:
+        """Make changes, one after the other; a change that names no range brings the whole text anew."""
         for change in changes:
-            codec, text = self.codec, self.text
-            start = 0 if change.start is None else codec.offset(*change.start)
-            end = len(text) if change.start is None else max(start, codec.offset(*change.end))
-            self.codec = PositionCodec(text[:start] + change.text + text[end:], codec.encoding)
+            text, gone = self.text, Span(0, len(self.text))
+            if isinstance(change, lsp.TextDocumentContentChangePartial):
+                gone = span_of(self.codec, change.range)
+            self.codec = PositionCodec(text[: gone.start] + change.text + text[gone.end :], self.codec.encoding)
         self.version = version
         self.outdate()
 

@@ -20,7 +20,7 @@ from armwright.program.language_server import lsp_types
 from armwright.program.language_server.analyse import Settings, analyse
 from armwright.program.language_server.analysis import Analysis
 from armwright.program.language_server.cell_lookup import Cells
-from armwright.program.language_server.documents import Changed, Document
+from armwright.program.language_server.documents import Document
 from armwright.program.language_server.message_limits import Incoming
 from armwright.version import __version__
 
@@ -240,7 +240,7 @@ def _conversation(server: RloServer) -> None:
     def did_change(params: lsp.DidChangeTextDocumentParams) -> None:
         document = server.documents.get(params.text_document.uri)
         if document is not None:
-            document.change([_changed(one) for one in params.content_changes], params.text_document.version)
+            document.change(params.content_changes, params.text_document.version)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_SAVE)
     def did_save(params: lsp.DidSaveTextDocumentParams) -> None:
@@ -271,13 +271,6 @@ def _surroundings(server: RloServer) -> None:
     @server.feature(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES)
     def did_change_watched_files(_: lsp.DidChangeWatchedFilesParams) -> None:
         server.outdate()
-
-
-def _changed(change: lsp.TextDocumentContentChangeEvent) -> Changed:
-    if isinstance(change, lsp.TextDocumentContentChangeWholeDocument):
-        return Changed(change.text)
-    start, end = change.range.start, change.range.end
-    return Changed(change.text, (start.line, start.character), (end.line, end.character))
 
 
 async def _watch(server: RloServer) -> None:
