@@ -9,13 +9,13 @@ from itertools import product
 import numpy as np
 
 from armwright.clearance.contact import stiffness
+from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.paths import TEST_PATHS, thesis_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.rest import at_rest
 from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import simulate
-from armwright.clearance.sweeping import FeatureSweep
 from clearance.exudyn_five_bar import simulated
 
 STEP = 1e-5

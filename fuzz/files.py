@@ -21,7 +21,7 @@ from armwright.accuracy.measurement_file import read_measurements as read_accura
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.calibration.measurements import read_measurements
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measured import read_measured
+from armwright.clearance.estimation.measurement_file import read_measured
 from armwright.clearance.reader import read_linkage
 from armwright.errors import ArmwrightError
 from armwright.motion.poses_file import read_poses

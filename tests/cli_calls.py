@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from armwright.cli.app import main
-from armwright.files import reading
+from armwright.files import inputs
 
 # What the interpreter does with warnings when nobody says otherwise: those for developers are not shown.
 _FOR_DEVELOPERS = (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning)
@@ -86,7 +86,7 @@ def _as_started(argv: list[str], columns: int, cwd: Path | None) -> Iterator[Non
     sys.argv = argv
     os.environ |= {"COLUMNS": str(columns), "NO_COLOR": "1"}
     os.chdir(cwd or before[2])
-    reading.forget()
+    inputs.forget()
     try:
         with warnings.catch_warnings():
             warnings.resetwarnings()

@@ -12,7 +12,7 @@ import pytest
 import armwright
 from armwright.arm.load import read_arm, read_load
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measured import RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import RestMeasured, read_measured
 from armwright.clearance.ideal import closed, tip_of
 from armwright.clearance.reader import read_linkage
 from armwright.clearance.scenario import assembly_guess

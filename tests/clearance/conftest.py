@@ -8,9 +8,9 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.kriging import Surrogate, learn
+from armwright.clearance.feature_sweep import FeatureSweep, feature_vector
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.sweeping import FeatureSweep, feature_vector
 from armwright.sweep.designs import sobol
 from clearance.arms import CENTRE, PATHS
 

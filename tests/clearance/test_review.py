@@ -10,8 +10,9 @@ import pytest
 from armwright.clearance import simulation
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.correction import correct_nodes, tip_at
-from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import PathsMeasured, RestMeasured, read_measured
 from armwright.clearance.estimation.static import estimate_at_rest, rest_matrix
+from armwright.clearance.feature_sweep import FeatureSweep, is_sweep_of
 from armwright.clearance.features import spectrum
 from armwright.clearance.ideal import sensitivity
 from armwright.clearance.linkage import Linkage
@@ -20,7 +21,6 @@ from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import Status, simulate
-from armwright.clearance.sweeping import FeatureSweep, is_sweep_of
 from armwright.errors import FileFormatError, InvalidValueError
 
 # Sums of a few doubles.

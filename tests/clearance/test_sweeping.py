@@ -9,13 +9,13 @@ import attrs
 import numpy as np
 import pytest
 
+from armwright.clearance.feature_sweep import FeatureSweep, feature_vector, is_chance
 from armwright.clearance.features import Features, features
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import named_path
 from armwright.clearance.predictability import APART, perturbed
 from armwright.clearance.scenario import prepare
 from armwright.clearance.simulation import simulate
-from armwright.clearance.sweeping import FeatureSweep, feature_vector, is_chance
 from armwright.errors import InvalidValueError, UnknownNameError
 from armwright.sweep.designs import Design, latin_hypercube
 from armwright.sweep.errors import SweepError

@@ -13,7 +13,7 @@ import typer.main
 from typer.testing import CliRunner
 
 from armwright.cli.app import app
-from armwright.cli.completing import Shell, script
+from armwright.cli.shell_completion import Shell, script
 from cli_calls import armwright
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from armwright.cli.rewriting import read_source, write_back
+from armwright.cli.source_files import read_source, write_back
 from armwright.errors import OutputError
 from cli_calls import fed_to
 

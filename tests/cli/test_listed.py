@@ -8,7 +8,7 @@ import pytest
 import typer
 
 from armwright.cli.app import app, application
-from armwright.cli.listed import COMMANDS
+from armwright.cli.command_list import COMMANDS
 
 
 def test_the_list_says_what_commands_say() -> None:

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from armwright.cli.numbers import named_numbers, numbers, within
-from armwright.cli.printing import command_line, print_json, print_table, table
+from armwright.cli.output import command_line, print_json, print_table, table
 
 TEXT = {"name": "Gelenk für die Hand", "µm": [1.5, None]}
 

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from armwright.cli.app import app
 from armwright.files.output import RECORD, is_stray, strays
-from armwright.files.staging import PREFIX
+from armwright.files.result_folder import PREFIX
 from samples import Sample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from armwright.errors import FileFormatError
 from armwright.files.document import Document, Table
-from armwright.files.reading import read_text
+from armwright.files.inputs import read_text
 
 
 @pytest.fixture

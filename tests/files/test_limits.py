@@ -12,15 +12,15 @@ from typer.testing import CliRunner
 
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measured import RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import RestMeasured, read_measured
 from armwright.clearance.reader import read_linkage
 from armwright.cli.app import app
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
-from armwright.files import limits, reading
+from armwright.files import inputs, limits
 from armwright.files.document import Document
+from armwright.files.inputs import read_lines, read_text, read_typed_program
 from armwright.files.limits import LIMITS, limit, parsed, raised
 from armwright.files.lines import longest_dotted_key
-from armwright.files.reading import read_lines, read_text, read_typed_program
 from armwright.files.rows import read_rows
 from armwright.motion.poses_file import read_poses
 from armwright.program import compile as compile_program
@@ -280,7 +280,7 @@ def test_the_page() -> None:
 
 def test_every_file_is_read_in_one_place() -> None:
     """Nobody but the readers opens a file that a user names, or parses what it holds."""
-    own = {"files/reading.py", "files/document.py", "files/lines.py", "files/rows.py", "arm/urdf/elements.py"}
+    own = {"files/inputs.py", "files/document.py", "files/lines.py", "files/rows.py", "arm/urdf/elements.py"}
     opening = re.compile(
         r"tomllib\.|csv\.reader|etree\.(parse|fromstring)|stdin\.buffer\.read\(|\bread_bytes\(\)|\.read_text\("
     )
@@ -325,7 +325,7 @@ def test_dotted_keys() -> None:
 
 def test_a_table_is_not_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A table of many rows is read in the memory of a few, whatever its size: its rows would take ten times as much."""
-    monkeypatch.setattr(reading, "_PIECE", 1 << 12)
+    monkeypatch.setattr(inputs, "_PIECE", 1 << 12)
     path = tmp_path / "long.csv"
     path.write_text("a,b\n" + "1.25,2.5\n" * 5000)
     tracemalloc.start()

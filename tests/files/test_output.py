@@ -9,8 +9,8 @@ import pytest
 
 from armwright.errors import OutputError
 from armwright.files import output
+from armwright.files.inputs import forget, read_text
 from armwright.files.output import descriptor, write_file, write_folder
-from armwright.files.reading import forget, read_text
 
 
 def test_writes_and_replaces(tmp_path: Path) -> None:

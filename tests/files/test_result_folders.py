@@ -13,7 +13,7 @@ import pytest
 
 from armwright.errors import OutputError
 from armwright.files.output import RECORD, is_stray, strays, write_folder
-from armwright.files.staging import PREFIX, remove_abandoned, staging
+from armwright.files.result_folder import PREFIX, remove_abandoned, staging
 from samples import Sample
 
 OLD = {f"figure-old{i}.svg": "old" for i in range(20)} | {f"figure-both{i}.svg": "old" for i in range(20)}
@@ -131,7 +131,7 @@ def test_killed_while_clearing_up(tmp_path: Path, removals: int) -> None:
     """Killed after any number of removals, a staging folder is known for abandoned, however it is listed."""
     code = (
         "import os, pathlib, sys\n"
-        "from armwright.files.staging import KEPT, staging\n"
+        "from armwright.files.result_folder import KEPT, staging\n"
         "class Listed(list):\n"
         "    def __enter__(self): return self\n"
         "    def __exit__(self, *_): pass\n"

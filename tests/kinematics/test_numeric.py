@@ -8,8 +8,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE
 from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
-from armwright.kinematics.inverse_kinematics.ranking import POSE_TOLERANCE
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Outcome
 from armwright.kinematics.inverse_kinematics.solve import inverse

@@ -5,8 +5,8 @@ import sys
 import numpy as np
 import pytest
 
+from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.paths import PickAndPlace
-from armwright.clearance.sweeping import FeatureSweep
 from armwright.errors import MissingExtraError
 from armwright.study import five_bar_clearance as study
 from armwright.study.five_bar_clearance import EstimateRow, Learnt

@@ -18,8 +18,8 @@ from armwright.cell.names import arm_name
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, closest
 from armwright.files.document import Document, Table
+from armwright.files.inputs import regular
 from armwright.files.limits import beyond, limit
-from armwright.files.reading import regular
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.spatial.poses import from_noap, homogeneous

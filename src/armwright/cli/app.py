@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
+from armwright.cli.command_list import register
 from armwright.cli.commands import COMPLETE, NAME, App
-from armwright.cli.completing import Shell, install, limits, prepare, script
 from armwright.cli.failures import Commands, run_and_exit
-from armwright.cli.listed import register
+from armwright.cli.shell_completion import Shell, install, limits, prepare, script
 from armwright.cli.terminal import bound_widths, prepare_streams
 from armwright.version import __version__
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 
 
 def arms(as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 from armwright.cli.programs import Std, Strict
 from armwright.errors import ExitStatus, FileFormatError
 from armwright.program.language.words import Standard

@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.completing import paths
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
-from armwright.cli.printing import json_text, plain_console, print_json, print_table, table
+from armwright.cli.output import json_text, plain_console, print_json, print_table, table
 from armwright.cli.results import warn_of_stray, write_results
+from armwright.cli.shell_completion import paths
 
 if TYPE_CHECKING:
     from armwright.arrays import Array
@@ -129,7 +129,7 @@ def _drawn(model: "Linkage", estimate: Path) -> "Array":
 
     from armwright.clearance.estimation.misfit import refuse_contradiction
     from armwright.errors import FileFormatError, TooFewError
-    from armwright.files.reading import read_text
+    from armwright.files.inputs import read_text
 
     warn_of_stray(estimate)
     text = read_text(estimate)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.linkages import LinkageName
-from armwright.cli.printing import plain_console, print_json, print_table, table
+from armwright.cli.output import plain_console, print_json, print_table, table
 from armwright.cli.progress import waiting
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
 if TYPE_CHECKING:
-    from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured
+    from armwright.clearance.estimation.measurement_file import PathsMeasured, RestMeasured
     from armwright.clearance.estimation.on_paths import Learnt
     from armwright.clearance.estimation.static import Estimate
     from armwright.clearance.linkage import Linkage
@@ -50,7 +50,7 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance estimate five-bar examples/five_bar_rest.csv`
     """
-    from armwright.clearance.estimation.measured import RestMeasured, read_measured
+    from armwright.clearance.estimation.measurement_file import RestMeasured, read_measured
     from armwright.clearance.reader import load_linkage
     from armwright.cli.results import warn_of_stray
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.completing import paths, setting
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
 from armwright.cli.options import JsonSummary, Quiet
-from armwright.cli.printing import command_line, print_json, print_result
+from armwright.cli.output import command_line, print_json, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
+from armwright.cli.shell_completion import paths, setting
 
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage

@@ -5,17 +5,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.completing import one_of
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
 from armwright.cli.options import Quiet
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 from armwright.cli.progress import sweep_bar, waiting
+from armwright.cli.shell_completion import one_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
     from armwright.arrays import Array
-    from armwright.clearance.sweeping import FeatureSweep
+    from armwright.clearance.feature_sweep import FeatureSweep
     from armwright.sweep.designs import Design
 
 
@@ -62,8 +62,8 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
     """
+    from armwright.clearance.feature_sweep import FeatureSweep
     from armwright.clearance.reader import load_linkage
-    from armwright.clearance.sweeping import FeatureSweep
     from armwright.sweep.extras import check_extras
     from armwright.sweep.folder import RESULTS
     from armwright.sweep.run import run
@@ -109,9 +109,9 @@ def _chaos(task: "FeatureSweep", found: "Dataset") -> dict[str, dict[str, Any]]:
     """Return by path until when its runs are predictions [s], and which features are left to chance."""
     import numpy as np
 
+    from armwright.clearance.feature_sweep import is_chance
     from armwright.clearance.features import Features
     from armwright.clearance.paths import thesis_path
-    from armwright.clearance.sweeping import is_chance
 
     done = found["status"].to_numpy() == 0
     if not task.twins or not done.any():

@@ -52,7 +52,7 @@ def load_code(path: Path, cell: Path | None, *, strict: bool, std: Standard) -> 
         typer.Exit: the program has errors.
     """
     from armwright.cli.programs import given_cell, print_diagnostics
-    from armwright.files.reading import read_program
+    from armwright.files.inputs import read_program
     from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
 

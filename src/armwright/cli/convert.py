@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.options import ArmName
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 from armwright.errors import counted
 
 if TYPE_CHECKING:

@@ -71,7 +71,7 @@ def load(launch: "Launch") -> "Loaded":
         FileFormatError: a file cannot be read.
     """
     from armwright.cli.programs import given_cell, imported_files
-    from armwright.files.reading import read_program
+    from armwright.files.inputs import read_program
     from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
     from armwright.program.debugger.dap_session import Loaded, LoadError

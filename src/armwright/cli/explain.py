@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armwright.cli.completing import codes
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
+from armwright.cli.shell_completion import codes
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from armwright.cli.commands import NAME, Group
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 from armwright.cli.terminal import cleaned
 from armwright.errors import ArmwrightError, CheckFailedError, DoubtfulError, ExitStatus, FileFormatError, shortened
 from armwright.files.output import WRITTEN

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.failures import failure_data
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 from armwright.cli.programs import Std
 from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.language.words import Standard
@@ -39,7 +39,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
-    from armwright.cli.rewriting import is_stream, print_difference, read_source, write_back
+    from armwright.cli.source_files import is_stream, print_difference, read_source, write_back
     from armwright.cli.terminal import print_verbatim
     from armwright.program.formatter.format import formatted
 

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.completing import one_of
 from armwright.cli.options import ArmName, Json, Posture, Rows
+from armwright.cli.shell_completion import one_of
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 
 if TYPE_CHECKING:

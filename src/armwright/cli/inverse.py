@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.options import ArmName, Json
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 from armwright.errors import ExitStatus
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import typer
 from armwright.cli.failures import outcome
 from armwright.cli.numbers import Named, named_numbers
 from armwright.cli.options import Json, Quiet
-from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table
+from armwright.cli.output import command_line, json_text, plain_console, print_json, print_table
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 from armwright.errors import CheckFailedError, TooFewError

@@ -4,9 +4,9 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.completing import quantities
 from armwright.cli.options import ArmName
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
+from armwright.cli.shell_completion import quantities
 
 
 def kernel(

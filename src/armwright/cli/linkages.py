@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from armwright.cli.completing import linkages, setting
 from armwright.cli.numbers import named_numbers
+from armwright.cli.shell_completion import linkages, setting
 from armwright.errors import InvalidValueError
 
 if TYPE_CHECKING:

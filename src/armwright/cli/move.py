@@ -9,7 +9,7 @@ import typer
 
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json, QuietButWarnings
-from armwright.cli.printing import command_line, json_text, plain_console, print_json, print_table, table
+from armwright.cli.output import command_line, json_text, plain_console, print_json, print_table, table
 from armwright.cli.progress import counting
 from armwright.cli.results import warn_of_stray, write_results
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armwright.motion.certificate import Certificate, LimitName
     from armwright.motion.moves import Move
     from armwright.motion.poses_file import PosesFile
-    from armwright.report.moved import Moved
+    from armwright.report.move_page import Moved
 
 # Bounds of the options [ms], [mm].
 _PERIOD_MS, _DEVIATION_MM = (0.01, 1000.0), (1e-4, 100.0)
@@ -181,7 +181,7 @@ def _planned(
 
 def _moved(planned: "Move", file: "PosesFile", poses: Path, period: float, notes: "Iterable[str]") -> "Moved":
     from armwright.dynamics.newton_euler import inverse_dynamics
-    from armwright.report.moved import Moved
+    from armwright.report.move_page import Moved
     from armwright.report.page import Message
 
     samples = planned.trajectory.sampled(period)
@@ -201,7 +201,7 @@ def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: b
     from armwright.kinematics.forward_kinematics import forward
     from armwright.report import move_figures
     from armwright.report.motion_table import motion_csv
-    from armwright.report.moved import move_page
+    from armwright.report.move_page import move_page
     from armwright.report.movie import films
     from armwright.report.page import run_page
 

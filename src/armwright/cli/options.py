@@ -5,7 +5,7 @@ from typing import Annotated, TypeAlias
 
 import typer
 
-from armwright.cli.completing import arms
+from armwright.cli.shell_completion import arms
 
 ArmName: TypeAlias = Annotated[
     str,

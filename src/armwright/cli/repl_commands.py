@@ -130,7 +130,7 @@ class Commands:
         Raises:
             FileFormatError: it cannot be read.
         """
-        from armwright.files.reading import read_program
+        from armwright.files.inputs import read_program
         from armwright.program.language.source import Source
 
         # What a file imports it names as seen from its own folder.

@@ -20,7 +20,7 @@ def write_results(folder: Path, files: "Mapping[str, Content]", record: Mapping[
     Raises:
         OutputError: the folder or a file cannot be written; the text says which and why.
     """
-    from armwright.cli.printing import command_line
+    from armwright.cli.output import command_line
     from armwright.files.output import write_folder
     from armwright.version import __version__
 

@@ -9,7 +9,7 @@ import typer
 
 from armwright.cli.numbers import within
 from armwright.cli.options import JsonSummary, QuietButWarnings
-from armwright.cli.printing import command_line, plain_console, print_json, print_table, table
+from armwright.cli.output import command_line, plain_console, print_json, print_table, table
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, given_cell
 from armwright.cli.progress import waiting
 from armwright.errors import ExitStatus, counted
@@ -168,7 +168,7 @@ def _translated(
 ) -> "tuple[Code, Cell, tuple[Diagnostic, ...], tuple[Path, ...]]":
     """Return the code of a program, its cell, what was said of it, and the files that it imports."""
     from armwright.cli.programs import imported_files
-    from armwright.files.reading import read_program
+    from armwright.files.inputs import read_program
     from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.options import ArmName
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

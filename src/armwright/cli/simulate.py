@@ -9,7 +9,7 @@ import typer
 from armwright.cli.load import Load
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json
-from armwright.cli.printing import print_json
+from armwright.cli.output import print_json
 from armwright.cli.results import write_results
 
 if TYPE_CHECKING:

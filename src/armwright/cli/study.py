@@ -5,10 +5,10 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.completing import studies
-from armwright.cli.printing import json_text, print_json, print_result
+from armwright.cli.output import json_text, print_json, print_result
 from armwright.cli.progress import parts, waiting
 from armwright.cli.results import write_results
+from armwright.cli.shell_completion import studies
 
 # Those that show bars.
 _WITH_BARS = {"five-bar-clearance"}

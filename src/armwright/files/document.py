@@ -12,9 +12,9 @@ import numpy as np
 
 from armwright.arrays import Array
 from armwright.errors import FileFormatError, closest
+from armwright.files.inputs import read_text
 from armwright.files.limits import beyond, limit
 from armwright.files.lines import Keys, Line, TwinKeyError, json_lines, longest_dotted_key, toml_lines
-from armwright.files.reading import read_text
 
 _MISSING: Any = object()
 # No quantity of a robot is larger, and products of three such numbers are still numbers.

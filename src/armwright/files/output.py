@@ -20,8 +20,8 @@ from typing import Any, TypeAlias
 
 from armwright.errors import OutputError
 from armwright.files.exchange import exchange, overwrite
-from armwright.files.reading import is_source
-from armwright.files.staging import KEPT, PREFIX, signals_held, staging
+from armwright.files.inputs import is_source
+from armwright.files.result_folder import KEPT, PREFIX, signals_held, staging
 
 Content: TypeAlias = str | bytes | Iterable[str]
 

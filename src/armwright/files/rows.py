@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from armwright.arrays import LARGEST
 from armwright.errors import FileFormatError, shown
+from armwright.files.inputs import read_lines
 from armwright.files.limits import beyond, limit
-from armwright.files.reading import read_lines
 
 # The first is taken where a line has none of them.
 _SEPARATORS = (",", ";", "\t")

@@ -12,7 +12,7 @@ from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damping import damped_rates
-from armwright.kinematics.inverse_kinematics.ranking import exact_pose
+from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, joint_distance
 from armwright.motion.deviation import Spline, Ways, deviation_of

@@ -10,7 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
-from armwright.kinematics.inverse_kinematics.ranking import typed_poses
+from armwright.kinematics.inverse_kinematics.candidates import typed_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances

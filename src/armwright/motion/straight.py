@@ -10,7 +10,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, number
 from armwright.errors import IncapableArmError, InvalidValueError
-from armwright.kinematics.inverse_kinematics.ranking import exact_pose
+from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solution import Outcome, violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import CLOSEST, Certificate, LimitName, checked_deviation, slowing

@@ -13,8 +13,8 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.errors import ArmwrightError, ExitStatus, InvalidValueError, counted
+from armwright.files.inputs import read_program, regular
 from armwright.files.limits import beyond, limit
-from armwright.files.reading import read_program, regular
 from armwright.program.bytecode.codegen import generate
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis import analysis

@@ -13,8 +13,8 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD
 from armwright.errors import ExitStatus
+from armwright.files.inputs import hash_read
 from armwright.files.output import sha256
-from armwright.files.reading import hash_read
 from armwright.motion.plan import Stage
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic, to_json
@@ -22,7 +22,7 @@ from armwright.program.vm.excerpt import IN_A_LIST, KEPT, Excerpt, excerpt, list
 from armwright.program.vm.machine import RunError
 from armwright.program.vm.recording import Effect, Recording, RunStage, motion_rows
 from armwright.report.page import COLLISIONS, run_page
-from armwright.report.recorded import page_of
+from armwright.report.run_data import page_of
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 

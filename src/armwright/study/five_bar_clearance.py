@@ -22,6 +22,7 @@ from armwright.clearance.correction import Correction, correct_nodes, misses
 from armwright.clearance.equations import FrictionModel
 from armwright.clearance.estimation.kriging import Surrogate, check_extra, learn, solve_features
 from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
+from armwright.clearance.feature_sweep import FeatureSweep, feature_vector
 from armwright.clearance.features import Features, features
 from armwright.clearance.ideal import closed, tip_of
 from armwright.clearance.linkage import Linkage
@@ -31,7 +32,6 @@ from armwright.clearance.rest import at_rest
 from armwright.clearance.scenario import Scenario, assembly_guess, prepare
 from armwright.clearance.settings import Settings, contact_stiffness
 from armwright.clearance.simulation import Simulation, simulate
-from armwright.clearance.sweeping import FeatureSweep, feature_vector
 
 # The two arms: clearances of the pins J2, J3, J4 [m].
 ARMS: Mapping[str, tuple[float, float, float]] = {

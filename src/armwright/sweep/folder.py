@@ -30,8 +30,8 @@ import numpy as np
 import scipy
 
 from armwright.errors import FileFormatError, KindError, OutputError, shown
+from armwright.files.inputs import read_text, regular
 from armwright.files.output import RECORD
-from armwright.files.reading import read_text, regular
 from armwright.sweep.designs import Design
 from armwright.sweep.errors import SweepError
 from armwright.sweep.task import Rows, Task

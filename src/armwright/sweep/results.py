@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armwright.errors import FileFormatError, shown
+from armwright.files.inputs import regular
 from armwright.files.output import RECORD, record_text, recorded, sha256
-from armwright.files.reading import regular
 from armwright.sweep.errors import SweepError
 from armwright.sweep.extras import extra
 from armwright.sweep.folder import MANIFEST, RESULTS, Folder, write_whole

@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.blind import POWER, faults, wrong_offsets
-from armwright.clearance.estimation.measured import RestMeasured
+from armwright.clearance.estimation.measurement_file import RestMeasured
 from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
 from armwright.errors import ContradictionError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import PathsMeasured, RestMeasured, read_measured
 from armwright.clearance.estimation.static import rest_offsets
 from armwright.clearance.features import features_of
 from armwright.clearance.linkage import Linkage

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.measured import PathsMeasured, RestMeasured
+from armwright.clearance.estimation.measurement_file import PathsMeasured, RestMeasured
 from armwright.clearance.estimation.misfit import CONTRADICTION, chance, refuse_contradiction, widening
 from armwright.clearance.estimation.posterior import posterior
 from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from armwright.clearance.estimation.on_paths import learnt_from
+from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.reader import load_linkage
-from armwright.clearance.sweeping import FeatureSweep
 from armwright.errors import FileFormatError, InvalidValueError
 from armwright.files.output import record_text, sha256
 from armwright.sweep.designs import sobol

@@ -7,11 +7,11 @@ from scipy.stats import binom
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.kriging import Surrogate, learn
-from armwright.clearance.estimation.measured import PathsMeasured
+from armwright.clearance.estimation.measurement_file import PathsMeasured
 from armwright.clearance.estimation.posterior import Posterior, posterior
+from armwright.clearance.feature_sweep import feature_vector
 from armwright.clearance.features import Features, features_of
 from armwright.clearance.simulation import Simulation, simulate
-from armwright.clearance.sweeping import feature_vector
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError
 from armwright.sweep.designs import sobol
 from clearance.arms import ARM_A, PATHS, accuracy

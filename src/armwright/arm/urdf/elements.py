@@ -17,8 +17,8 @@ import numpy as np
 
 from armwright.arrays import LARGEST, Array
 from armwright.errors import FileFormatError, MissingExtraError, closest, shown
+from armwright.files.inputs import read_bytes
 from armwright.files.limits import beyond, limit
-from armwright.files.reading import read_bytes
 
 _MISSING: Any = object()
 # What is matched is not given back: a word of a million digits and a letter is passed once.

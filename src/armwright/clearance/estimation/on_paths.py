@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.kriging import Surrogate, learn
+from armwright.clearance.feature_sweep import is_chance, is_sweep_of
 from armwright.clearance.linkage import Linkage
-from armwright.clearance.sweeping import is_chance, is_sweep_of
 from armwright.errors import FileFormatError, InvalidValueError, shown
 from armwright.sweep.folder import RESULTS
 from armwright.sweep.results import load

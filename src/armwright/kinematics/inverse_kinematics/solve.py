@@ -10,9 +10,9 @@ from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.kinematics.inverse_kinematics.branches import BRANCHES, Branches, branches, merged, single_branch
+from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, exact_pose, rank, typed_poses
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry, Sign, rotated_about_y
 from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
-from armwright.kinematics.inverse_kinematics.ranking import POSE_TOLERANCE, Candidate, exact_pose, rank, typed_poses
 from armwright.kinematics.inverse_kinematics.reach import nearest_wrist_centre
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry, find_geometry
 from armwright.kinematics.inverse_kinematics.self_motion import counter_rotate_within_limits, search_within_limits

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from armwright.errors import ArmwrightError
-from armwright.files.reading import regular
+from armwright.files.inputs import regular
 from armwright.program.debugger import dap_breakpoints, dap_inspection
 from armwright.program.debugger.dap_messages import Arguments, Noise, RequestError, framed, messages
 from armwright.program.debugger.dap_session import EditorSession, Launch, Load, Save

@@ -5,7 +5,7 @@ from armwright.program.api import no_collection
 from armwright.program.formatter.layout import rows_of
 from armwright.program.formatter.line_breaks import lines_of
 from armwright.program.formatter.pieces import pieces_of
-from armwright.program.formatter.spacing import set_blanks
+from armwright.program.formatter.whitespace import set_blanks
 from armwright.program.language.diagnostic import Diagnostic, in_order
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard

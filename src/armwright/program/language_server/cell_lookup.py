@@ -11,7 +11,7 @@ from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.errors import ArmwrightError, FileFormatError
 from armwright.files.document import Document
-from armwright.files.reading import regular
+from armwright.files.inputs import regular
 from armwright.program.semantics.cell_symbols import Imported
 
 _IMPORT = re.compile(r'\bIMPORT\s*"([^"\r\n]*)"', re.IGNORECASE)

@@ -18,7 +18,7 @@ from armwright.program.language_server.signature_help import open_call
 from armwright.program.semantics.builtins import AXES, FUNCTIONS
 from armwright.program.semantics.cell_symbols import WORLD
 from armwright.program.semantics.symbols import PREDECLARED, Scope, Symbols
-from armwright.program.syntax.expected import Expected
+from armwright.program.syntax.expected_tokens import Expected
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.parser import expected
 

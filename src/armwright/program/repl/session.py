@@ -21,7 +21,7 @@ from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.repl.declarations import Heading, NotNowError, merged
 from armwright.program.repl.input import Entry, moved, read
-from armwright.program.repl.listing import program_text, title
+from armwright.program.repl.session_text import program_text, title
 from armwright.program.repl.snapshots import (
     bring,
     forget,

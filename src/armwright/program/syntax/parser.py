@@ -10,7 +10,7 @@ from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import Standard
 from armwright.program.syntax import control_flow, devices, frames, output, rlo83, tree
-from armwright.program.syntax.expected import Expected
+from armwright.program.syntax.expected_tokens import Expected
 from armwright.program.syntax.headers import head, late
 from armwright.program.syntax.lexer import Token, TokenKind
 from armwright.program.syntax.move import move

@@ -9,7 +9,7 @@ from armwright.program.language.diagnostic import Findings, Fix, Label
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard, is_later
 from armwright.program.syntax import tree
-from armwright.program.syntax.expected import Expected
+from armwright.program.syntax.expected_tokens import Expected
 from armwright.program.syntax.lexer import Token, TokenKind
 
 # How deep statements, parentheses and operations may lie in one another.

@@ -18,7 +18,7 @@ def read_source(path: Path) -> "Source":
     """
     import sys
 
-    from armwright.files.reading import read_program, read_typed_program
+    from armwright.files.inputs import read_program, read_typed_program
     from armwright.program.language.source import Source
 
     if path == INPUT:
@@ -68,8 +68,8 @@ def write_back(source: "Source", path: Path, text: str) -> None:
     from codecs import BOM_UTF8
 
     from armwright.errors import OutputError
+    from armwright.files.inputs import decoded, read_bytes
     from armwright.files.output import write_file
-    from armwright.files.reading import decoded, read_bytes
 
     data = read_bytes(path, "program_mb")
     if decoded(data, path) != source.text:

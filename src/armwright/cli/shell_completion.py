@@ -44,7 +44,7 @@ def install(shell: Shell) -> Path:
     from typer.completion import install as install_script  # type: ignore[attr-defined]
 
     from armwright.errors import OutputError
-    from armwright.files.reading import regular
+    from armwright.files.inputs import regular
 
     try:
         for name in (".bashrc", ".zshrc"):
