@@ -40,21 +40,21 @@ Stretch = tuple[int, int, int, int]
 
 def line_stretches(analysis: Analysis, encoding: str) -> list[list[Stretch]]:
     """Return the coloured stretches of each line of a program."""
-    ruler = PositionCodec(analysis.text, encoding)
+    codec = PositionCodec(analysis.text, encoding)
     compiled = analysis.compiled
-    lines: list[list[Stretch]] = [[] for _ in ruler.starts]
-    _put(lines, ruler, compiled.tokens, analysis.occurrences, analysis)
+    lines: list[list[Stretch]] = [[] for _ in codec.starts]
+    _put(lines, codec, compiled.tokens, analysis.occurrences, analysis)
     for comment in compiled.comments:
-        _put_comment(lines, ruler, comment)
+        _put_comment(lines, codec, comment)
     for comment in compiled.comments:
-        lines[ruler.line_of(comment.start)].sort()
-        lines[ruler.line_of(comment.end)].sort()
+        lines[codec.line_of(comment.start)].sort()
+        lines[codec.line_of(comment.end)].sort()
     return lines
 
 
 def _put(
     lines: list[list[Stretch]],
-    ruler: PositionCodec,
+    codec: PositionCodec,
     tokens: Sequence[Token],
     names: Sequence[Occurrence],
     analysis: Analysis,
@@ -67,8 +67,8 @@ def _put(
         if name is not None and name.start == token.start:
             what, name = _named(name, analysis), next(name_at)
         if what is not None:
-            line, column = ruler.place(token.start)
-            lines[line].append((column, ruler.width(token.start, token.end), *what))
+            line, column = codec.place(token.start)
+            lines[line].append((column, codec.width(token.start, token.end), *what))
 
 
 def _plain(token: Token) -> tuple[int, int] | None:
@@ -110,15 +110,15 @@ def _named(one: Occurrence, analysis: Analysis) -> tuple[int, int] | None:
     return KINDS.index(word), bits
 
 
-def _put_comment(lines: list[list[Stretch]], ruler: PositionCodec, comment: Span) -> None:
+def _put_comment(lines: list[list[Stretch]], codec: PositionCodec, comment: Span) -> None:
     """Add a comment to each of its lines."""
     start = comment.start
-    for line in range(ruler.line_of(comment.start), ruler.line_of(comment.end) + 1):
-        end = min(comment.end, ruler.line_end(line))
+    for line in range(codec.line_of(comment.start), codec.line_of(comment.end) + 1):
+        end = min(comment.end, codec.line_end(line))
         if end > start:
-            lines[line].append((ruler.place(start)[1], ruler.width(start, end), _COMMENT, 0))
+            lines[line].append((codec.place(start)[1], codec.width(start, end), _COMMENT, 0))
         start = max(start, end)
-        while start < comment.end and ruler.line_of(start) == line:
+        while start < comment.end and codec.line_of(start) == line:
             start += 1
 
 

@@ -63,7 +63,7 @@ class RloServer(LanguageServer):
         self.encoding = _USUAL
         self.cells = Cells()
         self._left = False
-        self._told = ""
+        self._last_problem = ""
 
     def shutdown(self) -> None:
         """End at once: what is being read is for nobody any more, and is not waited for."""
@@ -131,9 +131,9 @@ class RloServer(LanguageServer):
         self.text_document_publish_diagnostics(
             lsp.PublishDiagnosticsParams(uri=document.uri, diagnostics=said, version=document.version)
         )
-        if problem and problem != self._told:
+        if problem and problem != self._last_problem:
             self.window_show_message(lsp.ShowMessageParams(lsp.MessageType.Warning, f"armwright: {problem}"))
-        self._told = problem
+        self._last_problem = problem
         return analysis
 
     # ---- settings
