@@ -45,17 +45,17 @@ def test_it_is_the_only_answer(rng: np.random.Generator) -> None:
         bounds = np.array((-1.0, 1.0))
         found = solve_complementarity(M, b, np.ones(3, dtype=bool), np.full(3, -1.0), np.full(3, 1.0))
         lawful = []
-        for way in itertools.product((-1, 0, 1), repeat=3):
-            free = [i for i in range(3) if way[i]]
-            x, r = np.zeros(3), np.array([-float(w) for w in way])
+        for direction in itertools.product((-1, 0, 1), repeat=3):
+            free = [i for i in range(3) if direction[i]]
+            x, r = np.zeros(3), np.array([-float(w) for w in direction])
             if free:
                 x[free] = np.linalg.solve(M[np.ix_(free, free)], (b + r)[free])
-            held = [i for i in range(3) if not way[i]]
-            r[held] = (M @ x - b)[held]
-            if all(x * way >= 0) and all(bounds[0] <= r) and all(r <= bounds[1]):
-                lawful.append(way)
+            locked = [i for i in range(3) if not direction[i]]
+            r[locked] = (M @ x - b)[locked]
+            if all(x * direction >= 0) and all(bounds[0] <= r) and all(r <= bounds[1]):
+                lawful.append(direction)
 
-        assert lawful == [tuple(found.way)]
+        assert lawful == [tuple(found.direction)]
 
 
 def test_one_block_by_hand() -> None:
@@ -63,11 +63,11 @@ def test_one_block_by_hand() -> None:
     M, rest = np.array([[4.0]]), np.array([True])
     lower, upper = np.array([-3.0]), np.array([3.0])
 
-    held = solve_complementarity(M, np.array([2.0]), rest, lower, upper)
+    locked = solve_complementarity(M, np.array([2.0]), rest, lower, upper)
     slides = solve_complementarity(M, np.array([5.0]), rest, lower, upper)
 
-    assert (held.x[0], held.r[0], held.way[0]) == (0.0, -2.0, 0)
-    assert (slides.x[0], slides.r[0], slides.way[0]) == (0.5, -3.0, 1)
+    assert (locked.x[0], locked.r[0], locked.direction[0]) == (0.0, -2.0, 0)
+    assert (slides.x[0], slides.r[0], slides.direction[0]) == (0.5, -3.0, 1)
 
 
 def test_one_joint_drags_another() -> None:
@@ -75,5 +75,5 @@ def test_one_joint_drags_another() -> None:
     M, b = np.array([[2.0, 1.9], [1.9, 2.0]]), np.array([4.0, 0.0])
     rest, strong, weak = np.array([False, True]), np.array([9.0, 9.0]), np.array([1.0, 1.0])
 
-    assert solve_complementarity(M, b, rest, -strong, strong).way[1] == 0
-    assert solve_complementarity(M, b, rest, -weak, weak).way[1] == -1
+    assert solve_complementarity(M, b, rest, -strong, strong).direction[1] == 0
+    assert solve_complementarity(M, b, rest, -weak, weak).direction[1] == -1

@@ -128,7 +128,7 @@ def _mass_and_bias(arm: Arm, q: Numbers, qd: Numbers) -> Rows:
 
 
 def _pose(frame: tuple[Matrix, Vector]) -> Vector:
-    rows = [[*row, place] for row, place in zip(*frame, strict=True)]
+    rows = [[*row, coordinate] for row, coordinate in zip(*frame, strict=True)]
     return [x for row in [*rows, [0.0, 0.0, 0.0, 1.0]] for x in row]
 
 

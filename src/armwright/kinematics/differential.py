@@ -132,9 +132,11 @@ def differential_inverse(
     rates = solve(geometry, angles, wrist_motion(arm, geometry, joints, asked, frame))
     factors = stack(determinant_factors(geometry, angles), lead)
     singular = np.abs(factors) < SINGULAR_FACTOR
-    found = stack([sign * rate for sign, rate in zip(geometry.signs, rates, strict=True)], lead)
+    joint_rates = stack([sign * rate for sign, rate in zip(geometry.signs, rates, strict=True)], lead)
     return DifferentialInverse(
-        rates=np.where(singular.any(axis=-1, keepdims=True), np.nan, found), factors=factors, singular=singular
+        rates=np.where(singular.any(axis=-1, keepdims=True), np.nan, joint_rates),
+        factors=factors,
+        singular=singular,
     )
 
 

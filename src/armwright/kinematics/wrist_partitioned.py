@@ -73,9 +73,9 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     geometry = _puma(arm)
     q = positions(arm, q)
     factors = np.stack(np.broadcast_arrays(*determinant_factors(geometry, _angles(geometry, q))), axis=-1)
-    for place in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
-        *which, factor = place
-        raise SingularPostureError(_FACTORS[factor], float(factors[*place]), tuple(which))
+    for index in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
+        *which, factor = index
+        raise SingularPostureError(_FACTORS[factor], float(factors[*index]), tuple(which))
     J = _blocks(geometry, q)
     out, plane, bend = factors[..., 0], geometry.upper_arm * factors[..., 1], factors[..., 2]
     inverse = np.zeros_like(J)

@@ -31,12 +31,12 @@ class ComplementaritySolution(NamedTuple):
     Attributes:
         x: (n,) accelerations, or speeds after an impact.
         r: (n,) efforts that hold or resist, or impulses; 0 for joints that are not at rest.
-        way: (n,) of the joints at rest: 0 held, 1 gives way forward, -1 backward; 0 for all others.
+        direction: (n,) of the joints at rest: 0 held, 1 gives way forward, -1 backward; 0 for all others.
     """
 
     x: Array
     r: Array
-    way: Signs
+    direction: Signs
 
 
 def solve_complementarity(
@@ -55,36 +55,36 @@ def solve_complementarity(
         Júdice & Pires (1994), block principal pivoting; when it goes in circles, Murty (1974), which never does.
     """
     n = len(b)
-    way: Signs = np.zeros(n, dtype=np.int8)
+    direction: Signs = np.zeros(n, dtype=np.int8)
     fewest, patience = n + 1, 3
     slack = _ROUNDING * (1.0 + np.abs(b).max())
     for _ in range(3**n + 3 * n + 4):
-        x, r = _of_guess(M, b, at_rest, way, (lower, upper))
-        held = at_rest & (way == 0)
-        better = np.where(held & (r < lower - slack), 1, np.where(held & (r > upper + slack), -1, way))
-        better = np.where(at_rest & (way * x < -_ROUNDING * np.abs(x).max()), 0, better).astype(np.int8)
-        wrong = np.flatnonzero(better != way)
+        x, r = _of_guess(M, b, at_rest, direction, (lower, upper))
+        locked = at_rest & (direction == 0)
+        better = np.where(locked & (r < lower - slack), 1, np.where(locked & (r > upper + slack), -1, direction))
+        better = np.where(at_rest & (direction * x < -_ROUNDING * np.abs(x).max()), 0, better).astype(np.int8)
+        wrong = np.flatnonzero(better != direction)
         if not len(wrong):
-            return ComplementaritySolution(x=x, r=r, way=way)
+            return ComplementaritySolution(x=x, r=r, direction=direction)
         if len(wrong) < fewest:
             fewest, patience = len(wrong), 3
         else:
             patience -= 1
         changed = wrong if patience > 0 else wrong[-1:]
-        way[changed] = better[changed]
+        direction[changed] = better[changed]
     raise AssertionError("a positive definite mass matrix leaves one answer")
 
 
 def _of_guess(
-    M: Array, b: Array, at_rest: npt.NDArray[np.bool_], way: Signs, bounds: tuple[Array, Array]
+    M: Array, b: Array, at_rest: npt.NDArray[np.bool_], direction: Signs, bounds: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     """Return accelerations and efforts when the held joints are held and the others give way as guessed."""
     lower, upper = bounds
-    r = np.where(way > 0, lower, np.where(way < 0, upper, 0.0))
-    held = at_rest & (way == 0)
+    r = np.where(direction > 0, lower, np.where(direction < 0, upper, 0.0))
+    locked = at_rest & (direction == 0)
     x = np.zeros_like(b)
-    free = np.flatnonzero(~held)
+    free = np.flatnonzero(~locked)
     if len(free):
         x[free] = np.linalg.solve(M[np.ix_(free, free)], b[free] + r[free])
-    r[held] = M[held] @ x - b[held]
+    r[locked] = M[locked] @ x - b[locked]
     return x, r

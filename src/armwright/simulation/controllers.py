@@ -34,10 +34,10 @@ class Controller(Protocol):
 
 def standing(q: ArrayLike) -> Reference:
     """Return the reference of an arm that should stay at q (n,)."""
-    place = floats(q, "q", LARGEST)
-    place.setflags(write=False)
-    zero = np.zeros_like(place)
-    return lambda _t, order: zero if order else place
+    position = floats(q, "q", LARGEST)
+    position.setflags(write=False)
+    zero = np.zeros_like(position)
+    return lambda _t, order: zero if order else position
 
 
 def no_effort(arm: Arm) -> Controller:
@@ -112,11 +112,13 @@ def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
 
     def efforts(t: float, q: Array, qd: Array) -> Array:
         speed = reference(t, 1)
-        asked = reference(t, 2) + damping * (speed - qd) + stiffness * (reference(t, 0) - q)
-        links = newton_euler(arm, q.tolist(), qd.tolist(), asked.tolist())
+        acceleration = reference(t, 2) + damping * (speed - qd) + stiffness * (reference(t, 0) - q)
+        links = newton_euler(arm, q.tolist(), qd.tolist(), acceleration.tolist())
         drives = [
             motor.inertia * a + motor.viscous * v + dry_friction(motor, direction)
-            for motor, a, v, direction in zip(arm.motors, asked.tolist(), qd.tolist(), speed.tolist(), strict=True)
+            for motor, a, v, direction in zip(
+                arm.motors, acceleration.tolist(), qd.tolist(), speed.tolist(), strict=True
+            )
         ]
         return np.array([link + drive for link, drive in zip(links, drives, strict=True)], dtype=np.float64)
 
@@ -125,8 +127,8 @@ def computed_torque(arm: Arm, reference: Reference, kp: ArrayLike, kd: ArrayLike
 
 def _gains(arm: Arm, value: ArrayLike, name: str) -> Array:
     n = known_arm(arm).n
-    given = floats(value, name, LARGEST)
-    gains = joint_array(np.broadcast_to(given, (n,)) if given.ndim == 0 else given, n, name)
+    values = floats(value, name, LARGEST)
+    gains = joint_array(np.broadcast_to(values, (n,)) if values.ndim == 0 else values, n, name)
     if gains.ndim != 1:
         raise ShapeError(f"{name}: expected one gain per joint, shape ({n},), got {gains.shape}")
     if (gains < 0).any():

@@ -155,9 +155,9 @@ class _AdaptiveStepper:
         self._lost = False
 
         def watched(t: float, y: Array) -> Array:
-            found = slope(t, y)
-            self._lost |= not np.isfinite(found).all()
-            return found
+            derivative = slope(t, y)
+            self._lost |= not np.isfinite(derivative).all()
+            return derivative
 
         solver = getattr(integrate, how.method)
         self._solver = solver(watched, t, y, end, rtol=how.rtol, atol=how.atol, max_step=how.longest)
@@ -189,20 +189,20 @@ def first_crossing(value: Callable[[float], float], start: float, end: float) ->
         Dowell & Jarratt (1971), the Illinois method, with a bisection whenever it is slow.
     """
     above, below = max(value(start), 0.0), value(end)
-    weight, kept = 1.0, 0
+    weight, kept_side = 1.0, 0
     for turn in range(200):
         if below >= -1 or np.nextafter(start, end) >= end:
             break
         # The end that stays for a second time counts half, so that the other one comes nearer too.
-        high, low = (above * weight, below) if kept > 0 else (above, below * weight)
+        high, low = (above * weight, below) if kept_side > 0 else (above, below * weight)
         middle = start + (high / (high - low) if turn % 3 < 2 else 0.5) * (end - start)
         if not start < middle < end:
             middle = (start + end) / 2
-        found = value(middle)
-        side = 1 if found < 0 else -1
-        weight, kept = (weight / 2 if side == kept else 1.0), side
-        if found < 0:
-            end, below = middle, found
+        level = value(middle)
+        side = 1 if level < 0 else -1
+        weight, kept_side = (weight / 2 if side == kept_side else 1.0), side
+        if level < 0:
+            end, below = middle, level
         else:
-            start, above = middle, found
+            start, above = middle, level
     return float(end)

@@ -36,15 +36,15 @@ class Phase:
     """What the joints do between two events.
 
     Attributes:
-        held: (n,) which are kept at rest.
-        way: (n,) direction in which the others move, or are about to; 0 for those that are held.
+        locked: (n,) which are kept at rest.
+        direction: (n,) direction in which the others move, or are about to; 0 for those that are held.
         lower: (n,) smallest effort that can hold a joint.
         upper: (n,) largest effort that can hold a joint.
         state: (n,) numbers of ``JointState``.
     """
 
-    held: Flags
-    way: Array
+    locked: Flags
+    direction: Array
     lower: Array
     upper: Array
     state: npt.NDArray[np.int8]
@@ -57,14 +57,14 @@ class Start(NamedTuple):
         q: (n,) joint positions.
         qd: (n,) joint speeds.
         phase: what the joints do from now on.
-        met: (n,) numbers of ``JointState``: what each joint has just run into, ``MOVES`` for none.
+        collided: (n,) numbers of ``JointState``: what each joint has just run into, ``MOVES`` for none.
         loss: energy that stops and brakes took [J].
     """
 
     q: Array
     qd: Array
     phase: Phase
-    met: npt.NDArray[np.int8]
+    collided: npt.NDArray[np.int8]
     loss: float
 
 
@@ -118,19 +118,21 @@ class Plant:
 
     def moment(self, t: float, q: Array, qd: Array, phase: Phase) -> Moment:
         """Return what the joints feel at one moment of a phase."""
-        M, tau, friction, left = self._pushed(t, q, qd, phase.way, phase.held)
+        M, tau, friction, surplus = self._pushed(t, q, qd, phase.direction, phase.locked)
         qdd, hold = np.zeros_like(q), np.zeros_like(q)
-        free = ~phase.held
-        qdd[free] = np.linalg.solve(M[np.ix_(free, free)], left[free])
-        hold[phase.held] = M[phase.held] @ qdd - left[phase.held]
+        free = ~phase.locked
+        qdd[free] = np.linalg.solve(M[np.ix_(free, free)], surplus[free])
+        hold[phase.locked] = M[phase.locked] @ qdd - surplus[phase.locked]
         return Moment(qdd=qdd, tau=tau, friction=friction, hold=hold)
 
-    def _pushed(self, t: float, q: Array, qd: Array, way: Array, held: Flags) -> tuple[Array, Array, Array, Array]:
+    def _pushed(
+        self, t: float, q: Array, qd: Array, direction: Array, locked: Flags
+    ) -> tuple[Array, Array, Array, Array]:
         """Return mass matrix, efforts of drives, of friction, and what is left to accelerate with."""
         M, bias = self.compiled.mass_and_bias(q, qd)
         tau = np.clip(np.asarray(self.controller(t, q, qd), dtype=np.float64), -self.effort, self.effort)
-        dry = np.where(way > 0, self.forward, np.where(way < 0, -self.backward, 0.0))
-        friction = np.where(held, 0.0, -self.viscous * qd - dry)
+        dry = np.where(direction > 0, self.forward, np.where(direction < 0, -self.backward, 0.0))
+        friction = np.where(locked, 0.0, -self.viscous * qd - dry)
         return M, tau, friction, tau + friction - bias
 
     def braked(self, t: float) -> Flags:
@@ -162,23 +164,23 @@ class Plant:
         qd = np.where(at_rest, 0.0, qd)
         lower = np.where(at_upper | braked, -np.inf, -self.forward)
         upper = np.where(at_lower | braked, np.inf, self.backward)
-        M, _, _, left = self._pushed(t, q, qd, np.where(at_rest, 0.0, np.sign(qd)), at_rest)
-        way = solve_complementarity(M, left, at_rest, lower, upper).way
-        held = at_rest & (way == 0)
+        M, _, _, surplus = self._pushed(t, q, qd, np.where(at_rest, 0.0, np.sign(qd)), at_rest)
+        direction = solve_complementarity(M, surplus, at_rest, lower, upper).direction
+        locked = at_rest & (direction == 0)
         state = np.where(
             braked,
             JointState.BRAKED,
             np.where(at_lower, JointState.LOWER_STOP, np.where(at_upper, JointState.UPPER_STOP, JointState.STICKS)),
         )
         phase = Phase(
-            held=held,
-            way=np.where(at_rest, way, np.sign(qd)).astype(np.float64),
+            locked=locked,
+            direction=np.where(at_rest, direction, np.sign(qd)).astype(np.float64),
             lower=lower,
             upper=upper,
-            state=np.where(held, state, JointState.MOVES).astype(np.int8),
+            state=np.where(locked, state, JointState.MOVES).astype(np.int8),
         )
-        met = np.where(hit, state, JointState.MOVES).astype(np.int8)
-        return Start(q=q, qd=qd, phase=phase, met=met, loss=loss)
+        collided = np.where(hit, state, JointState.MOVES).astype(np.int8)
+        return Start(q=q, qd=qd, phase=phase, collided=collided, loss=loss)
 
     def _collide(self, q: Array, qd: Array, from_below: Flags, from_above: Flags) -> tuple[Array, float]:
         """Return speeds after impacts that leave no speed against a stop or under a brake, and the energy lost."""
@@ -189,18 +191,18 @@ class Plant:
 
     def watch(self, t: float, q: Array, qd: Array, phase: Phase) -> float:
         """Return how far the nearest event is, in units of what counts as nothing; below 0 behind it."""
-        moving = ~phase.held
-        slides = moving & self.dry & (phase.way != 0)
+        moving = ~phase.locked
+        slides = moving & self.dry & (phase.direction != 0)
         below, above = moving & np.isfinite(self.lower), moving & np.isfinite(self.upper)
         distances = [
-            (phase.way * qd)[slides] / STILL + 1,
+            (phase.direction * qd)[slides] / STILL + 1,
             (q - self.lower)[below] / TOUCH + 1,
             (self.upper - q)[above] / TOUCH + 1,
         ]
-        if (phase.held & (phase.state != JointState.BRAKED)).any():
+        if (phase.locked & (phase.state != JointState.BRAKED)).any():
             hold = self.moment(t, q, qd, phase).hold
             for bound, side in ((phase.lower, 1.0), (phase.upper, -1.0)):
-                limited = phase.held & np.isfinite(bound)
+                limited = phase.locked & np.isfinite(bound)
                 spare = side * (hold - bound)[limited]
                 distances.append(spare / (_OVER * (1 + np.abs(bound[limited]))) + 1)
         return min((float(x.min()) for x in distances if x.size), default=math.inf)

@@ -126,11 +126,11 @@ def _held_to_shape(controller: Controller, n: int) -> Controller:
     """Return the controller, which is refused at the first moment at which it does not give n efforts."""
 
     def efforts(t: float, q: Array, qd: Array) -> Array:
-        given = controller(t, q, qd)
+        returned = controller(t, q, qd)
         try:
-            array = np.asarray(given, dtype=np.float64)
+            array = np.asarray(returned, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise KindError(f"efforts of the controller at {t:g} s: expected numbers, got {shown(given)}") from error
+            raise KindError(f"efforts of the controller at {t:g} s: expected numbers, got {shown(returned)}") from error
         if array.shape != (n,):
             raise ShapeError(f"efforts of the controller at {t:g} s: expected shape ({n},), got {array.shape}")
         return array
@@ -143,9 +143,9 @@ def _check(plant: Plant, q: Array, qd: Array) -> None:
     arm = plant.arm
     for i in np.flatnonzero((q < plant.lower) | (q > plant.upper)):
         scale, unit = (180 / np.pi, "deg") if arm.joints[i].revolute else (1e3, "mm")
-        at, lower, upper = (float(x[i]) * scale for x in (q, plant.lower, plant.upper))
+        position, lower, upper = (float(x[i]) * scale for x in (q, plant.lower, plant.upper))
         raise InvalidValueError(
-            f"{arm.called(int(i))} starts at {at:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
+            f"{arm.called(int(i))} starts at {position:g} {unit}, outside its stops at {lower:g} and {upper:g} {unit}; "
             "start inside, or simulate without stops"
         )
     for brake in plant.brakes:
@@ -171,8 +171,8 @@ class _Run:
         self._plant, self._integrator = plant, integrator
         count = math.floor(duration / period + _CRUMB)
         times = period * np.arange(count + 1)
-        rest = duration - times[-1]
-        self._times: list[float] = [*times.tolist(), *([duration] if rest > _CRUMB * period else [])]
+        remainder = duration - times[-1]
+        self._times: list[float] = [*times.tolist(), *([duration] if remainder > _CRUMB * period else [])]
         self._times[-1] = duration
         changes = {time for brake in plant.brakes for time in (brake.start, brake.end) if 0 < time < duration}
         self._ends = [*sorted(changes), duration]
@@ -211,11 +211,11 @@ class _Run:
         """Keep the events at the start of a phase; a joint that meets a stop and leaves it at once has two."""
         for i in range(len(before)):
             course = [before[i], start.phase.state[i]]
-            if start.met[i] not in (JointState.MOVES, course[1]):
-                course.insert(1, start.met[i])
-            for one, next_one in itertools.pairwise(course):
-                if one != next_one:
-                    self._events.append(Event(t, i, JointState(one), JointState(next_one)))
+            if start.collided[i] not in (JointState.MOVES, course[1]):
+                course.insert(1, start.collided[i])
+            for earlier, later in itertools.pairwise(course):
+                if earlier != later:
+                    self._events.append(Event(t, i, JointState(earlier), JointState(later)))
 
     def _phase(self, t: float, y: Array, phase: Phase, end: float) -> tuple[float, Array] | Status:
         """Integrate one phase to its end or to the first event."""
@@ -227,9 +227,9 @@ class _Run:
             if not np.abs(step.state[: 2 * self._plant.arm.n]).max() < _LOST or not np.isfinite(step.state).all():
                 return Status.DIVERGED
             if self._watch(phase, step.end, step.state) < 0:
-                found = first_crossing(self._watched(phase, step), step.start, step.end)
-                self._record(step, y, found, phase)
-                return found, step.between(found)
+                crossing = first_crossing(self._watched(phase, step), step.start, step.end)
+                self._record(step, y, crossing, phase)
+                return crossing, step.between(crossing)
             self._record(step, y, step.end, phase)
             t, y = step.end, step.state
         return t, y

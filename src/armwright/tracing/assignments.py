@@ -68,9 +68,9 @@ class Code:
 
     def __init__(self, graph: Graph, outputs: Sequence[int], watched: Watched) -> None:
         self._graph, self._outputs, self._watched = graph, outputs, watched
-        asked = [*outputs, *watched.positive]
-        self._order = reachable(graph, [*watched.inputs, *asked])
-        self.joined = fused(graph, self._order, asked)
+        required = [*outputs, *watched.positive]
+        self._order = reachable(graph, [*watched.inputs, *required])
+        self.joined = fused(graph, self._order, required)
         self._gone = set(self.joined.values())
 
     def lines(self, load: Sequence[str], store: Sequence[str], *, watched: bool = True) -> str:
@@ -101,7 +101,7 @@ class Code:
                 lines.append(f"v{i} = {self._fused(node, self.joined[i], names)}")
             elif i not in self._gone:
                 lines.append(f"v{i} = {_INFIX[node.op].format(*(names[j] for j in node.operands))}")
-        lines += [place.format(names[node]) for place, node in zip(store, self._outputs, strict=True)]
+        lines += [statement.format(names[node]) for statement, node in zip(store, self._outputs, strict=True)]
         if not watched:
             return "\n".join(lines)
         return "\n".join([*lines, *self._watched.lines(names)])

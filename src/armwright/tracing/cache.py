@@ -45,13 +45,13 @@ def compiled(source: str, entry: str, title: str) -> Callable[..., Any]:
 
 def _load(key: str, source: str, entry: str, title: str) -> Callable[..., Any]:
     store = user_store("compiled")
-    kept = store.get(key)
-    with contextlib.nullcontext() if kept else store.alone(key):
-        kept = kept or store.get(key)  # another process may have made it meanwhile
-        if kept:
+    stored = store.get(key)
+    with contextlib.nullcontext() if stored else store.alone(key):
+        stored = stored or store.get(key)  # another process may have made it meanwhile
+        if stored:
             # Sound bytes may still come from a Numba that writes them in another way.
             with contextlib.suppress(Exception):
-                code, made = pickle.loads(kept)  # noqa: S301 - our own, checked by the store
+                code, made = pickle.loads(stored)  # noqa: S301 - our own, checked by the store
                 return _function(key, entry, marshal.loads(code), _Exchange(made=made))  # noqa: S302
         if sys.stderr.isatty():
             print(f"armwright: compiling {shown(title)}, once", file=sys.stderr)  # noqa: T201 - asked for by who watches

@@ -323,7 +323,7 @@ class ArraySignature(NamedTuple):
             for axis, size in enumerate(shape):
                 yield f"in{i}.shape[{axis + before}] != {size}"
 
-    def places(self, side: Literal["in", "out"], before: str = "") -> Iterator[str]:
+    def elements(self, side: Literal["in", "out"], before: str = "") -> Iterator[str]:
         """Give the place of every number of the inputs or the outputs, such as ``in0[1, 2]``."""
         shapes = self.inputs if side == "in" else self.outputs
         for i, shape in enumerate(shapes):
@@ -332,9 +332,9 @@ class ArraySignature(NamedTuple):
 
     def stores(self, before: str = "") -> Iterator[str]:
         """Give the statement that fills every place of the outputs, with a gap for the value."""
-        for place in self.places("out", before):
-            is_flag = int(place[3 : place.index("[")]) in self.flags
-            yield f"{place} = {{}} != 0" if is_flag else f"{place} = {{}}"
+        for element in self.elements("out", before):
+            is_flag = int(element[3 : element.index("[")]) in self.flags
+            yield f"{element} = {{}} != 0" if is_flag else f"{element} = {{}}"
 
 
 def _rows_source(code: Code, signature: ArraySignature) -> str:
@@ -344,7 +344,8 @@ def _rows_source(code: Code, signature: ArraySignature) -> str:
         [f"x[{row} * {LANES} + k]" for row in range(width_in)],
         [f"y[{row} * {LANES} + k] = {{}}" for row in range(width_out)],
     )
-    load = [f"x[{row} * {LANES} + r] = {place}" for row, place in enumerate(signature.places("in", "start + r, "))]
+    loads = enumerate(signature.elements("in", "start + r, "))
+    load = [f"x[{row} * {LANES} + r] = {element}" for row, element in loads]
     store = [
         statement.format(f"y[{row} * {LANES} + r]") for row, statement in enumerate(signature.stores("start + r, "))
     ]
@@ -364,15 +365,15 @@ def _rows_source(code: Code, signature: ArraySignature) -> str:
 def _moves(lines: Sequence[str], shapes: Sequence[Shape]) -> str:
     """Write the loops that carry rows in or out of a block, one per array."""
     text: list[str] = []
-    rest = iter(lines)
+    remaining = iter(lines)
     for shape in shapes:
         text.append("        for r in range(m):")
-        text += ["            " + next(rest) for _ in range(math.prod(shape))]
+        text += ["            " + next(remaining) for _ in range(math.prod(shape))]
     return "\n".join(text)
 
 
 def _one_source(code: Code, signature: ArraySignature) -> str:
-    body = code.lines(list(signature.places("in")), list(signature.stores()))
+    body = code.lines(list(signature.elements("in")), list(signature.stores()))
     return _ONE.format(
         signature=signature.types(rows=False),
         arguments=", ".join(signature.names),

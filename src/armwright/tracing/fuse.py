@@ -26,11 +26,11 @@ def fused(graph: Graph, order: Iterable[int], outputs: Iterable[int]) -> dict[in
     for i in order:
         for operand in set(graph.nodes[i].operands):
             users.setdefault(operand, []).append(i)
-    asked = set(outputs)
+    required = set(outputs)
     products = [
         i
         for i, of in users.items()
-        if graph.nodes[i].op == "multiply" and i not in asked and all(graph.nodes[j].op in _SUMS for j in of)
+        if graph.nodes[i].op == "multiply" and i not in required and all(graph.nodes[j].op in _SUMS for j in of)
     ]
     taken: dict[int, int] = {}
     # Those with one user first: each of them is one instruction less, whatever becomes of the others.

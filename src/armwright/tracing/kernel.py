@@ -191,14 +191,14 @@ class Kernel:
         """Return the arrays to fill: new ones, or the caller's where they are fit for it."""
         if out is None:
             return [np.empty((*lead, *shape), kind) for shape, kind in self._kinds]
-        given = list(out) if isinstance(out, tuple) else [out]
+        to_fill = list(out) if isinstance(out, tuple) else [out]
         expected = [((*lead, *shape), np.dtype(kind)) for shape, kind in self._kinds]
-        fit = [isinstance(x, np.ndarray) and x.flags.c_contiguous and x.flags.writeable for x in given]
-        if not all(fit) or [(x.shape, x.dtype) for x in given] != expected:
-            wanted = ", ".join(f"{shape} {kind}" for shape, kind in expected)
-            got = ", ".join(f"{np.shape(x)} {np.asarray(x).dtype}" for x in given)
-            raise ShapeError(f"out: expected writable arrays in C order, {wanted}; got {got}")
-        return given
+        fit = [isinstance(x, np.ndarray) and x.flags.c_contiguous and x.flags.writeable for x in to_fill]
+        if not all(fit) or [(x.shape, x.dtype) for x in to_fill] != expected:
+            needed = ", ".join(f"{shape} {kind}" for shape, kind in expected)
+            got = ", ".join(f"{np.shape(x)} {np.asarray(x).dtype}" for x in to_fill)
+            raise ShapeError(f"out: expected writable arrays in C order, {needed}; got {got}")
+        return to_fill
 
     def _run(self, arrays: list[Array], lead: Shape, results: list[Array], threads: int | None) -> int:
         if not lead:

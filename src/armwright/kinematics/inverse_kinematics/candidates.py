@@ -61,9 +61,9 @@ def typed_poses(X_BT: ArrayLike) -> Array:
     X = of_shape(X_BT, (4, 4), "pose", LARGEST)
     wrong = np.flatnonzero(np.abs(X[..., 3, :] - (0, 0, 0, 1)).max(axis=-1).ravel() > _LAST_ROW)
     if len(wrong):
-        one = X.reshape(-1, 4, 4)[wrong[0]]
-        hint = "; is it transposed?" if one[3, :3].any() and not one[:3, 3].any() else ""
-        raise InvalidValueError(f"pose: expected 0 0 0 1 as the last row, got {one[3].tolist()}{hint}")
+        first = X.reshape(-1, 4, 4)[wrong[0]]
+        hint = "; is it transposed?" if first[3, :3].any() and not first[:3, 3].any() else ""
+        raise InvalidValueError(f"pose: expected 0 0 0 1 as the last row, got {first[3].tolist()}{hint}")
     error = orthonormality_error(X[..., :3, :3])
     worst = float(np.max(error, initial=0.0))
     if worst > _TYPED_ROTATION:
@@ -95,11 +95,11 @@ def rank(
         apart: configurations closer than this are one [rad] or [m].
         X_near: (4, 4) the pose in reach nearest to the one asked for; None when that itself is in reach.
     """
-    kept: list[Candidate] = []
+    distinct: list[Candidate] = []
     for candidate in candidates:
-        if not any(same_configuration(arm, candidate.q, other.q, apart) for other in kept):
-            kept.append(candidate)
-    distances, angles = pose_errors(arm, np.array([candidate.q for candidate in kept]), X)
+        if not any(same_configuration(arm, candidate.q, other.q, apart) for other in distinct):
+            distinct.append(candidate)
+    distances, angles = pose_errors(arm, np.array([candidate.q for candidate in distinct]), X)
     branches = [
         Branch(
             q=q,
@@ -109,7 +109,7 @@ def rank(
             position_error=float(distance),
             rotation_error=float(angle),
         )
-        for (q, label, free), distance, angle in zip(kept, distances, angles, strict=True)
+        for (q, label, free), distance, angle in zip(distinct, distances, angles, strict=True)
     ]
     branches.sort(key=lambda branch: (not branch.allowed, joint_distance(arm, near, branch.q)))
     allowed = [branch for branch in branches if branch.allowed]

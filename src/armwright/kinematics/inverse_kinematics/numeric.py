@@ -20,7 +20,7 @@ _STARTS = 48
 _ROUNDS = 5
 _STEPS = 150
 # A residual this small, in parts of the size of the arm, is rounding.
-_MET = 1e-15
+_ROUNDING = 1e-15
 # A configuration whose residual no longer falls by this part in a step stands at the bottom of its valley.
 _STILL = 1e-9
 # The damping, in parts of the squared residual: what it begins with, and how it answers a step that fails or succeeds.
@@ -83,18 +83,18 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
         size=size,
         length=max(size / 4, POSE_TOLERANCE),
     )
-    tried, met = _search(limited, near)
-    if not len(met):
+    tried, reached = _search(limited, near)
+    if not len(reached):
         endless = np.full(arm.n, np.inf)
         free = attrs.evolve(limited, lower=-endless, upper=endless)
         more = _descend(free, np.concatenate([tried, _starts(limited, near, 0, _STARTS)]))
-        met = np.array([nearest_equivalent(arm, q, near) for q in _met(free, more)]).reshape(-1, arm.n)
+        reached = np.array([nearest_equivalent(arm, q, near) for q in _reaching(free, more)]).reshape(-1, arm.n)
         tried = np.concatenate([tried, more])
-    if not len(met):
+    if not len(reached):
         best = tried[_residuals(limited, tried).argmin()]
         best = nearest_equivalent(arm, best, near)
         return rank(arm, X, [Candidate(best, "numeric 1")], near, apart=_SAME_CONFIGURATION, X_near=forward(arm, best))
-    return rank(arm, X, _named(limited, met, near), near, apart=_SAME_CONFIGURATION)
+    return rank(arm, X, _named(limited, reached, near), near, apart=_SAME_CONFIGURATION)
 
 
 def descend_from(arm: Arm, X: Array, near: Array) -> Array:
@@ -114,37 +114,37 @@ def descend_from(arm: Arm, X: Array, near: Array) -> Array:
 
 def _search(task: _Task, near: Array) -> tuple[Array, Array]:
     """Return all configurations (k, n) that the descents ended in, and those (l, n) that meet the pose."""
-    tried = met = np.empty((0, task.arm.n))
+    tried = reached = np.empty((0, task.arm.n))
     for number in range(_ROUNDS):
         ends = _descend(task, _starts(task, near, number * _STARTS, _STARTS))
-        fresh = _met(task, ends)
-        known = [Candidate(q, "") for q in met]
+        fresh = _reaching(task, ends)
+        known = [Candidate(q, "") for q in reached]
         news = any(not any(_same(task.arm, q, other) for other in known) for q in fresh)
-        tried, met = np.concatenate([tried, ends]), np.concatenate([met, fresh])
-        if len(met) and (task.arm.n > 6 or not news):
+        tried, reached = np.concatenate([tried, ends]), np.concatenate([reached, fresh])
+        if len(reached) and (task.arm.n > 6 or not news):
             break
-    return tried, met
+    return tried, reached
 
 
-def _named(task: _Task, met: Array, near: Array) -> list[Candidate]:
+def _named(task: _Task, reached: Array, near: Array) -> list[Candidate]:
     """Number the configurations, nearest first, one of each free family."""
-    found: list[Candidate] = []
+    solutions: list[Candidate] = []
     for q in sorted(
-        (nearest_equivalent(task.arm, q, near) for q in met), key=lambda q: joint_distance(task.arm, near, q)
+        (nearest_equivalent(task.arm, q, near) for q in reached), key=lambda q: joint_distance(task.arm, near, q)
     ):
-        if any(_same(task.arm, q, other) for other in found):
+        if any(_same(task.arm, q, other) for other in solutions):
             continue
-        found.append(Candidate(q, f"numeric {len(found) + 1}", _free_joints(task, q)))
-    return found
+        solutions.append(Candidate(q, f"numeric {len(solutions) + 1}", _free_joints(task, q)))
+    return solutions
 
 
 def _same(arm: Arm, q: Array, other: Candidate) -> bool:
     """Whether a configuration is another one, or a member of the family that is free there."""
-    held = [i for i in range(arm.n) if i + 1 not in other.free]
+    locked = [i for i in range(arm.n) if i + 1 not in other.free]
     apart = q - other.q
     revolute = np.array([joint.revolute for joint in arm.joints])
     apart = np.where(revolute, np.remainder(apart + np.pi, 2 * np.pi) - np.pi, apart)
-    return bool((np.abs(apart[held]) < _SAME_CONFIGURATION).all())
+    return bool((np.abs(apart[locked]) < _SAME_CONFIGURATION).all())
 
 
 def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
@@ -163,12 +163,12 @@ def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
         endless = np.full(task.arm.n, np.inf)
         loose = attrs.evolve(task, lower=-endless, upper=endless)
         moved = _descend(loose, (q + _FREE_WAY * idle)[None])[0]
-        if len(_met(loose, moved[None])) and np.linalg.norm(moved - q) > _FREE_WAY / 2:
+        if len(_reaching(loose, moved[None])) and np.linalg.norm(moved - q) > _FREE_WAY / 2:
             joints.update(int(i) + 1 for i in np.flatnonzero(np.abs(moved - q) > _SAME_CONFIGURATION))
     return tuple(sorted(joints))
 
 
-def _met(task: _Task, q: Array) -> Array:
+def _reaching(task: _Task, q: Array) -> Array:
     """Return those of the configurations (k, n) that meet the pose."""
     distance, angle = pose_errors(task.arm, q, task.X)
     return q[(distance <= POSE_TOLERANCE) & (angle <= POSE_TOLERANCE)]
@@ -198,7 +198,7 @@ def _descend(task: _Task, q: Array) -> Array:
         e[better], J[better] = e_moved[better], J_moved[better]
         square = np.where(better, square_moved, square)
         damping = np.where(better, damping * _SUCCEEDED, damping * _FAILED)
-        keep = ~still & (square > (_MET * task.size) ** 2) & (damping < 1 / _MET)
+        keep = ~still & (square > (_ROUNDING * task.size) ** 2) & (damping < 1 / _ROUNDING)
         running, e, J, square, damping = running[keep], e[keep], J[keep], square[keep], damping[keep]
         if not len(running):
             break
@@ -210,21 +210,21 @@ def _bounded_step(task: _Task, q: Array, e: Array, J: Array, damping: Array) -> 
     lower, upper = task.lower, task.upper
     H = np.swapaxes(J, -1, -2) @ J
     g = (np.swapaxes(J, -1, -2) @ e[..., None])[..., 0]
-    held = np.zeros(q.shape, dtype=bool)
+    locked = np.zeros(q.shape, dtype=bool)
     diagonal = np.arange(q.shape[-1])
     step = np.zeros(q.shape)
     for _ in range(2):
-        H_held = np.where(held[:, :, None] | held[:, None, :], 0.0, H)
-        H_held[:, diagonal, diagonal] += np.where(held, 1.0, np.maximum(damping, _MET * task.size**2))
-        step = np.linalg.solve(H_held, np.where(held, 0.0, g)[..., None])[..., 0]
+        H_held = np.where(locked[:, :, None] | locked[:, None, :], 0.0, H)
+        H_held[:, diagonal, diagonal] += np.where(locked, 1.0, np.maximum(damping, _ROUNDING * task.size**2))
+        step = np.linalg.solve(H_held, np.where(locked, 0.0, g)[..., None])[..., 0]
         outwards = ((q <= lower) & (step < 0)) | ((q >= upper) & (step > 0))
         if not outwards.any():
             break
-        held |= outwards
+        locked |= outwards
     # More than a radian, or a third of the arm, is no longer the neighbourhood that the step was made for.
     longest = np.array([1.0 if joint.revolute else task.size / 3 for joint in task.arm.joints])
     step /= np.maximum(np.max(np.abs(step) / longest, axis=-1, keepdims=True), 1.0)
-    return np.clip(q + np.where(held, 0.0, step), lower, upper)
+    return np.clip(q + np.where(locked, 0.0, step), lower, upper)
 
 
 def _residual_and_jacobian(task: _Task, q: Array, X: Array) -> tuple[Array, Array]:

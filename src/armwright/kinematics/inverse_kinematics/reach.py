@@ -12,7 +12,7 @@ from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry,
 
 # Angles of joint 1 looked at for the nearest place, and how often the neighbourhood of the best is looked at again,
 # each time twenty times closer: below 1e-8 rad the distance, flat at its least, has no digit left to tell.
-_LOOKS = 1440
+_SAMPLES = 1440
 _CLOSER = 7
 _FINER = 20
 
@@ -62,23 +62,25 @@ def _nearest_by_turning(geometry: ClosedFormGeometry, p: Array, R: Array) -> Arr
     flips: tuple[Sign, ...] = (1, -1) if geometry.family == "parallel" else (1,)
     best: tuple[float, Array] | None = None
     for flip in flips:
-        places = _places(geometry, p, rows, flip)
-        theta, width = np.linspace(-np.pi, np.pi, _LOOKS, endpoint=False), 2 * np.pi / _LOOKS
+        nearest = _nearest_by_angle(geometry, p, rows, flip)
+        theta, width = np.linspace(-np.pi, np.pi, _SAMPLES, endpoint=False), 2 * np.pi / _SAMPLES
         for _ in range(_CLOSER + 1):
-            found = places(theta)
-            distances = np.linalg.norm(found - p, axis=-1)
+            points = nearest(theta)
+            distances = np.linalg.norm(points - p, axis=-1)
             k = int(distances.argmin())
             theta, width = theta[k] + np.linspace(-width, width, 2 * _FINER + 1), width / _FINER
         if best is None or distances[k] < best[0]:
-            best = float(distances[k]), found[k]
+            best = float(distances[k]), points[k]
     assert best is not None  # noqa: S101 - there is at least one flip
     return best[1]
 
 
-def _places(geometry: ClosedFormGeometry, p: Array, R: list[list[float]], flip: Sign) -> Callable[[Array], Array]:
-    """Return the function from angles of joint 1 (k,) to the nearest places (k, 3) in reach at them."""
+def _nearest_by_angle(
+    geometry: ClosedFormGeometry, p: Array, R: list[list[float]], flip: Sign
+) -> Callable[[Array], Array]:
+    """Return the function from angles of joint 1 (k,) to the nearest points (k, 3) in reach at them."""
 
-    def places(theta: Array) -> Array:
+    def nearest(theta: Array) -> Array:
         c, s = np.cos(theta), np.sin(theta)
         X, Z = c * p[0] + s * p[1] - geometry.shoulder_offset, np.full_like(theta, p[2])
         foot_x, foot_z = np.zeros_like(theta), np.zeros_like(theta)
@@ -87,13 +89,13 @@ def _places(geometry: ClosedFormGeometry, p: Array, R: list[list[float]], flip: 
             foot_x, foot_z = rotated_about_y(raised, *geometry.wrist_link)
         x, z = X - foot_x, Z - foot_z
         distance = np.hypot(x, z)
-        wanted = np.clip(distance, geometry.inner_radius, geometry.outer_radius)
+        reached = np.clip(distance, geometry.inner_radius, geometry.outer_radius)
         safe = np.where(distance > 0, distance, 1.0)
-        x = np.where(distance > 0, x / safe, 1.0) * wanted + foot_x + geometry.shoulder_offset
-        z = z / safe * wanted + foot_z
+        x = np.where(distance > 0, x / safe, 1.0) * reached + foot_x + geometry.shoulder_offset
+        z = z / safe * reached + foot_z
         return np.stack([c * x - s * geometry.plane_offset, s * x + c * geometry.plane_offset, z], axis=-1)
 
-    return places
+    return nearest
 
 
 def _wrist_link_angle(geometry: ClosedFormGeometry, theta: Array, R: list[list[float]], flip: Sign) -> Array:
@@ -102,5 +104,5 @@ def _wrist_link_angle(geometry: ClosedFormGeometry, theta: Array, R: list[list[f
     c, s = np.cos(theta), np.sin(theta)
     far = 1.0 + abs(geometry.plane_offset)
     p = [far * c - geometry.plane_offset * s, far * s + geometry.plane_offset * c, np.zeros_like(theta)]
-    found: BranchAngles = branch_angles(geometry, p, R, (1, 1, flip), per_joint(np.zeros((len(theta), 6))))
-    return np.asarray(found.angles[1] + found.angles[2] + found.angles[3])
+    solution: BranchAngles = branch_angles(geometry, p, R, (1, 1, flip), per_joint(np.zeros((len(theta), 6))))
+    return np.asarray(solution.angles[1] + solution.angles[2] + solution.angles[3])

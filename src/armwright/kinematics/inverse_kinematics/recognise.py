@@ -78,7 +78,7 @@ def _wrist_centre(axes: Axes) -> Array | None:
     return centre
 
 
-class _Seen:
+class _ShoulderView:
     """The axes seen from the shoulder frame of an arm whose wrist centre is at ``centre``."""
 
     def __init__(self, axes: Axes, centre: Array) -> None:
@@ -95,7 +95,7 @@ class _Seen:
         self.R_TS = axes.X_BT[:3, :3].T @ R
         self.p_TW = axes.X_BT[:3, :3].T @ (centre - axes.X_BT[:3, 3])
 
-    def way(self, start: Array, end: Array) -> tuple[float, float]:
+    def segment(self, start: Array, end: Array) -> tuple[float, float]:
         """Return (x, z) from one point to another, seen along y."""
         x, _, z = end - start
         return float(x), float(z)
@@ -136,20 +136,20 @@ class _Seen:
 
 
 def _with_elbow(axes: Axes, wrist: Array) -> ClosedFormGeometry | None:
-    seen = _Seen(axes, wrist)
-    upper = seen.way(seen.points[1], seen.points[2])
-    fore = seen.way(seen.points[2], seen.centre)
+    view = _ShoulderView(axes, wrist)
+    upper = view.segment(view.points[1], view.points[2])
+    fore = view.segment(view.points[2], view.centre)
     if min(math.hypot(*upper), math.hypot(*fore)) < SAME:
         return None
     raised = _heading(*upper)
-    axis_4 = seen.directions[3]
+    axis_4 = view.directions[3]
     # The forearm's own z is the axis of joint 4, where that stays in the plane of the arm.
     flat = abs(float(axis_4[1])) < SAME
     folded = math.atan2(axis_4[0], axis_4[2]) if flat else raised
-    R_3W, offset_4, offset_5, R_SW = _wrist(seen, folded, flat)
-    return seen.build(
+    R_3W, offset_4, offset_5, R_SW = _wrist(view, folded, flat)
+    return view.build(
         "puma",
-        signs=(1, seen.sign(2), seen.sign(3), 1, 1, 1),
+        signs=(1, view.sign(2), view.sign(3), 1, 1, 1),
         offsets=(0, raised, folded - raised, offset_4, offset_5, 0),
         upper_arm=math.hypot(*upper),
         forearm=_as_floats(rotated_about_y(-folded, *fore)),
@@ -159,14 +159,14 @@ def _with_elbow(axes: Axes, wrist: Array) -> ClosedFormGeometry | None:
 
 
 def _with_slide(axes: Axes, wrist: Array) -> ClosedFormGeometry:
-    seen = _Seen(axes, wrist)
-    along = seen.directions[2]
+    view = _ShoulderView(axes, wrist)
+    along = view.directions[2]
     raised = math.atan2(along[0], along[2])
-    beside, length = rotated_about_y(-raised, *seen.way(seen.points[1], seen.centre))
-    R_3W, offset_4, offset_5, R_SW = _wrist(seen, raised, parallel(seen.directions[3], along))
-    return seen.build(
+    beside, length = rotated_about_y(-raised, *view.segment(view.points[1], view.centre))
+    R_3W, offset_4, offset_5, R_SW = _wrist(view, raised, parallel(view.directions[3], along))
+    return view.build(
         "stanford",
-        signs=(1, seen.sign(2), 1, 1, 1, 1),
+        signs=(1, view.sign(2), 1, 1, 1, 1),
         offsets=(0, raised, length, offset_4, offset_5, 0),
         forearm=(float(beside) if abs(beside) > SAME else 0.0, 0.0),
         R_3W=R_3W,
@@ -175,36 +175,36 @@ def _with_slide(axes: Axes, wrist: Array) -> ClosedFormGeometry:
 
 
 def _with_parallel_axes(axes: Axes, crossing: Array) -> ClosedFormGeometry | None:
-    seen = _Seen(axes, crossing)
-    upper = seen.way(seen.points[1], seen.points[2])
-    fore = seen.way(seen.points[2], seen.points[3])
+    view = _ShoulderView(axes, crossing)
+    upper = view.segment(view.points[1], view.points[2])
+    fore = view.segment(view.points[2], view.points[3])
     if min(math.hypot(*upper), math.hypot(*fore)) < SAME:
         return None
     raised, folded = _heading(*upper), _heading(*fore)
-    axis_5 = seen.directions[4]
+    axis_5 = view.directions[4]
     y = np.array((0.0, 1.0, 0.0))
     A = np.stack([np.cross(y, axis_5), y, axis_5], axis=-1)
-    across, along, _ = A.T @ seen.directions[5]
+    across, along, _ = A.T @ view.directions[5]
     offset_5 = math.atan2(-across, along)
-    return seen.build(
+    return view.build(
         "parallel",
-        signs=(1, seen.sign(2), seen.sign(3), seen.sign(4), 1, 1),
+        signs=(1, view.sign(2), view.sign(3), view.sign(4), 1, 1),
         offsets=(0, raised, folded - raised, -folded, offset_5, 0),
         upper_arm=math.hypot(*upper),
         forearm=(math.hypot(*fore), 0.0),
-        wrist_link=seen.way(seen.points[3], seen.centre),
+        wrist_link=view.segment(view.points[3], view.centre),
         tilt=math.atan2(axis_5[0], axis_5[2]),
         R_3W=_SWAP,
         R_SW=A @ _about_z(offset_5) @ _SWAP,
     )
 
 
-def _wrist(seen: _Seen, raised: float, aligned: bool) -> tuple[Array, float, float, Array]:  # noqa: FBT001
+def _wrist(view: _ShoulderView, raised: float, aligned: bool) -> tuple[Array, float, float, Array]:  # noqa: FBT001
     """Return the turn from forearm to wrist, the offsets of joints 4 and 5, and the last wrist frame at zero.
 
     ``raised`` is the turn of the forearm from x, all joints at 0; ``aligned``: whether its z is the axis of joint 4.
     """
-    axis_4, axis_5, axis_6 = seen.directions[3:]
+    axis_4, axis_5, axis_6 = view.directions[3:]
     forearm = _about_y(raised)
     A = forearm if aligned else np.stack([np.cross(axis_5, axis_4), axis_5, axis_4], axis=-1)
     x, y, _ = A.T @ axis_5

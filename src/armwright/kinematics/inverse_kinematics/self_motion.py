@@ -38,30 +38,30 @@ def search_within_limits(arm: Arm, q: Array, near: Array, members: Callable[[Arr
     """
     # What lies more than half a turn away is equivalent to what does not, which may be outside the limits.
     for turn in (np.pi, _TURN):
-        room = _room(arm, near, joint, turn)
-        found = _search(arm, near, members, joint, room) if room[0] <= room[1] else None
-        if found is not None:
-            return found
+        interval = _interval(arm, near, joint, turn)
+        inside_limits = _search(arm, near, members, joint, interval) if interval[0] <= interval[1] else None
+        if inside_limits is not None:
+            return inside_limits
     return q
 
 
 def _search(
-    arm: Arm, near: Array, members: Callable[[Array], Array], joint: int, room: tuple[float, float]
+    arm: Arm, near: Array, members: Callable[[Array], Array], joint: int, interval: tuple[float, float]
 ) -> Array | None:
     """Return the member nearest to ``near`` of those with all joints inside that a search of a room finds."""
-    (lower, upper), start = room, near[joint - 1]
-    places, width = np.linspace(lower, upper, _TRIED), (upper - lower) / (_TRIED - 1)
+    (lower, upper), start = interval, near[joint - 1]
+    values, width = np.linspace(lower, upper, _TRIED), (upper - lower) / (_TRIED - 1)
     for _ in range(_CLOSER):
-        rows = members(_placed(near, joint, places))
+        rows = members(_with_joint(near, joint, values))
         excess = _excess(arm, rows)
         inside = np.flatnonzero(excess < _INSIDE)
         if inside.size:
-            return nearest_equivalent(arm, rows[inside[np.abs(places[inside] - start).argmin()]], near)
+            return nearest_equivalent(arm, rows[inside[np.abs(values[inside] - start).argmin()]], near)
         around = np.pad(excess, 1, constant_values=np.inf)
         low = np.flatnonzero((excess <= around[:-2]) & (excess <= around[2:]))
         low = low[excess[low].argsort(kind="stable")][:_LEAST]
         fan = np.linspace(-width, width, 2 * _FINER + 1)
-        places, width = np.unique(np.clip(places[low][:, None] + fan, lower, upper)), width / _FINER
+        values, width = np.unique(np.clip(values[low][:, None] + fan, lower, upper)), width / _FINER
     return None
 
 
@@ -81,30 +81,30 @@ def counter_rotate_within_limits(
         joint: number of the free joint, from 1.
         other: number of the joint that turns with it.
     """
-    lower, upper = _room(arm, near, joint, _TURN)
+    lower, upper = _interval(arm, near, joint, _TURN)
     if lower > upper:
         return q
     start, limits = near[joint - 1], arm.joints[other - 1].limits
-    here, probed = members(_placed(near, joint, start + np.array((0.0, _PROBE))))[:, other - 1]
+    here, probed = members(_with_joint(near, joint, start + np.array((0.0, _PROBE))))[:, other - 1]
     way = 1.0 if abs(np.remainder(probed - here + np.pi, _TURN) - np.pi - _PROBE) < _PROBE else -1.0
     ends = [limit for limit in (limits.lower, limits.upper) if np.isfinite(limit)]
     reached = [way * (end - here + _TURN * (_WHOLE_TURNS - np.round((end - here) / _TURN))) for end in ends]
     turns = np.concatenate([[0.0, lower - start, upper - start], *reached])
     turns = turns[(turns >= lower - start) & (turns <= upper - start)]
     turns = turns[np.abs(turns).argsort(kind="stable")]
-    rows = members(_placed(near, joint, start + turns))
+    rows = members(_with_joint(near, joint, start + turns))
     inside = np.flatnonzero(_excess(arm, rows) < _INSIDE)
     return nearest_equivalent(arm, rows[inside[0]], near) if inside.size else q
 
 
-def _placed(near: Array, joint: int, values: Array) -> Array:
+def _with_joint(near: Array, joint: int, values: Array) -> Array:
     """Return where the arm is (k, n), with one joint, from 1, at other values (k,)."""
     rows = np.tile(near, (len(values), 1))
     rows[:, joint - 1] = values
     return rows
 
 
-def _room(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, float]:
+def _interval(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, float]:
     """Return from where to where a free joint may move: inside its limits, by so much at most [rad].
 
     One that is outside of them is moved inside before it is turned by a whole turn.

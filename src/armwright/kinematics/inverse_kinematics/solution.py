@@ -168,12 +168,12 @@ class NoSolutionError(ArmwrightError, ValueError):
 def violations(arm: Arm, q: ArrayLike) -> tuple[Violation, ...]:
     """Return the joints that one configuration (n,) puts outside their limits, in order."""
     q = joint_array(q, arm.n)
-    found = []
+    violated = []
     for i, (joint, value) in enumerate(zip(arm.joints, q.tolist(), strict=True), 1):
         limit = min(max(value, joint.limits.lower), joint.limits.upper)
         if abs(value - limit) > _AT_LIMIT * max(1.0, abs(limit)):
-            found.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute, name=joint.name))
-    return tuple(found)
+            violated.append(Violation(joint=i, value=value, limit=limit, revolute=joint.revolute, name=joint.name))
+    return tuple(violated)
 
 
 def _worst_violation(branch: Branch) -> float:
