@@ -1,5 +1,7 @@
 """Small angles about a, b, c that may stand on either side of half a turn: 179.9 and -179.9 deg are 0.2 deg apart."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arrays import Array

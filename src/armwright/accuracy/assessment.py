@@ -1,5 +1,7 @@
 """Every measure that a set of tests allows."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 
 import attrs
@@ -50,7 +52,7 @@ class Assessment:
         """The measures that do not keep their limits."""
         return tuple(measure for measure in self.measures if measure.holds is False)
 
-    def within(self, limits: Mapping[str, float]) -> "Assessment":
+    def within(self, limits: Mapping[str, float]) -> Assessment:
         """Return the same with limits that measures should keep.
 
         Args:

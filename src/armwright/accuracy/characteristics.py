@@ -1,5 +1,7 @@
 """The numbers of ISO 9283, each with its symbol, its unit, its cycles and the limit it should keep."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias
 

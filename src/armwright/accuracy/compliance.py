@@ -1,5 +1,7 @@
 """Static compliance: how far a pose gives way under a force."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

@@ -1,5 +1,7 @@
 """Cornering: how a sharp corner of a path is rounded off, CR, and overshot, CO."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

@@ -1,5 +1,7 @@
 """How often the standard asks for each measure to be repeated, and what is done where that was not kept."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 

@@ -1,5 +1,7 @@
 """Accuracy and repeatability of the distance between two poses: AD and RD."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

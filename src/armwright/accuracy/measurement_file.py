@@ -1,5 +1,7 @@
 """Tests out of tables: rows that belong together, what was commanded beside what was attained."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias

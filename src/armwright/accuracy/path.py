@@ -1,5 +1,7 @@
 """Accuracy and repeatability of a path, AT and RT, and the speed along it, AV, RV and FV."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

@@ -6,6 +6,8 @@ behind to the front, where no other part of the path is much nearer. Of all choi
 with the least sum of squares of the distances from the path, and of the ways back from plane to plane, is taken.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

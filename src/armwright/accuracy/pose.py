@@ -1,5 +1,7 @@
 """Accuracy and repeatability of one pose: AP and RP."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

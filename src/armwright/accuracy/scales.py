@@ -1,5 +1,7 @@
 """Commanded and attained values that look as if they were in different units."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arrays import Array

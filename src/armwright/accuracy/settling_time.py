@@ -1,5 +1,7 @@
 """Coming to rest: stabilisation time, overshoot, minimum posing time."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

@@ -1,5 +1,7 @@
 """Tables of measured poses and paths: their columns, and their rows in SI units."""
 
+from __future__ import annotations
+
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -36,7 +38,7 @@ class Row:
 
     __slots__ = ("_nominal", "_row", "_table")
 
-    def __init__(self, table: "Table", row: int, *, nominal: bool = False) -> None:
+    def __init__(self, table: Table, row: int, *, nominal: bool = False) -> None:
         """Look at a row of a table, counted from 0, or at the pose that its nominal columns ask for."""
         self._table, self._row, self._nominal = table, row, nominal
 
@@ -214,7 +216,7 @@ def _name(header: Header) -> str:
     return names[0]
 
 
-def _cycles(columns: UnitTable) -> "array[int]":
+def _cycles(columns: UnitTable) -> array[int]:
     """Return the numbers of the cycles; 0 for what was commanded.
 
     Raises:
@@ -232,7 +234,7 @@ def _cycles(columns: UnitTable) -> "array[int]":
     return cycles
 
 
-def _counted(columns: UnitTable, name: str) -> "array[int]":
+def _counted(columns: UnitTable, name: str) -> array[int]:
     """Return the numbers of the cycles where a file does not have them: rows of one pose, counted."""
     counts: dict[tuple[str | float | None, ...], int] = {}
     cycles = array("q")

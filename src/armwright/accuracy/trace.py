@@ -1,5 +1,7 @@
 """Measured places and traces at the door: shapes checked, copied, read-only."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

@@ -1,5 +1,7 @@
 """How a pose moves when something else changes: direction of approach (vAP), robot (E), time (dAP, dRP)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from itertools import combinations
 

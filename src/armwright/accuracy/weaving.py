@@ -1,5 +1,7 @@
 """Weaving: how far stroke and frequency of a swinging run are from the commanded ones, WS and WF."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

@@ -9,6 +9,8 @@ away, as for axes that are nearly parallel, a fixed transform F stands among the
 All quantities are SI and radians.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Sized
 from functools import cached_property
@@ -309,7 +311,7 @@ def _motors(value: Iterable[Motor]) -> tuple[Motor, ...]:
     return _parts(value, Motor, "motors")
 
 
-def _same_length(arm: "Arm", attribute: "attrs.Attribute[Any]", value: Sized) -> None:
+def _same_length(arm: Arm, attribute: attrs.Attribute[Any], value: Sized) -> None:
     if len(value) != len(arm.joints):
         raise ShapeError(f"arm '{arm.name}': {len(arm.joints)} joints but {len(value)} {attribute.name}")
 
@@ -395,7 +397,7 @@ class Arm:
         return f"joint {joint + 1} ('{name}')" if name else f"joint {joint + 1}"
 
     @cached_property
-    def limits(self) -> "JointLimits":
+    def limits(self) -> JointLimits:
         """The limits of all joints, each (n,)."""
         names = [field.name for field in attrs.fields(JointLimits)]
         return JointLimits(**{name: np.array([getattr(joint.limits, name) for joint in self.joints]) for name in names})

@@ -1,5 +1,7 @@
 """Quantities and poses in files that people write: the key tells the unit."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

@@ -4,6 +4,8 @@ Source:
     Spec of the calibration; ISO 9283:1998 for accuracy and repeatability.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator
 from typing import Any

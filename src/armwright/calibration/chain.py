@@ -8,6 +8,8 @@ Source:
     Hayati & Mirmirani (1985); Mooring, Roth, Driels (1991); spec of the calibration.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple, TypeAlias
 

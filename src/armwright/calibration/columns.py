@@ -1,5 +1,7 @@
 """The columns of a file of measurements, and which of them belong together."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping
 from pathlib import Path

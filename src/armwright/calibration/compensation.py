@@ -1,5 +1,7 @@
 """The inverse kinematics of a calibrated arm: where to send it so that its tool comes where it should."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -4,6 +4,8 @@ A joint whose encoder turns another joint too (q3 = a2 q2 + q3, as on palletiser
 sign, makes outliers of readings as soon as it moves. A robust fit then drops all of them and is sure of the rest.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The corrected arm in the forms that users need: an arm of this package, tables, URDF."""
 
+from __future__ import annotations
+
 import csv
 import io
 import math

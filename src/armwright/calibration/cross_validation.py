@@ -1,5 +1,7 @@
 """Cross-validation of a calibration: by how much it misses readings that it was not fitted to."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -35,11 +37,11 @@ class HeldOut(NamedTuple):
     positions: Array
 
     @classmethod
-    def unknown(cls, m: int) -> "HeldOut":
+    def unknown(cls, m: int) -> HeldOut:
         """Return those of m readings of which none is known yet."""
         return cls(np.full(m, np.nan), np.full(m, np.nan), np.full((m, 3), np.nan))
 
-    def put(self, rows: Flags, known: "HeldOut") -> None:
+    def put(self, rows: Flags, known: HeldOut) -> None:
         """Store those of some rows (m,)."""
         for own, more in zip(self, known, strict=True):
             own[rows] = more

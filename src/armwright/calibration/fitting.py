@@ -8,6 +8,8 @@ Source:
     Holland & Welsch (1977) for iteratively reweighted least squares; spec of the calibration.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import partial
 

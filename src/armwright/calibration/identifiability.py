@@ -6,6 +6,8 @@ leaves it a standard error of a millimetre or a few milliradians. All others are
 that they are collinear with.
 """
 
+from __future__ import annotations
+
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 

@@ -4,6 +4,8 @@ Readings that no registration brings near are of another arm, of other joints, o
 question.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import numpy as np

@@ -7,6 +7,8 @@ Source:
     ISO 9283:1998, 7.2.1, 7.2.2, 7.3.2.
 """
 
+from __future__ import annotations
+
 from itertools import pairwise
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Error models of joints: compliance under gravity, and the transmission error of gears."""
 
+from __future__ import annotations
+
 from functools import lru_cache
 
 import numpy as np

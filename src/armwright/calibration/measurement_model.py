@@ -4,6 +4,8 @@ Beside the errors of the arm, the setup has unknowns: six for each further frame
 that was touched, and three coordinates for each anchor.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -12,6 +12,8 @@ Cells may be empty where a row has something else. ``set`` marks the rows that a
 names the rows. docs/tables.md says how columns may be named.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -4,6 +4,8 @@ Source:
     Holland & Welsch (1977) for robust weights.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple

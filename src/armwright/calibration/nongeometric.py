@@ -11,6 +11,8 @@ Source:
     Thesis, outlook of chapter 5; spec of the calibration.
 """
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -64,7 +66,7 @@ class ModelComparison(NamedTuple):
     reason: str
 
     @classmethod
-    def rejected(cls, name: str, reason: str) -> "ModelComparison":
+    def rejected(cls, name: str, reason: str) -> ModelComparison:
         """Return that of a candidate that could not be tried."""
         return cls(name, None, 0.0, 0.0, accepted=False, reason=reason)
 
@@ -83,7 +85,7 @@ class NongeometricCalibration:
     """
 
     calibration: Calibration
-    residual_model: "ResidualModel | None"
+    residual_model: ResidualModel | None
     comparisons: tuple[ModelComparison, ...]
     geometry: HeldOut
     held_out: HeldOut
@@ -177,7 +179,7 @@ class _Folds:
             )
         return self._calibrations[key]
 
-    def residual_model(self, out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> "ResidualModel":
+    def residual_model(self, out: frozenset[int], joints: tuple[JointErrorModel, ...]) -> ResidualModel:
         """Return the model of the residuals of the same readings."""
         key = (out, tuple(error.name for error in joints))
         if key not in self._residual_models:

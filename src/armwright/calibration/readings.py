@@ -5,6 +5,8 @@ it touched a plane; or how far it was from a fixed anchor, or from where it was 
 in several frames, such as those of a board that was set up three times; where these stand is found with the rest.
 """
 
+from __future__ import annotations
+
 from typing import TypeAlias
 
 import attrs
@@ -64,7 +66,7 @@ class Readings:
         """Return how many there are."""
         return len(self.q)
 
-    def take(self, which: Flags | Numbers) -> "Readings":
+    def take(self, which: Flags | Numbers) -> Readings:
         """Return some of them."""
         rows = {
             key: getattr(self, key)[which]

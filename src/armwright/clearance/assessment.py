@@ -1,5 +1,7 @@
 """The assessment of a clearance run: errors of the tip, forces, impacts and free flight of pins, energy balance."""
 
+from __future__ import annotations
+
 import platform
 from collections.abc import Iterator
 from typing import Any
@@ -44,7 +46,7 @@ class ClearanceRun:
     depths: Array
 
     @classmethod
-    def of(cls, simulation: Simulation, outlook: Outlook | None = None) -> "ClearanceRun":
+    def of(cls, simulation: Simulation, outlook: Outlook | None = None) -> ClearanceRun:
         """Return a run with its energy balance, gaps and indentations.
 
         Raises:

@@ -9,6 +9,8 @@ Source:
     Thesis eq. (3.17)-(3.20); Lankarani & Nikravesh (1990); spec of the clearance, 1.1 and 2.2.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Mapping
 from typing import Literal, TypeAlias

@@ -9,6 +9,8 @@ Source:
     Spec of the clearance, 4.5; thesis, 5.3.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from math import comb
 

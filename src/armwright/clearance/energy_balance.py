@@ -1,5 +1,7 @@
 """The energy ledger of a linkage with play: what the drives gave, what is stored, what was lost."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

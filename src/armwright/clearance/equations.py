@@ -5,6 +5,8 @@ Source:
     ideal joints hang the bodies in trees, and pins with play are forces.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias
 

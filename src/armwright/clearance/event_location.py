@@ -14,6 +14,8 @@ of the step that each lane has made for good, ``part`` (LANES,) the fraction it 
 that came down in it, or -1.
 """
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

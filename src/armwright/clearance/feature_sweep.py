@@ -4,6 +4,8 @@ Each linkage is simulated several times with clearances that nobody can tell apa
 and their spread says how much of it is chance.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple

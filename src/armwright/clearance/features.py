@@ -4,6 +4,8 @@ Source:
     Thesis, 4.5.1; spec of the clearance, 1.2.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

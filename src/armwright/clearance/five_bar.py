@@ -8,6 +8,8 @@ Source:
     Thesis eq. (3.8)-(3.12), with the corrections of docs/errata.md.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -66,7 +68,7 @@ class FiveBar:
     rods: Array = attrs.field(converter=_lengths)
 
     @classmethod
-    def symmetric(cls, half_width: float, crank: float, rod: float) -> "FiveBar":
+    def symmetric(cls, half_width: float, crank: float, rod: float) -> FiveBar:
         """Return a five-bar with equal arms and its motors at (∓half_width, 0).
 
         Args:
@@ -77,7 +79,7 @@ class FiveBar:
         return cls(motors=[[-half_width, 0.0], [half_width, 0.0]], cranks=[crank, crank], rods=[rod, rod])
 
     @classmethod
-    def of(cls, linkage: Linkage) -> "FiveBar":
+    def of(cls, linkage: Linkage) -> FiveBar:
         """Return the five-bar that a linkage is when its play is left aside.
 
         Args:

@@ -1,5 +1,7 @@
 """Which body of a linkage is which link of a five-bar, if it is one."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

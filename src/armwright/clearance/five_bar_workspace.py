@@ -5,6 +5,8 @@ that arm. These places bound the workspace. A parallel singularity is where the 
 motors do not hold the tip across them.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Literal, NamedTuple, TypeAlias
 

@@ -4,6 +4,8 @@ All pins are closed. Positions come of Newton's iteration on the closure of the 
 derivatives, drives and reactions of the balance of every body; all for many moments at once.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 

@@ -3,6 +3,8 @@
 A run keeps its bits whatever runs beside it: no lane reads another.
 """
 
+from __future__ import annotations
+
 import textwrap
 from collections.abc import Sequence
 from typing import Literal, TypeAlias

@@ -6,6 +6,8 @@ those of the smallest linkage there is, one coordinate and one pin driven by an 
 ``event_location``; everything else is compiled as it stands there.
 """
 
+from __future__ import annotations
+
 from armwright.arrays import Array
 from armwright.clearance.equations import WORKS, Contact
 from armwright.tracing.emit import LANES as LANES  # noqa: PLC0414 - part of the layout

@@ -5,6 +5,8 @@ Lengths are in metres, angles in radians, counter-clockwise positive. The axis o
 ground points along x.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -304,7 +306,7 @@ class Linkage:
         """The clearance of each pin [m]."""
         return {pin.name: pin.clearance for pin in self.pins}
 
-    def with_clearances(self, clearances: Mapping[str, float]) -> "Linkage":
+    def with_clearances(self, clearances: Mapping[str, float]) -> Linkage:
         """Return the same linkage with other clearances at some pins [m].
 
         Raises:

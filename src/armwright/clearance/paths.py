@@ -4,6 +4,8 @@ Source:
     Thesis, 4.2 (24 test paths) and 5.2.2 (pick and place); spec of the clearance, 1.2.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 

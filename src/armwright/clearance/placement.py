@@ -5,6 +5,8 @@ velocity of a point is linear in the speeds, with the partial derivatives of its
 acceleration, which is there while no speed changes, is its bias.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,23 +21,23 @@ class Vec2(NamedTuple):
     x: Scalar
     y: Scalar
 
-    def plus(self, other: "Vec2") -> "Vec2":
+    def plus(self, other: Vec2) -> Vec2:
         """Return the sum."""
         return Vec2(self.x + other.x, self.y + other.y)
 
-    def minus(self, other: "Vec2") -> "Vec2":
+    def minus(self, other: Vec2) -> Vec2:
         """Return the difference."""
         return Vec2(self.x - other.x, self.y - other.y)
 
-    def times(self, factor: Scalar) -> "Vec2":
+    def times(self, factor: Scalar) -> Vec2:
         """Return a multiple."""
         return Vec2(factor * self.x, factor * self.y)
 
-    def dot(self, other: "Vec2") -> Scalar:
+    def dot(self, other: Vec2) -> Scalar:
         """Return the scalar product."""
         return self.x * other.x + self.y * other.y
 
-    def turned(self) -> "Vec2":
+    def turned(self) -> Vec2:
         """Return it turned by a right angle, counter-clockwise."""
         return Vec2(-self.y, self.x)
 

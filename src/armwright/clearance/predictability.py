@@ -8,6 +8,8 @@ Source:
     Spec of the clearance, 1.6: after the first impacts trajectories are chaotic.
 """
 
+from __future__ import annotations
+
 import contextlib
 
 import attrs

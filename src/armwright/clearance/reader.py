@@ -1,5 +1,7 @@
 """Linkages from files: the catalogue by name, any other by path; the format is in docs/clearance.md."""
 
+from __future__ import annotations
+
 import math
 from pathlib import Path
 

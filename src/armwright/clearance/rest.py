@@ -8,6 +8,8 @@ Source:
     Spec of the clearance, 0.1 and 4.3.
 """
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

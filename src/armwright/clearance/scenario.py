@@ -1,5 +1,7 @@
 """Making a path ready to be simulated many times: what the linkage without play does, and what its drives give."""
 
+from __future__ import annotations
+
 import math
 
 import attrs

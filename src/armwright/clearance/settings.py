@@ -1,5 +1,7 @@
 """How a linkage with play is simulated, and whether the step can be right for its contacts."""
 
+from __future__ import annotations
+
 from typing import Literal, TypeAlias
 
 import attrs

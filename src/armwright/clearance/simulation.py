@@ -3,6 +3,8 @@
 The drives give what a linkage without play would need for the path; what the tip then does differently is the error.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from enum import IntEnum
 from functools import cache

@@ -4,6 +4,8 @@ A run keeps its bits whatever runs beside it: no lane reads another. The functio
 ``lane_layout``.
 """
 
+from __future__ import annotations
+
 import numpy as np
 import numpy.typing as npt
 

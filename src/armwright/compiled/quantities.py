@@ -1,5 +1,7 @@
 """The quantities of an arm that can be compiled: their equations, shapes and conditions, and their emitted sources."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple

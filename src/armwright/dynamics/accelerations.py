@@ -1,5 +1,7 @@
 """Forward dynamics: the joint accelerations that efforts give, by two ways that share nothing but the links."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

@@ -1,5 +1,7 @@
 """What the functions of this folder take: joint arrays with leading axes that fit together."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -6,6 +6,8 @@ the hand; accelerations come back outward. Accelerations here are those of mater
 linear speeds never appear.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 

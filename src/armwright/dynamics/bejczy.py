@@ -4,6 +4,8 @@ Report TR-83-008 prints the model in its appendix III with slips. The form here 
 report's numbers, ``fitted`` finds the numbers of an arm.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import cast
 

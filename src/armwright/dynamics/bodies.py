@@ -1,5 +1,7 @@
 """Rigid bodies over abstract scalars: several as one, seen from any frame."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 from armwright.arm.model import Link

@@ -1,5 +1,7 @@
 """The terms of the efforts: how much each cause asks of each joint."""
 
+from __future__ import annotations
+
 import attrs
 import numpy as np
 

@@ -1,5 +1,7 @@
 """The mass matrix: what effort at one joint an acceleration of another one takes."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 from armwright.arm.model import Arm

@@ -1,5 +1,7 @@
 """Newton-Euler inverse dynamics: the joint efforts that a motion takes."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Shares of the efforts: what gravity and what the speeds alone ask of the joints."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 from armwright.arm.model import Arm

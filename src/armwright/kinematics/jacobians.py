@@ -1,5 +1,7 @@
 """The Jacobian: how fast the tool moves and turns for given joint speeds, and how that changes on the way."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 

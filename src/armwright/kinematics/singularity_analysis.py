@@ -1,5 +1,7 @@
 """Singular postures and their cause: which factor of the determinant vanishes, what is lost, what moves for nothing."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 
 import attrs

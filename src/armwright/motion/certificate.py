@@ -1,5 +1,7 @@
 """What a planned path is certified to keep: its deviation, and the limits of the joints."""
 
+from __future__ import annotations
+
 import math
 from typing import Literal, TypeAlias
 

@@ -1,5 +1,7 @@
 """Ways round what stops a straight line: by a via pose beside it, or along it by damped rates; and their price."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from itertools import chain
 from typing import Literal, TypeAlias

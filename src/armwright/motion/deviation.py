@@ -11,6 +11,8 @@ would otherwise be turned too far for where it is. On a line shorter than the al
 enough, and the progress alone counts.
 """
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 
@@ -43,7 +45,7 @@ class Ways(NamedTuple):
     turn: Array
 
     @staticmethod
-    def of_one(A: Array, B: Array, turn: Array, intervals: int) -> "Ways":
+    def of_one(A: Array, B: Array, turn: Array, intervals: int) -> Ways:
         """Return one way, from pose A to pose B, for all intervals."""
         parts = A[:3, 3], A[:3, :3], B[:3, 3] - A[:3, 3], turn
         return Ways(*(np.broadcast_to(part, (intervals, *part.shape)) for part in parts))
@@ -206,7 +208,7 @@ def half_sines(R_A: Array, R_B: Array) -> Array:
     return np.asarray(np.sqrt(a * a + b * b + c * c) / (4 * w))
 
 
-def _spin_of(hand: "HandBounds", change: Array, rate: Array) -> Array:
+def _spin_of(hand: HandBounds, change: Array, rate: Array) -> Array:
     """Return an upper bound (m,) of the acceleration of half the turn of the hand off an orientation that turns itself.
 
     The turn off it is a unit quaternion; the second derivative of its vector part is at most half the angular

@@ -7,6 +7,8 @@ Run k times slower, a motion asks of every joint at every place for
 so the least slowing follows from the roots of a parabola in 1/k, for each look at the motion by itself.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

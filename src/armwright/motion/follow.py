@@ -1,5 +1,7 @@
 """Following a path: joints solved at knots, joined by X-splines, and held against path and limits."""
 
+from __future__ import annotations
+
 from typing import NoReturn
 
 import attrs

@@ -1,5 +1,7 @@
 """Joints that carry the hand along a path planned in time, on one branch, with a bounded deviation."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
@@ -62,7 +64,7 @@ class Carried(NamedTuple):
 
     label: str
     trajectory: Trajectory
-    strays: "Strays"
+    strays: Strays
 
 
 class Strays(NamedTuple):

@@ -1,5 +1,7 @@
 """Where the hand is planned to be: places and orientations through poses, straight with blends, over time."""
 
+from __future__ import annotations
+
 from typing import Literal, TypeAlias
 
 import attrs
@@ -27,7 +29,7 @@ class HandPath:
     """
 
     place: Trajectory
-    turns: "Turns | None"
+    turns: Turns | None
     angles: Trajectory | None
 
     @property
@@ -43,7 +45,7 @@ class HandPath:
         assert self.turns is not None  # noqa: S101 - one of the two is there
         return homogeneous(self.turns(t), self.place(t))
 
-    def slowed(self, factor: float) -> "HandPath":
+    def slowed(self, factor: float) -> HandPath:
         """Return the same path run ``factor`` times slower."""
         return HandPath(
             place=self.place.slowed(factor),
@@ -100,7 +102,7 @@ class Turns:
         turn = np.where(since <= -width, before * since, np.where(since >= width, after * since, blend))
         return np.asarray(self.R[i] @ rotation_from_vector(turn))
 
-    def slowed(self, factor: float) -> "Turns":
+    def slowed(self, factor: float) -> Turns:
         """Return the same turns run ``factor`` times slower."""
         p = self.plan
         slow = BlendPlan(

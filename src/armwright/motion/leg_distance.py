@@ -1,5 +1,7 @@
 """How far the hand gets off straight legs: an upper bound that is hardly above what is seen."""
 
+from __future__ import annotations
+
 from itertools import pairwise
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Joint moves and Cartesian moves through poses, by straight ways with blends: of the joints, or of the hand."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Sequence
 
@@ -63,7 +65,7 @@ class Move:
     certificate: Certificate | None = None
     detours: tuple[Detour, ...] = ()
 
-    def slowed(self, factor: float) -> "Move":
+    def slowed(self, factor: float) -> Move:
         """Return the same move run ``factor`` times slower."""
         slow = self.trajectory.slowed(factor)
         certificate = self.certificate

@@ -9,6 +9,8 @@ constant, so x at a later place of it is x + 2 u (s - s_i), linear too: the boun
 its end.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Literal, NamedTuple, TypeAlias
 

@@ -8,6 +8,8 @@ so a bound of that bounds the width. The joints are solved along this path, whic
 it one.
 """
 
+from __future__ import annotations
+
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -318,7 +320,7 @@ def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
     return caps
 
 
-def _inside_efforts(task: _Task, rounded: Rounded, factor: float, stops: "_Stops | None") -> Rounded:
+def _inside_efforts(task: _Task, rounded: Rounded, factor: float, stops: _Stops | None) -> Rounded:
     """Return a run slowed as much as the efforts ask for, or as the same legs with stops allow.
 
     Where weight alone asks for more than a joint has no slowing helps, and the legs with stops fare no better.

@@ -1,5 +1,7 @@
 """What stops the arm on its way through poses, found by a close look."""
 
+from __future__ import annotations
+
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Straight lines with a certificate: knots where they are needed, until the deviation between them is bounded."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

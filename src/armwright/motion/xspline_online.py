@@ -11,6 +11,8 @@ the rate at the last knot, and the step between them. It is a value: what pushes
 ``xspline_kernel(n).one(state, knot, step, state, segment)`` does the same from compiled loops, in place.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import cache
 

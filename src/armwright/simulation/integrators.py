@@ -4,6 +4,8 @@ An integrator gives a stepper, a stepper gives steps; whoever asks for them watc
 step and begins anew behind each.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args

@@ -1,5 +1,7 @@
 """What a simulated motion is: its course, its energies, what happened to its joints."""
 
+from __future__ import annotations
+
 import math
 from enum import Enum, IntEnum
 from numbers import Integral

@@ -1,5 +1,7 @@
 """Rotations: how far from one a matrix is, the nearest one, the turn between two, the way from one to another."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, of_shape

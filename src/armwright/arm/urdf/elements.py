@@ -5,6 +5,8 @@ one that is spelt nearly as URDF spells it is refused, since what it says would 
 <origin> says of a place.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Collection
@@ -62,7 +64,7 @@ class Element:
     place: str
     tag: str
     attributes: dict[str, str]
-    children: "tuple[Element, ...]"
+    children: tuple[Element, ...]
 
     @property
     def name(self) -> str:
@@ -74,11 +76,11 @@ class Element:
         key = ", ".join(part for part in (self.place, attribute) if part)
         return FileFormatError(self.path, self.line, key, message)
 
-    def all(self, tag: str) -> "list[Element]":
+    def all(self, tag: str) -> list[Element]:
         """Return the elements in it that have a name, in their order."""
         return [child for child in self.children if child.tag == tag]
 
-    def one(self, tag: str) -> "Element | None":
+    def one(self, tag: str) -> Element | None:
         """Return the element in it that has a name, or None.
 
         Raises:
@@ -89,7 +91,7 @@ class Element:
             raise found[1].error("", f"given twice, first in line {found[0].line}")
         return found[0] if found else None
 
-    def needed(self, tag: str) -> "Element":
+    def needed(self, tag: str) -> Element:
         """Return the element in it that has a name.
 
         Raises:

@@ -5,6 +5,8 @@ for them, and nothing can tell; only what is left contradicts the model, once it
 whose weight hardly turns the forces in the pins is never seen, and with three poses little is left to see anything by.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple, TypeAlias

@@ -5,6 +5,8 @@ Source:
     own: what impacts leave to chance is noise to a smooth surface.
 """
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Sequence
 
@@ -129,7 +131,7 @@ class Surrogate:
         near = np.exp(-0.5 * (apart - apart.min(axis=-1, keepdims=True)))
         return np.asarray(np.sqrt(near @ self.spreads**2 / near.sum(axis=-1, keepdims=True)), dtype=np.float64)
 
-    def chosen(self, names: Sequence[str]) -> "Surrogate":
+    def chosen(self, names: Sequence[str]) -> Surrogate:
         """Return the surrogate of some of the features."""
         numbers = [self.features.index(name) for name in names]
         return attrs.evolve(

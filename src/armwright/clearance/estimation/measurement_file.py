@@ -5,6 +5,8 @@ sample: ``path, t_s, x_mm, y_mm``; those after the end of the path are left out.
 file in the same unit; time in s or ms.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from pathlib import Path

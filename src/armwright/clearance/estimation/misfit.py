@@ -9,6 +9,8 @@ Source:
     Particle Data Group, Review of Particle Physics, "Introduction", scale factors of weighted means.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 
 import numpy as np

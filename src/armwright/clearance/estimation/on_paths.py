@@ -1,5 +1,7 @@
 """What a sweep teaches of features of error curves, and which of them it shows to be chance alone."""
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence

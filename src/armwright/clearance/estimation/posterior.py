@@ -7,6 +7,8 @@ Source:
     Spec of the clearance, 4.4; Goodman & Weare (2010) for the walkers.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -67,7 +69,7 @@ class Posterior:
                     ends[name] = end
         return ends
 
-    def checked(self) -> "Posterior":
+    def checked(self) -> Posterior:
         """Return the same, if features and model do not contradict one another.
 
         Raises:

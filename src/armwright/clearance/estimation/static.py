@@ -8,6 +8,8 @@ Source:
     Spec of the clearance, 4.3.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 
 import attrs

@@ -4,6 +4,8 @@ Two tables of Denavit-Hartenberg numbers may describe one arm: twists of the oth
 elsewhere, frames slid along parallel axes. The lines are the same, and it is from them that a build is recognised.
 """
 
+from __future__ import annotations
+
 import math
 
 import attrs

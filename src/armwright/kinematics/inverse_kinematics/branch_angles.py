@@ -1,5 +1,7 @@
 """One branch of one arm: all six angles that put the hand at a pose, over abstract scalars."""
 
+from __future__ import annotations
+
 import math
 from typing import NamedTuple
 

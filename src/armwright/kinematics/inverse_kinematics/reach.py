@@ -1,5 +1,7 @@
 """The nearest place in reach, for a hand that keeps its orientation."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 

@@ -1,5 +1,7 @@
 """Which closed form fits an arm, read from the lines of its joint axes."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from functools import lru_cache

@@ -1,5 +1,7 @@
 """Wrapped angles: which of those equivalent by whole turns to take, and how far apart two configurations are."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """The last three joints: a spherical wrist turns the hand as the ZYZ Euler angles do, over abstract scalars."""
 
+from __future__ import annotations
+
 from armwright.kinematics.inverse_kinematics.geometry import Sign
 from armwright.tracing.scalar import Scalar, atan2, cos, select, sin
 from armwright.tracing.vectors import Matrix, Vector
