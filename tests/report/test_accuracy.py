@@ -9,7 +9,7 @@ import pytest
 from armwright.accuracy.assessment import Assessment, assess
 from armwright.accuracy.measurement_file import read_measurements
 from armwright.report.accuracy_figures import drawings
-from armwright.report.accuracy_page import accuracy_page, notes_of, shown_measure
+from armwright.report.accuracy_page import accuracy_page
 
 NAME = r"P<1>&$\x$"
 
@@ -72,26 +72,26 @@ def test_symbols(everything: Assessment) -> None:
 
 
 def test_page(everything: Assessment) -> None:
-    """The page has a row per measure and says what was reduced; no name on it can be taken for HTML."""
+    """The page has a table per test, a row per measure, and what was reduced; no name on it can be taken for HTML."""
     page = accuracy_page(everything, drawings(everything), title="A & B", command="armwright iso9283 <x>")
 
-    assert page.count("<tr") == 1 + len(everything.measures)
+    assert page.count("<tr") == len(list(everything.tables())) + len(everything.measures)
     assert "<1>" not in page
     assert r"P&lt;1&gt;&amp;$\x$" in page
     assert "A &amp; B" in page
     assert "armwright iso9283 &lt;x&gt;" in page
-    assert all(html.escape(note) in page for note in notes_of(everything))
-    assert notes_of(everything)[0].startswith("planar reduction: path L, cornering L, weaving L, settling P<1>&")
+    assert all(html.escape(note) in page for note in everything.notes)
+    assert everything.notes[0].startswith("planar reduction: path L, cornering L, weaving L, settling P<1>&")
 
 
 def test_units_for_people(everything: Assessment) -> None:
     """People read millimetres, degrees and percent, plus and minus where it is one, and how many cycles were asked."""
     by_symbol = {one.symbol: one for one in everything.within({"RV": 0.5, "RD": 1e-9}).measures}
 
-    assert shown_measure(by_symbol["C"]).unit == "mm/N"
-    assert float(shown_measure(by_symbol["C"]).value) == pytest.approx(0.02, rel=0.02)
-    assert shown_measure(by_symbol["RV"]).value.startswith("± ")
-    assert (shown_measure(by_symbol["RV"]).limit, shown_measure(by_symbol["RV"]).verdict) == ("50", "holds")
-    assert shown_measure(by_symbol["RD"]).verdict == "exceeds"
-    assert shown_measure(by_symbol["RP"]).cycles == "10 of 30"
-    assert shown_measure(by_symbol["t"]).cycles == "3"
+    assert by_symbol["C"].displayed_unit == "mm/N"
+    assert float(by_symbol["C"].displayed_value) == pytest.approx(0.02, rel=0.02)
+    assert by_symbol["RV"].displayed_value.startswith("± ")
+    assert (by_symbol["RV"].displayed_limit, by_symbol["RV"].verdict) == ("50", "holds")
+    assert by_symbol["RD"].verdict == "exceeds"
+    assert by_symbol["RP"].displayed_cycles == "10 of 30"
+    assert by_symbol["t"].displayed_cycles == "3"

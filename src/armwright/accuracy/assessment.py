@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
 
 import attrs
 import numpy as np
 
-from armwright.accuracy.characteristics import Measure, Result, measures_of
+from armwright.accuracy.characteristics import Characteristic, Result, characteristics_of
 from armwright.accuracy.compliance import StaticCompliance, static_compliance
 from armwright.accuracy.corner import corner_deviations
 from armwright.accuracy.distance import distance_accuracy, distance_repeatability
@@ -19,8 +22,11 @@ from armwright.accuracy.variation import exchangeability, multidirectional_varia
 from armwright.accuracy.weaving import weaving_deviation
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, one_of
+from armwright.files.result_table import ResultTable
 
 _AXES = "xyz"
+# How many tests a note names.
+_NAMED = 4
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -33,7 +39,7 @@ class Assessment:
         tests: as they were read.
     """
 
-    measures: tuple[Measure, ...]
+    measures: tuple[Characteristic, ...]
     results: tuple[tuple[Result, ...], ...]
     tests: tuple[AnyTest, ...]
 
@@ -48,9 +54,64 @@ class Assessment:
         return any(measure.few for measure in self.measures)
 
     @property
-    def exceeded(self) -> tuple[Measure, ...]:
+    def exceeded(self) -> tuple[Characteristic, ...]:
         """The measures that do not keep their limits."""
         return tuple(measure for measure in self.measures if measure.holds is False)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a reader must know beside the numbers."""
+        notes = []
+        if self.planar:
+            names = [f"{test.kind} {test.name}" for test in self.tests if test.size == 2]
+            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+            which = "all tests" if len(names) == len(self.tests) else f"{', '.join(names[:_NAMED])}{more}"
+            notes.append(f"planar reduction: {which} measured in a plane, without z; distances are taken in it")
+        if self.few:
+            notes.append(
+                "fewer cycles than ISO 9283 asks for, where n or the note says so: such a measure is an estimate"
+            )
+        if self.exceeded:
+            notes.append(f"limit exceeded: {', '.join(sorted({measure.symbol for measure in self.exceeded}))}")
+        return notes
+
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data in SI units; what is infinite is none."""
+        measures = [
+            {
+                **attrs.asdict(measure),
+                "value": measure.value if math.isfinite(measure.value) else None,
+                "few": measure.few,
+                "holds": measure.holds,
+            }
+            for measure in self.measures
+        ]
+        return {"standard": "ISO 9283:1998", "planar": self.planar, "notes": self.notes, "measures": measures}
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Give a table for each test, with a row for each measure; limits where any is stated."""
+        bounded = any(measure.limit is not None for measure in self.measures)
+        for (test, name, condition), group in groupby(self.measures, lambda one: (one.test, one.name, one.condition)):
+            measures = list(group)
+            yield ResultTable(
+                title=f"{test} {name}{f', {condition}' if condition else ''}",
+                heads=("symbol", "measure", "value", "unit", "n", *(["limit"] if bounded else []), "note"),
+                rows=[
+                    (
+                        measure.symbol,
+                        # The components of a measure need no words: AP_x below AP.
+                        "" if "_" in measure.symbol else measure.what,
+                        measure.displayed_value,
+                        measure.displayed_unit,
+                        measure.displayed_cycles,
+                        *([measure.displayed_limit] if bounded else []),
+                        " ".join(filter(None, (measure.verdict, measure.note))),
+                    )
+                    for measure in measures
+                ],
+                numbers=(2, 4, 5) if bounded else (2, 4),
+                marks=tuple({"exceeds": "over"}.get(measure.verdict, measure.verdict) for measure in measures),
+            )
 
     def within(self, limits: Mapping[str, float]) -> Assessment:
         """Return the same with limits that measures should keep.
@@ -86,7 +147,7 @@ def assess(
     Raises:
         ArmwrightError: a test lacks something, or has too few cycles; the text says which.
     """
-    measures: list[Measure] = []
+    measures: list[Characteristic] = []
     results: list[tuple[Result, ...]] = []
     for test in tests:
         try:
@@ -95,7 +156,7 @@ def assess(
             raise type(error)(f"{_title(test)}: {str(error).removeprefix(f'{test.kind}: ')}") from error
         results.append(found)
         for result in found:
-            measures.extend(measures_of(test, result))
+            measures.extend(characteristics_of(test, result))
     return Assessment(measures=tuple(measures), results=tuple(results), tests=tuple(tests))
 
 

@@ -20,6 +20,15 @@ from armwright.accuracy.variation import PoseDrift, Variation
 from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array
 
+# Units for people: name, and how many of it are one in SI units.
+_DISPLAYED = {
+    "m": ("mm", 1e3),
+    "rad": ("deg", 180 / np.pi),
+    "s": ("s", 1.0),
+    "m/s": ("mm/s", 1e3),
+    "m/N": ("mm/N", 1e3),
+    "": ("%", 100.0),
+}
 Result: TypeAlias = (
     PoseAccuracy
     | PoseRepeatability
@@ -39,7 +48,7 @@ _AXES = "xyz"
 
 
 @attrs.frozen(kw_only=True)
-class Measure:
+class Characteristic:
     """One number of ISO 9283.
 
     Attributes:
@@ -82,12 +91,43 @@ class Measure:
         """Whether it keeps its limit; None where there is none."""
         return None if self.limit is None else bool(abs(self.value) <= self.limit)
 
+    @property
+    def verdict(self) -> str:
+        """``holds`` or ``exceeds`` its limit; empty where there is none."""
+        return {None: "", True: "holds", False: "exceeds"}[self.holds]
 
-def measures_of(test: AnyTest, result: Result) -> Iterator[Measure]:
+    @property
+    def displayed_unit(self) -> str:
+        """The unit for people: mm, deg, s, mm/s, mm/N or %."""
+        return _DISPLAYED[self.unit][0]
+
+    @property
+    def scale(self) -> float:
+        """How many of that unit are one in SI units."""
+        return _DISPLAYED[self.unit][1]
+
+    @property
+    def displayed_value(self) -> str:
+        """The value in that unit, plus or minus where it is one."""
+        value = f"{self.value * self.scale:.4g}" if np.isfinite(self.value) else "never"
+        return f"± {value}" if self.either_way else value
+
+    @property
+    def displayed_limit(self) -> str:
+        """The limit in that unit; empty where there is none."""
+        return "" if self.limit is None else f"{self.limit * self.scale:.4g}"
+
+    @property
+    def displayed_cycles(self) -> str:
+        """The cycles, and, where those are too few, how many the standard asks for."""
+        return f"{self.cycles} of {self.asked}" if self.few else str(self.cycles)
+
+
+def characteristics_of(test: AnyTest, result: Result) -> Iterator[Characteristic]:
     """Give the numbers of a result of a test."""
     of = {"test": test.kind, "name": test.name, "condition": test.condition, "cycles": result.cycles}
     for fields in _TELL[type(result)](test, result):
-        yield Measure(**{**of, "asked": ASKED[test.kind], **fields})
+        yield Characteristic(**{**of, "asked": ASKED[test.kind], **fields})
 
 
 def _axes(symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:

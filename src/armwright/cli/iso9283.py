@@ -1,14 +1,14 @@
 """``armwright iso9283``: what measured poses and paths say of a robot, by the definitions of ISO 9283."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from armwright.cli.failures import outcome
 from armwright.cli.numbers import Named, named_numbers
 from armwright.cli.options import Json, Quiet
-from armwright.cli.output import command_line, json_text, plain_console, print_json, print_table
+from armwright.cli.output import command_line, json_text, print_json, print_result
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 from armwright.errors import CheckFailedError, TooFewError
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from armwright.accuracy.assessment import Assessment
-    from armwright.accuracy.characteristics import Measure
+    from armwright.accuracy.characteristics import Characteristic
     from armwright.accuracy.measurement_file import AnyTest
 
 
@@ -62,31 +62,29 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
         warn_of_stray(path)
     tests = read_measurements(files, columns=columns_of(columns), skip_incomplete=skip_incomplete)
     found = _assessed(tests, bounds, few=few, band_mm=band_mm, corners_mm=corners_mm)
-    plain = _plain(found)
     if output is not None:
-        write_results(output, _files(found, files, plain))
+        write_results(output, _files(found, files))
     exceeded = CheckFailedError(_exceeded(found.exceeded)) if found.exceeded else None
     if as_json:
-        print_json({**outcome(exceeded), **plain})
+        print_json({**outcome(exceeded), **found.as_data()})
     elif not quiet:
-        _print(found)
+        print_result(found)
         if output is not None:
             print(f"report: {output / 'report.html'}")
     if exceeded is not None:
         raise exceeded
 
 
-def _exceeded(measures: "Sequence[Measure]") -> str:
+def _exceeded(measures: "Sequence[Characteristic]") -> str:
     """Say which measures exceed their limits, and by how much."""
-    from armwright.report.accuracy_page import shown_measure
-
-    told = []
-    for one in measures:
-        seen = shown_measure(one)
-        unit = seen.unit
-        of = f"{one.test} {one.name}{f', {one.condition}' if one.condition else ''}"
-        told.append(f"{one.symbol} of {of} is {seen.value} {unit}, and at most {seen.limit} {seen.unit} is allowed")
-    return f"limit exceeded: {'; '.join(told)}"
+    exceeded = []
+    for measure in measures:
+        unit, condition = measure.displayed_unit, f", {measure.condition}" if measure.condition else ""
+        exceeded.append(
+            f"{measure.symbol} of {measure.test} {measure.name}{condition} is {measure.displayed_value} {unit}, "
+            f"and at most {measure.displayed_limit} {unit} is allowed"
+        )
+    return f"limit exceeded: {'; '.join(exceeded)}"
 
 
 def _refuse_no_lengths(band_mm: float | None, corners_mm: float) -> None:
@@ -125,33 +123,18 @@ def _bounds(texts: list[str]) -> dict[str, Named]:
 def _in_si(found: "Assessment", symbol: str, value: float, unit: str) -> float:
     """Return a limit in SI units."""
     from armwright.errors import one_of
-    from armwright.report.accuracy_page import unit_scale
 
-    units = {one.symbol: one.unit for one in found.measures}
-    shown, scale = unit_scale(units[one_of("measure", symbol, units)])
+    measures = {measure.symbol: measure for measure in found.measures}
+    measure = measures[one_of("measure", symbol, measures)]
+    shown = measure.displayed_unit
     if unit != shown:
         raise typer.BadParameter(
             f"{symbol} is in {shown}: {symbol}={value:g}{shown}, got '{unit}'", param_hint="--limit"
         )
-    return value / scale
+    return value / measure.scale
 
 
-def _plain(found: "Assessment") -> dict[str, Any]:
-    """Return an assessment as plain data in SI units; what is infinite is none."""
-    from math import isfinite
-
-    import attrs
-
-    from armwright.report.accuracy_page import notes_of
-
-    measures = [
-        {**attrs.asdict(one), "value": one.value if isfinite(one.value) else None, "few": one.few, "holds": one.holds}
-        for one in found.measures
-    ]
-    return {"standard": "ISO 9283:1998", "planar": found.planar, "notes": notes_of(found), "measures": measures}
-
-
-def _files(found: "Assessment", files: list[Path], plain: dict[str, Any]) -> dict[str, str]:
+def _files(found: "Assessment", files: list[Path]) -> dict[str, str]:
     """Return the files of an assessment by name."""
     from armwright.report.accuracy_figures import drawings
     from armwright.report.accuracy_page import accuracy_page
@@ -159,48 +142,7 @@ def _files(found: "Assessment", files: list[Path], plain: dict[str, Any]) -> dic
     drawn = drawings(found)
     title = f"ISO 9283: {', '.join(path.name for path in files)}"
     return {
-        "measures.json": json_text(plain) + "\n",
+        "measures.json": json_text(found.as_data()) + "\n",
         "report.html": accuracy_page(found, drawn, title=title, command=command_line()),
         **{f"{one.name}.svg": one.svg for one in drawn},
     }
-
-
-def _print(found: "Assessment") -> None:
-    from itertools import groupby
-
-    from rich import box
-    from rich.table import Table
-
-    from armwright.report.accuracy_page import notes_of
-
-    console = plain_console()
-    bounded = any(one.limit is not None for one in found.measures)
-    for (test, name, condition), measures in groupby(found.measures, lambda one: (one.test, one.name, one.condition)):
-        title = f"{test} {name}{f', {condition}' if condition else ''}"
-        table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-        table.add_column("symbol", min_width=6)
-        table.add_column("measure", min_width=27, overflow="fold")
-        table.add_column("value", min_width=10, justify="right", no_wrap=True)
-        table.add_column("unit", min_width=4)
-        table.add_column("n", min_width=2, justify="right")
-        if bounded:
-            table.add_column("limit", justify="right")
-        table.add_column("remark", overflow="fold")
-        for one in measures:
-            table.add_row(*_row(one, bounded=bounded))
-        print_table(console, table)
-    for note in notes_of(found):
-        console.print(note)
-
-
-def _row(one: "Measure", *, bounded: bool) -> "list[Any]":
-    from rich.text import Text
-
-    from armwright.report.accuracy_page import shown_measure
-
-    seen = shown_measure(one)
-    verdict = Text(seen.verdict, style="bold red" if seen.verdict == "exceeds" else "")
-    note = Text(" ").join(part for part in (verdict, Text(one.note)) if part)
-    # What stands below its whole needs no words: AP_x below AP.
-    what = "" if "_" in one.symbol else one.what
-    return [one.symbol, what, seen.value, seen.unit, seen.cycles, *([seen.limit] if bounded else []), note]

@@ -54,7 +54,10 @@ def print_result_tables(console: "Console", tables: "Iterable[ResultTable]") -> 
     for result in tables:
         if result.rows:
             words = [i for i in range(len(result.heads)) if i not in result.numbers]
-            print_table(console, table(result.heads, result.rows, title=result.title or None, words=words))
+            shown = table(result.heads, result.rows, title=result.title or None, words=words)
+            for row, mark in zip(shown.rows, result.marks, strict=False):
+                row.style = "bold red" if mark == "over" else None
+            print_table(console, shown)
             if result.remark:
                 console.print(result.remark)
 
