@@ -13,7 +13,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.jacobians import jacobian
 from armwright.motion.detour import line_or_detour
-from armwright.motion.follow import PathError
+from armwright.motion.obstruction import PathError
 from armwright.motion.straight import straight_line
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
@@ -146,22 +146,27 @@ def test_unknown_way() -> None:
 
 
 def test_no_crawling() -> None:
-    """Lines past the wrist's singularity that would take a minute and more are gone round in seconds."""
+    """Lines past the wrist's singularity are run in seconds: the hand is slowed where it passes, and nowhere else.
+
+    Slowed from end to end as the joints ask for beside the singularity, they would take a minute and more.
+    """
     arm = attrs.evolve(load_arm("puma560-seed"), tool=homogeneous(np.eye(3), (0, 0, 0.12)))
     level = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-    crawls = 0
+    run = 0
     for aside in (0.003, 0.004, 0.006):  # metres below the line is the place where forearm and hand are in line
         X, Y = homogeneous(level, (0.55, -0.05, aside - 0.3125)), homogeneous(level, (0.55, 0.35, aside - 0.5125))
         q = next(branch.q for branch in inverse(arm, X).allowed if branch.q[3] > 0)
         try:
-            crawls += straight_line(arm, q, Y, deviation=2e-3).trajectory.duration > 60
+            line = straight_line(arm, q, Y, deviation=2e-3)
         except PathError:
             continue
+        assert line.certificate.holds
+        # At full speed from end to end the joint that turns beside the singularity would need as much longer.
+        t = np.linspace(0, line.trajectory.duration, 5000)
+        way = np.linalg.norm(np.diff(forward(arm, line.trajectory(t))[:, :3, 3], axis=0), axis=-1) / np.diff(t)
+        crawls = line.trajectory.duration * way.max() / way[1000:-1000].min() > 60
+        run += bool(crawls)
         for by in ("via", "damped"):
-            way = line_or_detour(arm, q, Y, by=by, deviation=2e-3)  # type: ignore[arg-type]
-            assert way.trajectory.duration < 10
-            assert way.obstacle is not None
-            assert way.obstacle.joint in (4, 6)
-            assert 0.4 < way.obstacle.fraction < 0.6
-            assert "times slower" in way.obstacle.reason
-    assert crawls > 0
+            motion = line_or_detour(arm, q, Y, by=by, deviation=2e-3).trajectory  # type: ignore[arg-type]
+            assert motion.duration < 10
+    assert run > 0

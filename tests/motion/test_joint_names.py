@@ -12,10 +12,9 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import slower
 from armwright.motion.detour import line_or_detour
-from armwright.motion.follow import PathError
+from armwright.motion.obstruction import PathError, too_fast
 from armwright.motion.plan import Obstacle
 from armwright.motion.quintic_polynomials import point_to_point
-from armwright.motion.stops import at_speed
 from armwright.motion.straight import straight_line
 from armwright.motion.time_optimal_path import time_optimal
 from armwright.program.vm.move_diagnostics import stopped
@@ -73,7 +72,7 @@ def test_what_stops_a_line() -> None:
     assert (limits.value.cause, singular.value.cause) == ("limits", "singular")
     assert all_called(str(limits.value))
     assert all_called(str(singular.value))
-    assert at_speed(PUMA, 5, 70) == "joint 5 ('bend') would have to move 70 times as fast as it may"
+    assert too_fast(PUMA, 5, 70) == "joint 5 ('bend') would have to move 70 times as fast as it may"
 
 
 def test_detour() -> None:

@@ -18,9 +18,9 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion import detour
 from armwright.motion.blends import blended
 from armwright.motion.continuity_report import continuity
-from armwright.motion.follow import PathError
 from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import cartesian_move, exact_poses, joint_move, stopping_move
+from armwright.motion.obstruction import PathError
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, rotation_from_vector
 from samples import WHOLE, Sample

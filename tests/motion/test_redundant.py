@@ -10,8 +10,8 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint, Limits
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.follow import PathError
 from armwright.motion.moves import cartesian_move
+from armwright.motion.obstruction import PathError
 from armwright.motion.plan import Manner, StageGoal, plan
 from armwright.motion.straight import straight_line
 from armwright.spatial.rotations import rotation_from_vector

@@ -7,7 +7,7 @@ from armwright.arm.load import load_arm
 from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.continuity_report import continuity
-from armwright.motion.follow import PathError
+from armwright.motion.obstruction import PathError
 from armwright.motion.path import Path
 from armwright.motion.rounded import Rounded, rounded_move
 from armwright.spatial.poses import homogeneous
@@ -42,7 +42,7 @@ def test_a_corner_is_left_no_sooner_than_allowed(blend: float) -> None:
 
     assert off[away > blend + 1e-3].max() <= DEVIATION * 1.01
     assert 0.05 * blend < away.min() < blend
-    assert off.max() <= move.deviation
+    assert off.max() <= move.motion.certificate.deviation
     np.testing.assert_allclose(hand[-1], C, atol=1e-9)
 
 
@@ -67,7 +67,7 @@ def test_a_short_way_is_rounded_from_its_middle() -> None:
     """A blend longer than the ways begins where they are half over."""
     move = corner(5.0, (0.45, 0.1, 0.25), (0.45, 0.1, 0.15))
 
-    assert move.deviation > 0.005
+    assert move.motion.certificate.deviation > 0.005
     np.testing.assert_allclose(move.trajectory(0.0), start(), atol=1e-9)
 
 

@@ -17,12 +17,12 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.singularity_analysis import singularities, singularity_factors
-from armwright.motion.chain import Room, chain, step_by_step
-from armwright.motion.follow import TURN_PER_METRE, PathError, follow
-from armwright.motion.path import Path
+from armwright.motion.chain import chain, step_by_step
+from armwright.motion.obstruction import PathError
 from armwright.motion.plan import Manner, StageError, StageGoal, plan
 from armwright.motion.solver import solver_of
-from armwright.motion.straight import straight_line
+from armwright.motion.straight import coarse_line, straight_line
+from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
 
@@ -161,7 +161,7 @@ def test_the_singularity_and_a_joint_to_blame_are_named(name: str, factor: str, 
             assert (named.pop(), error.joint) in blamed(fast, A, B, error.fraction), str(error)
         if error is not None and error.joint is not None and error.cause == "limits" and name != "ur5":
             way, j = lifted(fast, q, A, B), error.joint - 1
-            straightened = np.abs(singularity_factors(arm, way)[:, 2]).min() < 2 * TURN_PER_METRE * deviation
+            straightened = np.abs(singularity_factors(arm, way)[:, 2]).min() < 2 * ROTATION_PER_METRE * deviation
             assert straightened or (way[:, j] < lower[j]).any() or (way[:, j] > upper[j]).any(), str(error)
     assert causes["run"] > LINES, causes
     assert causes["limits"] + causes["singular"] > LINES or factor != "wrist", causes
@@ -171,13 +171,13 @@ def test_the_singularity_and_a_joint_to_blame_are_named(name: str, factor: str, 
 def test_the_wrist_is_to_blame_and_not_the_elbow(deviation: float) -> None:
     """Beside a straight wrist joints 4 and 6 have to turn over; that the other elbow would be nearer is no way out."""
     puma = load_arm("puma560-seed")
-    q, A, B = upright(puma)
+    q, _, B = upright(puma)
     manner = Manner(deviation=deviation)
 
     with pytest.raises(PathError, match=r"singular there \(wrist\), joint [46] would have to move") as by_knots:
         straight_line(puma, q, B, deviation=deviation)
     with pytest.raises(PathError, match=r"joint [46] would") as by_rule:
-        follow(puma, Path(poses=[A, B]), q, deviation=deviation, speed=100)
+        coarse_line(puma, q, B, deviation=deviation, speed=100)
     with pytest.raises(StageError) as planned:
         plan(puma, q, [StageGoal(kind="LINE", poses=B[None])], manner)
 
@@ -192,11 +192,11 @@ def test_the_postures_of_a_close_look_belong_together() -> None:
     """
     puma = load_arm("puma560-seed")
     q, A, B = upright(puma)
-    room, straight = Room(1e-3, 5e-3), np.arctan2(0.433, -0.02)
+    allowed, straight = Tolerance(1e-3, 5e-3), np.arctan2(0.433, -0.02)
     X = between(A, B, np.linspace(0, 1, 9))
 
     hasty, _ = chain(solver_of(puma), X, q)
-    steps = list(step_by_step(solver_of(puma), X, q, room))
+    steps = list(step_by_step(solver_of(puma), X, q, allowed))
 
     assert np.ptp(np.sign(hasty[:, 2] - straight)) == 2
     assert np.ptp(np.sign([step.q[2] - straight for step in steps])) == 0
@@ -205,8 +205,8 @@ def test_the_postures_of_a_close_look_belong_together() -> None:
     for first, last in pairwise(steps):
         np.testing.assert_allclose(forward(puma, last.q), last.X, atol=MET)
         off, on = forward(puma, (first.q + last.q) / 2), between(first.X, last.X, 0.5)
-        assert np.linalg.norm(off[:3, 3] - on[:3, 3]) <= room.place
-        assert angle_between(off[:3, :3], on[:3, :3]) <= room.turn
+        assert np.linalg.norm(off[:3, 3] - on[:3, 3]) <= allowed.position
+        assert angle_between(off[:3, :3], on[:3, :3]) <= allowed.orientation
 
 
 def test_an_arm_without_a_closed_form_is_looked_at_as_well() -> None:

@@ -12,8 +12,9 @@ from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import InvalidValueError, KindError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.follow import PathError
-from armwright.motion.straight import CertifiedLine, straight_line
+from armwright.motion.certified import CertifiedMotion
+from armwright.motion.obstruction import PathError
+from armwright.motion.straight import straight_line
 from armwright.spatial.rotations import angle_between, rotation_from_vector, rotation_vector
 from samples import Sample
 
@@ -40,7 +41,7 @@ def random_line(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
     return q, X
 
 
-def plain_line(puma: Arm, **manner: float) -> CertifiedLine:
+def plain_line(puma: Arm, **manner: float) -> CertifiedMotion:
     """Return a line of half a metre in the open."""
     q = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
     X = forward(puma, q).copy()
@@ -48,7 +49,7 @@ def plain_line(puma: Arm, **manner: float) -> CertifiedLine:
     return straight_line(puma, q, X, **manner)
 
 
-def strayed(line: CertifiedLine, fast: CompiledArm, X_A: Array, X_B: Array, looks: int) -> tuple[float, float, float]:
+def strayed(line: CertifiedMotion, fast: CompiledArm, X_A: Array, X_B: Array, looks: int) -> tuple[float, float, float]:
     """Return how far the hand is off a line, turned off what belongs to its place, and how far it runs back."""
     X = fast.forward(line.trajectory(np.linspace(0.0, line.trajectory.duration, looks)))
     way, come = X_B[:3, 3] - X_A[:3, 3], X[:, :3, 3] - X_A[:3, 3]
@@ -82,7 +83,7 @@ def test_bounds_hold_for_a_hundred_times_the_looks(fast: CompiledArm, sample: Sa
             continue
         certificate = line.certificate
         assert certificate.holds
-        looks = 100 * min(certificate.looks, 300)
+        looks = 100 * min(certificate.samples, 300)
         off, twisted, back = strayed(line, fast, X_A, X_B, looks)
         assert off <= certificate.deviation + ROUNDING
         if np.linalg.norm(X_B[:3, 3] - X_A[:3, 3]) <= deviation:

@@ -8,7 +8,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.follow import PathError
+from armwright.motion.obstruction import PathError
 from armwright.motion.through import through_frames
 from armwright.spatial.poses import homogeneous
 
@@ -45,7 +45,7 @@ def test_through_without_a_stop() -> None:
         np.linalg.norm(X[:, :3, 3] - (a + np.clip((X[:, :3, 3] - a) @ u, 0, length)[:, None] * u), axis=1)
         for a, u, length in legs
     ]
-    assert np.min(away, axis=0).max() <= found.deviation
+    assert np.min(away, axis=0).max() <= found.certificate.deviation
 
 
 def test_what_is_refused() -> None:

@@ -6,8 +6,7 @@ import pytest
 
 from armwright.cell.simulator import Simulator
 from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.follow import follow
-from armwright.motion.path import Path
+from armwright.motion.through import through_frames
 from armwright.motion.trajectory import whole_ticks
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Code
@@ -66,8 +65,7 @@ def test_the_report_keeps_its_spline() -> None:
     (stage,) = run_code(code).stages
 
     arm, q = CELL.arms["ARM_1"].arm, CELL.arms["ARM_1"].start
-    X = [forward(arm, q), *_frames()]
-    report = follow(arm, Path(poses=X), q, deviation=CELL.deviation, speed=100.0)
+    report = through_frames(arm, q, _frames(), deviation=CELL.deviation)
     expected = whole_ticks(report.trajectory, CELL.period)
     np.testing.assert_array_equal(stage.stage.trajectory.coefficients, expected.coefficients)
     np.testing.assert_array_equal(stage.stage.trajectory.times, expected.times)

@@ -16,7 +16,7 @@ from armwright.cli.results import warn_of_stray, write_results
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from armwright.motion.certificate import Certificate, LimitName
+    from armwright.motion.certificate import LimitName
     from armwright.motion.moves import Move
     from armwright.motion.poses_file import PosesFile
     from armwright.report.move_page import Moved
@@ -152,8 +152,8 @@ def _planned(
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
     from armwright.errors import ArmwrightError
-    from armwright.motion.follow import PathError
     from armwright.motion.moves import cartesian_move, joint_move, stopping_move
+    from armwright.motion.obstruction import PathError
     from armwright.motion.poses_file import read_poses
 
     warn_of_stray(poses)
@@ -234,7 +234,7 @@ def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -
         "duration": planned.trajectory.duration,
         "branch": planned.label,
         "poses": [{"name": name, "time": t, "q": q, "missed_by": miss} for name, t, q, miss in passed],
-        "certificate": None if planned.certificate is None else _certificate(planned.certificate),
+        "certificate": None if planned.certificate is None else planned.certificate.as_data(),
         "of_limits": {name: use.tolist() for name, use in uses.items()},
         "ways": [
             {
@@ -246,23 +246,6 @@ def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -
             }
             for way in planned.detours
         ],
-    }
-
-
-def _certificate(found: "Certificate") -> dict[str, Any]:
-    return {
-        "holds": found.holds,
-        "deviation_asked": found.deviation_asked,
-        "deviation": found.deviation,
-        "deviation_seen": found.deviation_seen,
-        "turn_asked": found.turn_asked,
-        "turn": found.turn,
-        "turn_seen": found.turn_seen,
-        "worst_time": found.worst_time,
-        "worst_place": found.worst_place.tolist(),
-        "knots": found.knots,
-        "looks": found.looks,
-        "slower": found.factor,
     }
 
 

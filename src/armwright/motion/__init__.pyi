@@ -16,6 +16,9 @@ from .braking import (
 from .certificate import (
     Certificate as Certificate,
 )
+from .certified import (
+    CertifiedMotion as CertifiedMotion,
+)
 from .continuity_report import (
     Continuity as Continuity,
 )
@@ -58,6 +61,9 @@ from .moves import (
 from .moves import (
     stopping_move as stopping_move,
 )
+from .obstruction import (
+    PathError as PathError,
+)
 from .online import (
     OnlineError as OnlineError,
 )
@@ -72,9 +78,6 @@ from .quintic_polynomials import (
 )
 from .quintic_polynomials import (
     quintic as quintic,
-)
-from .straight import (
-    Line as Line,
 )
 from .straight import (
     straight_line as straight_line,

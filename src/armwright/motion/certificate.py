@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arrays import Array, number
-from armwright.errors import InvalidValueError
+from armwright.arrays import Array
+from armwright.motion.tolerance import Tolerance
 from armwright.notebook import html_lines
 
 LimitName: TypeAlias = Literal["speed", "acceleration", "effort"]
-# No bound closer than this can be certified: rounding and the solution of poses take up what is left [m].
-CLOSEST = 1e-9
 LIMITS: tuple[LimitName, ...] = ("speed", "acceleration", "effort")
 
 
@@ -27,18 +24,18 @@ class Certificate:
         arm: the arm.
         deviation_asked: bound of the distance of the hand from the path [m].
         deviation: upper bound of what that distance is, between samples as well [m].
-        deviation_seen: the largest distance that was seen [m].
+        deviation_seen: the largest distance at the samples [m].
         turn_asked: bound of the angle from the orientation that belongs to the progress on the path, and on a straight
             line to the position of the hand on it as well [rad].
         turn: upper bound of what that angle is [rad].
-        turn_seen: the largest angle that was seen [rad].
+        turn_seen: the largest angle at the samples [rad]; None where only the bound is known.
         backward: upper bound of how far the hand runs backwards along a straight line [m]; None for other paths.
-        worst_time: when the largest distance was seen [s].
+        worst_time: when the largest distance was sampled [s].
         worst_place: (3,) where the hand was then, seen from the base [m].
         knots: number of poses that were solved.
-        looks: how often the hand was looked at in between.
-        peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at the
-            looks.
+        samples: how often the hand was sampled in between.
+        peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at
+            samples.
         factor: how many times slower the motion is than the speed of the tool has it, 1 for not at all.
         because: which limit, and which joint, from 0, that is for; None where nothing had to give way.
     """
@@ -49,15 +46,61 @@ class Certificate:
     deviation_seen: float
     turn_asked: float
     turn: float
-    turn_seen: float
+    turn_seen: float | None
     worst_time: float
     worst_place: Array
     knots: int
-    looks: int
+    samples: int
     peaks: dict[LimitName, Array]
     factor: float
     because: tuple[LimitName, int] | None
     backward: float | None = None
+
+    @classmethod
+    def trivial(cls, arm: Arm, position: Array, tolerance: Tolerance) -> Certificate:
+        """Return that of an arm which stands still with its hand at a position (3,) [m]."""
+        still = np.zeros(arm.n)
+        return cls(
+            arm=arm,
+            deviation_asked=tolerance.position,
+            deviation=0.0,
+            deviation_seen=0.0,
+            turn_asked=tolerance.orientation,
+            turn=0.0,
+            turn_seen=0.0,
+            worst_time=0.0,
+            worst_place=position,
+            knots=1,
+            samples=0,
+            peaks={"speed": still, "acceleration": still, "effort": still},
+            factor=1.0,
+            because=None,
+            backward=0.0,
+        )
+
+    def retimed(self, stretch: float) -> Certificate:
+        """Return that of the same motion, all of it run so many times slower; efforts are those of the faster one."""
+        peaks: dict[LimitName, Array] = {
+            "speed": self.peaks["speed"] / stretch,
+            "acceleration": self.peaks["acceleration"] / stretch**2,
+            "effort": self.peaks["effort"],
+        }
+        return attrs.evolve(self, peaks=peaks, worst_time=self.worst_time * stretch)
+
+    @property
+    def summary(self) -> str:
+        """What it says, in one line."""
+        parts = [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
+        uses = "".join(f", {part:.0%} of the {name} of {self.arm.called(joint)}" for name, joint, part in parts)
+        return (
+            f"certificate {'holds' if self.holds else 'DOES NOT HOLD'}: within {self.deviation * 1e3:.3f} of "
+            f"{self.deviation_asked * 1e3:g} mm, {self.turn * 1e3:.3f} of {self.turn_asked * 1e3:g} mrad{uses}"
+        )
+
+    @property
+    def slowed(self) -> str:
+        """How many times slower the motion is, and for which limit, in words; empty where nothing had to give way."""
+        return "" if self.because is None else slower(self.arm, self.factor, self.because)
 
     @property
     def holds(self) -> bool:
@@ -75,6 +118,26 @@ class Certificate:
         joint = int(parts.argmax())
         return joint, float(parts[joint])
 
+    def as_data(self) -> dict[str, Any]:
+        """Return it as plain data in SI units, as JSON can carry it."""
+        limits = {name: self.use(name) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()}
+        return {
+            "holds": self.holds,
+            "deviation_asked": self.deviation_asked,
+            "deviation": self.deviation,
+            "deviation_seen": self.deviation_seen,
+            "turn_asked": self.turn_asked,
+            "turn": self.turn,
+            "turn_seen": self.turn_seen,
+            "worst_time": self.worst_time,
+            "worst_place": self.worst_place.tolist(),
+            "knots": self.knots,
+            "samples": self.samples,
+            "of_limits": {name: {"joint": joint + 1, "part": part} for name, (joint, part) in limits.items()},
+            "slower": self.factor,
+            "because": None if self.because is None else {"limit": self.because[0], "joint": self.because[1] + 1},
+        }
+
     def __str__(self) -> str:
         """Say it in a few lines."""
         x, y, z = self.worst_place * 1e3
@@ -85,8 +148,8 @@ class Certificate:
             f"{self.turn_asked * 1e3:g} mrad)"
         )
         seen = (
-            f"largest distance seen {self.deviation_seen * 1e3:.4f} mm, at {self.worst_time:.3f} s, "
-            f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base; {self.knots} knots, {self.looks} looks"
+            f"largest distance sampled {self.deviation_seen * 1e3:.4f} mm, at {self.worst_time:.3f} s, "
+            f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base; {self.knots} knots, {self.samples} samples"
         )
         lines = [within, seen]
         uses = [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
@@ -105,19 +168,6 @@ def slower(arm: Arm, factor: float, because: tuple[LimitName, int], than: str = 
     """Say how many times slower a motion is, and for which limit of which joint, from 0."""
     limit, joint = because
     return f"{factor:.2f} times slower{than}, for the {limit} of {arm.called(joint)}"
-
-
-def checked_deviation(deviation: float) -> float:
-    """Return an allowed distance of the hand from its path [m].
-
-    Raises:
-        InvalidValueError: it is none, or closer than can be certified.
-    """
-    if not CLOSEST <= number(deviation, "deviation") < math.inf:
-        raise InvalidValueError(
-            f"deviation: expected {CLOSEST:g} m or more, the closest that can be certified, got {deviation:g}"
-        )
-    return deviation
 
 
 def slowing(arm: Arm, peaks: dict[LimitName, Array]) -> tuple[float, tuple[LimitName, int] | None]:

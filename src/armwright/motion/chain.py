@@ -12,6 +12,7 @@ from armwright.arrays import Array, Flags
 from armwright.kinematics.inverse_kinematics.numeric import descend_from
 from armwright.kinematics.inverse_kinematics.wrapping import joint_distances, wrapped_near
 from armwright.motion.solver import Solver
+from armwright.motion.tolerance import Tolerance
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
 
@@ -26,13 +27,6 @@ _OTHER = 1e-6
 _STRIDE, _STRAIGHT, _CLOSE = 4, 0.25, 0.02
 # A step is halved at most so often; no hand has to keep nearer to its way than this [m], [rad].
 _HALVINGS, _CLOSEST = 16, (1e-6, 5e-6)
-
-
-class Room(NamedTuple):
-    """How far the hand may be from its way: in place [m], and turned [rad]."""
-
-    place: float
-    turn: float
 
 
 class Step(NamedTuple):
@@ -126,7 +120,7 @@ def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
     return q, int(off[0]) if len(off) else None
 
 
-def step_by_step(solver: Solver, X: Array, q_start: Array, room: Room) -> Iterator[Step]:
+def step_by_step(solver: Solver, X: Array, q_start: Array, allowed: Tolerance) -> Iterator[Step]:
     """Give the postures that an arm comes to on its way through poses.
 
     Where the hand, halfway between two postures, would be off the straight way between their poses, the step is taken
@@ -136,7 +130,7 @@ def step_by_step(solver: Solver, X: Array, q_start: Array, room: Room) -> Iterat
         solver: the arm.
         X: (k, 4, 4) poses, of which the first is that of ``q_start``.
         q_start: (n,) joint positions at the first pose.
-        room: how far the hand may be off.
+        allowed: how far the hand may be off.
 
     Yields:
         Every pose and those that were put between, from the first; whether they are met is for the caller to see.
@@ -144,27 +138,27 @@ def step_by_step(solver: Solver, X: Array, q_start: Array, room: Room) -> Iterat
     step = Step(0.0, X[0], q_start)
     yield step
     for k in range(1, len(X)):
-        step = yield from _between(solver, step, Step(float(k), X[k], step.q), room, _HALVINGS)
+        step = yield from _between(solver, step, Step(float(k), X[k], step.q), allowed, _HALVINGS)
 
 
-def _between(solver: Solver, first: Step, goal: Step, room: Room, halvings: int) -> Generator[Step, None, Step]:
+def _between(solver: Solver, first: Step, goal: Step, allowed: Tolerance, halvings: int) -> Generator[Step, None, Step]:
     """Give the postures after ``first`` up to the pose of ``goal``, whose posture is not looked at; return the last."""
     last = goal._replace(q=_nearest(solver, goal.X, first.q))
     halfway = between(first.X, goal.X, 0.5)
-    if halvings == 0 or not _astray(solver.forward((first.q + last.q) / 2), halfway, room):
+    if halvings == 0 or not _astray(solver.forward((first.q + last.q) / 2), halfway, allowed):
         yield last
         return last
     middle = yield from _between(
-        solver, first, Step((first.place + goal.place) / 2, halfway, first.q), room, halvings - 1
+        solver, first, Step((first.place + goal.place) / 2, halfway, first.q), allowed, halvings - 1
     )
-    return (yield from _between(solver, middle, goal, room, halvings - 1))
+    return (yield from _between(solver, middle, goal, allowed, halvings - 1))
 
 
-def _astray(X: Array, X_asked: Array, room: Room) -> bool:
+def _astray(X: Array, X_asked: Array, allowed: Tolerance) -> bool:
     """Whether a hand is off its way."""
     off = float(np.linalg.norm(X[:3, 3] - X_asked[:3, 3]))
     turned = float(angle_between(X_asked[:3, :3], X[:3, :3]))
-    return off > max(room.place, _CLOSEST[0]) or turned > max(room.turn, _CLOSEST[1])
+    return off > max(allowed.position, _CLOSEST[0]) or turned > max(allowed.orientation, _CLOSEST[1])
 
 
 def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None) -> Array:

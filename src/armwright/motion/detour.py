@@ -14,14 +14,18 @@ from armwright.arm.positions import one_posture
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, joint_distance
-from armwright.motion.deviation import Spline, Ways, deviation_of
-from armwright.motion.follow import TURN_PER_METRE, PathError
+from armwright.motion.certified import CertifiedMotion
+from armwright.motion.deviation import cubic_peaks, hand_bounds, tracking_error
 from armwright.motion.limit_utilization import slowing_for_limits
+from armwright.motion.obstruction import PathError
 from armwright.motion.solver import AnyArm, Solver, solver_of
-from armwright.motion.straight import CertifiedLine, Line, at_place, certified, straight_line, timed_line
+from armwright.motion.straight import asked_line, certified_line
+from armwright.motion.straight_path import StraightPath
+from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
 from armwright.motion.trajectory import Trajectory, join
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
@@ -51,7 +55,9 @@ _AFTER = 1.0
 _LITTLE = 0.1
 # Where a joint rushes the way is run slower: so often, over so many intervals to either side.
 _EASINGS, _AROUND = 3, 20
-# The end is met to this [m], a turn counted as ``TURN_PER_METRE`` says.
+# How far damped rates leave the line is found to a part of this [m].
+_LOOKED_AT = 1e-3
+# The end is met to this [m], a turn counted as ``ROTATION_PER_METRE`` says.
 _ARRIVED = 1e-6
 
 
@@ -93,7 +99,7 @@ class Detour:
     obstacle: PathError | None
     via: Array | None
     price: Price
-    legs: tuple[CertifiedLine, ...]
+    legs: tuple[CertifiedMotion, ...]
 
 
 def line_or_detour(
@@ -131,10 +137,11 @@ def line_or_detour(
     one_of("way round", by, ("via", "damped"))
     solver = solver_of(arm)
     q, B = one_posture(solver.arm, q_start, "q_start"), exact_pose(X_goal)
-    asked = timed_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
+    allowed = tolerance(deviation)
+    asked = asked_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
     straight: Detour | None = None
     try:
-        line = straight_line(arm, q, B, deviation=deviation, speed=speed)
+        line = certified_line(arm, q, B, allowed, speed=speed)
     except PathError as error:
         obstacle = error
     else:
@@ -148,7 +155,7 @@ def line_or_detour(
         raise obstacle
     found = _damped(arm, asked, q, damping, obstacle) if by == "damped" else None
     if by == "via":
-        found = _by_via(arm, asked, q, obstacle, deviation=deviation, speed=speed)
+        found = _by_via(arm, asked, q, obstacle, allowed=allowed, speed=speed)
     if straight is not None and (found is None or found.trajectory.duration > _BETTER * straight.trajectory.duration):
         return straight
     if found is None:
@@ -156,34 +163,38 @@ def line_or_detour(
     return found
 
 
-def _straight(line: CertifiedLine, slower: float) -> Detour:
+def _straight(line: CertifiedMotion, slower: float) -> Detour:
     """Return the line itself."""
     price = Price(distance=line.certificate.deviation, turn=line.certificate.turn, time=slower)
     return Detour(trajectory=line.trajectory, by="line", obstacle=None, via=None, price=price, legs=(line,))
 
 
-def _crawl(asked: Line, line: CertifiedLine) -> PathError:
+def _crawl(asked: StraightPath, line: CertifiedMotion) -> PathError:
     """Return what makes a line a crawl: the joint for which it is slowed most, and where that is."""
     factor, because = line.certificate.factor, line.certificate.because
     assert because is not None  # noqa: S101 - nothing is slowed for nothing
     order = {"speed": 1}.get(because[0], 2)  # efforts rise where accelerations do
     worst = int(line.trajectory.segment_peaks(order)[:, because[1]].argmax())
-    time = line.trajectory.times[worst] / line.trajectory.duration * asked.duration
-    s = float(asked.fractions(np.array([time]))[0])
-    joint = line.certificate.arm.called(because[1])
+    arm = line.certificate.arm
+    s = _nearest(asked, forward(arm, line.trajectory(line.trajectory.times[worst])))
+    x, y, z = asked.at(0, np.array([s]))[0, :3, 3] * 1e3
+    joint = arm.called(because[1])
     reason = f"for the {because[0]} of {joint} the line would have to be run {factor:.0f} times slower"
-    return PathError("singular", 0, s, f"near {at_place(asked, s)} {reason}", joint=because[1] + 1, reason=reason)
+    message = f"near ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base {reason}"
+    return PathError("singular", 0, s, message, joint=because[1] + 1, reason=reason)
 
 
-def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation: float, speed: float) -> Detour | None:
+def _by_via(
+    arm: AnyArm, line: StraightPath, q: Array, obstacle: PathError, *, allowed: Tolerance, speed: float
+) -> Detour | None:
     """Return the fastest way by one of the nearest via poses; None where none is found."""
     ways: list[Detour] = []
-    for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver_of(arm), q, line.B)):
+    for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver_of(arm), q, line.poses[-1])):
         for via in ring:
             try:
-                there = certified(arm, q, via, deviation=deviation, speed=speed, closely=False)
+                there = certified_line(arm, q, via, allowed, speed=speed, diagnose=False)
                 at_via = there.trajectory(there.trajectory.duration)
-                back = certified(arm, at_via, line.B, deviation=deviation, speed=speed, closely=False)
+                back = certified_line(arm, at_via, line.poses[-1], allowed, speed=speed, diagnose=False)
             # A leg on which gravity alone takes more than a joint may give is no way either.
             except (PathError, IncapableArmError):
                 continue
@@ -200,11 +211,11 @@ def _by_via(arm: AnyArm, line: Line, q: Array, obstacle: PathError, *, deviation
     return min(ways, key=lambda way: way.price.time, default=None)
 
 
-def _rings(line: Line, fraction: float) -> Iterator[list[Array]]:
+def _rings(line: StraightPath, fraction: float) -> Iterator[list[Array]]:
     """Give via poses for a place on the line, the nearest first: turned on the spot, then beside it."""
     s = min(max(fraction, _MARGIN), 1 - _MARGIN)
-    X = line.poses(np.array([s]))[0]
-    way = line.B[:3, 3] - line.A[:3, 3]
+    X = line.at(0, np.array([s]))[0]
+    way = line.shifts[0]
     length = float(np.linalg.norm(way))
     along = way / length if length > 0 else np.array((1.0, 0.0, 0.0))
     across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
@@ -251,42 +262,46 @@ def _moved(X: Array, shift: Array, turn: Array) -> Array:
     return Y
 
 
-def _apart(line: Line, X: Array) -> tuple[float, float]:
+def _apart(line: StraightPath, X: Array) -> tuple[float, float]:
     """Return how far a pose is from the nearest place of the line, and turned from the orientation there."""
-    way = line.B[:3, 3] - line.A[:3, 3]
-    square = float(way @ way)
-    s = min(max(float((X[:3, 3] - line.A[:3, 3]) @ way) / square, 0.0), 1.0) if square else 0.5
-    on = line.poses(np.array([s]))[0]
+    on = line.at(0, np.array([_nearest(line, X)]))[0]
     turn = rotation_vector(on[:3, :3].T @ X[:3, :3])
     return float(np.linalg.norm(X[:3, 3] - on[:3, 3])), float(np.linalg.norm(turn))
 
 
-def _damped(arm: AnyArm, line: Line, q: Array, damping: float, obstacle: PathError) -> Detour | None:
+def _nearest(line: StraightPath, X: Array) -> float:
+    """Return at which fraction of a line the position nearest to a hand (4, 4) is; the middle if it has no length."""
+    way = line.shifts[0]
+    square = float(way @ way)
+    return min(max(float((X[:3, 3] - line.poses[0, :3, 3]) @ way) / square, 0.0), 1.0) if square else 0.5
+
+
+def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle: PathError) -> Detour | None:
     """Follow the line by damped rates; None where the end is not met, or a joint cannot keep its limits."""
     solver = solver_of(arm)
     times, postures = _integrated(solver, line, q, damping)
     if postures is None:
         return None
-    fractions = line.fractions(np.minimum(times, line.duration))
-    knots = np.concatenate([postures, fractions[:, None]], axis=1)
-    n = solver.arm.n
+    fractions = line.progress(np.minimum(times, line.duration))
     for _ in range(_EASINGS):
         trajectory = xspline(times, postures)
         times = np.append(0.0, np.cumsum(np.diff(times) * _easing(solver.arm, trajectory)))
-    c = xspline(times, knots).coefficients
-    trajectory = Trajectory(times=times, coefficients=c[..., :n])
+    trajectory = xspline(times, postures)
     lowest, highest = trajectory.extremes(0)
     if (lowest < solver.arm.limit("lower")).any() or (highest > solver.arm.limit("upper")).any():
         return None
-    spline = Spline(np.diff(times), c[..., :n], c[..., n])
-    ways = Ways.of_one(line.A, line.B, line.turn, len(spline.lengths))
-    off = deviation_of(solver.arm, solver.forward, ways, spline, allowed=1e-3, allowed_turn=TURN_PER_METRE * 1e-3)
+    eased = attrs.evolve(line, corners=times[[0, -1]], progress=xspline(times, fractions), near=np.inf)
+    c, h = trajectory.coefficients, np.diff(times)
+    hand = hand_bounds(solver.arm, c, h, *cubic_peaks(c, h))
+    off = tracking_error(solver, eased, trajectory, hand, tolerance(_LOOKED_AT))
     try:
         factor, _ = slowing_for_limits(arm, trajectory)
     except IncapableArmError:  # where gravity alone takes more than a joint may give there is no way either
         return None
     trajectory = trajectory.slowed(factor)
-    price = Price(distance=float(off.place.max()), turn=float(off.turn.max()), time=trajectory.duration - line.duration)
+    price = Price(
+        distance=float(off.position.max()), turn=float(off.orientation.max()), time=trajectory.duration - line.duration
+    )
     return Detour(trajectory=trajectory, by="damped", obstacle=obstacle, via=None, price=price, legs=())
 
 
@@ -304,7 +319,7 @@ def _easing(arm: Arm, trajectory: Trajectory) -> Array:
     return np.asarray(smooth)
 
 
-def _integrated(solver: Solver, line: Line, q: Array, damping: float) -> tuple[Array, Array | None]:
+def _integrated(solver: Solver, line: StraightPath, q: Array, damping: float) -> tuple[Array, Array | None]:
     """Return times (k,) and postures (k, n) from the start to where the end is met.
 
     No postures where it is not met, or where a joint passes a limit before.
@@ -313,19 +328,17 @@ def _integrated(solver: Solver, line: Line, q: Array, damping: float) -> tuple[A
     lower, upper = solver.arm.limit("lower"), solver.arm.limit("upper")
     postures, t = [q], 0.0
     while t < line.duration * (1 + _AFTER) and not ((q < lower) | (q > upper)).any():
-        ahead = line.poses(line.fractions(np.minimum([t, t + h], line.duration)))
+        ahead = line(np.minimum([t, t + h], line.duration))
         twist = np.concatenate([ahead[1, :3, 3] - ahead[0, :3, 3], _turn(ahead[0], ahead[1])]) / h
         missing = _missing(solver.forward(q), ahead[0])
-        if t >= line.duration and np.abs(missing * np.repeat((1.0, 1 / TURN_PER_METRE), 3)).max() < _ARRIVED:
+        if t >= line.duration and np.abs(missing * np.repeat((1.0, 1 / ROTATION_PER_METRE), 3)).max() < _ARRIVED:
             return np.asarray(h * np.arange(len(postures))), np.array(postures)
         # What is missing at the end is little, so that bounded rates need no more than a little damping there.
         damping_now = damping if t < line.duration else _LITTLE * damping
         rates = damped_rates(solver.arm, q, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates
         # The middle of the step, so that the way is kept to second order.
         middle = q + rates * h / 2
-        missing = _missing(
-            solver.forward(middle), line.poses(line.fractions(np.minimum([t + h / 2], line.duration)))[0]
-        )
+        missing = _missing(solver.forward(middle), line(np.minimum([t + h / 2], line.duration))[0])
         rates = damped_rates(solver.arm, middle, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates
         q = q + rates * h
         t += h

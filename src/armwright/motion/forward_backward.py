@@ -73,7 +73,8 @@ class _Sides(NamedTuple):
 
 
 def _sides(bounds: Bounds) -> _Sides:
-    a, b, c = (np.pad(each, ((0, 0), (1, 0))) for each in bounds)
+    blank = np.zeros((len(bounds.a), 1))
+    a, b, c = (np.concatenate([blank, each], axis=1) for each in bounds)
     on_u = np.abs(a) > _NONE * np.abs(a).max(axis=1, keepdims=True)
     side = np.sign(a)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):

@@ -10,10 +10,23 @@ import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.motion.blends import PEAK_ACCELERATION, BlendPlan, Ends, blend_plan, blended
+from armwright.motion.deviation import (
+    ErrorBounds,
+    HandBounds,
+    HandSamples,
+    TrackingError,
+    error_of,
+    half_sines,
+    spin_bound,
+)
+from armwright.motion.knots import divided
 from armwright.motion.trajectory import Trajectory
 from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
+
+# Knots to begin with in each blend and on each straight way, at most.
+_ENOUGH = 500
 
 Orientation: TypeAlias = Literal["geodesic", "zyz"]
 
@@ -24,6 +37,7 @@ class HandPath:
 
     Attributes:
         place: (x, y, z) [m].
+        times: (k,) when the poses are passed that it was planned through [s].
         turns: the orientation by turns about one fixed axis from pose to pose; None where it is by ``angles``.
         angles: the orientation by ZYZ angles [rad]; None where it is by ``turns``.
     """
@@ -31,6 +45,7 @@ class HandPath:
     place: Trajectory
     turns: Turns | None
     angles: Trajectory | None
+    times: Array
 
     @property
     def knots(self) -> Array:
@@ -45,13 +60,40 @@ class HandPath:
         assert self.turns is not None  # noqa: S101 - one of the two is there
         return homogeneous(self.turns(t), self.place(t))
 
+    def first_knots(self, step: float, fewest: int) -> Array:
+        """Return times to begin with: so far apart [s], and so many at least in each blend and on each straight way."""
+        parts = np.clip(np.ceil(np.diff(self.knots) / step), fewest, _ENOUGH).astype(np.intp)
+        return divided(self.knots, parts)
+
     def slowed(self, factor: float) -> HandPath:
         """Return the same path run ``factor`` times slower."""
         return HandPath(
             place=self.place.slowed(factor),
             turns=None if self.turns is None else self.turns.slowed(factor),
             angles=None if self.angles is None else self.angles.slowed(factor),
+            times=self.times * factor,
         )
+
+    def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
+        """Return bounds of the error on the intervals between times: those of hand and path together."""
+        middles = (times[1:] + times[:-1]) / 2
+        piece = np.clip(np.searchsorted(self.knots, middles, side="right") - 1, 0, len(self.knots) - 2)
+        rate, change = (bound[piece] for bound in self.spin())
+        return ErrorBounds(hand.pull + self.acceleration()[piece], spin_bound(hand, change, rate))
+
+    def error(self, samples: HandSamples) -> TrackingError:
+        """Return how far a sampled hand is from where it should be at the time."""
+        planned = self(samples.times)
+        off = np.linalg.norm(samples.poses[..., :3, 3] - planned[..., :3, 3], axis=-1)
+        return error_of(samples, off, half_sines(planned[..., :3, :3], samples.poses[..., :3, :3]).max(axis=1))
+
+    def where(self, t: float) -> tuple[int, float, str]:
+        """Return on which way between poses a time is, at which fraction of it, and that in words."""
+        x, y, z = self(t)[:3, 3] * 1e3
+        i = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2))
+        fraction = float(np.clip((t - self.times[i]) / (self.times[i + 1] - self.times[i]), 0.0, 1.0))
+        between = f"at {t:.3f} s, between poses {i + 1} and {i + 2}"
+        return i, fraction, f"{between}, ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base,"
 
     def acceleration(self) -> Array:
         """Return upper bounds (m,) of the acceleration of the place on each interval between ``knots`` [m/s²]."""
@@ -143,16 +185,16 @@ def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, o
         Paul, "Manipulator Cartesian path control" (1979); for ``zyz`` the project on the PUMA's trajectories, 3.2.
     """
     place = blended(times, poses[:, :3, 3], blend, ends=ends)
-    R = poses[:, :3, :3]
+    R, t = poses[:, :3, :3], floats(times, "times")
     if orientation == "zyz":
-        return HandPath(place=place, turns=None, angles=blended(times, zyz_angles(R), blend, ends=ends))
+        return HandPath(place=place, turns=None, angles=blended(times, zyz_angles(R), blend, ends=ends), times=t)
     plan = blend_plan(times, poses[:, :3, 3], blend, ends)
     # A turn is the same vector in the axes of the pose before it and of that after it.
     ways = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
     still = np.zeros((1, 3))
     first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
     plan = plan._replace(before=np.concatenate([first, ways]), after=np.concatenate([ways, last]))
-    return HandPath(place=place, turns=Turns(R=R, plan=plan), angles=None)
+    return HandPath(place=place, turns=Turns(R=R, plan=plan), angles=None, times=t)
 
 
 def zyz_angles(R: Array) -> Array:

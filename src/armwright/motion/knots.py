@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, one_per_joint
 from armwright.errors import InvalidValueError, ShapeError
@@ -91,3 +92,10 @@ def limit_per_joint(value: ArrayLike, joints: int, what: str) -> Array:
     for j in np.flatnonzero(~(limits > 0)):
         raise InvalidValueError(f"{what}: expected more than 0, got {limits[j]:g} for joint {j + 1}")
     return limits
+
+
+def divided(times: Array, parts: npt.NDArray[np.intp]) -> Array:
+    """Return times (k,) with every interval divided into so many parts (k - 1,)."""
+    h = np.repeat(np.diff(times) / parts, parts)
+    number = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+    return np.append(np.repeat(times[:-1], parts) + number * h, times[-1])

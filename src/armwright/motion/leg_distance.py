@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,22 @@ _LOOKS, _MOST, _ADDED = 8, 128, 0.1
 _SMALL = 1e-9
 
 
-def farthest_from_legs(solver: Solver, trajectory: Trajectory, places: Array) -> float:
-    """Return an upper bound of the distance of the hand from the nearest of its straight legs [m].
+class LegDistance(NamedTuple):
+    """How far a hand gets off its straight legs.
+
+    Attributes:
+        bound: upper bound [m].
+        sampled: the largest at the samples and on the chords between them [m].
+        time: when that is, to an interval between two knots [s].
+    """
+
+    bound: float
+    sampled: float
+    time: float
+
+
+def farthest_from_legs(solver: Solver, trajectory: Trajectory, places: Array) -> LegDistance:
+    """Return how far the hand gets from the nearest of its straight legs.
 
     The hand is looked at on every interval between two knots. Between two looks a time d apart it leaves its chord by
     no more than d²/8 times its greatest acceleration, and the distance from a leg is convex, so that on the chord it is
@@ -39,7 +54,7 @@ def farthest_from_legs(solver: Solver, trajectory: Trajectory, places: Array) ->
         off = _off_chords(solver.forward(q)[..., :3, 3], places)
         most = float((off + (h / looks) ** 2 / 8 * bounds.pull).max())
         if looks == _MOST or most <= (1 + _ADDED) * float(off.max()) + _SMALL:
-            return most
+            return LegDistance(most, float(off.max()), float(trajectory.times[int(off.max(axis=0).argmax())]))
         looks *= 2
 
 

@@ -14,24 +14,27 @@ from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
 from armwright.kinematics.inverse_kinematics.candidates import typed_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import mid_range
+from armwright.kinematics.inverse_kinematics.wrapping import joint_distance, mid_range
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
-from armwright.motion.certificate import Certificate, LimitName, checked_deviation
+from armwright.motion.certificate import Certificate
+from armwright.motion.certified import certificate_of, limit_peaks
 from armwright.motion.detour import By, Detour, line_or_detour
-from armwright.motion.efforts import effort_peaks
-from armwright.motion.follow import TURN_PER_METRE, PathError
-from armwright.motion.follow_hand import carry
 from armwright.motion.hand_path import HandPath, Orientation, hand_path
 from armwright.motion.limit_utilization import slowing_for_limits
+from armwright.motion.obstruction import PathError, cause_of
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.postures import postures_at, postures_through
-from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.tolerance import Tolerance, tolerance
+from armwright.motion.tracking import Task, Tracking, path_error, track
 from armwright.motion.trajectory import Trajectory, join
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
 
 # A matrix this far from a rotation is not worth a warning.
 _ROUNDING = 1e-9
+# Knots to begin with: so far apart [s], and so many in each blend and on each straight way; and at most.
+_STEP, _FEWEST, _MOST = 0.02, 4, 500_000
 # Blends without a time of their own take this part of the shortest time between two poses.
 _BLEND = 0.2
 
@@ -73,7 +76,7 @@ class Move:
             certificate = attrs.evolve(
                 certificate,
                 worst_time=certificate.worst_time * factor,
-                peaks=_peaks(self.arm, slow),
+                peaks=limit_peaks(self.arm, slow),
                 factor=certificate.factor * factor,
             )
         return attrs.evolve(
@@ -195,37 +198,19 @@ def along(
     deviation: float = 1e-4,
 ) -> Move:
     """Return the move along a path of the hand, with its certificate; arguments and errors as of ``cartesian_move``."""
-    checked_deviation(deviation)
-    solver = solver_of(arm)
-    found = carry(solver, hand, times, _near(solver.arm, near), ends=ends, deviation=deviation)
-    strays = found.strays
-    worst = int(strays.seen.argmax())
-    certificate = Certificate(
-        arm=solver.arm,
-        deviation_asked=deviation,
-        deviation=float(strays.place.max()),
-        deviation_seen=float(strays.seen.max()),
-        turn_asked=TURN_PER_METRE * deviation,
-        turn=float(strays.turn.max()),
-        turn_seen=float(strays.seen_turn.max()),
-        worst_time=float(strays.times[worst]),
-        worst_place=hand(strays.times[worst])[:3, 3],
-        knots=len(found.trajectory.times),
-        looks=strays.looks * len(strays.seen),
-        peaks=_peaks(arm, found.trajectory),
-        factor=1.0,
-        because=None,
-    )
+    solver, allowed = solver_of(arm), tolerance(deviation)
+    label, found = _followed(solver, hand, _near(solver.arm, near), allowed, rest=ends == "rest")
+    certificate = certificate_of(arm, found.trajectory, found.error, allowed)
     return Move(
         arm=solver.arm,
         poses=X,
         times=times,
         postures=found.trajectory(times),
-        label=found.label,
+        label=label,
         trajectory=found.trajectory,
         misses=via_distances(times, X[:, :3, 3], blend, ends=ends),
         hand=hand,
-        certificate=certificate,
+        certificate=attrs.evolve(certificate, worst_place=hand(certificate.worst_time)[:3, 3]),
     )
 
 
@@ -346,10 +331,31 @@ def _inside_limits(arm: AnyArm, move: Move) -> Move:
     )
 
 
-def _peaks(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
-    limited = np.isfinite(solver_of(arm).arm.limit("effort")).any()
-    efforts = effort_peaks(arm, trajectory).peaks if limited else np.zeros(trajectory.coefficients.shape[2])
-    return {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2), "effort": efforts}
+def _followed(solver: Solver, hand: HandPath, near: Array, allowed: Tolerance, *, rest: bool) -> tuple[str, Tracking]:
+    """Return a branch, and the joints that follow a path of the hand on it.
+
+    The branch is chosen once and kept: of the postures inside the limits at the start the nearest that leads to the
+    end inside them.
+
+    Raises:
+        PathError: no branch does: what stops each of them, where.
+    """
+    arm, X = solver.arm, hand(0.0)
+    solution = inverse(arm, X, near)
+    if not solution.allowed:
+        raise PathError(cause_of(solution), 0, 0.0, f"pose 1: {solution.explain()}")
+    knots = hand.first_knots(_STEP, _FEWEST)
+    errors: dict[str, PathError] = {}
+    for branch in sorted(solution.allowed, key=lambda branch: joint_distance(arm, near, branch.q)):
+        task = Task(solver, hand, branch.q, allowed, allowed, rest=rest, whole_turns=True, most_knots=_MOST)
+        found = track(task, knots)
+        if isinstance(found, Tracking):
+            return branch.label, found
+        errors[branch.label] = path_error(hand, found)
+    first = next(iter(errors.values()))
+    reasons = "; ".join(f"{label}: {error}" for label, error in errors.items())
+    message = f"no branch carries the hand to its last pose. {reasons}"
+    raise PathError(first.cause, first.segment, first.fraction, message, joint=first.joint, reason=first.reason)
 
 
 def _legs(arm: AnyArm, q: Array, X: Array, *, by: By, deviation: float, speed: float) -> list[Detour]:

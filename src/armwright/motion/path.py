@@ -12,8 +12,8 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, of_shape
 from armwright.errors import IncapableArmError, InvalidValueError
-from armwright.motion.certificate import checked_deviation
 from armwright.motion.quintic_polynomials import TOP_SPEED, check_speed
+from armwright.motion.tolerance import tolerance
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
 
@@ -135,7 +135,7 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
         raise IncapableArmError(
             f"arm '{arm.name}': paths in space need its reach and its tool speed ([hand] in the arm file)"
         )
-    checked_deviation(deviation)
+    tolerance(deviation)
     lengths = path.lengths()
     moving = [i for i, length in enumerate(lengths) if length > NEGLIGIBLE]
     times, segments, fractions = [0.0], [0], [0.0]

@@ -8,19 +8,21 @@ from typing import Literal, TypeAlias
 import attrs
 import numpy as np
 
-from armwright.arm.model import Arm
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
-from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, joint_distance
-from armwright.motion.certificate import slower
+from armwright.motion.certificate import Certificate
+from armwright.motion.certified import joined
 from armwright.motion.detour import By, Detour, line_or_detour
-from armwright.motion.follow import PathError, follow
+from armwright.motion.ends import check_ends
+from armwright.motion.obstruction import Cause, PathError, cause_of
 from armwright.motion.path import Path
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.rounded import rounded_move
-from armwright.motion.stops import Cause, cause_of
+from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.straight import coarse_line
+from armwright.motion.through import through
 from armwright.motion.trajectory import Trajectory, whole_ticks
 
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
@@ -106,8 +108,8 @@ class Stage:
         kind: of the trajectory.
         trajectory: of the joints, at rest at both ends, a whole number of servo periods long.
         length: of the way of the hand [m].
-        knots: number of poses that were solved.
-        deviation: largest distance from the path that was found [m]; None for point to point.
+        certificate: what the motion keeps; None for point to point, which has no path, and for damped rates.
+        deviation: upper bound of the distance of the hand from the path [m]; None for point to point.
         slowed: why it runs slower than asked, or empty.
         obstacle: what stopped the straight line; of a SPLINE what kept the arm from rounding its corners, so that it
             stops at every frame; None where there is nothing of the kind.
@@ -117,7 +119,7 @@ class Stage:
     kind: StageKind
     trajectory: Trajectory
     length: float
-    knots: int
+    certificate: Certificate | None
     deviation: float | None
     slowed: str
     obstacle: Obstacle | None = None
@@ -138,7 +140,7 @@ class StageError(ArmwrightError, ValueError):
         super().__init__(obstacle.reason)
 
 
-def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manner) -> list[Stage]:
+def plan(arm: AnyArm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manner) -> list[Stage]:
     """Plan the stages of one move, each beginning where the last one ended.
 
     A point-to-point stage has up to eight postures to end in. The nearest comes first; when no straight line
@@ -146,7 +148,8 @@ def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manne
     when no posture has straight lines for the whole move.
 
     Args:
-        arm: any arm; with a closed-form inverse all its postures are known, without one those that are found.
+        arm: any arm, or a compiled one, which plans faster; with a closed-form inverse all its postures are known,
+            without one those that are found.
         q_start: (n,) present joint positions.
         goals: the stages.
         manner: speed, deviation, servo period, ways round.
@@ -160,7 +163,7 @@ def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manne
         InvalidValueError: speed or deviation are out of range.
         IncapableArmError: the arm cannot make such a motion, wherever it leads.
     """
-    q = joint_array(q_start, arm.n, "q_start")
+    q = joint_array(q_start, solver_of(arm).arm.n, "q_start")
     try:
         return _plan(arm, q, goals, attrs.evolve(manner, around=None), 0)
     except StageError:
@@ -173,15 +176,15 @@ def plan(arm: Arm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manne
         raise
 
 
-def _worth_looking(arm: Arm, goals: Sequence[StageGoal]) -> bool:
+def _worth_looking(arm: AnyArm, goals: Sequence[StageGoal]) -> bool:
     """Whether there is a line that could be gone round, and every pose can be taken in some posture."""
     poses = [X for goal in goals for X in goal.poses]
     return any(goal.kind == "LINE" for goal in goals) and all(
-        np.abs(X[:3, 3]).max() <= _FARTHEST and inverse(arm, X).allowed for X in poses
+        np.abs(X[:3, 3]).max() <= _FARTHEST and inverse(solver_of(arm).arm, X).allowed for X in poses
     )
 
 
-def _plan(arm: Arm, q: Array, goals: Sequence[StageGoal], manner: Manner, number: int) -> list[Stage]:
+def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, number: int) -> list[Stage]:
     if number == len(goals):
         return []
     first_error: StageError | None = None
@@ -194,7 +197,7 @@ def _plan(arm: Arm, q: Array, goals: Sequence[StageGoal], manner: Manner, number
     raise first_error
 
 
-def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[Stage]:
+def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[Stage]:
     """Give the ways to make one stage, best first: one per posture for point to point, else one."""
     poses = of_shape(goal.poses, (4, 4), "poses")
     far = np.abs(poses[:, :3, 3]).max(axis=-1)
@@ -205,48 +208,45 @@ def _ways(arm: Arm, q: Array, goal: StageGoal, manner: Manner, number: int) -> I
         # Planned as they are asked for: nearly always the first one does.
         yield from (_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number))
         return
-    path = Path(poses=np.concatenate([forward(arm, q)[None], poses]))
-    if goal.kind == "BLEND" or goal.corner is not None:
-        try:
-            yield _rounded(arm, path, q, goal, manner)
-        except PathError as error:
-            raise StageError(number, _on_the_way(arm, path, error)) from error
-        return
+    path = Path(poses=np.concatenate([np.asarray(solver_of(arm).forward(q))[None], poses]))
     try:
-        found = follow(arm, path, q, deviation=manner.deviation, speed=manner.speed)
+        yield _along(arm, path, q, goal, manner)
     except PathError as error:
         obstacle = _on_the_way(arm, path, error)
         way_round = _way_round(arm, q, goal, manner, obstacle)
         if way_round is None:
             raise StageError(number, obstacle) from error
         yield way_round
-        return
-    yield Stage(
-        kind=goal.kind,
-        trajectory=whole_ticks(found.trajectory, manner.period),
-        length=_length(path.poses) if goal.kind == "LINE" else hand_length(arm, found.trajectory),
-        knots=found.knots,
-        deviation=found.deviation,
-        slowed=found.slowed,
-    )
 
 
-def _rounded(arm: Arm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> Stage:
-    run = rounded_move(
-        arm, path, q, corner=goal.corner, blend=goal.blend, deviation=manner.deviation, speed=manner.speed
-    )
+def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -> Stage:
+    """Return the stage that follows a path: a line, the report's spline, or rounded corners."""
+    how = {"deviation": manner.deviation, "speed": manner.speed}
+    stops, stopped_by = "", None
+    if goal.kind == "LINE":
+        try:
+            motion = coarse_line(arm, q, path.poses[1], **how)
+        except PathError:
+            check_ends(solver_of(arm), path, q)  # a goal that cannot be taken at all is said to be so
+            raise
+    elif goal.kind == "BLEND" or goal.corner is not None:
+        run = rounded_move(arm, path, q, corner=goal.corner, blend=goal.blend, **how)
+        motion, stops, stopped_by = run.motion, run.stops, run.stopped_by
+    else:
+        motion = through(arm, path, q, **how)
+    motion = motion.on_ticks(manner.period)
     return Stage(
         kind=goal.kind,
-        trajectory=whole_ticks(run.trajectory, manner.period),
-        length=hand_length(arm, run.trajectory),
-        knots=run.knots,
-        deviation=run.deviation,
-        slowed=run.slowed,
-        obstacle=None if run.stopped_by is None else _on_the_way(arm, path, run.stopped_by),
+        trajectory=motion.trajectory,
+        length=_length(path.poses) if goal.kind == "LINE" else hand_length(arm, motion.trajectory),
+        certificate=motion.certificate,
+        deviation=motion.certificate.deviation,
+        slowed=stops or motion.certificate.slowed,
+        obstacle=None if stopped_by is None else _on_the_way(arm, path, stopped_by),
     )
 
 
-def _on_the_way(arm: Arm, path: Path, error: PathError) -> Obstacle:
+def _on_the_way(arm: AnyArm, path: Path, error: PathError) -> Obstacle:
     """Return what stops the arm on a path, with its place."""
     ends = path.poses[error.segment : error.segment + 2]
     return Obstacle(
@@ -257,7 +257,7 @@ def _on_the_way(arm: Arm, path: Path, error: PathError) -> Obstacle:
         fraction=error.fraction,
         length=_length(ends),
         place=path.at(error.segment, error.fraction)[:3, 3],
-        certain=error.fraction == 1 and not inverse(arm, ends[1]).allowed,
+        certain=error.fraction == 1 and not inverse(solver_of(arm).arm, ends[1]).allowed,
     )
 
 
@@ -268,29 +268,29 @@ def _at_pose(cause: Cause, reason: str, pose: int, X: Array) -> Obstacle:
     )
 
 
-def _way_round(arm: Arm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> Stage | None:
+def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> Stage | None:
     """Return the stage that goes round what stops a line; None where that is not asked for, or there is no way."""
     if manner.around is None or goal.kind != "LINE" or obstacle.certain:
         return None
-    X, Y = forward(arm, q), goal.poses[0]
+    X, Y = solver_of(arm).forward(q), goal.poses[0]
     try:
         detour = line_or_detour(arm, q, Y, by=manner.around, deviation=manner.deviation, speed=manner.speed)
     except (PathError, IncapableArmError):
         # No way was found, or none on which the joints could hold the arm up.
         return None
+    legs = joined(detour.legs).on_ticks(manner.period) if detour.legs else None
     trajectory = whole_ticks(detour.trajectory, manner.period)
     taken = detour.by != "line"
     corners = [X, Y] if detour.via is None else [X, detour.via, Y]
-    legs = [leg.certificate for leg in detour.legs]
-    slowest = max(legs, key=lambda leg: leg.factor, default=None)
+    off = 0.0 if legs is None else legs.certificate.deviation
     return Stage(
         kind="LINE",
         trajectory=trajectory,
         length=_length(np.stack(corners)) if legs else hand_length(arm, trajectory),
-        knots=sum(leg.knots for leg in legs) or len(trajectory.times),
-        # The via pose is as far from the line as any place of the legs that meet in it.
-        deviation=detour.price.distance + (max(leg.deviation for leg in legs) if taken and legs else 0.0),
-        slowed="" if slowest is None or slowest.because is None else slower(arm, slowest.factor, slowest.because),
+        certificate=None if legs is None else legs.certificate,
+        # The via pose is as far from the line as any position of the legs that meet in it.
+        deviation=detour.price.distance + (off if taken else 0.0),
+        slowed="" if legs is None else legs.certificate.slowed,
         obstacle=obstacle if taken else None,
         detour=detour if taken else None,
     )
@@ -301,27 +301,28 @@ def _length(poses: Array) -> float:
     return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1).sum())
 
 
-def hand_length(arm: Arm, trajectory: Trajectory) -> float:
+def hand_length(arm: AnyArm, trajectory: Trajectory) -> float:
     """Return the length of the way of the hand, looked at often enough for a smooth one [m]."""
-    return _length(forward(arm, trajectory(np.linspace(0.0, trajectory.duration, _LOOKS))))
+    return _length(solver_of(arm).forward(trajectory(np.linspace(0.0, trajectory.duration, _LOOKS))))
 
 
-def _postures(arm: Arm, X: Array, q: Array, number: int) -> list[Array]:
+def _postures(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]:
     """Return the postures inside the limits that reach a pose, whole turns included, nearest first."""
-    solution = inverse(arm, X, q)
+    model = solver_of(arm).arm
+    solution = inverse(model, X, q)
     if not solution.allowed:
         raise StageError(number, _at_pose(cause_of(solution), solution.explain(), 0, X))
-    postures = [image for branch in solution.allowed for image in equivalent_configurations(arm, branch.q)]
-    return sorted(postures, key=lambda posture: joint_distance(arm, q, posture))
+    postures = [image for branch in solution.allowed for image in equivalent_configurations(model, branch.q)]
+    return sorted(postures, key=lambda posture: joint_distance(model, q, posture))
 
 
-def _direct(arm: Arm, q: Array, goal: Array, manner: Manner) -> Stage:
-    trajectory = point_to_point(arm, q, goal, manner.speed)
+def _direct(arm: AnyArm, q: Array, goal: Array, manner: Manner) -> Stage:
+    trajectory = point_to_point(solver_of(arm).arm, q, goal, manner.speed)
     return Stage(
         kind="PTP",
         trajectory=whole_ticks(trajectory, manner.period),
         length=hand_length(arm, trajectory),
-        knots=2,
+        certificate=None,
         deviation=None,
         slowed="",
     )

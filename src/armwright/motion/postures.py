@@ -11,8 +11,7 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
-from armwright.motion.follow import PathError
-from armwright.motion.stops import cause_of
+from armwright.motion.obstruction import PathError, cause_of
 
 
 class Posture(NamedTuple):

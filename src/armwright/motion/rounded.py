@@ -10,6 +10,7 @@ it one.
 
 from __future__ import annotations
 
+import contextlib
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -21,18 +22,21 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.blends import MISS
-from armwright.motion.certificate import slower
+from armwright.motion.certificate import Certificate
+from armwright.motion.certified import CertifiedMotion, certificate_of, joined, standstill
 from armwright.motion.chain import chain
 from armwright.motion.efforts import slowing_for_efforts
-from armwright.motion.follow import COARSE, TURN_PER_METRE, Followed, PathError, check_ends, follow
-from armwright.motion.follow_hand import Carried, carry_on
+from armwright.motion.ends import check_ends
 from armwright.motion.hand_path import hand_path
 from armwright.motion.leg_distance import farthest_from_legs
+from armwright.motion.obstruction import MAX_SLOWDOWN, Obstruction, PathError
 from armwright.motion.path import NEGLIGIBLE, Path, report_speed
-from armwright.motion.solver import solver_of
-from armwright.motion.stops import SLOWEST
+from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.straight import COARSE, coarse_line
 from armwright.motion.timing_law import Timed, timed
-from armwright.motion.trajectory import Trajectory, hold, join
+from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance, tolerance
+from armwright.motion.tracking import Task, Tracking, path_error, track
+from armwright.motion.trajectory import Trajectory
 from armwright.motion.trapezoidal_profile import shortest_trapezoid
 from armwright.spatial.rotations import rotation_vector
 
@@ -49,6 +53,8 @@ _TOGETHER = 0.0125
 _TIGHTER, _TRIES = 8.0, 2
 _HALVINGS = 40
 _WITH_STOPS = "with a stop at every frame: {}"
+# Knots to begin with: so far apart [s], and so many in each blend and on each leg.
+_STEP, _FEWEST = 0.1, 8
 # So that rounding does not carry what is just allowed beyond it.
 _HAIR = 1e-9
 # A blend needs some width before and after each pose; nothing is rounded at the ends.
@@ -60,27 +66,25 @@ class Rounded:
     """A run along straight legs with rounded corners.
 
     Attributes:
-        trajectory: of the joints, at rest at both ends; position, speed and acceleration are continuous.
-        deviation: upper bound of the distance of the hand from the straight legs [m].
-        turn_deviation: the same of the angle from the orientations on them [rad].
-        knots: number of poses that were solved.
-        slowed: why it runs slower than asked, or empty.
-        stops: whether it stops at every pose, because no run without a stop was as fast.
+        motion: of the joints, at rest at both ends; position, speed and acceleration are continuous. Its certificate
+            tells how far the hand is from the straight legs, and from the orientations on them.
+        stops: why it stops at every pose, where no run without a stop was as fast; else empty.
         stopped_by: what keeps the arm from following rounded corners, where it stops at every pose for that.
     """
 
-    trajectory: Trajectory
-    deviation: float
-    turn_deviation: float
-    knots: int
-    slowed: str
-    stops: bool = False
+    motion: CertifiedMotion
+    stops: str = ""
     stopped_by: PathError | None = None
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Of the joints."""
+        return self.motion.trajectory
 
     @property
     def duration(self) -> float:
         """How long it takes [s]."""
-        return self.trajectory.duration
+        return self.motion.trajectory.duration
 
 
 class _Legs(NamedTuple):
@@ -107,7 +111,7 @@ class _Task(NamedTuple):
     """What is to be planned.
 
     Attributes:
-        arm: the arm.
+        arm: the arm, or a compiled one.
         path: as it was given.
         legs: the straight legs of it.
         widths: (k - 2,) half-widths of the blends at the corners [m].
@@ -116,9 +120,10 @@ class _Task(NamedTuple):
         speed: 1 to 120.
         closer: how near the joints keep the hand to its rounded path [m].
         off: how far the path may be off besides what the corners ask for [m].
+        allowed: how far the hand may be from the straight legs; of a blend, what follows from its width.
     """
 
-    arm: Arm
+    arm: AnyArm
     path: Path
     legs: _Legs
     widths: Array
@@ -127,10 +132,11 @@ class _Task(NamedTuple):
     speed: float
     closer: float
     off: float
+    allowed: Tolerance
 
 
 def rounded_move(
-    arm: Arm,
+    arm: AnyArm,
     path: Path,
     q_start: Array,
     *,
@@ -145,14 +151,14 @@ def rounded_move(
     on ``speed`` and the limits as well. Position and orientation are rounded alike.
 
     Args:
-        arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
+        arm: the arm, or a compiled one; its ``reach`` and ``tool_speed`` scale the speed.
         path: begins where the hand is at ``q_start``; equal poses one after the other count once.
         q_start: (n,) present joint positions.
         deviation: what a single line may be off [m]; here the joints keep the hand 50 times nearer to its path. No
             more than ``COARSE`` is used.
         speed: 1 to 120, 100 is normal.
         corner: how far the hand may be from the straight legs, and pass a pose, at most [m]; the orientation may be
-            off by ``TURN_PER_METRE`` times as many radians. In the middle third of a leg it is within a tenth of
+            off by ``ROTATION_PER_METRE`` times as many radians. In the middle third of a leg it is within a tenth of
             that, and within 0.5 mm. Such a run is never slower than the legs one by one.
         blend: instead of it, how far from a pose its rounding may begin [m]; where a leg is short, at its middle.
 
@@ -167,13 +173,14 @@ def rounded_move(
     for what, value in (("blend", blend), ("corner", corner), ("deviation", deviation)):
         if value is not None and not 0 < value < np.inf:
             raise InvalidValueError(f"{what}: expected more than 0 m, got {value:g}")
+    solver = solver_of(arm)
     together = NEGLIGIBLE if corner is None else max(min(_TOGETHER * corner, _MIDDLE / 2), NEGLIGIBLE)
     kept = _apart(path.poses, together)
     if Path(poses=path.poses[kept]).lengths().max() <= NEGLIGIBLE:
-        return Rounded(trajectory=hold(q_start, 0.0), deviation=0.0, turn_deviation=0.0, knots=1, slowed="")
-    check_ends(solver_of(arm), path, q_start)
+        return Rounded(motion=standstill(solver, q_start, tolerance(deviation if corner is None else corner)))
+    check_ends(solver, path, q_start)
     deviation = min(deviation, COARSE[-1])
-    legs = _legs(arm, path, kept, speed)
+    legs = _legs(solver.arm, path, kept, speed)
     allowed = deviation if corner is None else corner
     closer = max(min(deviation, allowed), min(_CLOSER * _NEAREST, allowed)) / _CLOSER
     off = closer + (together if len(kept) < 1 + (path.lengths() > NEGLIGIBLE).sum() else 0.0)
@@ -181,35 +188,41 @@ def rounded_move(
     widths = np.minimum(half, np.inf if blend is None else blend)
     if corner is not None:
         widths = _widths(legs, half, corner, off)
-    task = _Task(arm, path, legs, widths, q_start, deviation, speed, closer, off)
+    miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (legs.bend, legs.twist))
+    bound = Tolerance(off + miss, ROTATION_PER_METRE * off + twist) if corner is None else tolerance(corner)
+    task = _Task(arm, path, legs, widths, q_start, deviation, speed, closer, off, bound)
     return _without_stop(task) if corner is None else _never_slower(task)
 
 
 def _without_stop(task: _Task) -> Rounded:
     """Return the run past the corners."""
-    rounded, run, _ = _tightened(task, SLOWEST)
-    return _inside_efforts(task, rounded, run.factor, None)
+    motion, _ = _tightened(task, MAX_SLOWDOWN)
+    return Rounded(motion=_inside_efforts(task, motion))
 
 
 def _never_slower(task: _Task) -> Rounded:
     """Return the run past the corners, or that with stops where it is faster or the only one.
 
-    Beside a singularity a joint may rush: the timing slows the hand there, no further than stops would.
+    Beside a singularity a joint may be too fast: the timing slows the hand there, no further than stops would.
     """
     stops = _Stops(task)
     try:
-        rounded, run, rush = _tightened(task, np.inf)
+        motion, ratio = _tightened(task, np.inf)
     except PathError as error:
         if stops.run is None:
             raise
-        return attrs.evolve(
-            stops.run, slowed=_WITH_STOPS.format("the arm cannot follow rounded corners"), stopped_by=error
+        return Rounded(
+            motion=stops.run, stops=_WITH_STOPS.format("the arm cannot follow rounded corners"), stopped_by=error
         )
-    if rush > SLOWEST and stops.run is None:
+    if ratio > MAX_SLOWDOWN and stops.run is None:
         return _without_stop(task)
-    if rounded.duration > stops.least and stops.run is not None and stops.run.duration < rounded.duration:
-        return stops.run
-    return _inside_efforts(task, rounded, run.factor, stops)
+    # Where weight alone is too much for a motor the legs with stops fare no better.
+    with contextlib.suppress(IncapableArmError):
+        motion = _inside_efforts(task, motion)
+    duration = motion.trajectory.duration
+    if duration > stops.least and stops.run is not None and stops.run.trajectory.duration < duration:
+        return Rounded(motion=stops.run, stops=_WITH_STOPS.format("rounded corners would take longer"))
+    return Rounded(motion=motion)
 
 
 def _apart(poses: Array, together: float) -> list[int]:
@@ -247,7 +260,7 @@ def _widths(legs: _Legs, half: Array, corner: float, off: float) -> Array:
         corner: how far the hand may be from the legs [m].
         off: which part of that is spent otherwise [m].
     """
-    change = np.maximum(legs.bend, legs.twist / TURN_PER_METRE)
+    change = np.maximum(legs.bend, legs.twist / ROTATION_PER_METRE)
     with np.errstate(divide="ignore"):
         widths = np.minimum(half, (1 - _HAIR) * max(corner - off, corner / 2) / (MISS * change))
     # From the beginning of a blend of half-width r on, the path leaves its leg as u³ / 4 r² - u⁴ / 16 r³.
@@ -262,49 +275,58 @@ def _widths(legs: _Legs, half: Array, corner: float, off: float) -> Array:
     return np.asarray(low)
 
 
-def _tightened(task: _Task, fastest: float) -> tuple[Rounded, Timed, float]:
-    """Return the run past corners as wide as the joints can follow, its timing, and how fast they would have to be.
+def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
+    """Return the run past corners as wide as the joints can follow, and how many times too fast they would be.
 
     Args:
         task: what is to be planned.
-        fastest: how many times as fast as it may a joint may have to be at the full speed of the hand.
+        most: how many times as fast as it may a joint may have to be at the full speed of the hand.
     """
     for attempt in range(_TRIES):
         widths = task.widths / _TIGHTER**attempt
         try:
-            carried, run = _run(task, widths, fastest)
+            tracking, run = _run(task, widths, most)
         except PathError as error:
             last = error
             continue
-        off = task.off + float((MISS * widths * task.legs.bend).max(initial=0.0))
-        rounded = Rounded(
-            trajectory=run.trajectory,
-            deviation=min(off, farthest_from_legs(solver_of(task.arm), carried.trajectory, task.path.poses[:, :3, 3])),
-            turn_deviation=TURN_PER_METRE * task.off + float((MISS * widths * task.legs.twist).max(initial=0.0)),
-            knots=len(carried.trajectory.times),
-            slowed="" if run.because is None else slower(task.arm, run.factor, run.because),
-        )
-        return rounded, run, float((carried.trajectory.peaks(1) / task.arm.limit("speed")).max())
+        motion = CertifiedMotion(trajectory=run.trajectory, certificate=_certificate(task, widths, tracking, run))
+        return motion, float((tracking.speed / solver_of(task.arm).arm.limit("speed")).max())
     raise last
 
 
-def _run(task: _Task, widths: Array, fastest: float) -> tuple[Carried, Timed]:
+def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> Certificate:
+    """Return what a run keeps of its straight legs."""
+    legs = farthest_from_legs(solver_of(task.arm), tracking.trajectory, task.path.poses[:, :3, 3])
+    miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (task.legs.bend, task.legs.twist))
+    time = run.when(legs.time) * run.trajectory.duration
+    return attrs.evolve(
+        certificate_of(task.arm, run.trajectory, tracking.error, task.allowed, time=time),
+        deviation=min(task.off + miss, legs.bound),
+        deviation_seen=legs.sampled,
+        turn=ROTATION_PER_METRE * task.off + twist,
+        turn_seen=None,
+        factor=max(run.factor, 1.0),
+        because=run.because,
+    )
+
+
+def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, Timed]:
     """Return the joints along the rounded path over the time at full speed, and their run."""
     legs, solver = task.legs, solver_of(task.arm)
     top = float(legs.speeds.max())
     times = np.concatenate([[0.0], np.cumsum(legs.lengths)]) / top
     blends = np.concatenate([[_NO_BLEND], widths / top, [_NO_BLEND]])
     hand = hand_path(legs.poses, times, blends, ends="running", orientation="geodesic")
-    room = _CLOSER * task.closer
-    try:
-        carried = carry_on(solver, hand, times, task.q_start, deviation=task.closer, room=room, fastest=fastest)
-    except PathError as error:
+    close, wide = tolerance(task.closer), tolerance(_CLOSER * task.closer)
+    found = track(
+        Task(solver, hand, task.q_start, close, wide, rest=False, max_slowdown=most), hand.first_knots(_STEP, _FEWEST)
+    )
+    if isinstance(found, Obstruction):
+        error = path_error(hand, found)
         segment = legs.numbers[error.segment + 1] - 1
-        raise PathError(
-            error.cause, segment, error.fraction, str(error), joint=error.joint, reason=error.reason
-        ) from error
-    caps = _caps(carried.trajectory.times, times, widths / top, legs.speeds / top)
-    return carried, timed(task.arm, carried.trajectory, caps)
+        raise PathError(error.cause, segment, error.fraction, str(error), joint=error.joint, reason=error.reason)
+    caps = _caps(found.trajectory.times, times, widths / top, legs.speeds / top)
+    return found, timed(solver.arm, found.trajectory, caps)
 
 
 def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
@@ -320,23 +342,16 @@ def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
     return caps
 
 
-def _inside_efforts(task: _Task, rounded: Rounded, factor: float, stops: _Stops | None) -> Rounded:
-    """Return a run slowed as much as the efforts ask for, or as the same legs with stops allow.
+def _inside_efforts(task: _Task, motion: CertifiedMotion) -> CertifiedMotion:
+    """Return a run slowed as much as the efforts ask for.
 
-    Where weight alone asks for more than a joint has no slowing helps, and the legs with stops fare no better.
+    Raises:
+        IncapableArmError: weight alone asks for more than a joint may give.
     """
-    try:
-        found = slowing_for_efforts(task.arm, rounded.trajectory)
-    except IncapableArmError:
-        if stops is None:
-            raise
-        return rounded
+    found = slowing_for_efforts(task.arm, motion.trajectory)
     if found.joint is None:
-        return rounded
-    by = found.factor if stops is None else stops.longest(rounded.duration * found.factor) / rounded.duration
-    return attrs.evolve(
-        rounded, trajectory=rounded.trajectory.slowed(by), slowed=slower(task.arm, factor * by, ("effort", found.joint))
-    )
+        return motion
+    return motion.slowed(task.arm, found.factor, ("effort", found.joint))
 
 
 class _Stops:
@@ -346,17 +361,12 @@ class _Stops:
         """Remember the legs."""
         self._task = task
 
-    def longest(self, wanted: float) -> float:
-        """Return how long a run may take that should take ``wanted``, and not longer than with stops [s]."""
-        if wanted <= self.least or self.run is None:
-            return wanted
-        return min(wanted, self.run.duration)
-
     @cached_property
     def least(self) -> float:
         """A time that no run with a stop at every pose is shorter than [s]; 0 where it is not known."""
         task = self._task
-        limits = task.arm.limit("speed"), task.arm.limit("acceleration")
+        arm = solver_of(task.arm).arm
+        limits = arm.limit("speed"), arm.limit("acceleration")
         q, missed = chain(solver_of(task.arm), task.legs.poses, task.q_start)
         if missed is not None or not np.isfinite(limits[1]).all():
             return 0.0
@@ -364,24 +374,24 @@ class _Stops:
         return float(np.maximum(task.legs.lengths / task.legs.speeds, by_joints).sum())
 
     @cached_property
-    def run(self) -> Rounded | None:
+    def run(self) -> CertifiedMotion | None:
         """The lines, with a stop at every pose; None where they cannot be run."""
         task, q = self._task, self._task.q_start
-        lines: list[Followed] = []
-        for first, last in pairwise(task.legs.numbers):
-            leg = Path(poses=task.path.poses[[first, last]])
+        lines: list[CertifiedMotion] = []
+        for i in task.legs.numbers[1:]:
             try:
-                line = follow(task.arm, leg, q, deviation=task.deviation, speed=task.speed)
+                lines.append(coarse_line(task.arm, q, task.path.poses[i], deviation=task.deviation, speed=task.speed))
             except PathError:
                 return None
-            lines.append(line)
-            q = line.trajectory(line.trajectory.duration)
-        run = join([line.trajectory for line in lines])
-        return Rounded(
-            trajectory=run,
-            deviation=farthest_from_legs(solver_of(task.arm), run, task.path.poses[:, :3, 3]),
-            turn_deviation=max(line.turn_deviation for line in lines),
-            knots=sum(line.knots for line in lines),
-            slowed=_WITH_STOPS.format("rounded corners would take longer"),
-            stops=True,
+            q = lines[-1].trajectory(lines[-1].trajectory.duration)
+        run = joined(lines)
+        certificate = attrs.evolve(
+            run.certificate,
+            deviation_asked=task.allowed.position,
+            # Poses that are passed with others are as near to them.
+            deviation=run.certificate.deviation + task.off - task.closer,
+            turn_asked=task.allowed.orientation,
+            turn=run.certificate.turn + ROTATION_PER_METRE * (task.off - task.closer),
+            backward=None,
         )
+        return attrs.evolve(run, certificate=certificate)

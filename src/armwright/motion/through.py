@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from armwright.arm.model import Arm
 from armwright.arm.positions import one_posture
-from armwright.arrays import ArrayLike
-from armwright.kinematics.forward_kinematics import forward
-from armwright.motion.follow import Followed, follow
+from armwright.arrays import Array, ArrayLike
+from armwright.motion.certified import CertifiedMotion, slowed_alike, standstill
+from armwright.motion.ends import check_ends
 from armwright.motion.moves import exact_poses
-from armwright.motion.path import Path
+from armwright.motion.obstruction import Obstruction
+from armwright.motion.path import NEGLIGIBLE, Path
+from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.straight_path import report_path
+from armwright.motion.tolerance import tolerance
+from armwright.motion.tracking import Task, check_velocities, path_error, track
+
+# The report's path through several frames turns its corners without a stop, so it must round them; and it is gross
+# motion. It may leave the straight ways between its frames by this many times what a line may leave its own.
+_CORNERS = 20.0
 
 
 def through_frames(
-    arm: Arm, q_start: ArrayLike, frames: ArrayLike, *, deviation: float = 1e-3, speed: float = 100.0
-) -> Followed:
+    arm: AnyArm, q_start: ArrayLike, frames: ArrayLike, *, deviation: float = 1e-3, speed: float = 100.0
+) -> CertifiedMotion:
     """Return the joint motion of the tool through frames, from rest to rest, without a stop at those between.
 
     Knots lie on the straight ways from frame to frame, as densely as the report's rule asks and the bound needs, and
@@ -23,14 +31,15 @@ def through_frames(
     ways beside it: a MOVE with VIA of RLO-2 keeps to closer bounds.
 
     Args:
-        arm: the arm, with n joints.
+        arm: the arm, with n joints, or a compiled one, which plans faster.
         q_start: (n,) joint positions at the start [rad] or [m].
         frames: (k, 4, 4) tool poses in the base frame, two or more; a rotation typed with two digits is made exact.
         deviation: allowed distance of the tool from a single straight way [m]; twenty times as much about corners.
         speed: 1 to 120, 100 is normal.
 
     Returns:
-        The motion, and bounds on how far it strays from the straight ways.
+        The motion, slowed for the limits of speed and acceleration, for those of effort where that helps; and its
+        certificate.
 
     Raises:
         KindError: ``arm`` is no arm, or an argument something else than real numbers.
@@ -41,6 +50,24 @@ def through_frames(
     Source:
         TR-83-008, "continuous motion".
     """
-    q = one_posture(arm, q_start, "q_start")
+    solver = solver_of(arm)
+    q = one_posture(solver.arm, q_start, "q_start")
     goals = exact_poses(frames)
-    return follow(arm, Path(poses=np.concatenate([forward(arm, q)[None], goals])), q, deviation=deviation, speed=speed)
+    path = Path(poses=np.concatenate([np.asarray(solver.forward(q))[None], goals]))
+    return through(arm, path, q, deviation=deviation, speed=speed)
+
+
+def through(arm: AnyArm, path: Path, q_start: Array, *, deviation: float, speed: float) -> CertifiedMotion:
+    """Return what ``through_frames`` does, for a path that begins where the hand is at ``q_start``."""
+    solver = solver_of(arm)
+    allowed = tolerance(_CORNERS * tolerance(deviation).position)
+    if path.lengths().max() <= NEGLIGIBLE:
+        return standstill(solver, q_start, allowed)
+    check_ends(solver, path, q_start)
+    motion = report_path(solver.arm, path, deviation=deviation, speed=speed)
+    task = Task(solver, motion, q_start, allowed, allowed, smooth=False, clock=np.asarray)
+    found = track(task, motion.progress.times)
+    if isinstance(found, Obstruction):
+        raise path_error(motion, found)
+    check_velocities(task, found)
+    return slowed_alike(arm, found, allowed)

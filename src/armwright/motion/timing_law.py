@@ -26,10 +26,10 @@ from armwright.motion.forward_backward import Bounds, largest_squares
 from armwright.motion.polynomials import composed, derivative, evaluate, shifted
 from armwright.motion.trajectory import Trajectory
 
-# From rest to the full speed of the path takes no less than this, whatever the joints can do [s].
+# From rest to the full speed of the path takes no less than this where a joint has no limit of acceleration [s].
 _RAMP = 0.05
 # What averaging may cost, in parts of the shortest time and at most [s]; no window is longer than that.
-_COST, _LONGEST = 0.01, 0.08
+_COST, _LONGEST = 0.006, 0.05
 # Windows that are tried: where one costs too much, the next is shorter in that proportion and by a little more.
 _WINDOWS, _LESS, _LEAST_STEP = 8, 0.9, 1 / 16
 # Rounds of drawing limits tighter where they are passed.
@@ -39,8 +39,13 @@ _ROUNDS = 4
 _FINER, _ENOUGH = 4, 400
 # Parts of an interval where its bounds are kept, and parts of a piece where the limits are looked at.
 _PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
-# Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed.
-_SAME, _HALVINGS = 1e-10, 60
+# Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
+# to this part of the piece.
+_SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
+# A place on the path is found in time to this part of a piece.
+_LOOKED_UP = 1001
+# So that rounding does not make a run too long that is just short enough.
+_HAIR = 1e-9
 # A joint that uses this part of what the fullest limit uses binds.
 _BINDS = 0.95
 
@@ -52,11 +57,24 @@ class Timed(NamedTuple):
         trajectory: of the joints, at rest and without acceleration at both ends.
         factor: how many times longer it takes than a run at full speed that no joint limits.
         because: which limit, and which joint, from 0, binds longest; None where the joints do not slow it.
+        progress: s over time.
+        speed: (n,) largest speeds of the joints.
+        acceleration: (n,) largest accelerations.
     """
 
     trajectory: Trajectory
     factor: float
     because: tuple[LimitName, int] | None
+    progress: Trajectory
+    speed: Array
+    acceleration: Array
+
+    def when(self, s: float) -> float:
+        """Return when the run is at ``s``, as a part of its duration."""
+        starts = self.progress.coefficients[:, 0, 0]
+        k = int(np.clip(np.searchsorted(starts, s, side="right") - 1, 0, None))
+        t = np.linspace(self.progress.times[k], self.progress.times[k + 1], _LOOKED_UP)
+        return float(np.interp(s, self.progress(t)[:, 0], t)) / self.progress.duration
 
 
 class _Grid(NamedTuple):
@@ -67,13 +85,15 @@ class _Grid(NamedTuple):
         path: of its joints, a cubic on each of m intervals.
         caps: (m,) the largest s' on each.
         bounds: on each.
-        shortest: the time of the fastest run whose s'' is constant on each [s].
+        squares: (m + 1,) s'² at their ends on the fastest run whose s'' is constant on each.
+        shortest: the time of that run [s].
     """
 
     arm: Arm
     path: Trajectory
     caps: Array
     bounds: Bounds
+    squares: Array
     shortest: float
 
     @property
@@ -132,15 +152,20 @@ def timed(arm: Arm, path: Trajectory, caps: Array) -> Timed:
     grid = _gridded(arm, path, caps)
     run = _smooth(grid)
     trajectory = run.trajectory
+    speed, acceleration = trajectory.peaks(1), trajectory.peaks(2)
     over = max(
-        float((trajectory.peaks(1) / arm.limit("speed")).max()),
-        math.sqrt(float((trajectory.peaks(2) / arm.limit("acceleration")).max())),
+        float((speed / arm.limit("speed")).max()),
+        math.sqrt(float((acceleration / arm.limit("acceleration")).max())),
         float(run.uses[:, 0].max()),
         grid.allowed / trajectory.duration,
     )
     trajectory = trajectory.slowed(over)
     factor = trajectory.duration / _allowed(float((grid.lengths / grid.caps).sum()) + _RAMP)
-    return Timed(trajectory, factor, _binding(arm.n, run) if factor > 1 else None)
+    law = run.law.copy()
+    law[:, 0] += run.path.times[run.intervals]
+    progress = Trajectory(times=run.times, coefficients=law[..., None]).slowed(over)
+    because = _binding(arm.n, run) if factor > 1 else None
+    return Timed(trajectory, factor, because, progress, speed / over, acceleration / over**2)
 
 
 def _allowed(shortest: float) -> float:
@@ -156,15 +181,16 @@ def _gridded(arm: Arm, path: Trajectory, caps: Array) -> _Grid:
     times = np.append(np.repeat(path.times[:-1], finer) + starts, path.times[-1])
     fine, caps = Trajectory(times=times, coefficients=coefficients), np.repeat(caps, finer)
     bounds, lengths = _bounds(arm, fine, caps), np.diff(times)
-    speeds = np.sqrt(largest_squares(bounds, lengths, (False, False)))
-    return _Grid(arm, fine, caps, bounds, float(_steps(lengths, speeds).sum()))
+    squares = largest_squares(bounds, lengths, (False, False))
+    return _Grid(arm, fine, caps, bounds, squares, float(_steps(lengths, np.sqrt(squares)).sum()))
 
 
 def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
     """Return bounds on x = s'² at the start of every segment, and on u = s'', that hold all along it."""
     lengths, terms = np.diff(path.times), path.coefficients
     speed, acceleration = arm.limit("speed"), arm.limit("acceleration")
-    a, b = [np.full((len(lengths), 1), _RAMP)], [np.zeros((len(lengths), 1))]
+    ramp = 0.0 if np.isfinite(acceleration).all() else _RAMP
+    a, b = [np.full((len(lengths), 1), ramp)], [np.zeros((len(lengths), 1))]
     for part in _PARTS:
         at = (part * lengths)[:, None]
         rate, bend = evaluate(derivative(terms, 1), at), evaluate(derivative(terms, 2), at)
@@ -187,7 +213,7 @@ def _smooth(grid: _Grid) -> _Run:
     for _ in range(_WINDOWS):
         runs.append(_averaged_within(grid, window))
         cost = runs[-1].duration - grid.shortest
-        if cost <= most:
+        if cost <= most + _HAIR * grid.shortest:
             break
         window *= max(_LESS * most / cost, _LEAST_STEP)
     return min(runs, key=lambda run: run.duration)
@@ -196,15 +222,15 @@ def _smooth(grid: _Grid) -> _Run:
 def _averaged_within(grid: _Grid, window: float) -> _Run:
     """Return the fastest run averaged over a window, with bounds drawn tighter where that passes limits."""
     bounds, lengths = grid.bounds, grid.lengths
-    tighter, runs = np.ones((len(lengths), 1)), []
+    tighter, runs, x = np.ones((len(lengths), 1)), [], grid.squares
     for _ in range(_ROUNDS):
-        x = largest_squares(bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter), lengths, (False, False))
         runs.append(_looked_at(grid, *_averaged(lengths, np.sqrt(x), window)))
-        if runs[-1].duration <= grid.allowed:
+        if runs[-1].duration <= (1 + _HAIR) * grid.allowed:
             break
         worst = np.ones(len(lengths))
         np.maximum.at(worst, runs[-1].intervals, runs[-1].uses.max(axis=1))
         tighter = tighter * worst[:, None] ** 2
+        x = largest_squares(bounds._replace(a=bounds.a * tighter, b=bounds.b * tighter), lengths, (False, False))
     return min(runs, key=lambda run: run.duration)
 
 
@@ -278,13 +304,18 @@ def _looked_at(grid: _Grid, breaks: Array, law: Array) -> _Run:
 
 def _when(law: Array, steps: Array, knots: Array) -> Array:
     """Return when cubics s(t) (k, 4), which never fall, pass knots (k,), from 0 to ``steps`` (k,) [s]."""
-    terms = law[..., None]
-    low, high = np.zeros(len(knots)), steps
+    slow, bend, jerk = law[:, 1], law[:, 2], law[:, 3]
+    low, high, t = np.zeros(len(knots)), steps, steps / 2
     for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        below = evaluate(terms, middle[:, None])[:, 0] < knots
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return low
+        off = ((jerk * t + bend) * t + slow) * t + law[:, 0] - knots
+        low, high = np.where(off < 0, t, low), np.where(off < 0, high, t)
+        rate = (3 * jerk * t + 2 * bend) * t + slow
+        # Newton's step where it stays between the bounds, else a halving.
+        ahead = t - off / np.where(rate > 0, rate, np.inf)
+        last, t = t, np.where((ahead >= low) & (ahead <= high) & (rate > 0), ahead, (low + high) / 2)
+        if (np.abs(t - last) <= _CONVERGED * steps).all():
+            break
+    return t
 
 
 def _binding(joints: int, run: _Run) -> tuple[LimitName, int]:

@@ -35,6 +35,8 @@ Triple: TypeAlias = tuple[Scalar, Scalar, Scalar]
 
 # What this part of a rate adds to another one is lost in its digits.
 _FORGOTTEN = 1e-20
+# So few rows are solved sooner as a full matrix than SciPy is imported.
+_FEW = 200
 # New knots are put so much closer than the jump asks for, at most so many for one, so often, and so many in all.
 _CLOSER, _PARTS, _ROUNDS, _MOST = 1.05, 8, 40, 100_000
 
@@ -259,6 +261,8 @@ def _in_turn(right: Array, a: Array) -> Array:
 
 def _at_once(right: Array, a: Array, b: Array) -> Array:
     """Return the m with a m_last + m + b m_next = right for all rows."""
+    if len(a) <= _FEW:
+        return np.asarray(np.linalg.solve(np.eye(len(a)) + np.diag(a[1:], -1) + np.diag(b[:-1], 1), right))
     from scipy.linalg import solve_banded  # noqa: PLC0415 - SciPy takes longer to import than all else
 
     bands = np.stack([np.append(0.0, b[:-1]), np.ones(len(a)), np.append(a[1:], 0.0)])

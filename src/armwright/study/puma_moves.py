@@ -20,10 +20,10 @@ from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.motion.blends import blended, via_deviations
 from armwright.motion.chain import chain
 from armwright.motion.detour import By
-from armwright.motion.follow import PathError
 from armwright.motion.hand_path import HandPath, hand_path, zyz_angles
 from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import along, stopping_move
+from armwright.motion.obstruction import PathError
 from armwright.motion.solver import solver_of
 from armwright.motion.trajectory import Trajectory
 from armwright.motion.xspline_path import xspline
@@ -79,7 +79,7 @@ def path_of(way: Way) -> HandPath:
     if way == "seed":
         place = blended(TIMES, X[:, :3, 3], BLEND, ends="running")
         angles = blended(TIMES, matlab_zyz(PRINTED_ROTATIONS), BLEND, ends="running")
-        return HandPath(place=place, turns=None, angles=angles)
+        return HandPath(place=place, turns=None, angles=angles, times=np.array(TIMES))
     if way == "joint":
         raise UnknownNameError("Cartesian move", way, [known for known in WAYS if known != "joint"])
     return hand_path(X, TIMES, BLEND, ends="running", orientation=way)

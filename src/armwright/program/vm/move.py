@@ -11,8 +11,9 @@ from armwright.arrays import Array
 from armwright.cell.model import base_name
 from armwright.errors import IncapableArmError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.motion.certificate import Certificate
 from armwright.motion.plan import Manner, Obstacle, Stage, StageError, StageGoal, plan
-from armwright.motion.trajectory import hold, slowed_together, whole_ticks
+from armwright.motion.trajectory import Trajectory, hold, slowed_together, whole_ticks
 from armwright.program.bytecode.instructions import Instruction, MotionKind, Op, StagePlan, stages_of, stages_text
 from armwright.program.language.diagnostic import Label
 from armwright.program.language.names import is_arm
@@ -250,9 +251,22 @@ def _timed(machine: Machine, process: Process, asked: MoveRequest, stages: Seque
     # What kept a stage slow does so no more where it is to take longer.
     longer = asked_for > least + machine.cell.period
     return [
-        attrs.evolve(stage, trajectory=one, slowed="" if longer else stage.slowed)
+        attrs.evolve(
+            stage,
+            trajectory=one,
+            slowed="" if longer else stage.slowed,
+            certificate=_retimed(stage, one, longer=longer),
+        )
         for stage, one in zip(stages, slow, strict=True)
     ]
+
+
+def _retimed(stage: Stage, slow: Trajectory, *, longer: bool) -> Certificate | None:
+    """Return the certificate of a stage run as long as was asked for; no limit slows it where that is longer."""
+    if stage.certificate is None or not slow.duration:
+        return stage.certificate
+    certificate = stage.certificate.retimed(slow.duration / stage.trajectory.duration)
+    return attrs.evolve(certificate, factor=1.0, because=None) if longer else certificate
 
 
 def _fail_move(

@@ -92,6 +92,8 @@ def note_of(run: RunStage) -> str:
         notes = [f"the straight way is stopped {why}", f"{_lead(stage.detour, run.arm)}: {stage.detour.price}", *notes]
     elif stage.obstacle is not None:
         notes.append(f"without stops it is stopped {where_and_why(stage.obstacle, stage.kind, run.to, run.arm)}")
+    if stage.certificate is not None:
+        notes.append(stage.certificate.summary)
     return "; ".join(notes)
 
 

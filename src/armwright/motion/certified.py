@@ -1,0 +1,220 @@
+"""Motions with a certificate: a followed motion of the hand, run as fast as the limits of the joints allow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import attrs
+import numpy as np
+
+from armwright.arrays import Array
+from armwright.errors import IncapableArmError
+from armwright.motion.certificate import LIMITS, Certificate, LimitName, slowing
+from armwright.motion.deviation import TrackingError
+from armwright.motion.efforts import effort_peaks, slowing_for_efforts
+from armwright.motion.solver import AnyArm, Solver, solver_of
+from armwright.motion.timing_law import timed
+from armwright.motion.tolerance import Tolerance
+from armwright.motion.tracking import Tracking
+from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks
+
+# Efforts are sampled so often; those that come as near to a limit as this part of it are looked at closely.
+_SAMPLES, _NEAR = 101, 0.95
+# A joint that moves at less than this part of its top speed stands.
+_STANDS = 1e-9
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class CertifiedMotion:
+    """A motion of the joints, planned.
+
+    Attributes:
+        trajectory: of the joints, at rest at both ends.
+        certificate: what it keeps.
+    """
+
+    trajectory: Trajectory
+    certificate: Certificate
+
+    def slowed(self, arm: AnyArm, factor: float, because: tuple[LimitName, int]) -> CertifiedMotion:
+        """Return the same motion run ``factor`` times slower, for a limit of a joint, from 0."""
+        trajectory, certificate = self.trajectory.slowed(factor), self.certificate
+        return CertifiedMotion(
+            trajectory=trajectory,
+            certificate=attrs.evolve(
+                certificate,
+                worst_time=certificate.worst_time * factor,
+                peaks=limit_peaks(arm, trajectory),
+                factor=certificate.factor * factor,
+                because=because,
+            ),
+        )
+
+    def on_ticks(self, period: float) -> CertifiedMotion:
+        """Return the same motion slowed by less than a servo period [s], to end on a whole number of them."""
+        trajectory, certificate = whole_ticks(self.trajectory, period), self.certificate
+        if not trajectory.duration:
+            return self
+        stretch = trajectory.duration / self.trajectory.duration
+        return CertifiedMotion(trajectory=trajectory, certificate=certificate.retimed(stretch))
+
+
+def joined(motions: Sequence[CertifiedMotion]) -> CertifiedMotion:
+    """Return motions run one after the other, with what all of them keep; of the slowing the largest."""
+    certificates = [motion.certificate for motion in motions]
+    starts = np.cumsum([0.0, *(motion.trajectory.duration for motion in motions)])
+    worst = int(np.argmax([each.deviation_seen for each in certificates]))
+    slowest = max(certificates, key=lambda each: each.factor)
+    peaks = {name: np.max([each.peaks[name] for each in certificates], axis=0) for name in LIMITS}
+    certificate = attrs.evolve(
+        certificates[worst],
+        deviation=max(each.deviation for each in certificates),
+        turn=max(each.turn for each in certificates),
+        turn_seen=max(each.turn_seen or 0.0 for each in certificates),
+        worst_time=float(starts[worst]) + certificates[worst].worst_time,
+        knots=sum(each.knots for each in certificates),
+        samples=sum(each.samples for each in certificates),
+        peaks=peaks,
+        factor=slowest.factor,
+        because=slowest.because,
+        backward=max(each.backward or 0.0 for each in certificates),
+    )
+    return CertifiedMotion(trajectory=join([motion.trajectory for motion in motions]), certificate=certificate)
+
+
+def certificate_of(
+    arm: AnyArm,
+    trajectory: Trajectory,
+    error: TrackingError,
+    allowed: Tolerance,
+    *,
+    time: float | None = None,
+    peaks: dict[LimitName, Array] | None = None,
+) -> Certificate:
+    """Return the certificate of a motion, whatever its limits say.
+
+    Args:
+        arm: the arm, or a compiled one.
+        trajectory: the motion.
+        error: of the hand on it.
+        allowed: what it was asked to keep.
+        time: when the hand is farthest off [s]; as ``error`` has it when left out.
+        peaks: of speeds, accelerations and efforts, where they are known.
+    """
+    solver = solver_of(arm)
+    time = float(error.times[error.sampled_position.argmax()]) if time is None else time
+    return Certificate(
+        arm=solver.arm,
+        deviation_asked=allowed.position,
+        deviation=float(error.position.max()),
+        deviation_seen=float(error.sampled_position.max()),
+        turn_asked=allowed.orientation,
+        turn=float(error.orientation.max()),
+        turn_seen=float(error.sampled_orientation.max()),
+        worst_time=time,
+        worst_place=np.asarray(solver.forward(trajectory(time))[:3, 3]),
+        knots=len(error.position) + 1,
+        samples=error.samples * len(error.position),
+        peaks=limit_peaks(arm, trajectory) if peaks is None else peaks,
+        factor=1.0,
+        because=None,
+        backward=error.backward,
+    )
+
+
+def fastest(
+    arm: AnyArm,
+    tracking: Tracking,
+    allowed: Tolerance,
+    *,
+    nominal: float,
+    period: float | None = None,
+    weak: bool = False,
+) -> CertifiedMotion:
+    """Return the fastest run along a followed path whose time is a mere parameter, inside all limits.
+
+    Speeds and accelerations are kept place by place, efforts by running all of it slower.
+
+    Args:
+        arm: the arm, or a compiled one.
+        tracking: the joints along the path at full speed from end to end.
+        allowed: that they were asked to keep.
+        nominal: how long it would take if no joint limited it [s].
+        period: of the servo [s], to end on a whole number of them; any duration when left out.
+        weak: whether a motion is run as it is where gravity alone takes more than a joint may give.
+
+    Raises:
+        IncapableArmError: gravity alone takes more than a joint may give, and ``weak`` is not set.
+    """
+    path, error = tracking.trajectory, tracking.error
+    run = timed(solver_of(arm).arm, path, np.ones(len(path.times) - 1))
+    at = run.when(float(error.times[error.sampled_position.argmax()]))
+    trajectory, efforts, slower = _inside_efforts(arm, run.trajectory, weak=weak)
+    stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal
+    peaks: dict[LimitName, Array] = {
+        "speed": run.speed / stretch,
+        "acceleration": run.acceleration / stretch**2,
+        "effort": efforts,
+    }
+    certificate = attrs.evolve(
+        certificate_of(arm, trajectory, error, allowed, time=at * trajectory.duration, peaks=peaks),
+        factor=max(1.0, factor),
+        because=None if factor <= 1 else run.because if slower is None else ("effort", slower),
+    )
+    motion = CertifiedMotion(trajectory=trajectory, certificate=certificate)
+    return motion if period is None else motion.on_ticks(period)
+
+
+def slowed_alike(arm: AnyArm, tracking: Tracking, allowed: Tolerance) -> CertifiedMotion:
+    """Return a followed motion, all of it slowed until the joints keep their limits; efforts where that helps."""
+    model, planned = solver_of(arm).arm, tracking.trajectory
+    factor, because = slowing(model, {"speed": planned.peaks(1), "acceleration": planned.peaks(2)})
+    trajectory, _, slower = _inside_efforts(arm, planned.slowed(factor), weak=True)
+    factor = trajectory.duration / planned.duration
+    error = tracking.error
+    time = float(error.times[error.sampled_position.argmax()]) * factor
+    certificate = certificate_of(arm, trajectory, error, allowed, time=time)
+    because = because if slower is None else ("effort", slower)
+    return CertifiedMotion(trajectory=trajectory, certificate=attrs.evolve(certificate, factor=factor, because=because))
+
+
+def standstill(solver: Solver, q: Array, allowed: Tolerance) -> CertifiedMotion:
+    """Return the motion to where the arm is."""
+    certificate = Certificate.trivial(solver.arm, solver.forward(q)[:3, 3], allowed)
+    return CertifiedMotion(trajectory=hold(q, 0.0), certificate=certificate)
+
+
+def limit_peaks(arm: AnyArm, trajectory: Trajectory) -> dict[LimitName, Array]:
+    """Return the largest speeds, accelerations and efforts of a motion, (n,) each; no efforts where none is limited."""
+    return {"speed": trajectory.peaks(1), "acceleration": trajectory.peaks(2), "effort": _efforts(arm, trajectory)}
+
+
+def _efforts(arm: AnyArm, trajectory: Trajectory) -> Array:
+    """Return the largest efforts (n,): at samples, but exactly where they come near a limit."""
+    solver = solver_of(arm)
+    limits = solver.arm.limit("effort")
+    if not np.isfinite(limits).any():
+        return np.zeros(solver.arm.n)
+    t = np.linspace(0.0, trajectory.duration, _SAMPLES)
+    q, qd, qdd = (trajectory(t, order) for order in range(3))
+    # The sign of the speed of a joint that stands is rounding, and would give it Coulomb friction.
+    qd = np.where(np.abs(qd) > _STANDS * np.abs(qd).max(axis=0), qd, 0.0)
+    efforts = np.abs(solver.inverse_dynamics(q, qd, qdd)).max(axis=0)
+    return effort_peaks(arm, trajectory).peaks if (efforts > _NEAR * limits).any() else np.asarray(efforts)
+
+
+def _inside_efforts(arm: AnyArm, trajectory: Trajectory, *, weak: bool) -> tuple[Trajectory, Array, int | None]:
+    """Return a motion slowed for its efforts, the largest of them (n,), and for which joint, from 0, it is slowed."""
+    efforts = _efforts(arm, trajectory)
+    if (efforts <= _NEAR * solver_of(arm).arm.limit("effort")).all():
+        return trajectory, efforts, None
+    try:
+        slowing_down = slowing_for_efforts(arm, trajectory)
+    except IncapableArmError:
+        if not weak:
+            raise
+        return trajectory, efforts, None
+    if slowing_down.joint is None:
+        return trajectory, efforts, None
+    trajectory = trajectory.slowed(slowing_down.factor)
+    return trajectory, _efforts(arm, trajectory), slowing_down.joint

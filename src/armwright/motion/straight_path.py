@@ -1,0 +1,227 @@
+"""Straight ways of the hand over time: one line at even speed, or several past frames as the report times them."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import attrs
+import numpy as np
+import numpy.typing as npt
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.motion.deviation import (
+    ErrorBounds,
+    HandBounds,
+    HandSamples,
+    TrackingError,
+    error_of,
+    half_sines,
+    rotated,
+    spin_bound,
+)
+from armwright.motion.path import NEGLIGIBLE, Path, place_knots
+from armwright.motion.polynomials import derivative, evaluate
+from armwright.motion.s_curve import s_curve
+from armwright.motion.trajectory import Trajectory
+from armwright.motion.xspline_path import xspline
+from armwright.spatial.rotations import rotation_vector
+
+Ways: TypeAlias = npt.NDArray[np.intp]
+
+
+@attrs.frozen(kw_only=True, eq=False)
+class StraightPath:
+    """A motion of the hand along straight ways from pose to pose.
+
+    The distance of a hand from it is that from its way, wherever on it the hand should be. The orientation is held
+    against that which belongs to the time, and on a single line against that which belongs to the position nearest to
+    the hand as well: a hand that is late while it turns would otherwise be turned too far for where it is. On a line
+    shorter than ``near`` every position is near enough, and the time alone counts.
+
+    Attributes:
+        poses: (k + 1, 4, 4) at which ways begin and end.
+        rotations: (k, 3) rotation vector of each way, in the axes at its start [rad].
+        corners: (k + 1,) when the poses are passed, from 0 [s].
+        progress: on which way, from 0, and at which fraction of it, as one number over time.
+        numbers: (k) which ways of the path that was asked for they are, without those of no length.
+        near: positions on the line that are so near are all the same [m].
+    """
+
+    poses: Array
+    rotations: Array
+    corners: Array
+    progress: Trajectory
+    numbers: tuple[int, ...]
+    near: float
+
+    @property
+    def duration(self) -> float:
+        """From start to end [s]."""
+        return float(self.corners[-1])
+
+    @property
+    def shifts(self) -> Array:
+        """From the start to the end of each way, (k, 3) [m]."""
+        return np.asarray(np.diff(self.poses[:, :3, 3], axis=0))
+
+    def __call__(self, t: Array) -> Array:
+        """Return the poses (k, 4, 4) at times (k,)."""
+        way, fraction = self._along(t)
+        return self.at(way, fraction)
+
+    def at(self, way: npt.ArrayLike, fraction: Array) -> Array:
+        """Return the poses (k, 4, 4) at fractions (k,) of ways (k,), or of one way."""
+        way = np.broadcast_to(way, fraction.shape)
+        X = np.zeros((len(fraction), 4, 4))
+        X[:, :3, :3] = (self.poses[way, None, :3, :3] @ rotated(self.rotations[way], fraction[:, None]))[:, 0]
+        X[:, :3, 3] = self.poses[way, :3, 3] + fraction[:, None] * self.shifts[way]
+        X[:, 3, 3] = 1.0
+        return X
+
+    def _way(self, t: Array) -> Ways:
+        """Return the numbers of the ways (...) at times (...)."""
+        return np.asarray(np.clip(np.searchsorted(self.corners, t, side="right") - 1, 0, len(self.numbers) - 1))
+
+    def _along(self, t: Array) -> tuple[Ways, Array]:
+        """Return the numbers of the ways (...) at times (...), and the fractions of them."""
+        way = self._way(t)
+        return way, self.progress(t)[..., 0] - way
+
+    def where(self, t: float) -> tuple[int, float, str]:
+        """Return on which way a time is, at which fraction of it, and that in words."""
+        way, fraction = (each[0] for each in self._along(np.array([t])))
+        return self.numbers[way], float(np.clip(fraction, 0.0, 1.0)), f"on the line near {self.position_text(t)}"
+
+    def position_text(self, t: float) -> str:
+        """Return where the hand is at a time, in words, seen from the base of the arm."""
+        x, y, z = self(np.array([t]))[0, :3, 3] * 1e3
+        return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
+
+    def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
+        """Return bounds of the error on the intervals between times: the distance from a straight way is convex."""
+        way, rate, change = self._rates(times)
+        angle = np.linalg.norm(self.rotations[way], axis=-1)
+        spin = spin_bound(hand, angle * change, angle * rate)
+        if self._by_position:
+            # As an estimate the hand moves along the line as was planned; ``error`` does without.
+            spin = np.maximum(spin, spin_bound(hand, angle * hand.pull / self._length, angle * rate))
+        return ErrorBounds(hand.pull, spin)
+
+    def error(self, samples: HandSamples) -> TrackingError:
+        """Return how far a sampled hand is from its ways."""
+        way, rate, change = self._rates(np.append(samples.times[:, 0], samples.times[-1, -1]))
+        p_A, R_A, shift = self.poses[way, :3, 3], self.poses[way, None, :3, :3], self.shifts[way]
+        come = samples.poses[..., :3, 3] - p_A[:, None]
+        square = np.einsum("mi,mi->m", shift, shift)
+        along = (come @ shift[:, :, None])[..., 0] / np.where(square > 0, square, 1.0)[:, None]
+        off = np.linalg.norm(come - np.clip(along, 0.0, 1.0)[..., None] * shift[:, None], axis=-1)
+        planned = self.progress(samples.times)[..., 0] - way[:, None]
+        R = samples.poses[..., :3, :3]
+        half = half_sines(R_A @ rotated(self.rotations[way], planned), R).max(axis=1)
+        angle = np.linalg.norm(self.rotations[way], axis=-1)
+        between, hand = samples.step**2 / 8, samples.hand
+        orientation = half + between * spin_bound(hand, angle * change, angle * rate)
+        if not self._by_position:
+            return error_of(samples, off, half, orientation=orientation)
+        # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
+        hurry = hand.pull / self._length
+        rate = np.abs(np.diff(along, axis=1)).max(axis=1) / samples.step + samples.step * hurry
+        beyond = np.maximum(np.maximum(-along, along - 1).max(axis=1) + between * hurry, 0.0)
+        by_position = half_sines(R_A @ rotated(self.rotations[way], along), R).max(axis=1)
+        bound = by_position + between * spin_bound(hand, angle * hurry, angle * rate) + angle * beyond / 2
+        return error_of(
+            samples,
+            off,
+            np.maximum(half, by_position),
+            orientation=np.maximum(orientation, bound),
+            backward=_backward(along * self._length, between * hand.pull),
+        )
+
+    @property
+    def _length(self) -> float:
+        return float(np.linalg.norm(self.shifts[0]))
+
+    @property
+    def _by_position(self) -> bool:
+        return len(self.numbers) == 1 and self._length > self.near
+
+    def _rates(self, times: Array) -> tuple[Ways, Array, Array]:
+        """Return of intervals (m,) between times: the way, and upper bounds of the rate of progress and its change.
+
+        Each lies within one cubic of the progress, whose second derivative is largest at an end of the interval.
+        """
+        middles, h = (times[1:] + times[:-1]) / 2, np.diff(times)
+        way = self._way(middles)
+        piece = np.clip(np.searchsorted(self.progress.times, middles, side="right") - 1, 0, None)
+        piece = np.minimum(piece, len(self.progress.coefficients) - 1)
+        local = middles - self.progress.times[piece]
+        first, second, third = (
+            np.abs(evaluate(derivative(self.progress.coefficients, order)[piece], local[:, None])[:, 0])
+            for order in (1, 2, 3)
+        )
+        bend = second + third * h / 2
+        return way, first + bend * h / 2, bend
+
+
+def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:
+    """Return the straight line of the hand from A to B.
+
+    Args:
+        A: (4, 4) pose at the start.
+        B: (4, 4) pose at the end.
+        even: how long it takes at full speed all the way [s].
+        near: as for ``StraightPath``.
+        ramp: part of the duration that gathers speed, and that loses it again; at full speed from end to end if 0.
+    """
+    duration = even / (1 - ramp)
+    even_progress = Trajectory(times=[0.0, duration], coefficients=[[[0.0], [1 / duration]]])
+    return StraightPath(
+        poses=np.stack([A, B]),
+        rotations=rotation_vector(A[:3, :3].T @ B[:3, :3])[None],
+        corners=np.array([0.0, duration]),
+        progress=s_curve(duration, ramp) if ramp else even_progress,
+        numbers=(0,),
+        near=near,
+    )
+
+
+def report_path(arm: Arm, path: Path, *, deviation: float, speed: float) -> StraightPath:
+    """Return the straight ways of a path, run past its corners without a stop as the report's rule times them.
+
+    Args:
+        arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
+        path: the ways; those without length are left out.
+        deviation: that the rule places knots for [m].
+        speed: 1 to 120.
+
+    Raises:
+        ArmwrightError: as for ``place_knots``.
+
+    Source:
+        TR-83-008, "continuous motion".
+    """
+    knots = place_knots(arm, path, deviation=deviation, speed=speed)
+    numbers = tuple(np.flatnonzero(path.lengths() > NEGLIGIBLE).tolist())
+    way = np.searchsorted(numbers, knots.segments)
+    last = np.append(np.flatnonzero(np.diff(way)), len(way) - 1)
+    poses = np.stack([path.poses[numbers[0]], *(path.poses[i + 1] for i in numbers)])
+    R = poses[:, :3, :3]
+    return StraightPath(
+        poses=poses,
+        rotations=rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]),
+        corners=np.append(0.0, knots.times[last]),
+        progress=xspline(knots.times, (way + np.array(knots.fractions))[:, None]),
+        numbers=numbers,
+        near=np.inf,
+    )
+
+
+def _backward(along: Array, between: Array) -> float:
+    """Return how far a hand at most runs back along its line, from samples (m, k) [m] and what lies between (m,)."""
+    farthest = np.maximum.accumulate(along.ravel()).reshape(along.shape)
+    back = (farthest - along).max(axis=1)
+    # Between two samples the hand is off the chord by so much at most, before it turns back and after. Where the chord
+    # rises by four times that, the hand never turns back.
+    rising = np.diff(along, axis=1).min(axis=1) > 4 * between
+    return float(np.where(rising & (back <= 0), 0.0, back + 2 * between.max()).max())

@@ -1,0 +1,246 @@
+"""Joints that follow a motion of the hand, with a bound on how far the hand leaves it.
+
+The joints are solved at knots, each configuration next to the one before it, and joined by an X-spline. Where the hand
+is too far off between two knots, more are put: the error of a spline falls with the fourth power of the step. What
+stops the arm is returned and not raised, as whoever tries several branches goes on with the next; where there is doubt
+about it, the way is followed once more in small steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from armwright.arm.model import Arm
+from armwright.arrays import Array
+from armwright.motion.chain import beside, chain
+from armwright.motion.deviation import (
+    HandMotion,
+    TrackingError,
+    cubic_peaks,
+    hand_bounds,
+    tracking_error,
+    turning_points,
+)
+from armwright.motion.knots import divided
+from armwright.motion.obstruction import (
+    MAX_SLOWDOWN,
+    Diagnosis,
+    Obstruction,
+    PathError,
+    beyond_limits,
+    diagnose_obstruction,
+    nearest_singularity,
+    singular,
+    unmet,
+)
+from armwright.motion.solver import Solver
+from armwright.motion.tolerance import Tolerance
+from armwright.motion.trajectory import Trajectory
+from armwright.motion.xspline_path import smooth_weight, xspline
+
+# Rounds of putting knots where they are missing, and how much closer they are put than the error asks for; into how
+# many parts an interval is divided at most.
+_ROUNDS, _CLOSER, _PARTS = 12, 1.1, 8
+# Where knots are this part of the duration apart and a joint is still too fast, more of them do not help.
+_SHORT = 64
+# Where the hand does stay on its path a joint may have to be this much faster yet: only there is the hand slowed.
+_TRACKED = 1.5
+# Whole turns; a limit passed by this part of one is not passed.
+_TURN, _NONE = 2 * np.pi, 1e-9
+
+
+class Task(NamedTuple):
+    """What is to be followed, and how.
+
+    Attributes:
+        solver: the arm, with n joints.
+        motion: of the hand.
+        q_start: (n,) joint positions at its start.
+        tolerance: how far the hand may be from it.
+        diagnosis: how far it may be off where it is searched for what stops the arm.
+        rest: whether the joints rest at both ends; otherwise they run on as the motion does.
+        smooth: whether their acceleration is continuous; otherwise the spline is the report's.
+        whole_turns: whether joints may start whole turns away, to be inside their limits later.
+        clock: when times of the motion are passed at the speed that is asked for [s], where a motion is timed later;
+            None where limits and speeds do not stop the arm when it is searched for what does.
+        max_slowdown: how many times as fast as it may a joint may have to be, before more knots are put for it.
+        most_knots: that are put.
+    """
+
+    solver: Solver
+    motion: HandMotion
+    q_start: Array
+    tolerance: Tolerance
+    diagnosis: Tolerance
+    rest: bool = True
+    smooth: bool = True
+    whole_turns: bool = False
+    clock: Callable[[Array], Array] | None = None
+    max_slowdown: float = MAX_SLOWDOWN
+    most_knots: int = 4000
+
+
+class Tracking(NamedTuple):
+    """A motion of the joints that follows a motion of the hand.
+
+    Attributes:
+        trajectory: of the joints.
+        error: of the hand on each interval between two knots.
+        speed: (m, n) the largest speeds of the joints on these intervals, exactly.
+        acceleration: (m, n) the same of their accelerations.
+    """
+
+    trajectory: Trajectory
+    error: TrackingError
+    speed: Array
+    acceleration: Array
+
+
+def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking | Obstruction:
+    """Follow a motion of the hand with the joints.
+
+    Args:
+        task: what is to be followed.
+        knots: (k,) times to begin with, those at which the motion changes its form among them [s].
+        diagnose: whether it is searched for what really stops the arm; not needed where no reason is asked for.
+    """
+    found = _refined(task, knots, None)
+    # A pose that is out of reach is so for every configuration.
+    if isinstance(found, Tracking) or found.cause == "reach" or not diagnose:
+        return found
+    diagnosis = diagnose_obstruction(
+        task.solver, task.motion(knots), knots, task.q_start, task.diagnosis, clock=task.clock
+    )
+    if diagnosis is None:
+        return found
+    obstruction = _diagnosed(task, diagnosis)
+    if obstruction is None:
+        return _refined(task, knots, diagnosis)
+    return found if obstruction.agrees(found, float(knots[-1])) else obstruction
+
+
+def path_error(motion: HandMotion, obstruction: Obstruction) -> PathError:
+    """Return the error for what stops the arm, with the position in words."""
+    segment, fraction, where = motion.where(obstruction.time)
+    cause, _, joint, reason, *_ = obstruction
+    return PathError(cause, segment, fraction, f"{where} {reason}", joint=joint, reason=reason)
+
+
+def check_velocities(task: Task, tracking: Tracking) -> None:
+    """Refuse a motion that could only be crawled along.
+
+    Raises:
+        PathError: a joint would have to move so many times as fast as it may.
+    """
+    ratio = _velocity_ratios(task, tracking.trajectory, tracking.speed)
+    if ratio.max() > _TRACKED * MAX_SLOWDOWN:
+        worst, times = int(ratio.max(axis=1).argmax()), tracking.trajectory.times
+        ends = slice(worst, worst + 2)
+        obstruction = singular(task.solver.arm, tracking.trajectory(times[ends]), times[ends], ratio[worst])
+        raise path_error(task.motion, obstruction)
+
+
+def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
+    """Return how many times as fast as it may each joint is on each interval (m, n), at the speed that is asked for.
+
+    Args:
+        task: what is followed.
+        trajectory: of the joints.
+        speed: (m, n) their largest speeds on its intervals.
+    """
+    times = trajectory.times
+    slower = 1.0 if task.clock is None else (np.diff(task.clock(times)) / np.diff(times))[:, None]
+    return np.asarray(speed / slower / task.solver.arm.limit("speed"))
+
+
+def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Obstruction:
+    """Put knots until the hand stays within the tolerance everywhere, near the configurations of a diagnosis if any."""
+    arm, postures = task.solver.arm, None if guide is None else guide.guide
+    for _ in range(_ROUNDS):
+        X = task.motion(knots)
+        q, missed = chain(task.solver, X, task.q_start) if postures is None else beside(task.solver, X, postures(knots))
+        q = _whole_turns(arm, q, missed) if task.whole_turns else q
+        obstruction = beyond_limits(arm, q[:missed], knots)
+        if obstruction is None and missed is not None:
+            obstruction = unmet(arm, X[missed], q[missed - 1], float(knots[missed]), float(knots[missed]))
+        if obstruction is not None:
+            return obstruction
+        trajectory = _spline(task, knots, q)
+        h = np.diff(knots)
+        speed, acceleration = cubic_peaks(trajectory.coefficients, h)
+        hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
+        error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
+        excess = _excess(error, task.tolerance)
+        if excess.max() <= 1:
+            return _between_knots(arm, trajectory) or Tracking(trajectory, error, speed, acceleration)
+        ratio = np.where((h < knots[-1] / _SHORT)[:, None], _velocity_ratios(task, trajectory, speed), 0.0)
+        if ratio.max() > task.max_slowdown:
+            worst = int(ratio.max(axis=1).argmax())
+            return singular(arm, q[worst : worst + 2], knots[worst : worst + 2], ratio[worst])
+        parts = np.where(excess > 1, np.clip(np.ceil(_CLOSER * excess**0.25), 2, _PARTS), 1).astype(np.intp)
+        if parts.sum() > task.most_knots:
+            break
+        knots = divided(knots, parts)
+        if task.solver.inverse_branches is None:  # from where they nearly are already they are found at once
+            postures = trajectory
+    return _too_far(task, q, knots, int(excess.argmax()))
+
+
+def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
+    """Return the spline through configurations (k, n) at knots (k,)."""
+    still = np.zeros(q.shape[1])
+    rates = (still, still) if task.rest else (_rate(knots, q), _rate(knots[::-1], q[::-1]))
+    return xspline(knots, q, *rates, b=smooth_weight(knots) if task.smooth else None)
+
+
+def _rate(t: Array, q: Array) -> Array:
+    """Return the rate (n,) at the first of four knots or more: that of the cubic through them."""
+    return np.asarray(np.linalg.solve(np.vander(t[:4] - t[0], increasing=True), q[:4])[1])
+
+
+def _excess(error: TrackingError, allowed: Tolerance) -> Array:
+    """Return which part of what is allowed the hand is off on each interval (m,)."""
+    backward = 0.0 if error.backward is None else error.backward
+    return np.asarray(
+        np.maximum(np.maximum(error.position, backward) / allowed.position, error.orientation / allowed.orientation)
+    )
+
+
+def _diagnosed(task: Task, diagnosis: Diagnosis) -> Obstruction | None:
+    """Return what stops the arm on the way that a diagnosis found, whole turns allowed for."""
+    q = _whole_turns(task.solver.arm, diagnosis.q, None) if task.whole_turns else diagnosis.q
+    beyond = beyond_limits(task.solver.arm, q, diagnosis.times) if task.clock is None else None
+    return beyond or diagnosis.obstruction
+
+
+def _whole_turns(arm: Arm, q: Array, missed: int | None) -> Array:
+    """Turn joints by as few whole turns as bring all of their way inside the limits, where any do."""
+    lowest, highest = q[:missed].min(axis=0), q[:missed].max(axis=0)
+    least, most = (arm.limit("lower") - lowest) / _TURN, (arm.limit("upper") - highest) / _TURN
+    turns = np.where(least > _NONE, np.ceil(least), np.where(most < -_NONE, np.floor(most), 0.0))
+    fits = (turns >= least - _NONE) & (turns <= most + _NONE) & [joint.revolute for joint in arm.joints]
+    return np.asarray(q + _TURN * np.where(fits, turns, 0.0))
+
+
+def _between_knots(arm: Arm, trajectory: Trajectory) -> Obstruction | None:
+    """Return the limit that a spline passes between two knots which keep it, if there is one."""
+    c = trajectory.coefficients
+    t = turning_points(c, np.diff(trajectory.times))
+    q = ((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0]
+    return beyond_limits(arm, q[0], trajectory.times) or beyond_limits(arm, q[1], trajectory.times)
+
+
+def _too_far(task: Task, q: Array, knots: Array, worst: int) -> Obstruction:
+    """Return that the hand cannot be kept on its path after a knot, however many there are."""
+    arm = task.solver.arm
+    speed = arm.limit("speed")
+    jump = np.abs(q[worst + 1] - q[worst]) / np.where(np.isfinite(speed), speed, 1.0)
+    joint, near = int(jump.argmax()) + 1, nearest_singularity(arm, q[worst])
+    reason = (
+        f"the hand cannot be kept within {task.tolerance.position * 1e3:.3g} mm of its path: the arm is singular "
+        f"there ({near}), {arm.called(joint - 1)} would have to move at once"
+    )
+    return Obstruction("singular", float(knots[worst]), joint, reason)
