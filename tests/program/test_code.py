@@ -179,7 +179,7 @@ def test_statements_of_rlo_2(text: str, expected: list[str]) -> None:
     shown = []
     for step in code.instructions[7:-1]:
         words = [operand if isinstance(operand, str) else repr(operand) for operand in step.operands]
-        words = ["@" if "Place" in word else "c" if "Constant" in word else word for word in words]
+        words = ["@" if "JumpTarget" in word else "c" if "Constant" in word else word for word in words]
         shown.append(" ".join((step.op.value, *words)))
     first = min(int(word[1:]) for row in shown for word in row.split() if word[0] == "%") if "%" in str(shown) else 1
     renamed = [

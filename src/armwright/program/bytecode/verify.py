@@ -6,6 +6,7 @@ LOCK, FORK and MOVE are closed as they were opened. What depends on values or on
 arm that the cell does not have) is left to the run, which has messages for it.
 """
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import TypeAlias
@@ -29,9 +30,6 @@ from armwright.program.bytecode.verifier import (
 from armwright.program.language.kinds import VariableKind
 from armwright.program.syntax.pose_literals import EXACT
 from armwright.spatial.rotations import orthonormality_error
-
-# Larger numbers are none of a robot.
-_LARGEST = 1e9
 
 # What each operation takes: n a name or element, v a value, k a constant, p a jump target, t text or value, x a word;
 # in brackets what may be left out, + for any number more of the last.
@@ -142,8 +140,8 @@ def _wrong_ends(code: Code) -> Iterator[CodeError]:
         yield CodeError(last, "the code runs on behind its last instruction")
     for index, value in enumerate(code.constants):
         numbers = np.array(value)
-        if not np.abs(numbers).max() <= _LARGEST:
-            yield CodeError(0, f"constant c{index} is larger than any number of a robot")
+        if not np.isfinite(numbers).all():
+            yield CodeError(0, f"constant c{index} is no number")
         elif numbers.size > 1 and not orthonormality_error(numbers[:9].reshape(3, 3).T) <= EXACT:
             yield CodeError(0, f"constant c{index} is no place: its first nine numbers are no rotation")
 
@@ -168,8 +166,8 @@ def _fault(operand: Operand, instructions: int, constants: int) -> str:
             return f"there is no instruction @{index:04d}"
         case Constant(index=index) if not 0 <= index < constants:
             return f"there is no constant c{index}"
-        case float() | int() if not abs(operand) <= _LARGEST:
-            return f"{operand:g} is larger than any number of a robot"
+        case float() | int() if not math.isfinite(operand):
+            return f"{operand:g} is no number"
         case _:
             return ""
 
