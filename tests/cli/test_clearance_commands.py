@@ -115,7 +115,7 @@ def test_interrupted_sweep(tmp_path: Path) -> None:
     with subprocess.Popen(
         [sys.executable, "-m", "armwright", *command], cwd=tmp_path, stderr=subprocess.PIPE, text=True
     ) as running:
-        while not list(tmp_path.glob("out/blocks/??????.npz")) and running.poll() is None:
+        while not list(tmp_path.glob("out/blocks/???????.npy")) and running.poll() is None:
             time.sleep(0.1)
         running.send_signal(signal.SIGINT)
         _, said = running.communicate(timeout=300)
@@ -123,7 +123,7 @@ def test_interrupted_sweep(tmp_path: Path) -> None:
     assert running.returncode == 130
     kept = "what is finished is kept in 'out', and the same command goes on from there"
     assert said == f"armwright: interrupted; {kept}\n"
-    assert list(tmp_path.glob("out/blocks/??????.npz"))
+    assert list(tmp_path.glob("out/blocks/???????.npy"))
 
 
 def test_sweep_goes_on(folder: Path) -> None:
@@ -147,7 +147,7 @@ def test_damaged_sweep(folder: Path, tmp_path: Path) -> None:
     """Whoever reads a sweep back names the file that is damaged, with status 4; it stays as it is."""
     swept = tmp_path / "swept"
     shutil.copytree(folder, swept)
-    results, block = swept / "results.nc", swept / "blocks" / "000000.npz"
+    results, block = swept / "results.nc", swept / "blocks" / "0000000.npy"
     results.write_bytes(results.read_bytes()[:-1] + b"x")
     block.write_bytes(b"")
     sweep = ("clearance", "sweep", "five-bar", *CENTRE, "--workers", "1", "-n", "64", "-o", swept)
