@@ -152,6 +152,13 @@ def _texts(*paths: Path, lines: int = 400) -> list[str]:
     return ["\n".join(path.read_text(encoding="utf-8").split("\n")[:lines]) for path in paths]
 
 
+def _tables(*paths: Path, lines: int) -> list[str]:
+    """Return tables as they are, and with semicolons, decimal commas and units in brackets."""
+    texts = _texts(*paths, lines=lines)
+    european = [text.replace(",", ";").replace(".", ",").replace("_mm", " [mm]") for text in texts]
+    return [*texts, *european, european[0].replace("commanded_", "nominal ")]
+
+
 TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]] = {
     "arm": (".toml", read_arm, lambda: _texts(*(SOURCE / "arm" / "catalogue").glob("*.toml"))),
     "linkage": (".toml", read_linkage, lambda: _texts(*(SOURCE / "clearance" / "catalogue").glob("*.toml"))),
@@ -161,17 +168,17 @@ TARGETS: dict[str, tuple[str, Callable[[Path], object], Callable[[], list[str]]]
     "iso9283": (
         ".csv",
         lambda path: read_accuracy([path]),
-        lambda: _texts(EXAMPLES / "measured_poses.csv", EXAMPLES / "measured_paths.csv", lines=80),
+        lambda: _tables(EXAMPLES / "measured_poses.csv", EXAMPLES / "measured_paths.csv", lines=80),
     ),
     "calibration": (
         ".csv",
         lambda path: read_measurements(path, load_arm("puma560")),
-        lambda: _texts(EXAMPLES / "puma_points.csv", lines=40),
+        lambda: _tables(EXAMPLES / "puma_points.csv", lines=40),
     ),
     "clearance": (
         ".csv",
         read_measured,
-        lambda: _texts(EXAMPLES / "five_bar_rest.csv", EXAMPLES / "five_bar_paths.csv", lines=300),
+        lambda: _tables(EXAMPLES / "five_bar_rest.csv", EXAMPLES / "five_bar_paths.csv", lines=300),
     ),
 }
 

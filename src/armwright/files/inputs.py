@@ -213,7 +213,7 @@ def decoded(data: bytes, path: Path | str) -> str:
 
 def not_utf8(path: Path | str, line: int, byte: int) -> FileFormatError:
     """Return the error that says which byte of a line is no UTF-8."""
-    return FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} has no meaning")
+    return FileFormatError(path, line, "", f"not UTF-8 text: byte 0x{byte:02x} has no meaning; save it as UTF-8")
 
 
 def _too_large(path: Path, bound: str, size: int | None) -> FileFormatError:
