@@ -139,7 +139,8 @@ def test_standard_input_that_is_no_text() -> None:
     result = fmt("-", typed=b"BEGIN\n\xff END.")
 
     assert result.returncode == 4
-    assert result.stderr.decode() == "armwright: standard input:2: not UTF-8 text: byte 0xff has no meaning\n"
+    reason = "not UTF-8 text: byte 0xff has no meaning; save it as UTF-8"
+    assert result.stderr.decode() == f"armwright: standard input:2: {reason}\n"
 
 
 def test_wrong_program(written: Path) -> None:

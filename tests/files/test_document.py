@@ -289,11 +289,11 @@ def test_not_utf_8(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_bytes(b"x = 1\n# caf\xe9\n")
 
     said = refused(tmp_path, lambda: read_text(tmp_path / "a.toml"))
-    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 has no meaning"
+    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 has no meaning; save it as UTF-8"
 
     (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbfx = 1\n\xe9\n")
     said = refused(tmp_path, lambda: read_text(tmp_path / "a.toml"))
-    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 has no meaning"
+    assert said == "a.toml:2: not UTF-8 text: byte 0xe9 has no meaning; save it as UTF-8"
 
 
 def test_missing_file(tmp_path: Path) -> None:
