@@ -16,7 +16,7 @@ from armwright.motion.straight import straight_line
 from kinematics import toolbox_robot
 
 DEVIATION = 1e-4
-START = np.array([0.6, 0.2, 0.6, 0.3, 0.9, 0.1])
+START = np.array([0.6, -0.3, 0.9, 0.3, 0.9, 0.1])
 WAY = (0.1, -0.4, -0.28)
 
 

@@ -46,16 +46,23 @@ def largest_squares(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) ->
     Source:
         Pham & Pham, "A new approach to time-optimal path parameterization based on reachability analysis" (2018).
     """
-    sides = _sides(bounds)
-    twice = 2 * lengths
-    reachable = np.zeros(len(lengths) + 1)
+    sides, twice = _sides(bounds), (2 * lengths).tolist()
+    reachable = [0.0] * (len(twice) + 1)
     reachable[-1] = MOST if rests[1] else 0.0
-    for i in reversed(range(len(lengths))):
-        reachable[i] = _largest(sides, i, twice[i], reachable[i + 1])
-    x = np.zeros(len(lengths) + 1)
+    top, top_highs, top_lows = sides.top.tolist(), *sides.room(sides.top)
+    for i in reversed(range(len(twice))):
+        # Mostly the end is reached from the largest x of all.
+        by_end = 1 / twice[i] * top[i]
+        high, low = min(top_highs[i], reachable[i + 1] / twice[i] - by_end), max(top_lows[i], -by_end)
+        if high - low >= -_ROUNDING * (abs(high) + abs(low)):
+            reachable[i] = top[i]
+        else:
+            reachable[i] = _largest(sides, i, twice[i], reachable[i + 1])
+    x = np.zeros(len(reachable))
     x[0] = reachable[0] if rests[0] else 0.0
-    for i in range(len(lengths)):
-        u = (sides.upper[i, 1:] - sides.lean[i, 1:] * x[i]).min()
+    most, _ = sides.room(np.array(reachable[:-1]))
+    for i in range(len(twice)):
+        u = most[i] if x[i] == reachable[i] else float((sides.upper[i, 1:] - sides.lean[i, 1:] * x[i]).min())
         x[i + 1] = max(0.0, min(reachable[i + 1], x[i] + twice[i] * u))
     return x
 
@@ -70,6 +77,11 @@ class _Sides(NamedTuple):
     lower: Array
     lean: Array
     top: Array
+
+    def room(self, x: Array) -> tuple[list[float], list[float]]:
+        """Return the least upper and the greatest lower bounds of u on every interval at x (N,)."""
+        by_x = self.lean[:, 1:] * x[:, None]
+        return (self.upper[:, 1:] - by_x).min(axis=1).tolist(), (self.lower[:, 1:] - by_x).max(axis=1).tolist()
 
 
 def _sides(bounds: Bounds) -> _Sides:

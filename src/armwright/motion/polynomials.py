@@ -6,6 +6,7 @@ Coefficients are (m, k, n): of m segments and n joints, of the powers 0 to k-1 o
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -19,9 +20,11 @@ _POLISHES = 3
 
 def evaluate(terms: Array, t: Array) -> Array:
     """Return values (m, n) at times t that broadcast with (m, n)."""
-    value = np.zeros(np.broadcast_shapes(t.shape, terms[:, 0].shape))
-    for power in reversed(range(terms.shape[1])):
-        value = value * t + terms[:, power]
+    value = np.empty(np.broadcast_shapes(t.shape, terms[:, 0].shape))
+    value[...] = terms[:, -1]
+    for power in reversed(range(terms.shape[1] - 1)):
+        value *= t
+        value += terms[:, power]
     return value
 
 
@@ -85,19 +88,20 @@ def extremes(terms: Array, lengths: Array) -> tuple[Array, Array]:
 def peaks(terms: Array, lengths: Array) -> Array:
     """Return the largest magnitude (n,) of all segments.
 
-    Only segments whose Bernstein coefficients go beyond the largest value at an end of any can hold a larger one.
+    Only polynomials whose Bernstein coefficients go beyond the largest value at an end of any can hold a larger one.
 
     Args:
         terms: (m, k, n) coefficients.
         lengths: (m,) of the segments.
     """
+    segments, count, joints = terms.shape
     at_ends = np.maximum(np.abs(terms[:, 0]), np.abs(evaluate(terms, lengths[:, None]))).max(axis=0)
-    scaled = terms * (lengths[:, None] ** np.arange(terms.shape[1]))[..., None]
-    control = np.abs(np.swapaxes(scaled, 1, 2) @ _bernstein(terms.shape[1] - 1))
-    higher = (control.max(axis=2) > at_ends).any(axis=1)
-    lowest, highest = extremes(terms[higher], lengths[higher])
-    inside = np.maximum(np.abs(lowest), np.abs(highest)).max(axis=0, initial=0.0)
-    return np.asarray(np.maximum(at_ends, inside))
+    rows = np.swapaxes(terms * _powers(lengths, count)[..., None], 1, 2).reshape(-1, count)
+    control = np.abs(rows @ _bernstein(count - 1)).max(axis=1).reshape(segments, joints)
+    segment, joint = np.nonzero(control > at_ends)
+    lowest, highest = extremes(terms[segment, :, joint][..., None], lengths[segment])
+    np.maximum.at(at_ends, joint, np.maximum(np.abs(lowest), np.abs(highest))[:, 0])
+    return np.asarray(at_ends)
 
 
 def turning_times(terms: Array, lengths: Array) -> list[Array]:
@@ -110,7 +114,7 @@ def turning_times(terms: Array, lengths: Array) -> list[Array]:
     if count < 3:
         return []
     # By the part of the segment that has passed, so that coefficients compare.
-    slopes = terms[:, 1:] * (np.arange(1, count) * lengths[:, None] ** np.arange(1, count))[..., None]
+    slopes = terms[:, 1:] * (np.arange(1, count) * _powers(lengths, count)[:, 1:])[..., None]
     rows = np.swapaxes(slopes, 1, 2).reshape(-1, count - 1)
     control = rows @ _bernstein(count - 2)
     turns = np.flatnonzero((control.min(axis=1) < 0) & (control.max(axis=1) > 0))
@@ -122,6 +126,14 @@ def turning_times(terms: Array, lengths: Array) -> list[Array]:
     return list(np.moveaxis(times, -1, 0))
 
 
+def _powers(lengths: Array, count: int) -> Array:
+    """Return the powers (m, count) of lengths (m,), from 0."""
+    powers = np.ones((len(lengths), count))
+    powers[:, 1:] = lengths[:, None]
+    return np.multiply.accumulate(powers, axis=1)
+
+
+@cache
 def _bernstein(degree: int) -> Array:
     """Return the matrix that takes coefficients of powers to Bernstein coefficients on [0, 1]."""
     return np.array([[math.comb(i, j) / math.comb(degree, j) for i in range(degree + 1)] for j in range(degree + 1)])

@@ -191,9 +191,10 @@ def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
     speed, acceleration = arm.limit("speed"), arm.limit("acceleration")
     ramp = 0.0 if np.isfinite(acceleration).all() else _RAMP
     a, b = [np.full((len(lengths), 1), ramp)], [np.zeros((len(lengths), 1))]
+    rates, bends = derivative(terms, 1), derivative(terms, 2)
     for part in _PARTS:
         at = (part * lengths)[:, None]
-        rate, bend = evaluate(derivative(terms, 1), at), evaluate(derivative(terms, 2), at)
+        rate, bend = evaluate(rates, at), evaluate(bends, at)
         # At this part of the segment x has grown by 2 u times the way.
         for on_u, on_x in (
             (0.0, 1 / caps[:, None] ** 2),
