@@ -179,6 +179,22 @@ def test_the_spline_of_the_report_swings() -> None:
     assert not faults(arm, by_via(arm, q, X), X)
 
 
+def test_a_leg_that_comes_back_does_not_count() -> None:
+    """Where a later leg ends inside a corner, the distance at the corner is that from the legs which meet there."""
+    arm, q, X = corner_of_ur5()
+    inside = homogeneous(DOWN, X[1, :3, 3] + 0.012 * np.array([0.0, 0.447, -0.894]))
+    X = np.concatenate([X, inside[None]])
+
+    stage = by_via(arm, q, X)
+
+    corner = X[1, :3, 3]
+    hand = forward(arm, stage.trajectory(np.linspace(0, stage.trajectory.duration, LOOKS)))
+    passed = np.linalg.norm(hand[: LOOKS // 2, :3, 3] - corner, axis=-1).min()
+    assert stage.deviation is not None
+    assert stage.deviation > 0.8 * passed > 0.008
+    assert not faults(arm, stage, X)
+
+
 def test_speed_is_even_behind_a_corner() -> None:
     """On the straight 300 mm behind the corner the hand gathers speed once and loses it once."""
     arm, q, X = corner_of_ur5()

@@ -106,6 +106,11 @@ class _Legs(NamedTuple):
     bend: Array
     twist: Array
 
+    @property
+    def times(self) -> Array:
+        """When the poses are passed at the largest of the speeds (k,) [s]."""
+        return np.asarray(np.concatenate([[0.0], np.cumsum(self.lengths)]) / self.speeds.max())
+
 
 class _Task(NamedTuple):
     """What is to be planned.
@@ -296,12 +301,13 @@ def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
 
 def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> Certificate:
     """Return what a run keeps of its straight legs."""
-    legs = farthest_from_legs(solver_of(task.arm), tracking.trajectory, task.path.poses[:, :3, 3])
+    legs = farthest_from_legs(solver_of(task.arm), tracking.trajectory, task.legs.poses[:, :3, 3], task.legs.times)
     miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (task.legs.bend, task.legs.twist))
     time = run.when(legs.time) * run.trajectory.duration
     return attrs.evolve(
         certificate_of(task.arm, run.trajectory, tracking.error, task.allowed, time=time),
-        deviation=min(task.off + miss, legs.bound),
+        # Poses that are passed with others are as near to them.
+        deviation=min(task.off + miss, legs.bound + task.off - task.closer),
         deviation_seen=legs.sampled,
         turn=ROTATION_PER_METRE * task.off + twist,
         turn_seen=None,
@@ -313,8 +319,7 @@ def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> 
 def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, Timed]:
     """Return the joints along the rounded path over the time at full speed, and their run."""
     legs, solver = task.legs, solver_of(task.arm)
-    top = float(legs.speeds.max())
-    times = np.concatenate([[0.0], np.cumsum(legs.lengths)]) / top
+    top, times = float(legs.speeds.max()), legs.times
     blends = np.concatenate([[_NO_BLEND], widths / top, [_NO_BLEND]])
     hand = hand_path(legs.poses, times, blends, ends="running", orientation="geodesic")
     close, wide = tolerance(task.closer), tolerance(_CLOSER * task.closer)
