@@ -124,7 +124,7 @@ def coarse_line(
         ArmwrightError: as for ``straight_line``, but for an arm whose joints cannot hold it up.
     """
     first: PathError | None = None
-    for tried in [each for each in COARSE if each <= deviation] or [deviation]:
+    for tried in coarse_deviations(deviation):
         try:
             return certified_line(arm, q_start, X_goal, tolerance(tried), speed=speed, weak=True)
         except PathError as error:
@@ -133,6 +133,11 @@ def coarse_line(
                 break
     assert first is not None  # noqa: S101 - one deviation at least is tried
     raise first
+
+
+def coarse_deviations(deviation: float) -> list[float]:
+    """Return the deviations that a path is tried with, of those that an allowed one includes [m]."""
+    return [each for each in COARSE if each <= deviation] or [deviation]
 
 
 def asked_line(arm: Arm, A: Array, B: Array, speed: float) -> StraightPath | None:

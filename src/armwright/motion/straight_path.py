@@ -186,7 +186,7 @@ def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> 
     )
 
 
-def report_path(arm: Arm, path: Path, *, deviation: float, speed: float) -> StraightPath:
+def report_path(arm: Arm, path: Path, *, deviation: float, speed: float, finer: int = 1) -> StraightPath:
     """Return the straight ways of a path, run past its corners without a stop as the report's rule times them.
 
     Args:
@@ -194,6 +194,7 @@ def report_path(arm: Arm, path: Path, *, deviation: float, speed: float) -> Stra
         path: the ways; those without length are left out.
         deviation: that the rule places knots for [m].
         speed: 1 to 120.
+        finer: how many times more knots than the rule asks for.
 
     Raises:
         ArmwrightError: as for ``place_knots``.
@@ -201,7 +202,7 @@ def report_path(arm: Arm, path: Path, *, deviation: float, speed: float) -> Stra
     Source:
         TR-83-008, "continuous motion".
     """
-    knots = place_knots(arm, path, deviation=deviation, speed=speed)
+    knots = place_knots(arm, path, deviation=deviation, speed=speed, finer=finer)
     numbers = tuple(np.flatnonzero(path.lengths() > NEGLIGIBLE).tolist())
     way = np.searchsorted(numbers, knots.segments)
     last = np.append(np.flatnonzero(np.diff(way)), len(way) - 1)

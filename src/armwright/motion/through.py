@@ -9,16 +9,19 @@ from armwright.arrays import Array, ArrayLike
 from armwright.motion.certified import CertifiedMotion, slowed_alike, standstill
 from armwright.motion.ends import check_ends
 from armwright.motion.moves import exact_poses
-from armwright.motion.obstruction import Obstruction
+from armwright.motion.obstruction import Obstruction, PathError
 from armwright.motion.path import NEGLIGIBLE, Path
 from armwright.motion.solver import AnyArm, solver_of
+from armwright.motion.straight import coarse_deviations
 from armwright.motion.straight_path import report_path
 from armwright.motion.tolerance import tolerance
-from armwright.motion.tracking import Task, check_velocities, path_error, track
+from armwright.motion.tracking import Task, check_velocities, excess, path_error, too_far, track
 
 # The report's path through several frames turns its corners without a stop, so it must round them; and it is gross
 # motion. It may leave the straight ways between its frames by this many times what a line may leave its own.
 _CORNERS = 20.0
+# How often the steps of the report's rule are halved at most.
+_HALVINGS = 6
 
 
 def through_frames(
@@ -58,16 +61,39 @@ def through_frames(
 
 
 def through(arm: AnyArm, path: Path, q_start: Array, *, deviation: float, speed: float) -> CertifiedMotion:
-    """Return what ``through_frames`` does, for a path that begins where the hand is at ``q_start``."""
+    """Return what ``through_frames`` does, for a path that begins where the tool is at ``q_start``."""
     solver = solver_of(arm)
     allowed = tolerance(_CORNERS * tolerance(deviation).position)
     if path.lengths().max() <= NEGLIGIBLE:
         return standstill(solver, q_start, allowed)
     check_ends(solver, path, q_start)
-    motion = report_path(solver.arm, path, deviation=deviation, speed=speed)
-    task = Task(solver, motion, q_start, allowed, allowed, smooth=False, clock=np.asarray)
-    found = track(task, motion.progress.times)
-    if isinstance(found, Obstruction):
-        raise path_error(motion, found)
-    check_velocities(task, found)
-    return slowed_alike(arm, found, allowed)
+    motions: list[CertifiedMotion] = []
+    for tried in coarse_deviations(deviation):
+        try:
+            motions.append(_through(arm, path, q_start, deviation=tried, speed=speed))
+        except PathError as error:
+            last = error
+            if error.cause == "reach":  # a pose out of reach is so for every deviation
+                break
+    if not motions:
+        raise last
+    return min(motions, key=lambda motion: motion.trajectory.duration)
+
+
+def _through(arm: AnyArm, path: Path, q_start: Array, *, deviation: float, speed: float) -> CertifiedMotion:
+    """Return the motion with as few knots as keep the deviation: those of the report's rule, or two, four ... as many.
+
+    All steps are divided alike, since an X-spline through steps of different lengths asks for larger accelerations.
+    """
+    solver, allowed = solver_of(arm), tolerance(_CORNERS * deviation)
+    for halvings in range(_HALVINGS + 1):
+        motion = report_path(solver.arm, path, deviation=deviation, speed=speed, finer=2**halvings)
+        task = Task(solver, motion, q_start, allowed, allowed, smooth=False, refine=False, clock=np.asarray)
+        tracking = track(task, motion.progress.times)
+        if isinstance(tracking, Obstruction):
+            raise path_error(motion, tracking)
+        if excess(tracking.error, allowed).max() <= 1:
+            check_velocities(task, tracking)
+            return slowed_alike(arm, tracking, allowed)
+        obstruction = too_far(task, tracking)
+    raise path_error(motion, obstruction)

@@ -68,6 +68,8 @@ class Task(NamedTuple):
             None where limits and speeds do not stop the arm when it is searched for what does.
         max_slowdown: how many times as fast as it may a joint may have to be, before more knots are put for it.
         most_knots: that are put.
+        refine: whether knots are added where the tool is too far from its path; otherwise the error may pass the
+            tolerance, and ``excess`` says by how much.
     """
 
     solver: Solver
@@ -81,6 +83,7 @@ class Task(NamedTuple):
     clock: Callable[[Array], Array] | None = None
     max_slowdown: float = MAX_SLOWDOWN
     most_knots: int = 4000
+    refine: bool = True
 
 
 class Tracking(NamedTuple):
@@ -120,6 +123,29 @@ def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking | Obst
     if obstruction is None:
         return _refined(task, knots, diagnosis)
     return found if obstruction.agrees(found, float(knots[-1])) else obstruction
+
+
+def excess(error: TrackingError, allowed: Tolerance) -> Array:
+    """Return how many times the tolerance the error of the tool is on each interval (m,)."""
+    backward = 0.0 if error.backward is None else error.backward
+    return np.asarray(
+        np.maximum(np.maximum(error.position, backward) / allowed.position, error.orientation / allowed.orientation)
+    )
+
+
+def too_far(task: Task, tracking: Tracking) -> Obstruction:
+    """Return that the tool cannot be kept on its path, however many knots there are, with the worst interval."""
+    arm, trajectory = task.solver.arm, tracking.trajectory
+    worst, speed = int(excess(tracking.error, task.tolerance).argmax()), arm.limit("speed")
+    time = float(trajectory.times[worst])
+    q, q_next = trajectory(trajectory.times[worst : worst + 2])
+    jump = np.abs(q_next - q) / np.where(np.isfinite(speed), speed, 1.0)
+    joint, near = int(jump.argmax()) + 1, nearest_singularity(arm, q)
+    reason = (
+        f"the hand cannot be kept within {task.tolerance.position * 1e3:.3g} mm of its path: the arm is singular "
+        f"there ({near}), {arm.called(joint - 1)} would have to move at once"
+    )
+    return Obstruction("singular", time, joint, reason)
 
 
 def path_error(motion: HandMotion, obstruction: Obstruction) -> PathError:
@@ -173,20 +199,23 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
         speed, acceleration = cubic_peaks(trajectory.coefficients, h)
         hand = hand_bounds(arm, trajectory.coefficients, h, speed, acceleration)
         error = tracking_error(task.solver, task.motion, trajectory, hand, task.tolerance)
-        excess = _excess(error, task.tolerance)
-        if excess.max() <= 1:
-            return _between_knots(arm, trajectory) or Tracking(trajectory, error, speed, acceleration)
+        tracking = Tracking(trajectory, error, speed, acceleration)
+        ratios = excess(error, task.tolerance)
+        if ratios.max() <= 1:
+            return _between_knots(arm, trajectory) or tracking
+        if not task.refine:
+            return tracking
         ratio = np.where((h < knots[-1] / _SHORT)[:, None], _velocity_ratios(task, trajectory, speed), 0.0)
         if ratio.max() > task.max_slowdown:
             worst = int(ratio.max(axis=1).argmax())
             return singular(arm, q[worst : worst + 2], knots[worst : worst + 2], ratio[worst])
-        parts = np.where(excess > 1, np.clip(np.ceil(_CLOSER * excess**0.25), 2, _PARTS), 1).astype(np.intp)
+        parts = np.where(ratios > 1, np.clip(np.ceil(_CLOSER * ratios**0.25), 2, _PARTS), 1).astype(np.intp)
         if parts.sum() > task.most_knots:
             break
         knots = divided(knots, parts)
         if task.solver.inverse_branches is None:  # from where they nearly are already they are found at once
             postures = trajectory
-    return _too_far(task, q, knots, int(excess.argmax()))
+    return too_far(task, tracking)
 
 
 def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
@@ -199,14 +228,6 @@ def _spline(task: Task, knots: Array, q: Array) -> Trajectory:
 def _rate(t: Array, q: Array) -> Array:
     """Return the rate (n,) at the first of four knots or more: that of the cubic through them."""
     return np.asarray(np.linalg.solve(np.vander(t[:4] - t[0], increasing=True), q[:4])[1])
-
-
-def _excess(error: TrackingError, allowed: Tolerance) -> Array:
-    """Return which part of what is allowed the hand is off on each interval (m,)."""
-    backward = 0.0 if error.backward is None else error.backward
-    return np.asarray(
-        np.maximum(np.maximum(error.position, backward) / allowed.position, error.orientation / allowed.orientation)
-    )
 
 
 def _diagnosed(task: Task, diagnosis: Diagnosis) -> Obstruction | None:
@@ -231,16 +252,3 @@ def _between_knots(arm: Arm, trajectory: Trajectory) -> Obstruction | None:
     t = turning_points(c, np.diff(trajectory.times))
     q = ((c[:, 3] * t + c[:, 2]) * t + c[:, 1]) * t + c[:, 0]
     return beyond_limits(arm, q[0], trajectory.times) or beyond_limits(arm, q[1], trajectory.times)
-
-
-def _too_far(task: Task, q: Array, knots: Array, worst: int) -> Obstruction:
-    """Return that the hand cannot be kept on its path after a knot, however many there are."""
-    arm = task.solver.arm
-    speed = arm.limit("speed")
-    jump = np.abs(q[worst + 1] - q[worst]) / np.where(np.isfinite(speed), speed, 1.0)
-    joint, near = int(jump.argmax()) + 1, nearest_singularity(arm, q[worst])
-    reason = (
-        f"the hand cannot be kept within {task.tolerance.position * 1e3:.3g} mm of its path: the arm is singular "
-        f"there ({near}), {arm.called(joint - 1)} would have to move at once"
-    )
-    return Obstruction("singular", float(knots[worst]), joint, reason)
