@@ -16,7 +16,7 @@ from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
 
 ARMS = ("puma560", "stanford", "ur5")
-# Smallest singular value of the Jacobian of a well-conditioned posture [m].
+# Smallest singular value of the Jacobian of a well-conditioned configuration [m].
 REGULAR = 1e-3
 DECADES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 0.0)
 # A pose is met within this [m] and [rad].
@@ -35,10 +35,10 @@ class EdgeSet:
         name: what the poses are.
         arm: the arm, with the limits that count.
         X: (N, 4, 4) the poses.
-        q: (N, 6) the postures that they were made of.
+        q: (N, 6) the configurations that they were made of.
         met: how near to the pose counts as met [m] and [rad].
         reachable: whether the arm can be at the poses, limits aside.
-        own: whether the posture that made a pose should be among the answers.
+        own: whether the configuration that made a pose should be among the answers.
         turns: whether it should be so with its whole turns, when asked from there.
         decade: distance from the singularity; None for other sets.
     """
@@ -70,7 +70,7 @@ def edge_sets(name: str) -> list[EdgeSet]:
     ]
 
 
-def _of_postures(name: str, arm: Arm, q: Array, **more: object) -> EdgeSet:
+def _of_configurations(name: str, arm: Arm, q: Array, **more: object) -> EdgeSet:
     return EdgeSet(name=name, arm=arm, q=q, X=forward(arm, q), **more)  # type: ignore[arg-type]
 
 
@@ -86,7 +86,7 @@ def _wide(arm: Arm) -> Arm:
 
 
 def _random(arm: Arm, rng: np.random.Generator, count: int, margin: float = 0.0) -> Array:
-    """Postures inside the limits, (count, 6), angles within half a turn."""
+    """Configurations inside the limits, (count, 6), angles within half a turn."""
     turns = np.array([joint.revolute for joint in arm.joints])
     lower, upper = arm.limits.lower + margin, arm.limits.upper - margin
     lower, upper = np.where(turns, np.maximum(lower, -np.pi), lower), np.where(turns, np.minimum(upper, np.pi), upper)
@@ -102,15 +102,15 @@ def _grid(arm: Arm) -> list[EdgeSet]:
     regular = _smallest(arm, q) > REGULAR
     well, ill = (rows[:: max(1, len(rows) // _GRID)] for rows in (q[regular], q[~regular]))
     return [
-        _of_postures("45° grid, well-conditioned", arm, well),
-        _of_postures("45° grid, singular", arm, ill, own=False),
+        _of_configurations("45° grid, well-conditioned", arm, well),
+        _of_configurations("45° grid, singular", arm, ill, own=False),
     ]
 
 
 def _right_angle(arm: Arm, rng: np.random.Generator) -> EdgeSet:
     q = _random(arm, rng, 4 * _MANY)
     q[:, 1] = np.pi / 2
-    return _of_postures("q2 = 90° exactly", arm, q[_smallest(arm, q) > REGULAR][:_MANY])
+    return _of_configurations("q2 = 90° exactly", arm, q[_smallest(arm, q) > REGULAR][:_MANY])
 
 
 def _singular(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
@@ -122,12 +122,12 @@ def _singular(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
             shift = decade * np.eye(arm.n)[joint]
             q = exact if not decade else np.concatenate([exact + shift, exact - shift])
             # At a zero a family may be free, of which any member will do.
-            sets.append(_of_postures(factor, arm, q, own=decade > 0, decade=decade))
+            sets.append(_of_configurations(factor, arm, q, own=decade > 0, decade=decade))
     return sets
 
 
 def _zero(arm: Arm, geometry: ClosedFormGeometry, rng: np.random.Generator, factor: int, joint: int) -> Array:
-    """Return a posture at which one factor vanishes, by the choice of one joint, and the others do not."""
+    """Return a configuration at which one factor vanishes, by the choice of one joint, and the others do not."""
     span = np.linspace(-3.0, 3.0, 60) if arm.joints[joint].revolute else np.linspace(-1.2, 1.2, 60)
     while True:
         q = _random(arm, rng, 1)[0]
@@ -154,7 +154,7 @@ def _at_limits(arm: Arm, rng: np.random.Generator) -> EdgeSet:
             q = _random(arm, rng, 4 * _FEW)
             q[:, joint] = limit
             found.append(q[_smallest(arm, q) > REGULAR][: 2 * _FEW])
-    return _of_postures("one joint at its limit", arm, np.concatenate(found))
+    return _of_configurations("one joint at its limit", arm, np.concatenate(found))
 
 
 def _rounded(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
@@ -170,20 +170,20 @@ def _rounded(arm: Arm, rng: np.random.Generator) -> list[EdgeSet]:
 
 
 def _whole_turns(arm: Arm, rng: np.random.Generator) -> EdgeSet:
-    """Postures with an angle beyond half a turn, where the limits have room for it."""
+    """Configurations with an angle beyond half a turn, where the limits have room for it."""
     q = rng.uniform(arm.limits.lower, arm.limits.upper, size=(100 * _MANY, arm.n))
     turns = np.array([joint.revolute for joint in arm.joints])
     q = q[(np.abs(q[:, turns]) > np.pi).any(axis=-1)]
     q = q[_smallest(arm, q) > REGULAR][:_MANY] if len(q) else q
-    return _of_postures("asked from a posture beyond half a turn", arm, q, turns=True)
+    return _of_configurations("asked from a configuration beyond half a turn", arm, q, turns=True)
 
 
 def _beyond_limits(arm: Arm, rng: np.random.Generator) -> EdgeSet:
-    """Postures of which some joint is outside its limits; another branch of the pose may well be inside."""
+    """Configurations of which some joint is outside its limits; another branch of the pose may well be inside."""
     q = _random(_wide(arm), rng, 20 * _MANY)
     outside = ((q < arm.limits.lower - 1e-3) | (q > arm.limits.upper + 1e-3)).any(axis=-1)
     q = q[outside & (_smallest(arm, q) > REGULAR)][:_MANY]
-    return _of_postures("made outside the limits", arm, q)
+    return _of_configurations("made outside the limits", arm, q)
 
 
 def _out_of_reach(arm: Arm, rng: np.random.Generator) -> EdgeSet:

@@ -1,4 +1,4 @@
-"""One way to ask every library for the postures of a pose, and the proof that its model is ours."""
+"""One way to ask every library for the configurations of a pose, and the proof that its model is ours."""
 
 import functools
 from typing import Protocol
@@ -16,7 +16,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.solution import Outcome
 from armwright.kinematics.inverse_kinematics.solve import inverse
 
-# Two models that put the hand this near to each other at random postures are one [m] and entries of a rotation.
+# Two models that put the hand this near to each other at random configurations are one [m] and entries of a rotation.
 _SAME_MODEL = 1e-12
 
 
@@ -25,10 +25,10 @@ class Reply:
     """What a library answers for one pose.
 
     Attributes:
-        rows: (k, 6) the postures that it returns.
+        rows: (k, 6) the configurations that it returns.
         claimed: (k,) whether it says that they meet the pose.
         reached: whether it says that the pose can be reached; None where it looks inside the limits only.
-        inside: whether it says that a posture is inside the limits; None where it knows no limits.
+        inside: whether it says that a configuration is inside the limits; None where it knows no limits.
         errors: (k, 2) the residuals that it reports [m] and [rad]; None where it reports none for each row.
     """
 
@@ -42,10 +42,10 @@ class Reply:
 class Solver(Protocol):
     """A library, set up for one arm."""
 
-    one: bool  # whether it gives one posture only
+    one: bool  # whether it gives one configuration only
 
     def model(self, q: Array) -> Array:
-        """Return its own forward pose of a posture, (4, 4)."""
+        """Return its own forward pose of a configuration, (4, 4)."""
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:
         """Ask for a pose; ``arm`` has the limits of the set, ``near`` where to start from."""
@@ -60,7 +60,7 @@ class Armwright:
         self.arm = load_arm(name)
 
     def model(self, q: Array) -> Array:
-        """Return its own forward pose of a posture, (4, 4)."""
+        """Return its own forward pose of a configuration, (4, 4)."""
         return forward(self.arm, q)
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:
@@ -88,7 +88,7 @@ class Eaik:
         self.robot = DhRobot(*(np.array([getattr(joint, key) for joint in joints]) for key in ("alpha", "a", "d")))
 
     def model(self, q: Array) -> Array:
-        """Return its own forward pose of a posture, (4, 4)."""
+        """Return its own forward pose of a configuration, (4, 4)."""
         return self.robot.fwdKin(q)
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:  # noqa: ARG002
@@ -117,7 +117,7 @@ def _limit(robot: DHRobot, arm: Arm) -> None:
 
 
 class ToolboxAnalytic:
-    """``analytic_ik()`` of the Robotics Toolbox: all postures, and whether any is inside the limits."""
+    """``analytic_ik()`` of the Robotics Toolbox: all configurations, and whether any is inside the limits."""
 
     one = False
 
@@ -126,7 +126,7 @@ class ToolboxAnalytic:
         self.solver = self.robot.analytic_ik()
 
     def model(self, q: Array) -> Array:
-        """Return its own forward pose of a posture, (4, 4)."""
+        """Return its own forward pose of a configuration, (4, 4)."""
         return self.robot.fkine(q).A
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:
@@ -136,7 +136,7 @@ class ToolboxAnalytic:
         everything = self.solver.solve(X, joint_limits=False)
         rows = np.asarray(everything.q).reshape(-1, 6)
         if near is not None:
-            # From a posture it gives the nearest one, turned to it.
+            # From a configuration it gives the nearest one, turned to it.
             nearest = self.solver.ikine(X, q0=near)
             rows = np.asarray(nearest.q).reshape(-1, 6) if nearest.success else rows[:0]
         return Reply(
@@ -165,7 +165,7 @@ class ToolboxPuma:
         self.robot.links[3].d = load_arm(name).joints[3].d
 
     def model(self, q: Array) -> Array:
-        """Return its own forward pose of a posture, (4, 4)."""
+        """Return its own forward pose of a configuration, (4, 4)."""
         return self.robot.fkine(q + self._shift).A
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:  # noqa: ARG002
@@ -177,7 +177,7 @@ class ToolboxPuma:
 
 
 class ToolboxNumeric:
-    """``ikine_LM`` of the Robotics Toolbox, with a tolerance fine enough for 1e-6 m; one posture, inside the limits."""
+    """``ikine_LM`` of the Robotics Toolbox, with a tolerance fine enough for 1e-6 m; one solution inside the limits."""
 
     one = True
 
@@ -185,7 +185,7 @@ class ToolboxNumeric:
         self.robot = _toolbox(name)
 
     def model(self, q: Array) -> Array:
-        """Return its own forward pose of a posture, (4, 4)."""
+        """Return its own forward pose of a configuration, (4, 4)."""
         return self.robot.fkine(q).A
 
     def solve(self, arm: Arm, X: Array, near: Array | None) -> Reply:

@@ -24,7 +24,7 @@ from oracles.with_pinocchio import pinocchio_model
 PAGE = Path(__file__).parents[1] / "docs/physics/inverse-at-the-edges.md"
 START, END = "<!-- measured -->", "<!-- end of measured -->"
 PEERS = ("armwright", "eaik", "roboticstoolbox-python", "pin", "numpy")
-# The posture that made a pose is found again within this [rad] or [m].
+# The configuration that made a pose is found again within this [rad] or [m].
 OWN = 1e-6
 # Rows this near to each other are one row twice [rad] or [m].
 TWICE = 1e-8
@@ -38,7 +38,7 @@ class Judged:
 
     Attributes:
         solved: whether one of the rows meets the pose.
-        own: whether the posture that made the pose is among them.
+        own: whether the configuration that made the pose is among them.
         rows: how many there are.
         twice: how many of them repeat another.
         residual: the largest among those that are said to meet the pose, m or rad; 0 without any.
@@ -65,7 +65,7 @@ class Judge:
         self.turns = np.array([joint.revolute for joint in arm.joints])
 
     def errors(self, q: Array, X: Array) -> tuple[float, float]:
-        """Return how far from a pose a posture puts the hand [m] and [rad]."""
+        """Return how far from a pose a configuration puts the hand [m] and [rad]."""
         pin.framesForwardKinematics(self.model, self.data, q)
         place = self.data.oMf[self.tool]
         R = X[:3, :3].T @ place.rotation
@@ -73,12 +73,12 @@ class Judge:
         return float(np.linalg.norm(place.translation - X[:3, 3])), float(np.arctan2(sine, (np.trace(R) - 1) / 2))
 
     def apart(self, a: Array, b: Array) -> Array:
-        """Return how far postures (..., 6) are apart, but for whole turns (...)."""
+        """Return how far configurations (..., 6) are apart, but for whole turns (...)."""
         gap = np.abs(a - b)
         return np.where(self.turns, np.abs(np.remainder(gap + np.pi, 2 * np.pi) - np.pi), gap).max(axis=-1)
 
     def inside(self, arm: Arm, q: Array) -> bool:
-        """Whether a posture is inside the limits, by whole turns if need be."""
+        """Whether a configuration is inside the limits, by whole turns if need be."""
         images = q[:, None] + np.where(self.turns[:, None], 2 * np.pi * np.arange(-2, 3), 0.0)
         lower, upper = arm.limits.lower[:, None] - ON_LIMIT, arm.limits.upper[:, None] + ON_LIMIT
         return bool(((images >= lower) & (images <= upper)).any(axis=-1).all())
@@ -116,7 +116,7 @@ def measure(edge: EdgeSet, found: dict[str, Solver]) -> dict[str, list[Judged]]:
     }
     judged = {title: [judge.look(edge, k, reply) for k, reply in enumerate(many)] for title, many in replies.items()}
     for k, q in enumerate(edge.q):
-        # A posture inside the limits exists where the pose was made of one, or where any library has shown one.
+        # A configuration inside the limits exists where the pose was made of one, or where any library has shown one.
         inside = edge.reachable and (judge.inside(edge.arm, q) or any(many[k].inside for many in judged.values()))
         for title, many in replies.items():
             wrong = _faults(edge, many[k], inside=inside)
@@ -178,12 +178,19 @@ def report(name: str) -> list[str]:
             misreported[title] = max([misreported.get(title, 0.0), *told])
         if len(edges) > 1:
             decades += [by_decade(title, solver, edges, measured) for title, solver in found.items()]
-    head = ["poses (how many)", "library", "solved, %", "own posture, %", "rows, mean / most", "twice, mean / most"]
+    head = [
+        "poses (how many)",
+        "library",
+        "solved, %",
+        "own configuration, %",
+        "rows, mean / most",
+        "twice, mean / most",
+    ]
     return [
         f"### `{name}`",
         table([*head, "worst residual of a claim", "wrong verdicts"], rows),
         f"The residuals that armwright reports are off by {misreported['armwright']:.0e} at most.",
-        table(["solved / own posture, %", "library", *(f"{x:g}" for x in DECADES if x)], decades),
+        table(["solved / own configuration, %", "library", *(f"{x:g}" for x in DECADES if x)], decades),
     ]
 
 

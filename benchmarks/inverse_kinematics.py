@@ -59,8 +59,8 @@ def compare(name: str) -> list[list[str]]:
 if __name__ == "__main__":
     section(
         "All inverse solutions of many poses",
-        f"armwright: {ROWS} poses, eight postures each with a flag for a free joint, angles turned to within half a "
-        f"turn of a given posture; EAIK: {FEW} poses; `ikine_a`: {SLOW}, on its own PUMA.",
+        f"armwright: {ROWS} poses, eight solutions each with a flag for a free joint, angles within half a "
+        f"revolution of a given configuration; EAIK: {FEW} poses; `ikine_a`: {SLOW}, on its own PUMA.",
         table(
             ["arm", "peer", "peer, µs per pose", "armwright, µs per pose", "into new arrays", "ratio"],
             [row for name in ARMS for row in compare(name)],

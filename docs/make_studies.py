@@ -99,7 +99,7 @@ def puma() -> Iterator[str]:
     yield "## puma-moves\n"
     yield "Joint angles of the three poses in degrees, printed, and computed from the printed poses.\n"
     rows = []
-    for one in puma_moves.posture_table():
+    for one in puma_moves.configuration_table():
         rows.append((one.pose, "printed", *(f"{q:.2f}" for q in one.printed), ""))
         rows.append(("", "computed", *(f"{q:.2f}" for q in one.computed), f"{one.farthest:.2f}"))
     yield from table(("pose", "", *(f"joint {i}" for i in range(1, 7)), "apart"), rows)

@@ -64,7 +64,7 @@ MANY: dict[str, Door] = {
     "bejczy_efforts: q": lambda x: bejczy_efforts(x, Q),
     "bejczy_efforts: qdd": lambda x: bejczy_efforts(Q, x),
 }
-# Functions of one posture (6,).
+# Functions of one configuration (6,).
 ONE: dict[str, Door] = {
     "singularities: q": lambda x: armwright.kinematics.singularities(PUMA, x).singular_values,
     "simulate: q": lambda x: armwright.simulation.simulate(PUMA, x, duration=1e-3, stops=False).q,

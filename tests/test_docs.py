@@ -164,7 +164,7 @@ def known_keys(message: str) -> list[str]:
     return keys
 
 
-HEAD = "[arms.ARM_1]\nposture = [0, 0, 0.3, 0, 0, 0]\n"
+HEAD = "[arms.ARM_1]\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n"
 
 
 @pytest.mark.parametrize(
@@ -283,8 +283,8 @@ def test_names_of_the_translation() -> None:
         assert callable(operator.attrgetter(name)(armwright)), name
 
 
-def test_postures_of_the_picture() -> None:
-    """The pose on the page on kinematics has eight postures; of each pair of wrists joint 4 allows one."""
+def test_configurations_of_the_picture() -> None:
+    """The pose on the page on kinematics has eight configurations; of each pair of wrists joint 4 allows one."""
     text = (DOCS / "physics" / "kinematics.md").read_text(encoding="utf-8")
     found = re.search(r"inverse puma560-seed --xyz (\S+) --rpy ([^`]+)`", text)
     assert found is not None

@@ -138,8 +138,8 @@ def test_leading_axes(door: str) -> None:
 
 
 @pytest.mark.parametrize("door", ONE)
-def test_one_posture_only(door: str) -> None:
-    """Where one posture is asked for, two are refused."""
+def test_one_configuration_only(door: str) -> None:
+    """Where one configuration is asked for, two are refused."""
     with pytest.raises(ShapeError, match=r"expected .*\(6,\), got \(2, 6\)"):
         ONE[door]([Q, Q])
 
@@ -218,7 +218,7 @@ POSES: dict[str, tuple[Any, type[ArmwrightError], str]] = {
 @pytest.mark.parametrize("what", POSES)
 @pytest.mark.parametrize("ask", [armwright.kinematics.inverse, armwright.kinematics.inverse_branches])
 def test_what_is_no_pose(ask: Callable[..., object], what: str) -> None:
-    """What is no pose is refused before any posture is sought, alone or among others, and what is wrong is told."""
+    """What is no pose is refused with a reason before any configuration is sought, alone or among others."""
     value, kind, said = POSES[what]
     with pytest.raises(kind, match=f"^pose: .*{re.escape(said)}"):
         ask(PUMA, value)
@@ -319,7 +319,7 @@ def test_numbers_without_a_meaning(door: str, value: float) -> None:
         (lambda: armwright.motion.quintic(Q, OTHER, 1.0)("x"), KindError, "t: expected numbers, got 'x'"),
         (lambda: armwright.motion.quintic(Q, OTHER, 1.0)(0.5, 1.5), KindError, "order: expected a whole number from 0"),
         (lambda: armwright.Trajectory(times=[0, 1], coefficients=Q), ShapeError, "coefficients: expected (segments,"),
-        (lambda: fitted(armwright.load_arm("stanford"), Q), ShapeError, "q: expected (m, 6) postures"),
+        (lambda: fitted(armwright.load_arm("stanford"), Q), ShapeError, "q: expected (m, 6) configurations"),
         (lambda: pd(PUMA, standing(Q), -1.0, 1.0), InvalidValueError, "kp: expected 0 or more for every joint"),
     ],
 )

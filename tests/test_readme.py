@@ -20,7 +20,7 @@ def _section(title: str) -> str:
 
 
 def test_python_examples_run() -> None:
-    """The Python lines of the README run, find the posture they started from, and their line holds."""
+    """The Python lines of the README run, find the configuration they started from, and their line holds."""
     scope: dict[str, Any] = {}
 
     exec(_section("From Python"), scope)

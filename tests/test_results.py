@@ -68,7 +68,7 @@ def test_copies(name: str, copied: Callable[[Any], Any]) -> None:
         assert not same.flags.writeable
 
 
-def test_equal_postures_hash_equal() -> None:
+def test_equal_configurations_hash_equal() -> None:
     """Two solutions of one pose are equal, hash equal, and so do their branches."""
     one, two = (armwright.kinematics.inverse(PUMA, armwright.kinematics.forward(PUMA, Q)) for _ in range(2))
 

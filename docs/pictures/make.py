@@ -65,7 +65,7 @@ PLACE, TURN = (0.36, 0.02, -0.05), (120, -25, 90)
 AROUND, UP = np.radians(-62), np.radians(22)
 FLOOR = -0.45  # below the shoulder [m]
 COLOURS = {"left": ("#1d6fa5", "#8fc1e3"), "right": ("#b45309", "#f3b26b")}
-POSTURES = ("up, no-flip", "up, flip", "down, no-flip", "down, flip")
+CONFIGURATIONS = ("up, no-flip", "up, flip", "down, no-flip", "down, flip")
 
 
 def seen(p: Array) -> Array:
@@ -105,7 +105,7 @@ def floor(axes: Axes) -> None:
             axes.plot(points[:, 0], points[:, 1], color=GRID, linewidth=0.7, zorder=0)
 
 
-def draw_posture(axes: Axes, arm: Arm, branch: Branch) -> None:
+def draw_configuration(axes: Axes, arm: Arm, branch: Branch) -> None:
     """Draw the arm in one posture; pale where it is outside the limits."""
     dark, light = COLOURS[branch.label.split(",")[0]]
     fills = ("#d3d9df", light, "#52606d", dark)
@@ -148,7 +148,7 @@ def write_angles(axes: Axes, branch: Branch) -> None:
         )
 
 
-def postures() -> Figure:
+def configurations() -> Figure:
     """Draw all postures in which the PUMA holds its hand in one pose."""
     arm = load_arm("puma560-seed")
     roll, pitch, yaw = (
@@ -159,9 +159,9 @@ def postures() -> Figure:
     edges = {"left": 0, "right": 1, "top": 0.95, "bottom": 0.085, "hspace": 0.33, "wspace": 0.05}
     rows = figure.subplots(2, 4, gridspec_kw=edges)
     for row, side in zip(rows, COLOURS, strict=True):
-        for axes, name in zip(row, POSTURES, strict=True):
+        for axes, name in zip(row, CONFIGURATIONS, strict=True):
             branch = branches[f"{side}, {name}"]
-            draw_posture(axes, arm, branch)
+            draw_configuration(axes, arm, branch)
             write_angles(axes, branch)
             axes.set_title(branch.label, fontsize=9.5, fontweight="bold", color=COLOURS[side][0], pad=2)
     return figure
@@ -411,7 +411,7 @@ def before_and_after() -> Figure:
 def main() -> None:
     """Draw all pictures."""
     with mpl.rc_context(STYLE):
-        write(postures(), "postures.svg")
+        write(configurations(), "postures.svg")
         write(released(), "released.svg")
         write(two_moves(), "two_moves.svg")
         write(past_frames(), "past_frames.svg")

@@ -14,7 +14,7 @@ from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.solution import Outcome
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.spatial.poses import homogeneous
-from oracles.arms import random_postures
+from oracles.arms import random_configurations
 from samples import Sample
 
 INCH = 0.0254
@@ -189,9 +189,9 @@ def test_speed_rule_of_the_stanford_arm(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "stanford-jpl", "ur5"])
 def test_reach(name: str, rng: np.random.Generator) -> None:
-    """No posture takes the hand further from the base axis than the published or the computed reach."""
+    """No configuration takes the hand further from the base axis than the published or the computed reach."""
     arm = load_arm(name)
-    places = forward(arm, random_postures(arm, rng, 5000))[:, :3, 3]
+    places = forward(arm, random_configurations(arm, rng, 5000))[:, :3, 3]
 
     farthest = np.hypot(places[:, 0], places[:, 1]).max()
 
@@ -202,9 +202,9 @@ def test_reach(name: str, rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "stanford-jpl", "ur5"])
 def test_motors_are_strong_enough(name: str, rng: np.random.Generator) -> None:
-    """In any posture the motors give what all joints ask that speed up or slow down together at their limits."""
+    """In any configuration the motors give what all joints ask that speed up or slow down together at their limits."""
     arm = load_arm(name)
-    q = random_postures(arm, rng, 2000)
+    q = random_configurations(arm, rng, 2000)
     forward_or_back = rng.choice((-1.0, 1.0), size=(2, *q.shape))
 
     tau = inverse_dynamics(arm, q, forward_or_back[0] * arm.limits.speed, forward_or_back[1] * arm.limits.acceleration)

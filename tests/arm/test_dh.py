@@ -13,7 +13,7 @@ from armwright.arm.model import Arm, Link
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.spatial.poses import inverse
-from oracles.arms import random_arm, random_link, random_pose, random_postures
+from oracles.arms import random_arm, random_configurations, random_link, random_pose
 
 ROUNDING = 1e-12  # matrices multiplied in another order
 
@@ -73,7 +73,7 @@ def test_modified_table(joints: int, rng: np.random.Generator, written: Callable
     table = random_arm(rng, joints)
     arm = written(table, "modified")
 
-    for q in random_postures(table, rng, 20):
+    for q in random_configurations(table, rng, 20):
         np.testing.assert_allclose(link_poses(arm, q)[-1], modified_poses(table, q)[-1], atol=joints * ROUNDING)
 
 

@@ -50,8 +50,8 @@ def test_speeds_and_efforts_are_not_positions(door: str) -> None:
         DOORS[door](DEGREES)
 
 
-def test_one_warning_for_many_postures() -> None:
-    """However many postures there are, there is one warning, of the first such joint and its farthest position."""
+def test_one_warning_for_many_configurations() -> None:
+    """For any number of configurations there is one warning, of the first such joint and its farthest position."""
     rows = np.zeros((50, 4, 6))
     rows[:, 2, 3], rows[7, 2, 3], rows[:, :, 4] = 30.0, -170.0, 80.0
 

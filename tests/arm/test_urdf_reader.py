@@ -61,7 +61,7 @@ def test_by_load_arm(tmp_path: Path) -> None:
 def test_in_a_cell(tmp_path: Path) -> None:
     """An arm of a cell may be a URDF file beside the cell's, if it is built like one that has a closed-form inverse."""
     (tmp_path / "puma.urdf").write_text(urdf_text(load_arm("puma560")))
-    (tmp_path / "cell.toml").write_text('[arms.ARM_1]\nmodel = "puma.urdf"\nposture = [0, 0, 1, 0, 1, 0]\n')
+    (tmp_path / "cell.toml").write_text('[arms.ARM_1]\nmodel = "puma.urdf"\njoint_positions = [0, 0, 1, 0, 1, 0]\n')
 
     assert read_cell(tmp_path / "cell.toml").arms["ARM_1"].arm == load_urdf(tmp_path / "puma.urdf")
 

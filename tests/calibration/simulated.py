@@ -40,8 +40,8 @@ def random_errors(rng: np.random.Generator, chain: Chain, scale: float = 1.0) ->
     return np.asarray(rng.standard_normal(len(chain.names)) * np.where(chain.is_length, LENGTH, ANGLE) * scale)
 
 
-def postures(rng: np.random.Generator, arm: Arm, m: int) -> Array:
-    """Return (m, n) postures all over an arm's room, slides within 0.3 m."""
+def configurations(rng: np.random.Generator, arm: Arm, m: int) -> Array:
+    """Return (m, n) configurations all over an arm's room, slides within 0.3 m."""
     turns = rng.uniform(-2.5, 2.5, (m, arm.n))
     slides = rng.uniform(0.0, 0.3, (m, arm.n))
     return np.where([joint.revolute for joint in arm.joints], turns, slides)

@@ -10,7 +10,7 @@ from armwright.arrays import Array
 from armwright.calibration.chain import Chain, chain_of
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import forward
-from calibration.simulated import postures, random_arm, random_errors, random_pose
+from calibration.simulated import configurations, random_arm, random_errors, random_pose
 
 # Some thirty turns and shifts, each rounded.
 ROUNDING = 1e-13
@@ -59,7 +59,7 @@ def product(chain: Chain, q: Array, errors: npt.NDArray[np.complex128]) -> Compl
 def test_no_errors(name: str, rng: np.random.Generator) -> None:
     """An arm without errors has its tool where forward kinematics has it, for every arm of the catalogue."""
     arm = load_arm(name)
-    q = postures(rng, arm, 20)
+    q = configurations(rng, arm, 20)
 
     reached = chain_of(arm).forward(q)
 
@@ -71,7 +71,7 @@ def test_no_errors(name: str, rng: np.random.Generator) -> None:
 def test_no_errors_anywhere(n: int, rng: np.random.Generator) -> None:
     """The same for arms with slides, and a base and a tool that are turned anyhow."""
     arm = random_arm(rng, n, slides=True)
-    q = postures(rng, arm, 20)
+    q = configurations(rng, arm, 20)
 
     np.testing.assert_allclose(chain_of(arm).forward(q).position, forward(arm, q)[:, :3, 3], atol=ROUNDING)
 
@@ -82,7 +82,7 @@ def test_quarter_turn_of_the_tool(R: tuple[tuple[int, ...], ...], rng: np.random
     tool = np.eye(4)
     tool[:3, :3] = R
     arm = Arm(name="one", joints=[Joint(kind="revolute", a=0.3)], tool=tool)
-    q = postures(rng, arm, 5)
+    q = configurations(rng, arm, 5)
 
     np.testing.assert_allclose(chain_of(arm).forward(q).rotation, forward(arm, q)[:, :3, :3], atol=ROUNDING)
 
@@ -92,7 +92,7 @@ def test_derivatives(n: int, rng: np.random.Generator) -> None:
     """Position, rotation and both derivatives are those of a product of matrices in complex numbers."""
     arm = random_arm(rng, n, slides=True)
     chain = chain_of(arm, base=random_pose(rng, 0.5))
-    q = postures(rng, arm, 3)
+    q = configurations(rng, arm, 3)
     errors = random_errors(rng, chain, scale=30.0)
 
     reached = chain.forward(q, errors)
@@ -115,7 +115,7 @@ def test_derivatives(n: int, rng: np.random.Generator) -> None:
 def test_differences(rng: np.random.Generator) -> None:
     """Moving an error a little moves the tool as the derivative says."""
     chain = chain_of(load_arm("stanford"))
-    q = postures(rng, chain.arm, 10)
+    q = configurations(rng, chain.arm, 10)
     errors = random_errors(rng, chain)
 
     slopes = chain.forward(q, errors).position_jacobian

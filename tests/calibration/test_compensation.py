@@ -13,7 +13,7 @@ from armwright.calibration.nongeometric import calibrate_nongeometric
 from armwright.calibration.readings import readings
 from armwright.errors import ShapeError
 from armwright.spatial.rotations import rotation_vector
-from calibration.simulated import postures, random_errors, seen
+from calibration.simulated import configurations, random_errors, seen
 
 NOISE = 2e-5
 # What the steps end at.
@@ -32,9 +32,9 @@ def bent(rng: np.random.Generator) -> tuple[Chain, Array]:
 def test_places(rng: np.random.Generator) -> None:
     """Sent to compensated positions, the true arm is where it should be but for the noise; sent as said, it is not."""
     chain, errors = bent(rng)
-    q = postures(rng, chain.arm, 120)
+    q = configurations(rng, chain.arm, 120)
     found = calibrate_nongeometric(chain.arm, readings(q, seen(chain, q, errors, NOISE, rng)))
-    near = postures(rng, chain.arm, 10)
+    near = configurations(rng, chain.arm, 10)
     goals = chain_of(chain.arm).forward(near).position
 
     there = inverse_calibrated(found, goals, near)
@@ -51,7 +51,7 @@ def test_poses(rng: np.random.Generator) -> None:
     """Poses are met in place and turn, with turns about y that no table holds."""
     arm = load_arm("ur5")
     chain = chain_of(arm)
-    errors, q = random_errors(rng, chain), postures(rng, arm, 40)
+    errors, q = random_errors(rng, chain), configurations(rng, arm, 40)
     X = np.tile(np.eye(4), (40, 1, 1))
     reached = chain.forward(q, errors)
     X[:, :3, 3], X[:, :3, :3] = reached.position, reached.rotation
@@ -70,7 +70,7 @@ def test_a_hand_the_other_way_round(rng: np.random.Generator) -> None:
     """A pose is not met by a hand at its place that is turned over: it turns, or says by how much it misses."""
     arm = load_arm("puma560")
     chain = chain_of(arm)
-    q = postures(rng, arm, 40)
+    q = configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
     near = np.array([0.3, -0.7, 0.4, 0.2, 0.9, 0.1])
     reached = found.chain.forward(near, found.arm_errors)
@@ -88,7 +88,7 @@ def test_out_of_reach(rng: np.random.Generator) -> None:
     """A goal that is out of reach is missed, and that is said."""
     arm = load_arm("puma560")
     chain = chain_of(arm)
-    q = postures(rng, arm, 40)
+    q = configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
 
     there = inverse_calibrated(found, (5.0, 0.0, 0.0), q[0])
@@ -97,12 +97,12 @@ def test_out_of_reach(rng: np.random.Generator) -> None:
 
 
 def test_no_step_that_leads_away(rng: np.random.Generator) -> None:
-    """Goals beyond the edge of what can be reached are missed by no more than from the nearest posture passed."""
+    """Goals beyond the edge of what can be reached are missed by no more than from the nearest configuration passed."""
     arm = load_arm("puma560")
     chain = chain_of(arm)
-    q = postures(rng, arm, 40)
+    q = configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
-    near = postures(rng, arm, 60)
+    near = configurations(rng, arm, 60)
     shoulder = found.chain.base[:3, 3]
     goals = shoulder + (found.predict(near) - shoulder) * rng.uniform(1.3, 3.0, (60, 1))
 
@@ -116,7 +116,7 @@ def test_limits(rng: np.random.Generator) -> None:
     """Positions beyond the limits are told."""
     arm = load_arm("puma560")
     chain = chain_of(arm)
-    q = 0.3 * postures(rng, arm, 40)
+    q = 0.3 * configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), NOISE, rng))
     beyond = arm.limits.upper + 0.05
 
@@ -128,7 +128,7 @@ def test_limits(rng: np.random.Generator) -> None:
 def test_as_many(rng: np.random.Generator) -> None:
     """As many joint positions as goals, or one for all."""
     arm = load_arm("puma560")
-    q = postures(rng, arm, 40)
+    q = configurations(rng, arm, 40)
     found = calibrate_points(arm, q, seen(chain_of(arm), q, np.zeros(len(chain_of(arm).names)), NOISE, rng))
 
     assert inverse_calibrated(found, found.predict(q[:3]), q[0]).q.shape == (3, 6)

@@ -10,7 +10,7 @@ from armwright.calibration.readings import readings
 from armwright.kinematics.forward_kinematics import forward
 
 
-def postures(rng: np.random.Generator, count: int) -> np.ndarray:
+def configurations(rng: np.random.Generator, count: int) -> np.ndarray:
     """Joint configurations of the ur5 all over its workspace."""
     return rng.uniform(-1.2, 1.2, (count, 6)) + np.array((0.0, -1.0, 0.8, 0.0, 0.6, 0.0))
 
@@ -18,7 +18,7 @@ def postures(rng: np.random.Generator, count: int) -> np.ndarray:
 def test_coupled_joint(rng: np.random.Generator) -> None:
     """Where joint 3 follows joint 2 in a third of the readings, these are outliers, and it is said what they share."""
     arm = load_arm("ur5")
-    q = postures(rng, 90)
+    q = configurations(rng, 90)
     # Two thirds are measured with joint 2 held.
     q[:60, 1] = -1.0
     true = q.copy()
@@ -35,7 +35,7 @@ def test_coupled_joint(rng: np.random.Generator) -> None:
 def test_nothing_to_doubt(rng: np.random.Generator) -> None:
     """An arm that is a little off, with noise and some outliers anywhere, is not doubted."""
     arm = load_arm("ur5")
-    q = postures(rng, 60)
+    q = configurations(rng, 60)
     points = forward(arm, q + 2e-3)[:, :3, 3] + rng.normal(0.0, 5e-5, (60, 3))
     points[[3, 17, 40]] += 5e-3
 
@@ -45,7 +45,7 @@ def test_nothing_to_doubt(rng: np.random.Generator) -> None:
 def test_errors_beyond_belief(rng: np.random.Generator) -> None:
     """A joint that is told 590 mrad from where it is, is no error of a link, and it is said what to check."""
     arm = load_arm("ur5")
-    q = postures(rng, 60)
+    q = configurations(rng, 60)
     points = forward(arm, q + np.array((0.0, 0.0, 0.59, 0.0, 0.0, 0.0)))[:, :3, 3] + rng.normal(0.0, 5e-5, (60, 3))
 
     said = " ".join(contradictions(calibrate_points(arm, q, points), readings(q, points)))
@@ -55,9 +55,9 @@ def test_errors_beyond_belief(rng: np.random.Generator) -> None:
 
 
 def test_regions(rng: np.random.Generator) -> None:
-    """Five regions hold every posture once, lie apart, and miss what leans on one another more than random parts do."""
+    """Five regions hold every configuration once, lie apart, and lose more shared information than random parts."""
     arm = load_arm("ur5")
-    q = postures(rng, 80)
+    q = configurations(rng, 80)
     parts = workspace_regions(arm, q, 5)
     places = forward(arm, q)[:, :3, 3]
 

@@ -23,7 +23,7 @@ from armwright.errors import InvalidValueError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector
-from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
+from calibration.simulated import configurations, random_arm, random_errors, random_pose, seen
 
 # Products of ten poses [m].
 ROUNDING = 1e-12
@@ -36,7 +36,7 @@ def test_corrected_arm(n: int, rng: np.random.Generator) -> None:
     """The forward kinematics of the corrected arm are those of the calibration, in the frame of the measurements."""
     arm = random_arm(rng, n, slides=True)
     chain = chain_of(arm, base=random_pose(rng, 0.5))
-    q = postures(rng, arm, 60)
+    q = configurations(rng, arm, 60)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng), without=("beta",))
 
     better = corrected_arm(found)
@@ -49,7 +49,7 @@ def test_gravity_stays_where_it_was(rng: np.random.Generator) -> None:
     """A tracker that lies on its side turns the frame of the corrected arm, not the torques that hold the arm."""
     arm = load_arm("puma560")
     chain = chain_of(arm, base=homogeneous(rotation_from_vector([np.pi / 2, 0.0, 0.0]), (1.0, 2.0, 3.0)))
-    q, none = postures(rng, arm, 60), np.zeros(len(chain.names))
+    q, none = configurations(rng, arm, 60), np.zeros(len(chain.names))
 
     better = corrected_arm(calibrate_points(arm, q, seen(chain, q, none, 1e-7, rng), without=("beta",)))
 
@@ -62,7 +62,7 @@ def test_turns_about_y_do_not_fit_a_table(rng: np.random.Generator) -> None:
     """A turn about y between parallel axes has no place in a table, and the text says what to do."""
     arm = load_arm("ur5")
     chain = chain_of(arm)
-    q = postures(rng, arm, 60)
+    q = configurations(rng, arm, 60)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng))
 
     with pytest.raises(InvalidValueError, match=r'calibrate without=\("beta",\)'):
@@ -73,7 +73,7 @@ def test_held_out_points_tell_the_noise(rng: np.random.Generator) -> None:
     """Held-out points are as far off as the noise of three coordinates makes them, and a little more."""
     arm = load_arm("puma560")
     chain = chain_of(arm)
-    q, noise = postures(rng, arm, 120), 1e-4
+    q, noise = configurations(rng, arm, 120), 1e-4
     off = cross_validate(arm, readings(q, seen(chain, q, random_errors(rng, chain), noise, rng)))
 
     usual = noise * np.sqrt(8 / np.pi)
@@ -132,7 +132,7 @@ def tilted(rng: np.random.Generator) -> Calibration:
     """Return a calibration of a UR5 with all errors, turns about y among them."""
     arm = load_arm("ur5")
     chain = chain_of(arm)
-    q = postures(rng, arm, 80)
+    q = configurations(rng, arm, 80)
     return calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 2e-5, rng))
 
 
@@ -140,7 +140,7 @@ def test_tables_by_their_formulas(rng: np.random.Generator) -> None:
     """A table, multiplied out by the formula of its convention, has the tool where the corrected arm has it."""
     arm = random_arm(rng, 6, slides=True)
     chain = chain_of(arm)
-    q = postures(rng, arm, 80)
+    q = configurations(rng, arm, 80)
     found = calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 2e-5, rng), without=("beta",))
 
     tables = corrected_tables(found)
@@ -153,7 +153,7 @@ def test_tables_by_their_formulas(rng: np.random.Generator) -> None:
 def test_table_with_turns_about_y(rng: np.random.Generator) -> None:
     """With turns about y, the table of Hayati alone holds the arm."""
     found = tilted(rng)
-    q = postures(rng, found.chain.arm, 1)[0]
+    q = configurations(rng, found.chain.arm, 1)[0]
 
     tables = corrected_tables(found)
 
@@ -167,7 +167,7 @@ def test_urdf_with_turns_about_y(rng: np.random.Generator) -> None:
     model = pinocchio.buildModelFromXML(corrected_urdf(found))
     data = model.createData()
 
-    for q in postures(rng, found.chain.arm, 5):
+    for q in configurations(rng, found.chain.arm, 5):
         pinocchio.framesForwardKinematics(model, data, _configuration(model, q))
         place = data.oMf[model.getFrameId("tool")].translation
         np.testing.assert_allclose(place, found.predict(q)[0], atol=EXACT)
@@ -185,7 +185,7 @@ def test_how_well_it_is_known(rng: np.random.Generator) -> None:
     """The corrected arm tells how well its tool is known as the calibration does, from its file too."""
     arm = random_arm(rng, 5)
     chain = chain_of(arm)
-    q, elsewhere = postures(rng, arm, 60), postures(rng, arm, 20)
+    q, elsewhere = configurations(rng, arm, 60), configurations(rng, arm, 20)
     points = seen(chain, q, random_errors(rng, chain), 5e-5, rng) @ rotation_from_vector([0.3, -0.5, 1.0]).T + 2.0
     found = calibrate_points(arm, q, points, without=("beta",))
     better = corrected_arm(found)
@@ -201,7 +201,7 @@ def test_known_in_the_file(rng: np.random.Generator, tmp_path: Path) -> None:
     """What an arm file says of its own errors is read back to the last bit."""
     arm = load_arm("puma560")
     chain = chain_of(arm)
-    q = postures(rng, arm, 60)
+    q = configurations(rng, arm, 60)
     better = corrected_arm(
         calibrate_points(arm, q, seen(chain, q, random_errors(rng, chain), 5e-5, rng), without=("beta",))
     )

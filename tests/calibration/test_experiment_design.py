@@ -14,7 +14,7 @@ from armwright.calibration.experiment_design import INDICES, observability, plan
 from armwright.calibration.fitting import calibrate_points
 from armwright.calibration.readings import readings
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, UnknownNameError
-from calibration.simulated import postures, random_errors, seen
+from calibration.simulated import configurations, random_errors, seen
 from samples import Sample
 
 
@@ -134,14 +134,14 @@ def test_enough_to_calibrate(name: str, fewest: int, sample: Sample) -> None:
 def test_no_poses(count: int) -> None:
     """Beside enough that were measured before, too, there is one pose to propose or more."""
     arm = load_arm("ntu-3r")
-    before = postures(np.random.default_rng(0), arm, 20)
+    before = configurations(np.random.default_rng(0), arm, 20)
 
     with pytest.raises(InvalidValueError, match=f"count: expected 1 pose or more, got {count}"):
         plan_poses(arm, count, measured=before)
 
 
 def test_measured_before_by_another_arm() -> None:
-    """Postures that were measured before have as many joints as the arm."""
+    """Configurations that were measured before have as many joints as the arm."""
     with pytest.raises(ShapeError, match="measured: expected 6 numbers on the last axis"):
         plan_poses(load_arm("puma560"), 20, measured=np.zeros((3, 5)))
 
@@ -150,7 +150,7 @@ def test_next_poses_see_what_the_first_did_not() -> None:
     """After poses in which one joint stood still, the next ones tell its errors; poses by chance tell them worse."""
     arm = load_arm("ntu-3r")
     rng = np.random.default_rng(0)
-    before = postures(rng, arm, 20)
+    before = configurations(rng, arm, 20)
     before[:, 1] = 0.3
 
     plan = plan_poses(arm, 3, measured=before, index="O3")

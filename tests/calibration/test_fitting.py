@@ -18,7 +18,7 @@ from armwright.calibration.fitting import Calibration, calibrate_points
 from armwright.calibration.initial_guess import register
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, UnknownNameError
 from armwright.spatial.rotations import angle_between
-from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
+from calibration.simulated import configurations, random_arm, random_errors, random_pose, seen
 
 # Noise of a good and of a poor laser tracker's or camera's coordinate [m].
 NOISES = (2e-5, 5e-5, 1e-4)
@@ -42,7 +42,7 @@ def trial(seed: int) -> Trial:
     rng = np.random.default_rng(seed)
     arm = random_arm(rng, 3 + seed % 5, slides=seed % 3 == 0)
     chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
-    q = postures(rng, arm, POINTS)
+    q = configurations(rng, arm, POINTS)
     none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
     expected = calibrate_points(arm, q, seen(chain, q, none, noise, rng), base=np.eye(4)).identifiability.fitted
     true[list(expected)] = random_errors(rng, chain)[list(expected)]
@@ -73,9 +73,9 @@ def ur5() -> Arm:
 
 
 def measured(arm: Arm, rng: np.random.Generator, noise: float, m: int = 60) -> tuple[Array, Array, Array]:
-    """Return postures, what is seen of an arm with errors, and where its tool really is."""
+    """Return configurations, what is seen of an arm with errors, and where its tool really is."""
     chain = chain_of(arm)
-    q, errors = postures(rng, arm, m), random_errors(rng, chain)
+    q, errors = configurations(rng, arm, m), random_errors(rng, chain)
     return q, seen(chain, q, errors, noise, rng), seen(chain, q, errors, 0.0, rng)
 
 
@@ -125,13 +125,13 @@ def test_noise_is_found(trials: list[Trial]) -> None:
 
 
 def test_corrected_arms_are_right_elsewhere() -> None:
-    """With all errors, told or not, a corrected arm is right in postures never measured, as well as it says."""
+    """With all errors, told or not, a corrected arm is right in configurations never measured, as well as it says."""
     off, far = [], []
     for seed in range(15):
         rng = np.random.default_rng(1000 + seed)
         arm = random_arm(rng, 3 + seed % 5, slides=seed % 3 == 0)
         chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
-        errors, q, elsewhere = random_errors(rng, chain), postures(rng, arm, POINTS), postures(rng, arm, 50)
+        errors, q, elsewhere = random_errors(rng, chain), configurations(rng, arm, POINTS), configurations(rng, arm, 50)
         found = calibrate_points(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
 
         missed = found.predict(elsewhere) - chain.forward(elsewhere, errors).position
@@ -156,7 +156,7 @@ def test_nearly_dependent_errors(seed: int) -> None:
     arm = random_arm(rng, 3 + seed % 3)
     arm = attrs.evolve(arm, joints=[attrs.evolve(joint, alpha=0.0) for joint in arm.joints])
     chain, noise = chain_of(arm), NOISES[seed % len(NOISES)]
-    errors, q, elsewhere = random_errors(rng, chain), postures(rng, arm, POINTS), postures(rng, arm, 50)
+    errors, q, elsewhere = random_errors(rng, chain), configurations(rng, arm, POINTS), configurations(rng, arm, 50)
 
     found = calibrate_points(arm, q, seen(chain, q, errors, noise, rng), base=np.eye(4))
 
@@ -201,7 +201,7 @@ def test_many_outliers(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = random_arm(rng, 3 + seed % 5)
     chain = chain_of(arm)
-    errors, q, elsewhere = random_errors(rng, chain), postures(rng, arm, 100), postures(rng, arm, 50)
+    errors, q, elsewhere = random_errors(rng, chain), configurations(rng, arm, 100), configurations(rng, arm, 50)
     points = seen(chain, q, errors, 5e-5, rng)
     points[:20] += rng.uniform(0.005, 0.02, (20, 3)) * rng.choice([-1, 1], (20, 3))
 
@@ -220,7 +220,7 @@ def test_outliers_do_not_count() -> None:
     for seed in range(10):
         rng = np.random.default_rng(seed)
         arm = random_arm(rng, 3 + seed % 5)
-        chain, q = chain_of(arm), postures(rng, arm, POINTS)
+        chain, q = chain_of(arm), configurations(rng, arm, POINTS)
         none, true = np.zeros(len(chain.names)), np.zeros(len(chain.names))
         told = list(calibrate_points(arm, q, seen(chain, q, none, 5e-5, rng), base=np.eye(4)).identifiability.fitted)
         true[told] = random_errors(rng, chain)[told]
@@ -267,7 +267,7 @@ def test_any_measuring_frame(robust: bool, ur5: Arm, rng: np.random.Generator) -
 def test_registered(ur5: Arm, rng: np.random.Generator) -> None:
     """Points of a perfect arm tell its base to rounding; what a mirror shows is brought near by a turn all the same."""
     chain, X = chain_of(ur5), random_pose(rng, 5.0)
-    q = postures(rng, ur5, 10)
+    q = configurations(rng, ur5, 10)
     points = chain.forward(q).position @ X[:3, :3].T + X[:3, 3]
 
     base = register(chain, q, points)
@@ -304,7 +304,7 @@ def test_without_what_there_is_not(rng: np.random.Generator) -> None:
     """Turns about y may be left out of an arm that has none; what no arm has may not."""
     arm = load_arm("puma560")
     none = attrs.evolve(arm, joints=[attrs.evolve(joint, alpha=1.0) for joint in arm.joints])
-    q = postures(rng, none, 40)
+    q = configurations(rng, none, 40)
     points = seen(chain_of(none), q, np.zeros(36), 3e-5, rng)
 
     assert calibrate_points(none, q, points, without=["beta"]).names
@@ -331,9 +331,9 @@ def test_progress(ur5: Arm, rng: np.random.Generator) -> None:
 
 
 def test_joint_that_never_moved(ur5: Arm, rng: np.random.Generator) -> None:
-    """An arm of which one joint never moved is right in the postures in which it stands like that."""
+    """An arm of which one joint never moved is right in the configurations in which it stands like that."""
     chain = chain_of(ur5)
-    q, errors = postures(rng, ur5, 80), random_errors(rng, chain)
+    q, errors = configurations(rng, ur5, 80), random_errors(rng, chain)
     q[:, 3] = 0.7
 
     found = calibrate_points(ur5, q[:60], seen(chain, q[:60], errors, 3e-5, rng), base=np.eye(4))
@@ -383,7 +383,7 @@ def test_too_few(m: int, ur5: Arm, rng: np.random.Generator) -> None:
 
 
 def test_shapes(ur5: Arm) -> None:
-    """As many points as postures, each of three coordinates, and as many joints as the arm has."""
+    """As many points as configurations, each of three coordinates, and as many joints as the arm has."""
     with pytest.raises(ShapeError, match=r"points: expected \(5, 3\) points or \(5, 4, 4\) poses .* got \(4, 3\)"):
         calibrate_points(ur5, np.zeros((5, 6)), np.zeros((4, 3)))
     with pytest.raises(ShapeError, match="expected readings of 6 joints, as ur5 has, got 7"):
@@ -418,7 +418,7 @@ def test_round_that_leaves_less_is_kept(monkeypatch: pytest.MonkeyPatch, rng: np
     """Where what is left hides errors, and what is not fitted is left, rounds lead away: the best of them counts."""
     arm = random_arm(rng, 5)
     chain = chain_of(arm)
-    q, errors = postures(rng, arm, 60), random_errors(rng, chain)
+    q, errors = configurations(rng, arm, 60), random_errors(rng, chain)
     points = seen(chain, q, errors, 3e-5, rng)
     fitted, rounds = fitting._fit, count()
 

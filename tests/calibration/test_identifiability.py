@@ -9,7 +9,7 @@ from armwright.arrays import Array
 from armwright.calibration.chain import Chain, chain_of
 from armwright.calibration.identifiability import Identifiability, select_identifiable
 from armwright.spatial.poses import homogeneous
-from calibration.simulated import postures, random_arm
+from calibration.simulated import configurations, random_arm
 
 # Noise so small that only geometry hides an error [m].
 NONE = 1e-9
@@ -20,7 +20,7 @@ ZERO = 1e-10
 
 
 def told(chain: Chain, q: Array, noise: float = NONE) -> Identifiability:
-    """Return what points at postures q tell, base and tool first."""
+    """Return what points at configurations q tell, base and tool first."""
     first = [i for part in ("base.", "tool.") for i, name in enumerate(chain.names) if part in name]
     J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     return select_identifiable(chain.names, J, chain.is_length, noise, first=first)
@@ -84,7 +84,7 @@ def null_space(chain: Chain) -> Array:
 def test_skew_arm(n: int, rng: np.random.Generator) -> None:
     """Of n turning joints, a measured point tells 4 n + 3 mixtures of errors, and hides just what geometry says."""
     chain = chain_of(skew(rng, n))
-    q = postures(rng, chain.arm, 60)
+    q = configurations(rng, chain.arm, 60)
     J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     hidden = null_space(chain)
 
@@ -102,7 +102,7 @@ def test_parallel_axes(n: int, parallel: tuple[int, ...], rng: np.random.Generat
     arm = skew(rng, n)
     joints = [attrs.evolve(joint, alpha=0.0) if i in parallel else joint for i, joint in enumerate(arm.joints, 1)]
     chain = chain_of(attrs.evolve(arm, joints=joints))
-    q = postures(rng, chain.arm, 60)
+    q = configurations(rng, chain.arm, 60)
     J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
     hidden = null_space(chain)
 
@@ -122,7 +122,7 @@ def test_antiparallel_axes(rng: np.random.Generator) -> None:
     joints = [attrs.evolve(joint, alpha=np.pi) if i == 2 else joint for i, joint in enumerate(arm.joints, 1)]
     chain = chain_of(attrs.evolve(arm, joints=joints))
 
-    fixed = {one.name: one for one in told(chain, postures(rng, chain.arm, 60)).fixed}
+    fixed = {one.name: one for one in told(chain, configurations(rng, chain.arm, 60)).fixed}
 
     assert fixed["joint3.d"].reason == "redundant: it has the same effect as joint2.d"
     assert fixed["joint3.d"].collinear[0] == ("joint2.d", pytest.approx(-1.0))
@@ -132,7 +132,7 @@ def test_planar_arm(rng: np.random.Generator) -> None:
     """A planar 3R arm, too, tells 15 mixtures: 8 by what moves in the plane, 7 by what leaves it."""
     chain = chain_of(planar())
 
-    found = told(chain, postures(rng, chain.arm, 40))
+    found = told(chain, configurations(rng, chain.arm, 40))
 
     assert len(found.fitted) == 15
     assert {"joint1.beta", "joint2.beta"} <= kept(found)
@@ -149,7 +149,7 @@ def test_slides(seed: int) -> None:
     ]
     chain = chain_of(attrs.evolve(arm, joints=joints))
 
-    found = told(chain, postures(rng, chain.arm, 60))
+    found = told(chain, configurations(rng, chain.arm, 60))
 
     assert len(found.fitted) == 4 * 4 + 2 * 1 + 3
 
@@ -160,7 +160,7 @@ def test_what_does_the_same(rng: np.random.Generator) -> None:
     chain = chain_of(arm)
     _, y, z = arm.tool[:3, 3]
 
-    fixed = {one.name: one for one in told(chain, postures(rng, arm, 60)).fixed}
+    fixed = {one.name: one for one in told(chain, configurations(rng, arm, 60)).fixed}
 
     assert fixed["joint1.theta"] == (
         "joint1.theta",
@@ -182,7 +182,7 @@ def test_tool_on_the_last_axis(rng: np.random.Generator) -> None:
     arm = attrs.evolve(arm, joints=[*arm.joints[:-1], last], tool=homogeneous(np.eye(3), (0.0, 0.0, 0.1)))
     chain = chain_of(arm)
 
-    found = told(chain, postures(rng, arm, 60))
+    found = told(chain, configurations(rng, arm, 60))
 
     fixed = {one.name: one.reason for one in found.fixed}
     assert fixed["joint4.theta"] == "unobservable: it does not move the tool in any of the poses"
@@ -194,7 +194,7 @@ def test_tool_on_the_last_axis(rng: np.random.Generator) -> None:
 def test_joint_that_never_moved(still: int, rng: np.random.Generator) -> None:
     """An arm of which one joint never moves tells as much as one with a joint less: both its links are one."""
     chain = chain_of(skew(rng, 5))
-    q = postures(rng, chain.arm, 60)
+    q = configurations(rng, chain.arm, 60)
     q[:, still - 1] = 0.4
 
     assert len(told(chain, q).fitted) == 4 * (5 - 1) + 3
@@ -204,7 +204,7 @@ def test_few_poses(rng: np.random.Generator) -> None:
     """Five points have 15 coordinates, and tell no more errors than that."""
     chain = chain_of(skew(rng, 6))
 
-    found = told(chain, postures(rng, chain.arm, 5))
+    found = told(chain, configurations(rng, chain.arm, 5))
 
     assert len(found.fitted) <= 15
     assert len(found.fitted) + len(found.fixed) == len(chain.names)
@@ -213,7 +213,7 @@ def test_few_poses(rng: np.random.Generator) -> None:
 def test_noise_hides(rng: np.random.Generator) -> None:
     """The more noise, the fewer errors are told; those that noise hides are named as such."""
     chain = chain_of(skew(rng, 6))
-    q = 0.1 * postures(rng, chain.arm, 40)
+    q = 0.1 * configurations(rng, chain.arm, 40)
 
     counts = [len(told(chain, q, noise).fitted) for noise in (NONE, 1e-5, 1e-4, 1e-3)]
     fixed = [one.reason for one in told(chain, q, 1e-4).fixed]
@@ -227,7 +227,7 @@ def test_noise_hides(rng: np.random.Generator) -> None:
 def test_allowed(rng: np.random.Generator) -> None:
     """What may not be fitted is neither fitted nor fixed for a reason of geometry."""
     chain = chain_of(skew(rng, 4))
-    q = postures(rng, chain.arm, 40)
+    q = configurations(rng, chain.arm, 40)
     J = chain.forward(q).position_jacobian.reshape(-1, len(chain.names))
 
     found = select_identifiable(chain.names, J, chain.is_length, NONE, allowed=range(6))

@@ -10,7 +10,7 @@ from armwright.errors import TooFewError
 
 
 def test_by_hand() -> None:
-    """Two postures, 3 and 4 mm off to either side: AP is 3.5 mm, AD what their distance grew by."""
+    """Two configurations, 3 and 4 mm off to either side: AP is 3.5 mm, AD what their distance grew by."""
     q = np.array([[0.0], [1.0]])
     seen = readings(q, [[0.0, 0.003, 0.0], [1.004, 0.0, 0.0]])
 
@@ -24,7 +24,7 @@ def test_by_hand() -> None:
 
 
 def test_repeated() -> None:
-    """A posture that was measured three times has a barycentre, an RP of mean plus three deviations, and a floor."""
+    """A configuration measured three times has a barycentre, an RP of mean plus three deviations, and a floor."""
     q = np.array([[0.0], [0.0], [0.0], [1.0]])
     cloud = np.array([[0.001, 0, 0], [-0.001, 0, 0], [0, 0, 0.0]])
     seen = readings(q, np.vstack([cloud, [[1.0, 0, 0]]]))
@@ -41,13 +41,13 @@ def test_repeated() -> None:
     assert pytest.approx(0.0, abs=1e-15) == words.AP
 
 
-def test_one_posture() -> None:
-    """One posture has no distance from another."""
+def test_one_configuration() -> None:
+    """One configuration has no distance from another."""
     assert accuracy(readings(np.zeros((2, 1)), np.zeros((2, 3))), np.zeros((2, 3))) is None
 
 
-def test_one_posture_cannot_be_held_out() -> None:
-    """Of one posture, however often measured, nothing is left to hold out."""
+def test_one_configuration_cannot_be_held_out() -> None:
+    """Of one configuration, however often measured, nothing is left to hold out."""
     with pytest.raises(TooFewError, match="folds: 30 readings of one joint configuration leave none to hold out"):
         random_folds(np.ones((30, 6)), 5, 0)
 
@@ -65,7 +65,7 @@ def test_repeats_are_held_out_together() -> None:
 
 
 def test_encoders_never_say_the_same() -> None:
-    """Positions read back from encoders differ in the last digits, and are of one posture all the same."""
+    """Positions read back from encoders differ in the last digits, and are of one configuration all the same."""
     rng = np.random.default_rng(0)
     q = np.repeat(rng.uniform(-2, 2, (8, 6)), 4, axis=0) + 1e-6 * rng.standard_normal((32, 6))
 

@@ -208,7 +208,7 @@ def test_joint_that_never_moved(arm: Arm, write: Write) -> None:
 
 
 def test_copies(arm: Arm, write: Write) -> None:
-    """Rows that repeat others to the last digit are named; a posture that is measured again is none of them."""
+    """Rows that repeat others to the last digit are named; a configuration that is measured again is none of them."""
     again = "10,-20,300.6,10,5"
 
     measured = read_measurements(write(table(HEAD, [*ROWS, again, ROWS[1]])), arm)

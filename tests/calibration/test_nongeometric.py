@@ -16,7 +16,7 @@ from armwright.calibration.nongeometric import calibrate_nongeometric, compare_h
 from armwright.calibration.readings import Readings, readings
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import InvalidValueError
-from calibration.simulated import postures, random_arm, random_errors
+from calibration.simulated import configurations, random_arm, random_errors
 
 NOISE = 3e-5
 # What joints give under the largest effort of gravity, and half the swing of gears [rad].
@@ -36,7 +36,7 @@ def measured(
     errors = random_errors(rng, chain)
     bent = by * rng.uniform(0.5, 1.0, len(bends))
     errors[len(errors) - len(bends) :] = bent
-    q = postures(rng, arm, m)
+    q = configurations(rng, arm, m)
     return readings(q, chain.forward(q, errors).position + NOISE * rng.standard_normal((m, 3))), np.asarray(bent)
 
 
@@ -72,7 +72,7 @@ def test_gears_are_found(puma: Arm, rng: np.random.Generator) -> None:
 
 
 def test_what_is_left_is_learnt(puma: Arm, rng: np.random.Generator) -> None:
-    """What no model of ours has, such as a link that bends with the posture, is learnt as far as points tell it."""
+    """What no model of ours has, such as a link that bends with the configuration, is learnt as far as points show."""
     seen, _ = measured(puma, rng, (), 0.0, m=200)
     q = seen.q
     strange = 4e-4 * np.stack([np.sin(q[:, 1]) * np.cos(q[:, 2]), np.cos(q[:, 1] + q[:, 3]), np.sin(2 * q[:, 0])], 1)
@@ -123,8 +123,8 @@ def test_two_parts_leave_no_choice(rng: np.random.Generator) -> None:
     assert calibrate_nongeometric(arm, seen, folds=2, nested=True).nested is None
 
 
-def test_readings_of_one_posture_count_once(rng: np.random.Generator) -> None:
-    """An arm that is sent to a posture four times is off by the same each time: chance is no smaller for that."""
+def test_readings_of_one_configuration_count_once(rng: np.random.Generator) -> None:
+    """An arm that is sent to a configuration four times is off by the same each time: chance is no smaller for that."""
     before, after = rng.normal(1e-4, 1e-5, (2, 40))
     once = compare_held_out("", before, after, np.arange(40))
     often = compare_held_out("", *(np.repeat(one, 4) for one in (before, after)), np.repeat(np.arange(40), 4))
@@ -148,7 +148,7 @@ def test_no_masses(puma: Arm, rng: np.random.Generator) -> None:
 
 def test_springs_follow_gravity(puma: Arm, rng: np.random.Generator) -> None:
     """A spring gives against the effort that holds its joint; a joint about the vertical has none."""
-    q = postures(rng, puma, 20)
+    q = configurations(rng, puma, 20)
     by_name = {bend.name: bend for bend in compliances(puma)}
 
     assert "joint1.sag" not in by_name
@@ -158,7 +158,7 @@ def test_springs_follow_gravity(puma: Arm, rng: np.random.Generator) -> None:
 
 def test_needs_points(puma: Arm, rng: np.random.Generator) -> None:
     """Without a point there is nothing to see what is left on."""
-    q = postures(rng, puma, 20)
+    q = configurations(rng, puma, 20)
 
     with pytest.raises(InvalidValueError, match="expected points in the measuring frame"):
         calibrate_nongeometric(puma, readings(q, plane=["table"] * 20))

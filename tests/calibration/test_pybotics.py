@@ -17,7 +17,7 @@ from armwright.calibration.chain import chain_of
 from armwright.calibration.fitting import calibrate_points
 from armwright.kinematics.forward_kinematics import forward
 from armwright.spatial.poses import homogeneous
-from calibration.simulated import postures, random_errors, seen
+from calibration.simulated import configurations, random_errors, seen
 
 # Both fits end at the same minimum; pybotics' least squares has derivatives by differences [m].
 SAME = 1e-6
@@ -60,13 +60,13 @@ def test_the_same_arm(pybotics: Any, rng: np.random.Generator) -> None:
     """Both programs have the tool of an arm in the same place."""
     arm = skew_arm()
     robot = robot_of(pybotics, arm)
-    q = postures(rng, arm, 10)
+    q = configurations(rng, arm, 10)
 
     np.testing.assert_allclose([robot.fk(one) for one in q], forward(arm, q), atol=ROUNDING)
 
 
 def test_the_same_fit(pybotics: Any, rng: np.random.Generator) -> None:
-    """Fitted to the same points, both have the tool in the same place, in postures that neither has seen.
+    """Fitted to the same points, both have the tool in the same place, in configurations that neither has seen.
 
     Numbers that a point does not tell are left out by hand for pybotics, which does not look for them: the frame before
     the first joint, and what the last joint does as the tool does.
@@ -75,7 +75,7 @@ def test_the_same_fit(pybotics: Any, rng: np.random.Generator) -> None:
     chain = chain_of(arm)
     errors = random_errors(rng, chain)
     errors[[i for i, name in enumerate(chain.names) if name.startswith("base")]] = 0.0
-    q, elsewhere = postures(rng, arm, 60), postures(rng, arm, 40)
+    q, elsewhere = configurations(rng, arm, 60), configurations(rng, arm, 40)
     points = seen(chain, q, errors, NOISE, rng)
     ours = calibrate_points(
         arm, q, points, base=np.eye(4), robust=False, only=["joint1", "joint2", "joint3", "joint4", "tool"]

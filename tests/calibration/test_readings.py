@@ -16,7 +16,7 @@ from armwright.calibration.nongeometric import calibrate_nongeometric
 from armwright.calibration.readings import Readings, concatenate, readings, refuse_not_fitted
 from armwright.errors import ContradictionError, InvalidValueError, ShapeError, TooFewError
 from armwright.spatial.rotations import rotation_from_quaternion, rotation_from_vector
-from calibration.simulated import postures, random_arm, random_errors, random_pose, seen
+from calibration.simulated import configurations, random_arm, random_errors, random_pose, seen
 
 # Standard deviations of a coordinate and of a turn [m], [rad].
 NOISE, TURN = 3e-5, 1e-4
@@ -35,9 +35,9 @@ class Truth:
         self.errors = random_errors(rng, self.chain)
         self.rng = rng
 
-    def postures(self, m: int) -> Array:
-        """Return (m, 6) postures."""
-        return postures(self.rng, self.arm, m)
+    def configurations(self, m: int) -> Array:
+        """Return (m, 6) configurations."""
+        return configurations(self.rng, self.arm, m)
 
     def points(self, q: Array, noise: float = NOISE) -> Array:
         """Return (m, 3) points seen."""
@@ -52,13 +52,13 @@ class Truth:
         return X
 
     def missed(self, found: Calibration, *, rigid: bool = False) -> Array:
-        """Return (50,) by how much the corrected arm misses in postures never measured [m].
+        """Return (50,) by how much the corrected arm misses in configurations never measured [m].
 
         Args:
             found: the calibration.
             rigid: whether the measurements tell nothing of where the arm stands.
         """
-        q = self.postures(50)
+        q = self.configurations(50)
         away, true = found.predict(q), self.points(q, 0.0)
         if rigid:
             a, b = away - away.mean(axis=0), true - true.mean(axis=0)
@@ -91,7 +91,7 @@ def test_derivatives(rng: np.random.Generator) -> None:
         plane_names=("table",),
         anchor_names=("wire",),
     )
-    q = postures(rng, arm, 6)
+    q = configurations(rng, arm, 6)
     X = np.stack([random_pose(rng, 1.0) for _ in q])
     X[:, :3, :3] = rotation_from_vector(0.3 * rng.standard_normal((6, 3))) @ chain.forward(q).rotation
     given = concatenate(
@@ -112,7 +112,7 @@ def test_derivatives(rng: np.random.Generator) -> None:
 
 def test_poses_tell_the_tool_frame(truth: Truth) -> None:
     """Poses tell how the tool is turned, which points do not; their two noises are found."""
-    q = truth.postures(60)
+    q = truth.configurations(60)
 
     found = calibrate_points(truth.arm, q, truth.poses(q))
     points = calibrate_points(truth.arm, q, truth.points(q))
@@ -129,7 +129,7 @@ def test_poses_tell_the_tool_frame(truth: Truth) -> None:
 
 def test_fewer_poses_than_points(truth: Truth) -> None:
     """Six poses give 36 numbers, more than the errors of a six-joint arm; six points do not."""
-    q = truth.postures(6)
+    q = truth.configurations(6)
 
     found = calibrate_points(truth.arm, q, truth.poses(q))
 
@@ -147,7 +147,7 @@ def test_intervals_of_few_poses() -> None:
     within, noises = [], []
     for seed in range(12):
         truth = Truth(np.random.default_rng(seed))
-        q, elsewhere = truth.postures(8), truth.postures(30)
+        q, elsewhere = truth.configurations(8), truth.configurations(30)
         found = calibrate_points(truth.arm, q, truth.poses(q))
         off = found.predict(elsewhere) - truth.points(elsewhere, 0.0)
         deviation = np.sqrt(np.diagonal(found.uncertainty(elsewhere), axis1=1, axis2=2))
@@ -160,7 +160,7 @@ def test_intervals_of_few_poses() -> None:
 
 def test_poses_of_another_frame_of_the_hand(truth: Truth) -> None:
     """A reflector that is screwed on anyhow tells the arm as well as one that is turned as the tool is."""
-    q = truth.postures(60)
+    q = truth.configurations(60)
     X = truth.poses(q)
     X[:, :3, :3] = X[:, :3, :3] @ rotation_from_vector([2.0, -1.0, 0.4])
 
@@ -172,7 +172,7 @@ def test_poses_of_another_frame_of_the_hand(truth: Truth) -> None:
 
 def test_one_pose_that_is_turned(truth: Truth) -> None:
     """A pose whose place is right and whose turn is not is named and does not count."""
-    q = truth.postures(60)
+    q = truth.configurations(60)
     X = truth.poses(q)
     X[7, :3, :3] = X[7, :3, :3] @ rotation_from_vector([0.0, 0.05, 0.0])
 
@@ -184,7 +184,7 @@ def test_one_pose_that_is_turned(truth: Truth) -> None:
 
 def test_poses_that_are_turned_over(truth: Truth) -> None:
     """Poses that stand the other way round, where the sine of the turn is 0 again, are half a turn off, and named."""
-    q = truth.postures(60)
+    q = truth.configurations(60)
     X = truth.poses(q)
     X[:6, :3, :3] = X[:6, :3, :3] @ rotation_from_vector([np.pi, 0.0, 0.0])
 
@@ -201,7 +201,7 @@ def test_derivatives_of_large_turns(angle: float, rng: np.random.Generator) -> N
     arm = random_arm(rng, 4)
     chain = chain_of(arm)
     model = MeasurementModel(chain=chain, frames=(np.eye(4), random_pose(rng, 1.0)), frame_names=("a", "b"))
-    q = postures(rng, arm, 4)
+    q = configurations(rng, arm, 4)
     X, axes = np.tile(np.eye(4), (4, 1, 1)), rng.standard_normal((4, 3))
     axes *= angle / np.linalg.norm(axes, axis=1)[:, None]
     X[:, :3, :3] = rotation_from_vector(axes) @ chain.forward(q).rotation
@@ -220,7 +220,7 @@ def test_derivatives_of_large_turns(angle: float, rng: np.random.Generator) -> N
 
 def test_a_board_set_up_three_times(truth: Truth) -> None:
     """Points told in frames that stand anywhere tell the arm as points in one frame do."""
-    q = truth.postures(90)
+    q = truth.configurations(90)
     points, frame = truth.points(q), np.repeat(["flat", "roll", "pitch"], 30)
     for name in ("roll", "pitch"):
         X = random_pose(truth.rng, 1.0)
@@ -235,7 +235,7 @@ def test_a_board_set_up_three_times(truth: Truth) -> None:
 
 
 def test_touched_planes(truth: Truth) -> None:
-    """Three planes touched in a hundred postures each, and no point measured, tell all but where the arm stands.
+    """Three planes touched in a hundred configurations each, and no point measured, tell all but where the arm stands.
 
     Planes tell no scale: an arm that is larger all over touches planes as well. One length is held for that.
     """
@@ -249,16 +249,16 @@ def test_touched_planes(truth: Truth) -> None:
     assert found.after.distance.mean() < 1e-7
     held = {one.name for one in found.fixed}
     assert held >= {"base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"}
-    q = truth.postures(100)
+    q = truth.configurations(100)
     lengths = [one.name for one in found.fixed if one.name in calibrate_points(truth.arm, q, truth.points(q)).names]
     assert [name for name in lengths if not name.startswith("base")] == ["joint5.d"]
 
 
 def _on(truth: Truth, X: Array, m: int) -> Array:
-    """Return (m, 6) postures in which the true tool is on the plane z = 0 of a frame."""
+    """Return (m, 6) configurations in which the true tool is on the plane z = 0 of a frame."""
     taken: list[Array] = []
     while len(taken) < m:
-        q = truth.postures(200)
+        q = truth.configurations(200)
         for _ in range(30):
             reached = truth.chain.forward(q, truth.errors)
             height = (reached.position - X[:3, 3]) @ X[:3, 2]
@@ -272,7 +272,7 @@ def _on(truth: Truth, X: Array, m: int) -> Array:
 
 def test_distances_from_anchors(truth: Truth) -> None:
     """Three wires whose ends hang anywhere tell the arm's links, and where the ends are."""
-    q, ends = truth.postures(120), truth.rng.uniform(-2, 2, (3, 3))
+    q, ends = truth.configurations(120), truth.rng.uniform(-2, 2, (3, 3))
     true = truth.points(q, 0.0)
     parts = [
         readings(
@@ -290,9 +290,9 @@ def test_distances_from_anchors(truth: Truth) -> None:
     assert truth.missed(found, rigid=True).mean() < 3 * NOISE
 
 
-def test_distances_between_postures(truth: Truth) -> None:
-    """How far the tool goes between postures tells the arm's links, whoever measures from wherever."""
-    q, other = truth.postures(150), truth.postures(150)
+def test_distances_between_configurations(truth: Truth) -> None:
+    """How far the tool goes between configurations tells the arm's links, whoever measures from wherever."""
+    q, other = truth.configurations(150), truth.configurations(150)
     apart = np.linalg.norm(truth.points(q, 0.0) - truth.points(other, 0.0), axis=1)
 
     found = calibrate(truth.arm, readings(q, distances=apart + NOISE * truth.rng.standard_normal(150), other=other))
@@ -303,7 +303,7 @@ def test_distances_between_postures(truth: Truth) -> None:
 
 def test_points_with_distances(truth: Truth) -> None:
     """Points and distances together tell no less than points alone."""
-    q, more = truth.postures(30), truth.postures(100)
+    q, more = truth.configurations(30), truth.configurations(100)
     away = np.linalg.norm(truth.points(more, 0.0), axis=1) + NOISE * truth.rng.standard_normal(100)
     points = readings(q, truth.points(q))
 
@@ -315,7 +315,7 @@ def test_points_with_distances(truth: Truth) -> None:
 
 def test_no_noise(truth: Truth) -> None:
     """From poses without noise an arm is found to rounding."""
-    q = truth.postures(30)
+    q = truth.configurations(30)
 
     found = calibrate_points(truth.arm, q, truth.poses(q, 0.0, 0.0))
 
@@ -327,7 +327,7 @@ def test_no_noise(truth: Truth) -> None:
 
 def test_a_frame_on_a_line(truth: Truth) -> None:
     """Two points of a frame do not tell where it stands."""
-    q = truth.postures(42)
+    q = truth.configurations(42)
     given = readings(q, truth.points(q), frame=["one"] * 40 + ["other"] * 2)
 
     with pytest.raises(TooFewError, match="frame other: 2 points do not tell where it stands; measure 3 or more"):
@@ -337,7 +337,7 @@ def test_a_frame_on_a_line(truth: Truth) -> None:
 @pytest.mark.parametrize("what", ["plane", "anchor"])
 def test_few_touches(what: str, truth: Truth) -> None:
     """Three touches only tell where a plane is, three distances where an anchor is."""
-    q = truth.postures(40)
+    q = truth.configurations(40)
     more = readings(q[:3], plane=["a"] * 3) if what == "plane" else readings(q[:3], distances=[1] * 3, anchor=["a"] * 3)
 
     with pytest.raises(TooFewError, match=f"{what} a: 3 .* only tell where it is; measure 4 or more"):
@@ -346,7 +346,7 @@ def test_few_touches(what: str, truth: Truth) -> None:
 
 def test_ways_in_millimetres(truth: Truth) -> None:
     """Distances in another unit are refused with a question."""
-    q, other = truth.postures(40), truth.postures(40)
+    q, other = truth.configurations(40), truth.configurations(40)
     apart = 1e3 * np.linalg.norm(truth.points(q) - truth.points(other), axis=1)
 
     with pytest.raises(ContradictionError, match=r"distances are .* are they millimetres read as metres"):
@@ -354,12 +354,12 @@ def test_ways_in_millimetres(truth: Truth) -> None:
 
 
 def test_what_does_not_fit(truth: Truth) -> None:
-    """As many names as postures; distances from something; something measured; arms of as many joints."""
-    q = truth.postures(4)
+    """As many names as configurations; distances from something; something measured; arms of as many joints."""
+    q = truth.configurations(4)
 
     with pytest.raises(ShapeError, match="plane: expected 4 names for as many q, got 2"):
         readings(q, plane=["a", "b"])
-    with pytest.raises(InvalidValueError, match="tell from which anchor they are, or from which other posture"):
+    with pytest.raises(InvalidValueError, match="tell from which anchor they are, or from which other configuration"):
         readings(q, distances=[1.0] * 4)
     with pytest.raises(InvalidValueError, match="expected points, poses, planes or distances, got none"):
         readings(q)
@@ -372,7 +372,7 @@ def test_what_does_not_fit(truth: Truth) -> None:
 @pytest.mark.parametrize("how", ["never turned", "x, y, z, w for w, x, y, z"])
 def test_turns_told_another_way(how: str, truth: Truth) -> None:
     """Turns that the arm cannot have, however what is measured is fixed to the hand, are refused with a question."""
-    q = truth.postures(40)
+    q = truth.configurations(40)
     X = truth.poses(q)
     if how == "never turned":
         X[:, :3, :3] = np.eye(3)
@@ -388,7 +388,7 @@ def test_turns_told_another_way(how: str, truth: Truth) -> None:
 @pytest.mark.parametrize("by", [(2.0, 2.0, 2.0), (1.0, 1.0, -1.0)])
 def test_no_poses(by: tuple[float, ...], truth: Truth) -> None:
     """What is scaled or mirrored is no rotation, and no pose."""
-    q = truth.postures(4)
+    q = truth.configurations(4)
     X = truth.poses(q)
     X[2, :3, :3] *= by
 
@@ -397,14 +397,14 @@ def test_no_poses(by: tuple[float, ...], truth: Truth) -> None:
 
 
 def test_nothing_told(truth: Truth) -> None:
-    """Postures all over the room do not touch one plane; that nothing is told is said, and soon."""
+    """Configurations all over the room do not touch one plane; that nothing is told is said, and soon."""
     with pytest.raises(ContradictionError, match=r"misses its readings by, .* mm, hides every error"):
-        calibrate(load_arm("puma560"), readings(truth.postures(40), plane=["table"] * 40))
+        calibrate(load_arm("puma560"), readings(truth.configurations(40), plane=["table"] * 40))
 
 
 def test_nothing_fitted(truth: Truth) -> None:
     """An arm of which nothing may be fitted that its readings tell stays as it is."""
-    q = truth.postures(40)
+    q = truth.configurations(40)
 
     found = calibrate_points(truth.arm, q, truth.points(q), only=["tool.rx"])
 
@@ -414,7 +414,7 @@ def test_nothing_fitted(truth: Truth) -> None:
 
 def test_nothing_to_hold_against(truth: Truth) -> None:
     """Points in a frame of which all are held out, or a plane that is touched at the check alone, say nothing."""
-    q = truth.postures(44)
+    q = truth.configurations(44)
     given = concatenate(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
 
     with pytest.raises(InvalidValueError, match=r"plane table: no reading that is fitted .* so that the 4 others"):
@@ -424,7 +424,7 @@ def test_nothing_to_hold_against(truth: Truth) -> None:
 
 def test_too_few_to_hold_out(truth: Truth) -> None:
     """Where a fit without the part that is held out cannot be, the text says that it is of that part."""
-    q = truth.postures(44)
+    q = truth.configurations(44)
     given = concatenate(readings(q[:40], truth.points(q[:40])), readings(q[40:], plane=["table"] * 4))
 
     for held_out in (cross_validate, calibrate_nongeometric):
@@ -434,7 +434,7 @@ def test_too_few_to_hold_out(truth: Truth) -> None:
 
 def test_taken(truth: Truth) -> None:
     """Some of many readings keep the names of all frames."""
-    q = truth.postures(4)
+    q = truth.configurations(4)
     given: Readings = readings(q, truth.points(q), frame=["a", "b", "a", "b"])
 
     some = given.take(np.array([True, False, True, False]))

@@ -221,7 +221,7 @@ CELL = """gravity_m_per_s2 = [0, 0, -1.62]
 [arms.ARM_1]
 model   = "mine.toml"
 base    = [1, 0, 0,  0, -1, 0,  0, 0, -1,  0, 0, 2]
-posture = [0, 0.5, 0.4, 0, 0.6, 0]
+joint_positions = [0, 0.5, 0.4, 0, 0.6, 0]
 """
 
 

@@ -104,7 +104,7 @@ def test_contact(name: str, height: float) -> None:
 
 @pytest.mark.parametrize("name", ["puma_cell.toml", "stanford_cell.toml"])
 def test_examples(name: str) -> None:
-    """The cells of the examples are read, and every start posture is inside its limits."""
+    """The cells of the examples are read, and every start configuration is inside its limits."""
     for arm in read_cell(EXAMPLES / name).arms.values():
         assert (arm.start >= arm.arm.limits.lower).all()
         assert (arm.start <= arm.arm.limits.upper).all()
@@ -112,7 +112,7 @@ def test_examples(name: str) -> None:
 
 def test_defaults(tmp_path: Path) -> None:
     """What a cell file leaves out: the report's arm at the origin of the world, a servo of 1 ms, deviations of 1 mm."""
-    place = cell(tmp_path, "[arms.ARM_1]\nposture = [0, 0, 0.3, 0, 0, 0]\n")
+    place = cell(tmp_path, "[arms.ARM_1]\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n")
     arm = place.arms["ARM_1"]
 
     assert (place.period, place.deviation, place.vision_time) == (1e-3, 1e-3, 0.1)
@@ -130,7 +130,7 @@ def test_everything_at_once(tmp_path: Path) -> None:
 name = "all of it"
 [arms.arm-2]
 model = "puma560"
-posture = [0, 0.5, 0.5, 0, 0.5, 0]
+joint_positions = [0, 0.5, 0.5, 0, 0.5, 0]
 tool = [1,0,0, 0,1,0, 0,0,1, 0,0,0.12]
 open_s = 0.25
 grasp_s = 0.5
@@ -238,7 +238,7 @@ def test_arm_file_beside_the_cell(tmp_path: Path) -> None:
     before = Path.cwd()
     os.chdir(elsewhere)
     try:
-        place = cell(tmp_path, '[arms.ARM_1]\nmodel = "arms/mine.toml"\nposture = [0,0,0.3,0,0,0]\n')
+        place = cell(tmp_path, '[arms.ARM_1]\nmodel = "arms/mine.toml"\njoint_positions = [0,0,0.3,0,0,0]\n')
     finally:
         os.chdir(before)
 
@@ -250,12 +250,12 @@ FAULTS = {
     "no arm among the arms": ("[arms]\n", 1, "arms: expected at least one arm, such as [arms.ARM_1]"),
     "an arm by another name": ("[arms.ROBOT]\n", 1, "arms, ROBOT: expected the name of an arm, such as ARM_1"),
     "arms that differ in spelling": (
-        ARM + "[arms.arm-1]\nposture = [0,0,0.3,0,0,0]\n",
+        ARM + "[arms.arm-1]\njoint_positions = [0,0,0.3,0,0,0]\n",
         4,
         "arms, arm-1: ARM_1 is given twice",
     ),
     "arms that differ in leading zeros": (
-        ARM + "[arms.ARM_01]\nposture = [0,0,0.3,0,0,0]\n",
+        ARM + "[arms.ARM_01]\njoint_positions = [0,0,0.3,0,0,0]\n",
         4,
         "arms, ARM_01: ARM_1 is given twice; case, - or _ and leading zeros make no other arm",
     ),
@@ -271,7 +271,11 @@ FAULTS = {
         "arms, ARM_1, model: 'ntu-3r' has 3 joints; moves ask for a place and an orientation",
     ),
     "no start": ("[arms.ARM_1]\n", 1, "arms, ARM_1, hand: missing; give the pose of the hand at the start, or the jo"),
-    "two starts": (ARM + "posture = [0,0,0.3,0,0,0]\n", 3, "hand: the start is given twice, as hand and as posture"),
+    "two starts": (
+        ARM + "joint_positions = [0,0,0.3,0,0,0]\n",
+        3,
+        "hand: the start is given twice, as hand and as joint_positions",
+    ),
     "start out of reach": (
         '[arms.ARM_1]\nmodel = "puma560"\nhand = [1,0,0, 0,1,0, 0,0,1, 3,0,0]\n',
         3,
@@ -281,18 +285,22 @@ FAULTS = {
     "start outside the limits": (
         "[arms.ARM_1]\nhand = [1,0,0, 0,-1,0, 0,0,-1, 5,0,0]\n",
         2,
-        "arms, ARM_1, hand: no posture of 'stanford' is inside the joint limits; in the closest, joint 3 would stand",
+        "arms, ARM_1, hand: no configuration of 'stanford' is inside the joint limits; in the closest, joint 3 would",
     ),
-    "posture outside the limits": (
-        "[arms.ARM_1]\nposture = [0, 0, 1.2, 0, 0, 0]\n",
+    "configuration outside the limits": (
+        "[arms.ARM_1]\njoint_positions = [0, 0, 1.2, 0, 0, 0]\n",
         2,
-        "arms, ARM_1, posture: joint 3 would stand at 1200.0 mm, 82.4 mm beyond its limit 1117.6 mm",
+        "arms, ARM_1, joint_positions: joint 3 would stand at 1200.0 mm, 82.4 mm beyond its limit 1117.6 mm",
     ),
-    "posture too short": ("[arms.ARM_1]\nposture = [0, 0]\n", 2, "arms, ARM_1, posture: expected 6 numbers, got 2"),
-    "posture in degrees": (
-        '[arms.ARM_1]\nmodel = "ur5"\nposture = [10, -90, 90, -90, -90, 0]\n',
+    "configuration too short": (
+        "[arms.ARM_1]\njoint_positions = [0, 0]\n",
+        2,
+        "arms, ARM_1, joint_positions: expected 6 numbers, got 2",
+    ),
+    "configuration in degrees": (
+        '[arms.ARM_1]\nmodel = "ur5"\njoint_positions = [10, -90, 90, -90, -90, 0]\n',
         3,
-        "arms, ARM_1, posture: joint 1",
+        "arms, ARM_1, joint_positions: joint 1",
     ),
     "key without its unit": (
         ARM + "[motion]\ncorner = 3\n",

@@ -18,12 +18,12 @@ from armwright.spatial.poses import homogeneous
 
 BENCH = """name = "bench"
 [arms.ARM_1]
-posture = [0, 0, 0.3, 0, 0, 0]
+joint_positions = [0, 0, 0.3, 0, 0, 0]
 open_s = 0.2
 grasp_s = 0.5
 [arms.ARM_2]
 base = [-1,0,0, 0,-1,0, 0,0,1, 2,0,0]
-posture = [1, 0, 0.3, 0, 0, 0]
+joint_positions = [1, 0, 0.3, 0, 0, 0]
 [camera]
 pose = [0,1,0, -1,0,0, 0,0,1, 1,0,0]
 time_s = 0.25
@@ -84,7 +84,7 @@ def test_camera_that_finds_nothing(frame: str, tmp_path: Path) -> None:
 
 def test_camera_without_any_answer(tmp_path: Path) -> None:
     """In a cell that lists no visions the camera finds nothing at all."""
-    text = "[arms.ARM_1]\nposture = [0, 0, 0.3, 0, 0, 0]\n"
+    text = "[arms.ARM_1]\njoint_positions = [0, 0, 0.3, 0, 0, 0]\n"
 
     with pytest.raises(DeviceError, match=r"in cell 'bench\.toml' it finds nothing"):
         Simulator(bench(tmp_path, text)).look("OBJ")
@@ -119,19 +119,19 @@ def test_no_devices_at_all(tmp_path: Path) -> None:
 
 
 def test_arms_move_alone(tmp_path: Path) -> None:
-    """An arm ends where its trajectory ends, the other stays, and nobody can bend a posture from outside."""
+    """An arm ends where its trajectory ends, the other stays, and nobody can bend a configuration from outside."""
     hardware = Simulator(bench(tmp_path))
     goal = [0.5, -0.2, 0.4, 0.1, 0.2, 0.3]
 
-    motion = quintic(hardware.posture("ARM_1", 5.0), goal, 2.0)
+    motion = quintic(hardware.configuration("ARM_1", 5.0), goal, 2.0)
     hardware.begin("ARM_1", motion, 5.0, np.eye(4))
 
-    np.testing.assert_array_equal(hardware.posture("ARM_1", 6.0), motion(1.0))
+    np.testing.assert_array_equal(hardware.configuration("ARM_1", 6.0), motion(1.0))
     for later in (7.0, 100.0):
-        np.testing.assert_allclose(hardware.posture("ARM_1", later), goal, atol=1e-12)
-        np.testing.assert_array_equal(hardware.posture("ARM_2", later), (1, 0, 0.3, 0, 0, 0))
-    hardware.posture("ARM_1", 7.0)[0] = 9
-    np.testing.assert_allclose(hardware.posture("ARM_1", 7.0), goal, atol=1e-12)
+        np.testing.assert_allclose(hardware.configuration("ARM_1", later), goal, atol=1e-12)
+        np.testing.assert_array_equal(hardware.configuration("ARM_2", later), (1, 0, 0.3, 0, 0, 0))
+    hardware.configuration("ARM_1", 7.0)[0] = 9
+    np.testing.assert_allclose(hardware.configuration("ARM_1", 7.0), goal, atol=1e-12)
 
 
 def test_a_trajectory_that_begins_elsewhere(tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
     assert hardware.touches_at("ARM_1") == pytest.approx(4.0, abs=1e-9)
     assert hardware.force("ARM_1", 4.0)[2] == pytest.approx(0, abs=1e-6)
     for later, local in ((4.5, 1.5), (5.0, 2.0), (60.0, 2.0)):
-        np.testing.assert_array_equal(hardware.posture("ARM_1", later), motion(local))
+        np.testing.assert_array_equal(hardware.configuration("ARM_1", later), motion(local))
         depth = plane - (X_WB @ forward(arm, motion(local)))[2, 3]
         np.testing.assert_allclose(hardware.force("ARM_1", later), (0, 0, 1000 * depth), atol=1e-6)
         np.testing.assert_allclose(hardware.pressed("ARM_1", later), (depth, 1000 * depth), atol=1e-9)

@@ -47,8 +47,8 @@ def test_jacobian(frame: str) -> None:
     np.testing.assert_allclose(data["jacobian"], expected, atol=1e-12)
 
 
-def test_inverse_finds_the_posture() -> None:
-    """The posture whose pose is asked for comes back, nearest first."""
+def test_inverse_finds_the_configuration() -> None:
+    """The configuration whose pose is asked for comes back, nearest first."""
     noap = forward(load_arm("puma560"), Q)[:3].T.ravel()
 
     done = armwright("inverse", "puma560", "--noap", " ".join(map(repr, map(float, noap))), "--near", Q_DEG, "--json")

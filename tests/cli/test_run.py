@@ -569,8 +569,8 @@ def test_a_long_stream(tmp_path: Path) -> None:
 
 def test_few_rows_of_many_arms(tmp_path: Path) -> None:
     """Where there are fewer rows than arms, none are kept of a run that failed, and not all."""
-    base, posture = "base = [1,0,0, 0,1,0, 0,0,1, {0},0,0]\n", "posture = [0,0,0.3,0,1,0]\n"
-    arms = (f"[arms.ARM_{i}]\n{base.format(i)}{posture}" for i in range(3))
+    base, configuration = "base = [1,0,0, 0,1,0, 0,0,1, {0},0,0]\n", "joint_positions = [0,0,0.3,0,1,0]\n"
+    arms = (f"[arms.ARM_{i}]\n{base.format(i)}{configuration}" for i in range(3))
     (tmp_path / "cell.toml").write_text("".join(arms))
     program, out = tmp_path / "p.rlo", tmp_path / "out"
     program.write_text("VAR n : SCALAR ; BEGIN n = 0 ; PAUSE 0.01 ; n = 1 / n END.")

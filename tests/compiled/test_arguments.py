@@ -184,13 +184,13 @@ def test_status_of_one_configuration() -> None:
     assert [status(x) for x in (0.5, 90.0, 1e13, np.nan, -np.inf)] == [0, 2, 1, 1, 1]
 
 
-def test_all_images_of_a_posture() -> None:
+def test_all_images_of_a_configuration() -> None:
     """Where limits allow more than a turn, all images of a branch can be had: each puts the tool where it was."""
     arm: Arm = load_arm("ur5")  # two turns each way: 2 images of every angle but 0
     q = np.array([0.1, -1.2, 1.1, -0.4, 0.9, 0.3])
-    postures, _ = compile_arm(arm).inverse_branches(forward(arm, q), q)
+    configurations, _ = compile_arm(arm).inverse_branches(forward(arm, q), q)
 
-    found = equivalent_configurations(arm, postures[np.abs(postures - q).max(axis=-1).argmin()])
+    found = equivalent_configurations(arm, configurations[np.abs(configurations - q).max(axis=-1).argmin()])
 
     assert len(found) == 2**6
     with warnings.catch_warnings():

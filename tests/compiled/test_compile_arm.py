@@ -23,7 +23,7 @@ from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, Un
 from armwright.kinematics.forward_kinematics import forward, link_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
 from armwright.kinematics.jacobians import jacobian
-from oracles.arms import random_arm, random_postures
+from oracles.arms import random_arm, random_configurations
 from samples import WHOLE, Sample
 
 ROUNDING = 1e-11  # two orders of the same sums, and sines that differ by two units in the last place
@@ -57,7 +57,7 @@ PLAIN: dict[str, Callable[..., Any]] = {
 def _inputs(fast: CompiledArm, name: str, rng: np.random.Generator, lead: tuple[int, ...]) -> list[Array]:
     """Return random inputs of a quantity."""
     shapes = fast.kernel(name).emitted.inputs
-    positions = random_postures(fast.arm, rng, int(np.prod(lead))).reshape(*lead, fast.arm.n)
+    positions = random_configurations(fast.arm, rng, int(np.prod(lead))).reshape(*lead, fast.arm.n)
     return [positions if key == "q" else rng.normal(size=(*lead, *shape)) for key, shape in shapes.items()]
 
 
@@ -113,9 +113,9 @@ def some_of(sample: Sample, arms: Sequence[Arm]) -> list[Arm]:
 def assert_branches(arm: Arm, rng: np.random.Generator) -> None:
     """Check the branches of one arm."""
     fast = compile_arm(arm).inverse_branches
-    postures = random_postures(arm, rng, 300)
-    postures[:100, 4] = 0.0
-    X, near = forward(arm, postures), np.tile(arm.limits.lower * 0.3, (300, 1))
+    configurations = random_configurations(arm, rng, 300)
+    configurations[:100, 4] = 0.0
+    X, near = forward(arm, configurations), np.tile(arm.limits.lower * 0.3, (300, 1))
     X[250:, :3, 3] *= 2.0
 
     q, singular = fast(X, near)
@@ -125,7 +125,7 @@ def assert_branches(arm: Arm, rng: np.random.Generator) -> None:
     assert singular.dtype == bool
     assert singular[:100].any()
     assert not singular[100:].any()
-    # Postures may differ by rounding where the arm is stretched out; what they put the hand at may not.
+    # Configurations may differ by rounding where the arm is stretched out; what they put the hand at may not.
     np.testing.assert_allclose(forward(arm, q), forward(arm, expected), atol=1e-9)
     in_reach = np.linalg.norm(forward(arm, q)[..., :3, 3] - X[:, None, :3, 3], axis=-1).max(axis=-1) < 1e-9
     assert in_reach[:250].all()

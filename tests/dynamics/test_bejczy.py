@@ -9,13 +9,13 @@ from armwright.dynamics.bejczy import PRINTED, Coefficients, bejczy_efforts, bej
 from armwright.dynamics.inertia_matrix import mass_matrix
 from armwright.dynamics.shares import gravity_efforts
 from armwright.errors import ShapeError, UnsupportedArmError
-from oracles.arms import random_postures
+from oracles.arms import random_configurations
 
 
 @pytest.fixture
 def fit(rng: np.random.Generator) -> Coefficients:
     arm = load_arm("stanford-jpl")
-    return fitted(arm, random_postures(arm, rng, 500))
+    return fitted(arm, random_configurations(arm, rng, 500))
 
 
 def test_fit_finds_the_report(fit: Coefficients) -> None:
@@ -47,7 +47,7 @@ def test_fit_by_hand(fit: Coefficients) -> None:
 def test_model_is_near_the_arm(fit: Coefficients, rng: np.random.Generator) -> None:
     """With fitted constants the model misses the diagonal of the mass matrix and gravity by a few percent at most."""
     arm = load_arm("stanford-jpl")
-    q = random_postures(arm, rng, 200)
+    q = random_configurations(arm, rng, 200)
     D = np.diagonal(mass_matrix(arm, q), axis1=-2, axis2=-1)
     G = gravity_efforts(arm, q)
 
@@ -59,7 +59,7 @@ def test_model_is_near_the_arm(fit: Coefficients, rng: np.random.Generator) -> N
 
 
 def test_efforts_are_inertias_and_gravity(rng: np.random.Generator) -> None:
-    """Each joint feels its own acceleration and gravity; a whole motion is as its postures."""
+    """Each joint feels its own acceleration and gravity; a whole motion is as its configurations."""
     q, qdd = rng.normal(size=(2, 3, 4, 6))
 
     tau = bejczy_efforts(q, qdd, gravity=9.80621)

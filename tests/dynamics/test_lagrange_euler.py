@@ -95,7 +95,7 @@ def test_skew_symmetry_exactly(rng: np.random.Generator) -> None:
 
 
 def test_coriolis_matrix_times_speeds(rng: np.random.Generator) -> None:
-    """C qd are the efforts of Newton-Euler without acceleration and gravity, on a grid of postures."""
+    """C qd are the efforts of Newton-Euler without acceleration and gravity, on a grid of configurations."""
     arm = random_arm(rng, 6)
     q, qd = rng.normal(size=(2, 2, 3, 6))
 

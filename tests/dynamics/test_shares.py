@@ -11,7 +11,7 @@ from armwright.dynamics.inertia_matrix import composite_rigid_body, mass_matrix
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
 from armwright.errors import ShapeError
-from oracles.arms import random_arm, random_postures
+from oracles.arms import random_arm, random_configurations
 from oracles.with_pinocchio import pinocchio_model
 
 AGREEMENT = 1e-10  # relative to the largest number
@@ -69,7 +69,7 @@ def test_mass_matrix_is_positive(rng: np.random.Generator) -> None:
     for name in ("puma560", "stanford", "stanford-jpl"):
         arm = load_arm(name)
 
-        assert np.linalg.eigvalsh(mass_matrix(arm, random_postures(arm, rng, 50))).min() > 0
+        assert np.linalg.eigvalsh(mass_matrix(arm, random_configurations(arm, rng, 50))).min() > 0
 
 
 def test_base_that_falls_freely(rng: np.random.Generator) -> None:
@@ -99,7 +99,7 @@ def test_base_acceleration_of_wrong_shape() -> None:
 
 
 def test_leading_axes_stay() -> None:
-    """A grid of postures comes back as a grid of mass matrices, each that of its posture alone."""
+    """A grid of configurations comes back as a grid of mass matrices, each that of its configuration alone."""
     arm = load_arm("puma560")
     q = np.linspace(-1, 1, 36).reshape(2, 3, 6)
 

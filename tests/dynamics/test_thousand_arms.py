@@ -133,7 +133,7 @@ def test_coriolis_matrix() -> None:
 
 
 def test_energies() -> None:
-    """Pinocchio finds the same energy of motion, and the same gain in height energy from one posture to another."""
+    """Pinocchio finds the same kinetic energy, and the same potential energy between two configurations."""
     motion = largest_deviation(
         lambda case: kinetic_energy(case.arm, case.q, case.qd, drives=False),
         lambda case: pin.computeKineticEnergy(*case.links, case.q, case.qd),

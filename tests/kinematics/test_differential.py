@@ -9,7 +9,7 @@ from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.differential import (
-    SingularPostureError,
+    SingularConfigurationError,
     Way,
     differential_inverse,
     rates_by_blocks,
@@ -22,7 +22,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.jacobians import jacobian
 from armwright.tracing.graph import Graph, evaluate
 from armwright.tracing.scalar import Scalar
-from oracles.arms import random_pose, random_postures
+from oracles.arms import random_configurations, random_pose
 
 # Agreement with a solver that loses digits with the condition of the Jacobian, at most 1e3 in these tests.
 SOLVED = 1e-9
@@ -44,9 +44,9 @@ def _regular(arm: Arm, q: Array) -> Array:
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("frame", ["base", "tool"])
 def test_against_the_numerical_jacobian(way: Way, frame: str, puma: Arm, rng: np.random.Generator) -> None:
-    """On well-conditioned random postures both ways give what solving the Jacobian gives, in base and tool axes."""
+    """At well-conditioned configurations both methods yield what solving the Jacobian yields, in base and tool axes."""
     arm = attrs.evolve(puma, base=random_pose(rng), tool=random_pose(rng))
-    q = _regular(arm, random_postures(arm, rng, 3000))
+    q = _regular(arm, random_configurations(arm, rng, 3000))
     twist = rng.normal(size=(len(q), 6))
 
     rates = differential_inverse(arm, q, twist, way=way, frame=frame).checked()  # type: ignore[arg-type]
@@ -58,8 +58,8 @@ def test_against_the_numerical_jacobian(way: Way, frame: str, puma: Arm, rng: np
 
 
 def test_both_ways_agree(puma: Arm, rng: np.random.Generator) -> None:
-    """Blocks and derivative give the same rates for the same twist, in postures of any condition above 1e-6."""
-    q = random_postures(puma, rng, 5000)
+    """Blocks and derivative give the same rates for the same twist, in configurations of any condition above 1e-6."""
+    q = random_configurations(puma, rng, 5000)
     q = q[np.linalg.svd(jacobian(puma, q), compute_uv=False)[:, -1] > 1e-6]
     twist = rng.normal(size=(len(q), 6))
 
@@ -71,7 +71,7 @@ def test_both_ways_agree(puma: Arm, rng: np.random.Generator) -> None:
 
 
 def test_it_is_the_slope_of_the_inverse(puma: Arm) -> None:
-    """Along a motion of the hand the postures that the inverse finds move at the rates."""
+    """Along a motion of the hand the configurations that the inverse finds move at the rates."""
     q = np.array((0.3, -0.4, 0.5, 0.6, 0.7, 0.8))
     qd = np.array((0.1, -0.2, 0.3, 0.2, -0.1, 0.4))
     twist = jacobian(puma, q) @ qd
@@ -121,16 +121,16 @@ def test_arms_built_like_the_puma(way: Way, number: int) -> None:
 @pytest.mark.parametrize("way", [rates_by_blocks, rates_by_derivative])
 def test_plain_numbers_and_arrays(way: object, puma: Arm, rng: np.random.Generator) -> None:
     """The equations give for floats what they give for arrays."""
-    q, twist = random_postures(puma, rng, 20), rng.normal(size=(20, 6))
+    q, twist = random_configurations(puma, rng, 20), rng.normal(size=(20, 6))
     geometry = find_geometry(puma)
     assert geometry is not None
     name = "blocks" if way is rates_by_blocks else "derivative"
 
     many = differential_inverse(puma, q, twist, way=name).rates  # type: ignore[arg-type]
 
-    for row, posture, asked in zip(many, q.tolist(), twist.tolist(), strict=True):
-        motion = wrist_motion(puma, geometry, posture, asked, "base")
-        one = way(geometry, geometry.angles(posture), motion)  # type: ignore[operator]
+    for row, configuration, asked in zip(many, q.tolist(), twist.tolist(), strict=True):
+        motion = wrist_motion(puma, geometry, configuration, asked, "base")
+        one = way(geometry, geometry.angles(configuration), motion)  # type: ignore[operator]
         assert all(isinstance(rate, float) for rate in one)
         np.testing.assert_allclose(np.array(geometry.signs) * one, row, rtol=1e-12, atol=1e-12)
 
@@ -147,7 +147,7 @@ def test_the_equations_can_be_traced(way: object, puma: Arm, rng: np.random.Gene
 
     inputs = Graph().inputs(12)
     outputs = [rate.node for rate in rates(inputs[:6], inputs[6:])]
-    q, twist = random_postures(puma, rng, 1)[0].tolist(), rng.normal(size=6).tolist()
+    q, twist = random_configurations(puma, rng, 1)[0].tolist(), rng.normal(size=6).tolist()
 
     np.testing.assert_allclose(evaluate(inputs[0].graph, outputs, [*q, *twist]), rates(q, twist), rtol=SOLVED)
 
@@ -161,7 +161,7 @@ def test_the_equations_can_be_traced(way: object, puma: Arm, rng: np.random.Gene
         ((0.3, np.arctan2(0.432 + 0.433, -0.02), np.pi / 2, 0.6, 0.5, 0.7), "shoulder"),
     ],
 )
-def test_singular_postures_are_named(way: Way, q: tuple[float, ...], factor: str, puma: Arm) -> None:
+def test_singular_configurations_are_named(way: Way, q: tuple[float, ...], factor: str, puma: Arm) -> None:
     """At a singularity there are no rates: they are NaN, never numbers that look right; the factor is named."""
     place = ("shoulder", "elbow", "wrist").index(factor)
 
@@ -169,11 +169,13 @@ def test_singular_postures_are_named(way: Way, q: tuple[float, ...], factor: str
 
     assert np.isnan(found.rates).all()
     np.testing.assert_array_equal(np.flatnonzero(found.singular), [place])
-    with pytest.raises(SingularPostureError, match=f"the posture is singular at the {factor}: .* damped_rates"):
+    with pytest.raises(
+        SingularConfigurationError, match=f"the configuration is singular at the {factor}: .* damped_rates"
+    ):
         found.checked()
 
 
-def test_one_singular_posture_among_many(puma: Arm) -> None:
+def test_one_singular_configuration_among_many(puma: Arm) -> None:
     """Only the row that is singular stays without rates, and its number is told."""
     q = np.tile((0.3, 0.4, 0.5, 0.6, 0.7, 0.8), (3, 1))
     q[1, 4] = 0.0
@@ -183,7 +185,7 @@ def test_one_singular_posture_among_many(puma: Arm) -> None:
     np.testing.assert_array_equal(found.singular.any(axis=-1), [False, True, False])
     np.testing.assert_array_equal(np.isnan(found.rates).all(axis=-1), [False, True, False])
     np.testing.assert_allclose(jacobian(puma, q[0]) @ found.rates[2], 1.0, atol=SOLVED)
-    with pytest.raises(SingularPostureError, match=r"^posture 1 is singular at the wrist"):
+    with pytest.raises(SingularConfigurationError, match=r"^configuration 1 is singular at the wrist"):
         found.checked()
 
 

@@ -1,4 +1,4 @@
-"""The edges of inverse kinematics: right angles, singular postures and what is next to them, limits, typed poses."""
+"""The edges of inverse kinematics: right angles, singular configurations and their neighbours, limits, typed poses."""
 
 import math
 
@@ -16,13 +16,13 @@ from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branc
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.singularity_analysis import singularity_factors
 from armwright.spatial.poses import homogeneous
-from oracles.arms import random_postures
+from oracles.arms import random_configurations
 from oracles.with_pinocchio import pinocchio_model
 from samples import Sample
 
 RESIDUAL = 1e-12  # a pose met, in m and rad
-POSTURE = 1e-9  # a posture found again where the Jacobian is regular
-REGULAR = 1e-3  # smallest singular value of a well-conditioned posture [m]
+SAME_CONFIGURATION = 1e-9  # two configurations are equal where the Jacobian is regular
+REGULAR = 1e-3  # smallest singular value of a well-conditioned configuration [m]
 ELBOW = math.atan2(0.433, -0.02)  # the PUMA's elbow is straight where tan q3 = d4 / a3
 # With q3 a right angle the PUMA's wrist centre is above its shoulder where (a2 + d4)·c2 = a3·s2.
 UPRIGHT = math.atan2(0.432 + 0.433, -0.02)
@@ -36,7 +36,7 @@ def _upright(arm: Arm, q: tuple[float, ...]) -> float:
 
 # The UR5's wrist is above the axis of joint 1, seen in the plane of the arm, where A cos q2 + B sin q2 = 0.
 LEANING = (0.3, 0.0, 0.8, 0.6, 0.5, 0.7)
-# Postures in which one factor of the determinant vanishes, and the joint that leads away from there.
+# Configurations in which one factor of the determinant vanishes, and the joint that leads away from there.
 SINGULAR = {
     "PUMA wrist": ("puma560-seed", (0.3, 0.4, 0.5, 0.6, 0.0, 0.7), 5),
     "PUMA elbow stretched": ("puma560-seed", (0.3, 0.4, ELBOW, 0.6, 0.5, 0.7), 3),
@@ -60,7 +60,7 @@ def _wide(name: str) -> Arm:
 
 
 def _grid(arm: Arm) -> Array:
-    """All postures inside the limits whose angles are multiples of 45 degrees."""
+    """All configurations inside the limits whose angles are multiples of 45 degrees."""
     steps = [np.radians(np.arange(-180, 181, 45)) if joint.revolute else np.array((0.3, 1.0)) for joint in arm.joints]
     kept = [
         step[(step >= joint.limits.lower) & (step <= joint.limits.upper) & (np.abs(step) < np.pi)]
@@ -89,9 +89,9 @@ def _honest(solution: InverseSolution, X: Array) -> None:
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_every_well_conditioned_pose_of_the_grid(name: str) -> None:
-    """On the whole 45 degree grid each well-conditioned posture, q2 = 90 degrees and all, is a branch of its own pose.
+    """On the whole 45 degree grid each well-conditioned configuration, also q2 = 90 degrees, is a branch of its pose.
 
-    And every branch meets the pose; where the posture is singular, some branch does.
+    And every branch meets the pose; where the configuration is singular, some branch does.
     """
     arm = load_arm(name) if name != "ur5" else _wide("ur5")
     q = _grid(arm)
@@ -103,7 +103,7 @@ def test_every_well_conditioned_pose_of_the_grid(name: str) -> None:
 
     assert regular.sum() > 2000
     assert (np.abs(q[regular, 1] - np.pi / 2) < 1e-12).sum() > 100
-    assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < POSTURE
+    assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < SAME_CONFIGURATION
     np.testing.assert_allclose(
         forward(arm, found), np.broadcast_to(X[:, None], (*found.shape[:2], 4, 4)), atol=RESIDUAL
     )
@@ -114,20 +114,20 @@ def test_verdict_on_the_grid(name: str) -> None:
     """Judged one by one, grid poses are solved or singular, none has more than eight branches, and none comes twice."""
     arm = load_arm(name) if name != "ur5" else _wide("ur5")
     q = _grid(arm)
-    for posture in q[:: len(q) // 60]:
-        X = forward(arm, posture)
-        solution = inverse(arm, X, posture)
+    for configuration in q[:: len(q) // 60]:
+        X = forward(arm, configuration)
+        solution = inverse(arm, X, configuration)
 
-        assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR), posture
+        assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR), configuration
         assert 1 <= len(solution.branches) <= 8
         assert _apart(solution) > 1e-6
-        assert np.abs(solution.best.q - posture).max() < 1e-6
+        assert np.abs(solution.best.q - configuration).max() < 1e-6
         _honest(solution, X)
 
 
 @pytest.mark.parametrize("case", SINGULAR)
 def test_exactly_singular(case: str) -> None:
-    """At a singular posture the pose is met, no branch comes twice, and the posture itself is among them."""
+    """At a singular configuration the pose is reached, no branch comes twice, and the configuration is among them."""
     name, q, _ = SINGULAR[case]
     arm = _wide(name)
     X = forward(arm, q)
@@ -137,7 +137,7 @@ def test_exactly_singular(case: str) -> None:
     assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR)
     assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
     assert _apart(solution) > 1e-6
-    # At the edge of a reach half of the digits of the posture are lost, and none of the pose.
+    # At the edge of a reach half of the digits of the configuration are lost, and none of the pose.
     assert min(np.abs(branch.q - q).max() for branch in solution) < 1e-6
     _honest(solution, X)
 
@@ -147,11 +147,11 @@ def test_exactly_singular(case: str) -> None:
 @pytest.mark.parametrize("way", [1, -1])
 @pytest.mark.drawn(0.3)
 def test_next_to_a_singularity(case: str, distance: float, way: int) -> None:
-    """From a thousandth to a billionth beside it the pose is met; the posture is found as well as rounding allows.
+    """From 1e-3 to 1e-9 beside it the pose is reached; the configuration is found as well as rounding allows.
 
-    Rounding of the pose by 1e-16 moves the posture by 1e-16 over the factor of the determinant that vanishes; nearer
-    than 1e-7 the two branches that fall together at the edge of a reach are one. Where a second factor is small as
-    well, as with the wrist centre at the shoulder, all that is drawn out once more by that one.
+    Rounding of the pose by 1e-16 moves the configuration by 1e-16 over the factor of the determinant that vanishes;
+    nearer than 1e-7 the two branches that fall together at the edge of a reach are one.Where a second factor is small
+    as well, as with the wrist centre at the shoulder, all that is drawn out once more by that one.
     """
     name, q, joint = SINGULAR[case]
     arm = _wide(name)
@@ -173,11 +173,11 @@ def test_next_to_a_singularity(case: str, distance: float, way: int) -> None:
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_at_every_limit(name: str, rng: np.random.Generator) -> None:
-    """A posture with a joint exactly at its limit is inside the limits, and found."""
+    """A configuration with a joint exactly at its limit is inside the limits, and found."""
     arm = load_arm(name)
     for joint in range(6):
         for limit in (arm.joints[joint].limits.lower, arm.joints[joint].limits.upper):
-            q = random_postures(arm, rng, 1)[0]
+            q = random_configurations(arm, rng, 1)[0]
             q[joint] = limit
             if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] < REGULAR:
                 continue
@@ -185,7 +185,7 @@ def test_at_every_limit(name: str, rng: np.random.Generator) -> None:
             solution = inverse(arm, forward(arm, q), q)
 
             assert solution.outcome is Outcome.SOLVED
-            np.testing.assert_allclose(solution.best.q, q, atol=POSTURE)
+            np.testing.assert_allclose(solution.best.q, q, atol=SAME_CONFIGURATION)
             assert solution.best.allowed
 
 
@@ -194,7 +194,7 @@ def test_just_beyond_a_limit(name: str, rng: np.random.Generator) -> None:
     """A millionth beyond its limit the same branch is not allowed, and the joint is named."""
     arm = load_arm(name)
     for joint in range(6):
-        q = random_postures(arm, rng, 1)[0]
+        q = random_configurations(arm, rng, 1)[0]
         q[joint] = arm.joints[joint].limits.upper + 1e-6
 
         solution = inverse(arm, forward(arm, q), q)
@@ -208,12 +208,12 @@ def test_just_beyond_a_limit(name: str, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 @pytest.mark.parametrize(("digits", "off"), [(6, 2e-6), (4, 2e-4)])
 def test_typed_poses(name: str, digits: int, off: float, rng: np.random.Generator) -> None:
-    """Poses typed with six or four digits of a metre solve; the posture is off by what the rounding asks of it.
+    """Poses typed with six or four digits of a metre solve; the configuration is off by what the rounding asks of it.
 
     The rotation is made one first, and that pose is met to rounding.
     """
     arm = load_arm(name)
-    for q in random_postures(arm, rng, 60):
+    for q in random_configurations(arm, rng, 60):
         smallest = np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1]
         if smallest < 0.02:
             continue
@@ -260,7 +260,7 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
     fore, side = math.hypot(0.02, 0.433), 0.149
     counts = dict.fromkeys(Outcome, 0)
     for _ in range(300):
-        X = forward(arm, random_postures(arm, rng, 1)[0])
+        X = forward(arm, random_configurations(arm, rng, 1)[0])
         X[:3, 3] = rng.uniform(-0.95, 0.95, size=3) * rng.choice((1.0, 0.2))
         along = math.sqrt(max(X[:3, 3] @ X[:3, 3] - side**2, 0.0))
         reached = np.hypot(X[0, 3], X[1, 3]) >= side and abs(0.432 - fore) <= along <= 0.432 + fore
@@ -270,7 +270,7 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
         assert (solution.outcome is not Outcome.OUT_OF_REACH) == reached
         counts[solution.outcome] += 1
         if solution.outcome is Outcome.OUT_OF_LIMITS:
-            # By brute force: no posture of the eight is inside by whole turns of any joint.
+            # By brute force: no configuration of the eight is inside by whole turns of any joint.
             q, _ = inverse_branches(arm, X)
             turns = q[..., None] + 2 * np.pi * np.arange(-2, 3)
             lower, upper = arm.limits.lower[:, None], arm.limits.upper[:, None]
@@ -282,16 +282,16 @@ def test_verdicts_of_the_puma_by_hand(rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 def test_right_angle_of_joint_2(name: str, rng: np.random.Generator) -> None:
-    """With joint 2 at 90 degrees exactly and all others anywhere the posture is found again, and none comes twice."""
+    """With joint 2 at exactly 90 degrees and all others anywhere the configuration is found, and none comes twice."""
     arm = load_arm(name)
-    for q in random_postures(arm, rng, 40):
+    for q in random_configurations(arm, rng, 40):
         q[1] = np.pi / 2
         if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] < REGULAR:
             continue
         solution = inverse(arm, forward(arm, q), q)
 
         assert solution.outcome is Outcome.SOLVED
-        assert np.abs(solution.best.q - q).max() < POSTURE
+        assert np.abs(solution.best.q - q).max() < SAME_CONFIGURATION
         assert _apart(solution) > 1e-6
 
 
@@ -299,16 +299,16 @@ def test_right_angle_of_joint_2(name: str, rng: np.random.Generator) -> None:
 def test_whole_turns(name: str, rng: np.random.Generator) -> None:
     """An arm that stands beyond half a turn, where its limits have room for it, is told to stay there."""
     arm = load_arm(name)
-    beyond = [q for q in random_postures(arm, rng, 400) if (np.abs(q) > np.pi).any()][:40]
+    beyond = [q for q in random_configurations(arm, rng, 400) if (np.abs(q) > np.pi).any()][:40]
     assert len(beyond) == 40
     for q in beyond:
         if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] > REGULAR:
-            assert np.abs(inverse(arm, forward(arm, q), q).best.q - q).max() < POSTURE
+            assert np.abs(inverse(arm, forward(arm, q), q).best.q - q).max() < SAME_CONFIGURATION
 
 
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford"])
 def test_made_outside_the_limits(name: str, rng: np.random.Generator) -> None:
-    """A pose made outside the limits has that posture among its branches, not allowed unless a turn brings it inside.
+    """A pose made outside the limits has its configuration among the branches, allowed if a revolution helps.
 
     It is called out of limits where no branch is inside by any whole turns, and solved where one is.
     """
@@ -316,7 +316,7 @@ def test_made_outside_the_limits(name: str, rng: np.random.Generator) -> None:
     turn = 2 * np.pi * np.array([joint.revolute for joint in arm.joints])[:, None] * np.arange(-2, 3)
     lower, upper = arm.limits.lower[:, None], arm.limits.upper[:, None]
     answers = dict.fromkeys(Outcome, 0)
-    for q in random_postures(_wide(name), rng, 100):
+    for q in random_configurations(_wide(name), rng, 100):
         X = forward(arm, q)
         solution = inverse(arm, X)
         images = inverse_branches(arm, X)[0][..., None] + turn
@@ -341,7 +341,7 @@ def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Gene
         "ur5": (0.10915, 0.089159, 0.0823),
     }[name]
     arm = _wide(name)
-    for R in (forward(arm, q)[:3, :3] for q in random_postures(arm, rng, 5)):
+    for R in (forward(arm, q)[:3, :3] for q in random_configurations(arm, rng, 5)):
         turn, rho = rng.uniform(-np.pi, np.pi), side - short
         # On the ring of the wrist's reach in every arm: half a metre up.
         wrist = np.array((rho * np.cos(turn), rho * np.sin(turn), height + 0.5))
@@ -352,7 +352,7 @@ def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Gene
         assert solution.outcome is Outcome.OUT_OF_REACH
         assert solution.allowed == ()
         assert solution.distance == pytest.approx(short, abs=1e-9)
-        assert solution.turn < RESIDUAL
+        assert solution.rotation_error < RESIDUAL
         np.testing.assert_allclose(solution.nearest_pose[:3, :3], R, atol=RESIDUAL)
         assert inverse(arm, solution.nearest_pose).outcome is not Outcome.OUT_OF_REACH
 
@@ -360,13 +360,13 @@ def test_too_near_to_the_first_axis(name: str, short: float, rng: np.random.Gene
 @pytest.mark.parametrize("name", ["puma560-seed", "stanford", "ur5"])
 @pytest.mark.parametrize("room", [0.1, 1e-2, 1e-4, 1e-6])
 def test_free_joint_with_little_room(name: str, room: float, rng: np.random.Generator) -> None:
-    """With joint 5 straight and joint 6 held to a hair's breadth, the one posture in a free family is found.
+    """With joint 5 straight and joint 6 held to a hair's breadth, the one configuration in a free family is found.
 
     Joints 4 and 6 are free together, or all of 2, 3, 4 and 6; that joint 6 has room for a part of the family only,
     and next to none, does not put the pose out of limits.
     """
     wide = _wide(name)
-    for q in random_postures(wide, rng, 5):
+    for q in random_configurations(wide, rng, 5):
         q[4] = 0.0
         held = Limits(lower=q[5] - 0.3 * room, upper=q[5] + 0.7 * room)
         arm = attrs.evolve(wide, joints=[*wide.joints[:5], attrs.evolve(wide.joints[5], limits=held)])

@@ -19,9 +19,9 @@ from armwright.kinematics.inverse_kinematics.solve import BRANCHES, inverse, inv
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
 from armwright.tracing.graph import Graph, evaluate
-from oracles.arms import random_arm, random_pose, random_postures
+from oracles.arms import random_arm, random_configurations, random_pose
 
-POSTURE = 1e-9  # a posture found again where the Jacobian is regular
+SAME_CONFIGURATION = 1e-9  # two configurations are equal where the Jacobian is regular
 RESIDUAL = 1e-12  # a pose met, in m and rad
 RIGHT = np.pi / 2
 SLIDE = Limits(lower=0.2, upper=1.0)
@@ -67,24 +67,24 @@ def _random_build(rng: np.random.Generator, family: str) -> Arm:
 @pytest.mark.parametrize("family", ["puma", "stanford", "parallel"])
 @pytest.mark.parametrize("number", range(8))
 def test_any_table_of_a_build_is_solved(family: str, number: int) -> None:
-    """Random signs of twists, offsets of angles, shoulders, forearms, bases and tools: 500 postures each come back."""
+    """Random twist signs, offsets of angles, shoulders, forearms, bases, tools: 500 configurations each are found."""
     rng = np.random.default_rng(number)
     arm = _random_build(rng, family)
-    q = random_postures(arm, rng, 500)
+    q = random_configurations(arm, rng, 500)
     X = forward(arm, q)
     regular = np.linalg.svd(jacobian(arm, q), compute_uv=False)[:, -1] > 1e-3
 
     found, _ = inverse_branches(arm, X, q)
 
     assert find_geometry(arm).family == family  # type: ignore[union-attr]
-    assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < POSTURE
+    assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < SAME_CONFIGURATION
     np.testing.assert_allclose(forward(arm, found), np.broadcast_to(X[:, None], (500, 8, 4, 4)), atol=RESIDUAL)
 
 
 @pytest.mark.parametrize("number", range(8))
 @pytest.mark.parametrize("family", ["puma", "parallel"])
 def test_two_tables_of_one_arm(family: str, number: int) -> None:
-    """Turning an axis over and its joint with it changes the numbers and not the arm: the postures are the same."""
+    """Reversing an axis and its joint changes the numbers and not the arm: the configurations are the same."""
     rng = np.random.default_rng(number)
     arm = _random_build(rng, family)
     # Turn the axis of joint 4 over: half a turn about x before and after, and theta and d count the other way.
@@ -99,7 +99,7 @@ def test_two_tables_of_one_arm(family: str, number: int) -> None:
         ],
     )
     mirror = np.array((1, 1, 1, -1, 1, 1))
-    q = random_postures(arm, rng, 20)
+    q = random_configurations(arm, rng, 20)
     X = forward(arm, q)
     np.testing.assert_allclose(forward(over, q * mirror), X, atol=RESIDUAL)
 
@@ -107,10 +107,10 @@ def test_two_tables_of_one_arm(family: str, number: int) -> None:
         one, two = inverse(arm, hand, near), inverse(over, hand, near * mirror)
 
         assert len(one.branches) == len(two.branches)
-        postures = np.array([branch.q * mirror for branch in two])
+        configurations = np.array([branch.q * mirror for branch in two])
         for branch in one:
             # Of two images at half a turn either way both are right.
-            turned = np.abs(np.angle(np.exp(1j * (postures - branch.q)))).max(axis=-1)
+            turned = np.abs(np.angle(np.exp(1j * (configurations - branch.q)))).max(axis=-1)
             assert turned.min() < 1e-6
 
 
@@ -159,7 +159,7 @@ def test_nearest_pose_is_nearest_for_any_build(family: str) -> None:
         if solution.outcome is not Outcome.OUT_OF_REACH:
             continue
         out += 1
-        assert solution.turn < RESIDUAL
+        assert solution.rotation_error < RESIDUAL
         assert inverse(arm, solution.nearest_pose).branches[0].position_error < RESIDUAL
         # Any other pose in reach of that orientation: steps from the nearest one that shorten the way must all fail.
         way = X[:3, 3] - solution.nearest_pose[:3, 3]
@@ -193,8 +193,8 @@ def ur5() -> Arm:
     return load_arm("ur5")
 
 
-def test_ur5_finds_every_posture_again(ur5: Arm, rng: np.random.Generator) -> None:
-    """Of 5000 postures of the UR5 each is among its own branches, and each branch meets the pose."""
+def test_ur5_finds_every_configuration_again(ur5: Arm, rng: np.random.Generator) -> None:
+    """Of 5000 configurations of the UR5 each is among its own branches, and each branch meets the pose."""
     q = rng.uniform(-np.pi, np.pi, size=(5000, 6))
     X = forward(ur5, q)
     regular = np.linalg.svd(jacobian(ur5, q), compute_uv=False)[:, -1] > 1e-3
@@ -202,14 +202,14 @@ def test_ur5_finds_every_posture_again(ur5: Arm, rng: np.random.Generator) -> No
     found, _ = inverse_branches(ur5, X, q)
 
     assert regular.mean() > 0.95
-    assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < POSTURE
+    assert np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)[regular].max() < SAME_CONFIGURATION
     np.testing.assert_allclose(forward(ur5, found), np.broadcast_to(X[:, None], (5000, 8, 4, 4)), atol=RESIDUAL)
 
 
 def test_ur5_labels_say_how_the_arm_stands(ur5: Arm, rng: np.random.Generator) -> None:
     """The elbow called up is above the line from shoulder to joint 4; left and right are half a turn of joint 1 or so.
 
-    Eight labels, each once, where all eight postures exist.
+    Eight labels, each once, where all eight configurations exist.
     """
     full = 0
     for q in rng.uniform(-np.pi, np.pi, size=(60, 6)):
@@ -271,7 +271,7 @@ def test_ur5_out_of_reach(ur5: Arm) -> None:
 
 
 def test_branches_that_a_pose_has_not_repeat_one_it_has(ur5: Arm, rng: np.random.Generator) -> None:
-    """Of 2000 poses many have less than eight postures; the array of eight holds only postures that meet the pose."""
+    """Of 2000 poses many have fewer than eight solutions; the array of eight holds only solutions of the pose."""
     X = forward(ur5, rng.uniform(-np.pi, np.pi, size=(2000, 6)))
 
     q, _ = inverse_branches(ur5, X)
@@ -283,7 +283,7 @@ def test_branches_that_a_pose_has_not_repeat_one_it_has(ur5: Arm, rng: np.random
 
 
 def _on_axis(arm: Arm, rng: np.random.Generator) -> Array:
-    """A posture of an elbow arm without side offset whose wrist centre is on the first axis."""
+    """A configuration of an elbow arm without side offset whose wrist centre is on the first axis."""
     q = rng.uniform(-1, 1, size=6)
     q[2] = np.radians(100)
     geometry = find_geometry(arm)
@@ -333,7 +333,7 @@ def test_one_branch_is_one_of_eight(name: str, rng: np.random.Generator) -> None
     """A branch solved by itself has the joint positions that it has among all eight, of singular poses too."""
     arm = load_arm(name)
     geometry = closed_form_geometry(arm)
-    for q in random_postures(arm, rng, 5):
+    for q in random_configurations(arm, rng, 5):
         q[4] = rng.choice((q[4], 0.0))
         X, near = forward(arm, q), rng.uniform(-3, 3, (3, arm.n))
         place = ([X[i, :3].tolist() for i in range(3)], X[:3, 3].tolist(), per_joint(near))

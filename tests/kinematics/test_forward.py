@@ -12,7 +12,7 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import nearest_rotation
-from oracles.arms import random_postures
+from oracles.arms import random_configurations
 from oracles.with_pinocchio import pinocchio_model
 
 ROUNDING = 1e-10  # agreement with an oracle that multiplies the same matrices in another order
@@ -106,7 +106,7 @@ def _compare(arm: Arm, rng: np.random.Generator) -> None:
 def test_many_configurations_at_once(rng: np.random.Generator) -> None:
     """Leading axes come back unchanged, and every row is what it is alone."""
     arm = load_arm("stanford")
-    q = random_postures(arm, rng, 6).reshape(2, 3, 6)
+    q = random_configurations(arm, rng, 6).reshape(2, 3, 6)
 
     X, J = forward(arm, q), jacobian(arm, q)
 
@@ -120,7 +120,7 @@ def test_many_configurations_at_once(rng: np.random.Generator) -> None:
 def test_jacobian_is_the_slope_of_forward(rng: np.random.Generator) -> None:
     """A small step of one joint moves the hand by its column times the step, to second order."""
     arm = load_arm("puma560")
-    q = random_postures(arm, rng, 1)[0]
+    q = random_configurations(arm, rng, 1)[0]
     step = 1e-6
 
     slope = (forward(arm, q + step * np.eye(6)) - forward(arm, q - step * np.eye(6)))[:, :3, 3].T / (2 * step)

@@ -15,10 +15,10 @@ from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branc
 from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
-from oracles.arms import random_postures
+from oracles.arms import random_configurations
 
 ARMS = ("puma560-seed", "stanford", "stanford-jpl")
-POSTURE = 1e-9  # a posture found again
+SAME_CONFIGURATION = 1e-9  # a configuration found again
 RESIDUAL = 1e-12  # a pose met, in m and rad
 DOWN = np.diag((1.0, -1.0, -1.0))
 
@@ -28,28 +28,28 @@ def _at(x: float, y: float, z: float) -> Array:
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_finds_the_posture_again(name: str, rng: np.random.Generator) -> None:
-    """Of 5000 random postures each is among the branches of its own pose.
+def test_finds_the_configuration_again(name: str, rng: np.random.Generator) -> None:
+    """Of 5000 random configurations each is among the branches of its own pose.
 
-    Where the Jacobian is nearly singular, rounding of the pose by 1e-16 moves the posture by more than 1e-9; there
-    is nothing to find there but a posture with the same pose, so those (a few in a hundred) are held to that alone.
+    Where the Jacobian is nearly singular, rounding of the pose by 1e-16 moves the configuration by more than 1e-9:
+    only a configuration with the same pose can be found, and those (a few in a hundred) are held to that alone.
     """
     arm = load_arm(name)
-    q = random_postures(arm, rng, 5000)
+    q = random_configurations(arm, rng, 5000)
     regular = np.linalg.svd(jacobian(arm, q), compute_uv=False)[:, -1] > 1e-3
 
     found, _ = inverse_branches(arm, forward(arm, q), q)
 
     miss = np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)
     assert regular.mean() > 0.95
-    assert miss[regular].max() < POSTURE
+    assert miss[regular].max() < SAME_CONFIGURATION
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_every_branch_meets_the_pose(name: str, rng: np.random.Generator) -> None:
     """All eight branches of a pose in reach put the hand there."""
     arm = load_arm(name)
-    X = forward(arm, random_postures(arm, rng, 2000))
+    X = forward(arm, random_configurations(arm, rng, 2000))
 
     q, _ = inverse_branches(arm, X)
 
@@ -58,15 +58,15 @@ def test_every_branch_meets_the_pose(name: str, rng: np.random.Generator) -> Non
 
 @pytest.mark.parametrize("name", ARMS)
 def test_judged_solution(name: str, rng: np.random.Generator) -> None:
-    """Asked for the branch nearest to the posture itself, the solver gives that posture, allowed and first."""
+    """Asked for the branch nearest to the configuration, the solver returns that configuration, allowed and first."""
     arm = load_arm(name)
-    for q in random_postures(arm, rng, 200):
+    for q in random_configurations(arm, rng, 200):
         if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] < 1e-3:
             continue
         solution = inverse(arm, forward(arm, q), q)
 
         assert solution.outcome is Outcome.SOLVED
-        np.testing.assert_allclose(solution.best.q, q, atol=POSTURE)
+        np.testing.assert_allclose(solution.best.q, q, atol=SAME_CONFIGURATION)
         assert all(branch.allowed for branch in solution.allowed)
         assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
 
@@ -91,9 +91,9 @@ def test_grid_of_right_angles(name: str) -> None:
         assert solution.outcome in (Outcome.SOLVED, Outcome.SINGULAR), q
         np.testing.assert_allclose(forward(arm, solution.best.q), X, atol=RESIDUAL)
         assert len(solution.branches) <= 8
-        postures = np.array([branch.q for branch in solution])
-        apart = np.abs(postures[:, None] - postures[None]).max(axis=-1) + np.eye(len(postures))
-        assert apart.min() > POSTURE
+        configurations = np.array([branch.q for branch in solution])
+        apart = np.abs(configurations[:, None] - configurations[None]).max(axis=-1) + np.eye(len(configurations))
+        assert apart.min() > SAME_CONFIGURATION
 
 
 def test_labels_say_how_the_arm_stands() -> None:
@@ -142,7 +142,7 @@ def test_near_the_wrist_singularity(q5: float) -> None:
 def test_typed_poses_solve(rng: np.random.Generator) -> None:
     """A pose typed with six digits is solved, and met to those digits."""
     arm = load_arm("stanford")
-    for q in random_postures(arm, rng, 100):
+    for q in random_configurations(arm, rng, 100):
         solution = inverse(arm, np.round(forward(arm, q), 6))
 
         assert solution.branches[0].position_error < 2e-6
@@ -166,7 +166,7 @@ def test_out_of_reach_says_how_far() -> None:
 
 
 def test_nearest_pose_is_nearest(rng: np.random.Generator) -> None:
-    """No wrist place that random postures reach is nearer to the asked one than the nearest pose said to be."""
+    """No wrist place that random configurations reach is nearer to the asked one than the nearest pose said to be."""
     arm = load_arm("puma560-seed")
     reached = forward(arm, rng.uniform(-np.pi, np.pi, size=(20000, 6)))[:, :3, 3]  # no hand: the wrist centre
     for target in [(0.0, 0.05, 0.3), (0.01, 0.0, 0.0), (0.9, 0.9, 0.9), (0.05, 0.05, 1.2)]:
@@ -214,11 +214,11 @@ def test_base_and_tool_count(rng: np.random.Generator) -> None:
     from oracles.arms import random_pose
 
     arm = attrs.evolve(load_arm("puma560-seed"), base=random_pose(rng), tool=random_pose(rng))
-    q = random_postures(arm, rng, 50)
+    q = random_configurations(arm, rng, 50)
 
     found, _ = inverse_branches(arm, forward(arm, q), q)
 
-    assert np.median(np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)) < POSTURE
+    assert np.median(np.abs(found - q[:, None]).max(axis=-1).min(axis=-1)) < SAME_CONFIGURATION
 
 
 def test_other_arms_are_refused() -> None:

@@ -10,7 +10,7 @@ from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.jacobians import Axes, jacobian, jacobian_rate, tool_twist
 from armwright.kinematics.manipulability_index import manipulability
-from oracles.arms import random_arm, random_postures
+from oracles.arms import random_arm, random_configurations
 from oracles.with_pinocchio import pinocchio_model
 
 ROUNDING = 1e-10  # agreement with an oracle that multiplies the same matrices in another order, arms of a few metres
@@ -48,7 +48,7 @@ def test_rate_of_catalogue_arms_against_pinocchio(name: str, rng: np.random.Gene
 def test_rate_is_the_slope_of_the_jacobian(frame: Axes, rng: np.random.Generator) -> None:
     """Along a motion the Jacobian changes by its rate times the time, to second order."""
     arm = load_arm("stanford")
-    q, qd = random_postures(arm, rng, 1)[0], rng.uniform(-1, 1, size=6)
+    q, qd = random_configurations(arm, rng, 1)[0], rng.uniform(-1, 1, size=6)
     step = 1e-5
 
     slope = (jacobian(arm, q + step * qd, frame) - jacobian(arm, q - step * qd, frame)) / (2 * step)
@@ -72,9 +72,9 @@ def test_twist_of_a_turning_base(elbow: Arm) -> None:
 
 
 def test_many_rates_at_once(rng: np.random.Generator) -> None:
-    """Leading axes come back unchanged, one posture goes with many speeds, every row is what it is alone."""
+    """Leading axes come back unchanged, one configuration goes with many speeds, every row is what it is alone."""
     arm = load_arm("puma560")
-    q, qd = random_postures(arm, rng, 1)[0], rng.normal(size=(2, 3, 6))
+    q, qd = random_configurations(arm, rng, 1)[0], rng.normal(size=(2, 3, 6))
 
     rates = jacobian_rate(arm, q, qd, "tool")
 
@@ -84,7 +84,7 @@ def test_many_rates_at_once(rng: np.random.Generator) -> None:
 
 
 def test_leading_axes_must_fit() -> None:
-    """Two postures and three speeds are refused with both shapes."""
+    """Two configurations and three speeds are refused with both shapes."""
     with pytest.raises(ShapeError, match=r"q, qd: leading axes must fit together, got shapes \(2, 6\) and \(3, 6\)"):
         jacobian_rate(load_arm("puma560"), np.zeros((2, 6)), np.zeros((3, 6)))
 
@@ -116,7 +116,7 @@ def test_isotropic_elbow() -> None:
 def test_yoshikawa_is_the_determinant(rng: np.random.Generator) -> None:
     """For six joints it is |det J|, and a length of 2 m counts each of the three angular rows twice."""
     arm = load_arm("puma560")
-    q = random_postures(arm, rng, 20)
+    q = random_configurations(arm, rng, 20)
 
     np.testing.assert_allclose(manipulability(arm, q), np.abs(np.linalg.det(jacobian(arm, q))), atol=ROUNDING)
     np.testing.assert_allclose(manipulability(arm, q, length=2.0), 8 * manipulability(arm, q), atol=ROUNDING)
@@ -125,7 +125,7 @@ def test_yoshikawa_is_the_determinant(rng: np.random.Generator) -> None:
 def test_redundant_arm(rng: np.random.Generator) -> None:
     """With seven joints it is the root of det(J Jᵀ)."""
     arm = random_arm(rng, 7)
-    q = random_postures(arm, rng, 5)
+    q = random_configurations(arm, rng, 5)
     J = jacobian(arm, q)
 
     expected = np.sqrt(np.linalg.det(J @ np.swapaxes(J, -1, -2)))
@@ -136,7 +136,7 @@ def test_redundant_arm(rng: np.random.Generator) -> None:
 def test_smallest_is_the_worst_direction(rng: np.random.Generator) -> None:
     """No joint speeds of length 1 move the tool slower than the smallest singular value, and some come near."""
     arm = load_arm("stanford")
-    q = random_postures(arm, rng, 1)[0]
+    q = random_configurations(arm, rng, 1)[0]
     qd = rng.normal(size=(200_000, 6))
     qd /= np.linalg.norm(qd, axis=-1, keepdims=True)
 
@@ -153,7 +153,7 @@ def test_manipulability_does_not_depend_on_the_base(rng: np.random.Generator) ->
     from oracles.arms import random_pose
 
     arm = load_arm("stanford")
-    q = random_postures(arm, rng, 5)
+    q = random_configurations(arm, rng, 5)
     moved = attrs.evolve(arm, base=random_pose(rng))
 
     np.testing.assert_allclose(manipulability(arm, q), manipulability(moved, q), atol=ROUNDING)

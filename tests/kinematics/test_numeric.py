@@ -16,12 +16,13 @@ from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
-from oracles.arms import random_arm, random_postures
+from oracles.arms import random_arm, random_configurations
 from samples import Sample
 
 # Where the slope is regular the last step leaves nothing but rounding, of arms ten metres long [m] and [rad].
 RESIDUAL = 1e-12
-POSTURE = 1e-6  # a posture found again, a hundred times the rounding where the Jacobian's condition is 1e8
+# Two configurations are equal: a hundred times the rounding where the Jacobian's condition is 1e8.
+SAME_CONFIGURATION = 1e-6
 TURN = Limits(lower=-np.pi, upper=np.pi)
 RIGHT = np.pi / 2
 # Seven joints, a shoulder, an elbow and a wrist that are each spherical.
@@ -45,36 +46,36 @@ def elbow() -> Arm:
 
 @pytest.mark.parametrize("joints", [1, 2, 3, 4, 5])
 @pytest.mark.drawn(0.4)
-def test_short_arms_find_their_posture_again(joints: int, sample: Sample) -> None:
-    """With fewer than six joints, skew and of both kinds, the one posture of a pose is found from no hint at all."""
+def test_short_arms_find_their_configuration_again(joints: int, sample: Sample) -> None:
+    """With fewer than six joints, skew and of both kinds, the only configuration of a pose is found without a hint."""
     for rng in sample.cases(20):
         arm = random_arm(rng, joints)
-        for q in random_postures(arm, rng, 5):
+        for q in random_configurations(arm, rng, 5):
             solution = inverse(arm, forward(arm, q))
 
             assert solution.outcome is Outcome.SOLVED
-            assert min(np.abs(branch.q - q).max() for branch in solution) < POSTURE
+            assert min(np.abs(branch.q - q).max() for branch in solution) < SAME_CONFIGURATION
             assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
-    sample.record(f"postures of skew arms of {joints} joints found again, 5 each", sample.count(20), 0)
+    sample.record(f"configurations of skew arms of {joints} joints found again, 5 each", sample.count(20), 0)
 
 
 @pytest.mark.share(0.2)
-def test_six_skew_turns_find_their_posture_again(rng: np.random.Generator, sample: Sample) -> None:
-    """With six skew axes every posture found meets the pose and nine of ten times the very one asked is among them.
+def test_six_skew_turns_find_their_configuration_again(rng: np.random.Generator, sample: Sample) -> None:
+    """With six skew axes every solution reaches the pose, and in nine of ten cases the original one is among them.
 
-    Such an arm may have sixteen postures, and no number of starts is sure to find all.
+    Such an arm may have sixteen configurations, and no number of starts is sure to find all.
     """
     again, arms = 0, sample.count(5)
     for _ in range(arms):
         arm = random_arm(rng, 6)
         arm = attrs.evolve(arm, joints=[attrs.evolve(joint, kind="revolute", limits=TURN) for joint in arm.joints])
         assert find_geometry(arm) is None
-        for q in random_postures(arm, rng, 4):
+        for q in random_configurations(arm, rng, 4):
             solution = inverse(arm, forward(arm, q))
 
             assert solution.outcome is Outcome.SOLVED
             assert all(max(b.position_error, b.rotation_error) < RESIDUAL for b in solution)
-            again += int(min(np.abs(branch.q - q).max() for branch in solution) < POSTURE)
+            again += int(min(np.abs(branch.q - q).max() for branch in solution) < SAME_CONFIGURATION)
     assert again >= 0.9 * 4 * arms - 1
 
 
@@ -85,7 +86,7 @@ def test_against_the_closed_form(name: str, rng: np.random.Generator) -> None:
     arm = load_arm(name)
     arm = attrs.evolve(arm, joints=[attrs.evolve(joint, limits=TURN) for joint in arm.joints]) if name == "ur5" else arm
     found = known = 0
-    for q in random_postures(arm, rng, 5):
+    for q in random_configurations(arm, rng, 5):
         if np.linalg.svd(jacobian(arm, q), compute_uv=False)[-1] < 1e-2:
             continue
         X = forward(arm, q)
@@ -95,14 +96,14 @@ def test_against_the_closed_form(name: str, rng: np.random.Generator) -> None:
         assert searched.outcome is Outcome.SOLVED
         for branch in searched:
             turned = np.abs(np.angle(np.exp(1j * (exact - branch.q)))) if name == "ur5" else np.abs(exact - branch.q)
-            assert turned.max(axis=-1).min() < POSTURE
+            assert turned.max(axis=-1).min() < SAME_CONFIGURATION
         found, known = found + len(searched.branches), known + len(exact)
     assert found > 0.8 * known
 
 
 def test_seven_joints(rng: np.random.Generator) -> None:
-    """A redundant arm meets every pose; the posture nearest to where it is comes first, and that is very near."""
-    for q in random_postures(SEVEN, rng, 10):
+    """A redundant arm meets every pose; the configuration nearest to where it is comes first, and that is very near."""
+    for q in random_configurations(SEVEN, rng, 10):
         near = np.clip(q + rng.normal(scale=0.05, size=7), -2.9, 2.9)
 
         solution = inverse(SEVEN, forward(SEVEN, q), near)
@@ -126,11 +127,11 @@ def test_the_same_question_has_the_same_answer() -> None:
 
 
 def test_two_elbows_of_a_planar_arm(elbow: Arm) -> None:
-    """Place and turn together leave a planar arm of two links one posture: the other elbow turns the hand elsewhere."""
+    """Position and orientation leave a planar 2R arm one solution: the other elbow rotates the tool otherwise."""
     solution = inverse(elbow, forward(elbow, [0.3, 1.1]))
 
     (only,) = solution
-    np.testing.assert_allclose(only.q, (0.3, 1.1), atol=POSTURE)
+    np.testing.assert_allclose(only.q, (0.3, 1.1), atol=SAME_CONFIGURATION)
 
 
 def test_out_of_reach_of_a_short_arm(elbow: Arm) -> None:
@@ -156,7 +157,7 @@ def test_a_pose_out_of_the_plane(elbow: Arm) -> None:
 
     assert solution.outcome is Outcome.OUT_OF_REACH
     assert solution.distance == pytest.approx(0.2, abs=1e-6)
-    assert solution.turn == pytest.approx(0.1, abs=1e-6)
+    assert solution.rotation_error == pytest.approx(0.1, abs=1e-6)
     assert "200.0 mm and 5.73 deg out of reach" in solution.explain()
 
 
@@ -170,11 +171,11 @@ def test_out_of_limits_is_another_answer(elbow: Arm) -> None:
 
     assert solution.outcome is Outcome.OUT_OF_LIMITS
     assert [violation.joint for violation in solution.branches[0].violations] == [2]
-    np.testing.assert_allclose(solution.branches[0].q, (0.3, 1.1), atol=POSTURE)
+    np.testing.assert_allclose(solution.branches[0].q, (0.3, 1.1), atol=SAME_CONFIGURATION)
 
 
-def test_a_posture_at_its_limits(rng: np.random.Generator) -> None:
-    """A pose that only a posture with a joint at the end of its range has is solved, and is not out of limits."""
+def test_a_configuration_at_its_limits(rng: np.random.Generator) -> None:
+    """A pose that only a configuration with a joint at the end of its range has is solved, and is not out of limits."""
     for _ in range(10):
         q = rng.uniform(-2.5, 2.5, size=7)
         joint = rng.integers(7)
@@ -201,7 +202,7 @@ def test_whole_turns_come_inside_the_limits() -> None:
     assert np.degrees(best.q[0]) == pytest.approx(400)
 
 
-def test_free_joints_of_a_singular_posture() -> None:
+def test_free_joints_of_a_singular_configuration() -> None:
     """Of two coaxial joints at the end of a short arm each may turn if the other turns back: one family, one branch."""
     arm = Arm(
         name="coaxial",
@@ -221,7 +222,7 @@ def test_free_joints_of_a_singular_posture() -> None:
 
 
 def test_a_stretched_arm_is_not_free(elbow: Arm) -> None:
-    """Stretched out a planar arm of three joints has an idle motion to first order, and no second posture."""
+    """Stretched out a planar arm of three joints has an idle motion to first order, and no second configuration."""
     three = attrs.evolve(
         elbow, joints=[*elbow.joints, elbow.joints[1]], links=elbow.links[:1] * 3, motors=elbow.motors[:1] * 3
     )

@@ -1,4 +1,4 @@
-"""Singular postures, their cause, and bounded rates through them."""
+"""Singular configurations, their cause, and bounded rates through them."""
 
 import attrs
 import numpy as np
@@ -13,13 +13,13 @@ from armwright.kinematics.damping import damped_rates
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.jacobians import jacobian, tool_twist
 from armwright.kinematics.singularity_analysis import singularities, singularity_factors
-from oracles.arms import random_arm, random_pose, random_postures
+from oracles.arms import random_arm, random_configurations, random_pose
 
 ROUNDING = 1e-10
 PUMA, STANFORD, UR5 = load_arm("puma560"), load_arm("stanford"), load_arm("ur5")
 ARMS = {"puma560": PUMA, "stanford": STANFORD, "stanford-jpl": load_arm("stanford-jpl"), "ur5": UR5}
-# In each of these postures just one factor vanishes. The PUMA's elbow is straight where tan q3 = d4 / a3, its wrist
-# centre beside the first axis where a2·c2 + a3·c23 + d4·s23 = 0; the Stanford's boom is vertical where q2 = 0.
+# In each of these configurations just one factor vanishes. The PUMA's elbow is straight where tan q3 = d4 / a3, its
+# wrist centre beside the first axis where a2·c2 + a3·c23 + d4·s23 = 0; the Stanford's boom is vertical where q2 = 0.
 ELBOW = np.arctan2(0.433, -0.02)
 BENT = ELBOW - 1.0
 RAISED = np.arctan2(0.432 - 0.02 * np.cos(BENT) + 0.433 * np.sin(BENT), -0.02 * np.sin(BENT) - 0.433 * np.cos(BENT))
@@ -36,7 +36,7 @@ SINGULAR = {
 
 def test_factors_of_the_puma(rng: np.random.Generator) -> None:
     """They are the seed's: a2·c2 + a3·c23 + d4·s23, d4·c3 - a3·s3 and s5, with the lengths of its table."""
-    q = random_postures(PUMA, rng, 50)
+    q = random_configurations(PUMA, rng, 50)
     a2, a3, d4 = 0.432, -0.02, 0.433
     _, q2, q3, _, q5, _ = q.T
     expected = [
@@ -50,7 +50,7 @@ def test_factors_of_the_puma(rng: np.random.Generator) -> None:
 
 def test_factors_of_the_stanford_arm(rng: np.random.Generator) -> None:
     """They are the boom's reach d3·s2, its length d3, and s5."""
-    q = random_postures(STANFORD, rng, 50)
+    q = random_configurations(STANFORD, rng, 50)
     expected = [q[:, 2] * np.sin(q[:, 1]), q[:, 2], np.sin(q[:, 4])]
 
     np.testing.assert_allclose(singularity_factors(STANFORD, q), np.stack(expected, axis=-1), atol=ROUNDING)
@@ -60,7 +60,7 @@ def test_factors_of_the_stanford_arm(rng: np.random.Generator) -> None:
 def test_determinant_is_the_product(name: str, rng: np.random.Generator) -> None:
     """The determinant of the Jacobian is their product, times the upper arm where there is one, or minus that.
 
-    The sign is one for all postures; base and tool do not enter.
+    The sign is one for all configurations; base and tool do not enter.
     """
     arm = attrs.evolve(ARMS[name], base=random_pose(rng), tool=random_pose(rng))
     q = rng.uniform(-3, 3, size=(500, 6))
@@ -75,7 +75,7 @@ def test_determinant_is_the_product(name: str, rng: np.random.Generator) -> None
 
 @pytest.mark.parametrize("case", SINGULAR)
 def test_cause_is_named(case: str) -> None:
-    """At each singular posture the one factor that vanishes is named, and a twist and a joint motion with it."""
+    """At each singular configuration the one factor that vanishes is named, and a twist and a joint motion with it."""
     arm, q, cause = SINGULAR[case]
     found = singularities(arm, q)
 
@@ -148,9 +148,9 @@ def test_parallel_slides_are_singular() -> None:
 
 
 def test_redundant_arm_always_has_an_idle_motion(rng: np.random.Generator) -> None:
-    """Seven joints: nothing is lost in a common posture, and one joint motion leaves the hand alone."""
+    """Seven joints: nothing is lost in a common configuration, and one joint motion leaves the hand alone."""
     arm = random_arm(rng, 7)
-    q = random_postures(arm, rng, 1)[0]
+    q = random_configurations(arm, rng, 1)[0]
 
     found = singularities(arm, q)
 
@@ -184,7 +184,7 @@ def test_lost_directions_are_measured_with_their_turn_in_metres() -> None:
 
 
 def test_refusals(rng: np.random.Generator) -> None:
-    """Arms without known factors, many postures at once and senseless thresholds are refused with what to do."""
+    """Arms without known factors, many configurations at once and senseless thresholds are refused with what to do."""
     with pytest.raises(UnsupportedArmError, match=r"'random': .* use its singular values"):
         singularity_factors(random_arm(rng, 6), np.zeros(6))
     with pytest.raises(ShapeError, match=r"q: expected shape \(6,\), got \(2, 6\)"):
@@ -210,7 +210,7 @@ SPEED = st.floats(-10, 10)
 def test_damped_rates_are_bounded(
     name: str, q: tuple[float, ...], twist: tuple[float, ...], damping: float, length: float
 ) -> None:
-    """Whatever the posture, singular ones included, the rates are no longer than |twist| / damping."""
+    """Whatever the configuration, singular ones included, the rates are no longer than |twist| / damping."""
     found = damped_rates(ARMS[name], q, twist, damping=damping, length=length)
 
     assert np.linalg.norm(found.rates) <= found.bound * (1 + 1e-9)
@@ -222,7 +222,7 @@ def test_damped_rates_are_bounded(
 
 @pytest.mark.parametrize("case", SINGULAR)
 def test_error_of_damped_rates(case: str) -> None:
-    """At a singular posture only the lost direction is left undone; nearby the stated part of it."""
+    """At a singular configuration only the lost direction is left undone; nearby the stated part of it."""
     arm, q, cause = SINGULAR[case]
     lost = singularities(arm, q).lost[0]
     twist = np.array((0.1, -0.2, 0.15, 0.3, 0.1, -0.2))
@@ -241,9 +241,9 @@ def test_error_of_damped_rates(case: str) -> None:
     np.testing.assert_allclose(left, U[:, -1] * (U[:, -1] @ twist) * (1 - 0.25) / (1 + 0.25), atol=ROUNDING)
 
 
-def test_regular_postures_are_not_damped(rng: np.random.Generator) -> None:
+def test_regular_configurations_are_not_damped(rng: np.random.Generator) -> None:
     """Where the smallest singular value is above the damping the twist is met, in base and tool axes, many at once."""
-    q = random_postures(PUMA, rng, 200)
+    q = random_configurations(PUMA, rng, 200)
     regular = np.linalg.svd(jacobian(PUMA, q), compute_uv=False)[:, -1] > 0.05
     twist = rng.normal(size=(200, 6))
 

@@ -8,7 +8,7 @@ from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.differential import SingularPostureError
+from armwright.kinematics.differential import SingularConfigurationError
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.kinematics.jacobians import jacobian
 from armwright.kinematics.wrist_partitioned import wrist_partitioned_inverse, wrist_partitioned_jacobian
@@ -58,7 +58,7 @@ def test_the_inverse_of_the_blocks(rng: np.random.Generator) -> None:
 def test_singular(q: tuple[float, ...], factor: str) -> None:
     """Where a factor of the determinant vanishes there is no inverse, and the factor is named."""
     arm = load_arm("puma560")
-    with pytest.raises(SingularPostureError, match=f"singular at the {factor}: its factor of the determinant is"):
+    with pytest.raises(SingularConfigurationError, match=f"singular at the {factor}: its factor of the determinant is"):
         wrist_partitioned_inverse(arm, q)
 
 

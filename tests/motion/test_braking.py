@@ -67,7 +67,7 @@ def test_a_stop_keeps_to_its_path(running: Trajectory, share: float) -> None:
 
 
 def test_stops_of_random_motions(sample: Sample) -> None:
-    """Splines through random postures, run as fast as the limits allow, are stopped within them, wherever that is."""
+    """Splines through random configurations, as fast as the limits allow, are stopped within them at any time."""
     arm = load_arm("puma560")
     speed, acceleration = arm.limit("speed"), arm.limit("acceleration")
     worst = 0.0

@@ -61,11 +61,11 @@ def some_poses(arm: Arm, rng: np.random.Generator, count: int = 4) -> tuple[Arra
     return X, q
 
 
-def test_the_seeds_postures(puma: CompiledArm) -> None:
-    """Through the seed's poses the postures are the seed's, the wrist flipped at the last one as there."""
+def test_the_seeds_configurations(puma: CompiledArm) -> None:
+    """Through the seed's poses the configurations are the seed's, the wrist flipped at the last one as there."""
     move = joint_move(puma, forward(puma.arm, SEED_Q), SEED_TIMES, blend=SEED_BLEND, ends="running")
 
-    np.testing.assert_allclose(move.postures, SEED_Q, atol=ROUNDING)
+    np.testing.assert_allclose(move.configurations, SEED_Q, atol=ROUNDING)
     assert move.label == "left, down, no-flip -> left, down, no-flip -> left, down, flip"
     t = 0.002 * np.arange(501)
     np.testing.assert_allclose(
@@ -80,7 +80,7 @@ def test_the_seeds_poses_as_printed(puma: CompiledArm) -> None:
 
     assert [str(one.message)[5] for one in caught] == ["1", "2", "3"]
     assert caught[0].filename == __file__
-    np.testing.assert_allclose(move.postures, SEED_Q, atol=np.radians(1.0))
+    np.testing.assert_allclose(move.configurations, SEED_Q, atol=np.radians(1.0))
 
 
 @pytest.mark.filterwarnings("ignore::armwright.errors.RotationWarning")
@@ -272,7 +272,7 @@ def test_one_branch_where_there_is_one(seed: int) -> None:
 
     if len(labels) == 1:
         assert "->" not in move.label
-    for X, q in zip(move.poses, move.postures, strict=True):
+    for X, q in zip(move.poses, move.configurations, strict=True):
         np.testing.assert_allclose(forward(arm, q), X, atol=1e-8)
         assert ((lower <= q) & (q <= upper)).all()
 
@@ -342,8 +342,8 @@ def test_whole_turns_that_fit(puma: CompiledArm) -> None:
 
     move = cartesian_move(arm, X, [0, 2], near=q)
 
-    assert move.postures[0, 5] == pytest.approx(5.5 - 2 * np.pi)
-    assert move.postures[1, 5] == pytest.approx(7.5 - 2 * np.pi)
+    assert move.configurations[0, 5] == pytest.approx(5.5 - 2 * np.pi)
+    assert move.configurations[1, 5] == pytest.approx(7.5 - 2 * np.pi)
 
 
 def test_a_move_of_a_day(puma: CompiledArm) -> None:

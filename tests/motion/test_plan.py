@@ -18,7 +18,7 @@ from armwright.motion.through import through
 from armwright.motion.tolerance import ROTATION_PER_METRE
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, rotation_from_vector
-from oracles.arms import random_postures
+from oracles.arms import random_configurations
 
 DOWN = np.diag((1.0, -1.0, -1.0))
 POSE = 1e-9  # how well a knot is met, in m and rad
@@ -79,7 +79,7 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
     """On random lines 20 times denser looks find nothing worse than the planner says, or than was asked."""
     arm = load_arm(name)
     done = 0
-    for q in random_postures(arm, rng, 60):
+    for q in random_configurations(arm, rng, 60):
         A = forward(arm, q)
         B = A @ homogeneous(rotation_from_vector(rng.normal(scale=0.3, size=3)), rng.normal(scale=0.1, size=3))
         try:
@@ -103,7 +103,7 @@ def test_lines_stay_within_the_deviation(name: str, deviation: float, rng: np.ra
 def test_coarser_lines_are_no_slower(name: str, rng: np.random.Generator) -> None:
     """Who allows more than a millimetre waits no longer for it, and the hand is turned by 25 mrad at most."""
     arm, done = load_arm(name), 0
-    for q in random_postures(arm, rng, 20):
+    for q in random_configurations(arm, rng, 20):
         A = forward(arm, q)
         B = A @ homogeneous(np.eye(3), rng.normal(size=3) * 10 ** rng.uniform(-2, -0.7))
         try:
@@ -237,7 +237,7 @@ def test_line_past_a_singularity() -> None:
 
 
 def test_stages_join(stanford: Arm) -> None:
-    """Every stage of a move begins in the posture where the last one ended, and lasts whole servo periods."""
+    """Every stage of a move begins in the configuration where the last one ended, and lasts whole servo periods."""
     q = start(stanford, at(0.45, 0, 0.25))
     goals = [
         StageGoal(kind="PTP", poses=np.array([at(0.4, 0.15, 0.15)])),
@@ -256,13 +256,13 @@ def test_stages_join(stanford: Arm) -> None:
     assert stages[1].length == pytest.approx(0.1, abs=1e-9)
 
 
-def test_another_posture_is_tried(rng: np.random.Generator) -> None:
-    """Where a line cannot go on from the nearest posture, the move ends its first stage in another one.
+def test_another_configuration_is_tried(rng: np.random.Generator) -> None:
+    """Where a line cannot go on from the nearest configuration, the move ends its first stage in another one.
 
-    The case is searched for: a posture whose line fails, with another posture of the same pose whose line works.
+    The case is searched for: a configuration whose line fails, with another one of the same pose whose line works.
     """
     arm = load_arm("puma560-seed")
-    for q in random_postures(arm, rng, 400):
+    for q in random_configurations(arm, rng, 400):
         A = forward(arm, q)
         B = A @ homogeneous(np.eye(3), (0.0, 0.0, -0.25))
         outcomes = []
@@ -275,7 +275,7 @@ def test_another_posture_is_tried(rng: np.random.Generator) -> None:
         if outcomes and not outcomes[0] and any(outcomes):
             break
     else:
-        pytest.fail("no such case among the random postures")
+        pytest.fail("no such case among the random configurations")
 
     goals = [StageGoal(kind="PTP", poses=A[None]), StageGoal(kind="LINE", poses=B[None])]
     _, line = plan(arm, q, goals, Manner())
@@ -304,7 +304,7 @@ def test_deviation_must_be_positive(stanford: Arm) -> None:
         place_knots(stanford, Path(poses=[at(0.5, 0, 0.1), at(0.5, 0.1, 0.1)]), deviation=0, speed=100)
 
 
-def test_the_first_obstacle_of_the_nearest_posture(stanford: Arm) -> None:
+def test_the_first_obstacle_of_the_nearest_configuration(stanford: Arm) -> None:
     """What stops a line is told with joint, fraction, length and place, and the place lies on the line."""
     q = start(stanford, at(0.3, 0.3, 0.1))
 
@@ -319,11 +319,11 @@ def test_the_first_obstacle_of_the_nearest_posture(stanford: Arm) -> None:
     np.testing.assert_allclose(stopped.place, (x, x, 0.1), atol=POSE)
 
 
-def test_a_posture_with_a_free_line_comes_before_a_way_round(rng: np.random.Generator) -> None:
-    """Where another posture has the line free, it is run, and nothing is gone round although that was asked for."""
+def test_a_configuration_with_a_free_line_comes_before_a_way_round(rng: np.random.Generator) -> None:
+    """Where another configuration has the line free, it is run, without a detour although one was allowed."""
     arm = load_arm("puma560-seed")
     tried = 0
-    for q in random_postures(arm, rng, 400):
+    for q in random_configurations(arm, rng, 400):
         A = forward(arm, q)
         B = A @ homogeneous(np.eye(3), (0.0, 0.0, -0.25))
         goals = [StageGoal(kind="PTP", poses=A[None]), StageGoal(kind="LINE", poses=B[None])]

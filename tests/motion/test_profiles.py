@@ -1,4 +1,4 @@
-"""Profiles from one posture to another: trapezoids of speed and cubics."""
+"""Profiles from one configuration to another: trapezoids of speed and cubics."""
 
 import hypothesis.strategies as st
 import numpy as np

@@ -19,7 +19,7 @@ SAME = 1e-12
 # Limits may be passed by this part of them: rounding.
 AT_LIMIT = 1e-9
 
-# Joint angles of the course's three postures [deg].
+# Joint angles of the course's three configurations [deg].
 A = np.array((-100.4577, 70.6108, -48.3997, 0, 60.9896, 29.2746))
 B = np.array((-52.1158, -1.4358, 30.2060, 58.6166, 11.4781, 3.2859))
 C = np.array((0.0955, 65.7969, 14.3196, 15.3377, -20.1730, 29.5160))

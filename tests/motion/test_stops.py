@@ -26,7 +26,7 @@ from armwright.motion.tolerance import ROTATION_PER_METRE, Tolerance
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
 
-# A posture followed through whole turns stands beyond them.
+# A configuration followed through whole turns stands beyond them.
 pytestmark = pytest.mark.filterwarnings("ignore::armwright.errors.UnitWarning")
 
 # Of each factor of the determinant: its number, and the joint that is turned until it has the value asked for.
@@ -40,7 +40,7 @@ MET = 1e-8
 
 
 def upright(puma: Arm) -> tuple[Array, Array, Array]:
-    """Return the nearest posture below, and the poses below and above one whose wrist is straight to 0.05 deg."""
+    """Return the nearest configuration below, and the poses below and above one whose wrist is straight to 0.05 deg."""
     q = np.radians((20, 10, 60, 80, 0.05, -80))
     A, B = forward(puma, q).copy(), forward(puma, q).copy()
     A[2, 3] -= 0.15
@@ -49,7 +49,7 @@ def upright(puma: Arm) -> tuple[Array, Array, Array]:
 
 
 def nearly_singular(arm: Arm, factor: str, part: float, rng: np.random.Generator) -> Array:
-    """Return a posture inside the limits, one factor this part of its scale from zero and the others far from it."""
+    """Return a configuration inside the limits, one factor this part of its scale from zero, the others far from it."""
     number, turning = FACTORS[factor]
     lower, upper = arm.limit("lower"), arm.limit("upper")
     scales = np.array([one.scale for one in singularities(arm, (lower + upper) / 2).factors])
@@ -72,7 +72,7 @@ def nearly_singular(arm: Arm, factor: str, part: float, rng: np.random.Generator
 
 
 def lines_past(arm: Arm, factor: str, rng: np.random.Generator) -> Iterator[tuple[Array, Array, Array]]:
-    """Give lines that pass a singularity at several distances: posture at the start, poses at both ends."""
+    """Give lines that pass a singularity at several distances: configuration at the start, poses at both ends."""
     for part in DISTANCES:
         for _ in range(LINES):
             q = nearly_singular(arm, factor, part * rng.choice((-1, 1)), rng)
@@ -106,7 +106,7 @@ def refused(fast: CompiledArm, q: Array, B: Array, deviation: float) -> PathErro
 def blamed(fast: CompiledArm, A: Array, B: Array, fraction: float) -> set[tuple[str, int]]:
     """Return each singularity near a place of a line with each joint that moves much in the motion that goes idle.
 
-    All postures of the closed form are looked at, densely about the place, and their Jacobians decide.
+    All configurations of the closed form are looked at, densely about the place, and their Jacobians decide.
     """
     arm, found = fast.arm, set()
     around = np.clip(fraction + np.sinh(np.linspace(-8, 8, 401)) / np.sinh(8) * 0.03, 0, 1)
@@ -123,7 +123,7 @@ def blamed(fast: CompiledArm, A: Array, B: Array, fraction: float) -> set[tuple[
 
 
 def lifted(fast: CompiledArm, q_start: Array, A: Array, B: Array) -> Array:
-    """Return postures (k, 6) along a line: those of the first one's branch, solved densely, without whole turns."""
+    """Return configurations (k, 6) along a line: those of the first one's branch, solved densely and unwrapped."""
     s = np.linspace(0, 1, 8001)
     found = fast.inverse_branches(between(A, B, s), np.broadcast_to(q_start, (len(s), 6)))[0]
     q = found[:, int(np.abs(found[0] - q_start).max(axis=-1).argmin())]
@@ -185,8 +185,8 @@ def test_the_wrist_is_to_blame_and_not_the_elbow(deviation: float) -> None:
     assert {by_knots.value.joint, by_rule.value.joint, planned.value.obstacle.joint} <= {4, 6}
 
 
-def test_the_postures_of_a_close_look_belong_together() -> None:
-    """The nearest posture to each before it hops to the other elbow; a close look never lets the hand leave the line.
+def test_the_configurations_of_a_close_look_belong_together() -> None:
+    """The nearest configuration to the last hops to the other elbow; finer sampling never lets the tool leave the line.
 
     Elbow up is where tan q3 is above d4 / a3.
     """

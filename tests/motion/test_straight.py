@@ -32,7 +32,7 @@ def fast(request: pytest.FixtureRequest) -> CompiledArm:
 
 
 def random_line(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return a posture inside the limits, and a pose up to half a metre and a radian away."""
+    """Return a configuration inside the limits, and a pose up to half a metre and a radian away."""
     lower, upper = arm.limit("lower"), arm.limit("upper")
     q = rng.uniform(0.8 * lower + 0.2 * upper, 0.2 * lower + 0.8 * upper)
     X = forward(arm, q).copy()
@@ -137,7 +137,7 @@ def test_limits_hold_between_samples(fast: CompiledArm) -> None:
 
 
 def test_the_ends() -> None:
-    """A line begins and ends at rest, at the posture and the pose asked for."""
+    """A line begins and ends at rest, at the configuration and the pose asked for."""
     puma = load_arm("puma560-seed")
     line = plain_line(puma, deviation=1e-4)
 

@@ -58,7 +58,7 @@ def arm_called(name: str) -> Arm:
 
 
 def reached(arm: Arm, q: Array, X: Array, Y: Array) -> bool:
-    """Whether an arm with the posture q at X has one inside its limits at Y; of a redundant one the nearest counts."""
+    """Whether an arm at q, the pose X, has a configuration inside its limits at Y; of a redundant arm the nearest."""
     if arm.n <= 6:
         return bool(inverse(arm, Y).allowed)
     found, off = chain(solver_of(arm), np.stack([X, Y]), q)
@@ -66,7 +66,7 @@ def reached(arm: Arm, q: Array, X: Array, Y: Array) -> bool:
 
 
 def random_way(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array]:
-    """A posture, and poses from there past 1 to 6 others; half of the ways turn the hand."""
+    """A configuration, and poses from there past 1 to 6 others; half of the ways turn the hand."""
     vias, turning = int(rng.integers(1, 7)), bool(rng.integers(2))
     lower, upper = np.maximum(arm.limit("lower"), -3.0), np.minimum(arm.limit("upper"), 3.0)
     while True:

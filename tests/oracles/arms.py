@@ -66,6 +66,6 @@ def squared(arm: Arm, rng: np.random.Generator) -> Arm:
     )
 
 
-def random_postures(arm: Arm, rng: np.random.Generator, count: int) -> Array:
-    """Postures spread evenly over the limits, (count, n)."""
+def random_configurations(arm: Arm, rng: np.random.Generator, count: int) -> Array:
+    """Configurations spread evenly over the limits, (count, n)."""
     return rng.uniform(arm.limits.lower, arm.limits.upper, size=(count, arm.n))

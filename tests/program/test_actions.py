@@ -68,7 +68,7 @@ def test_halt_after_an_error_in_an_action(action: str, says: str) -> None:
 
     assert [one.data["printed"] for one in recording.effects if one.kind == "PRINT"] == [says]
     cell = recording.cell
-    hand = forward(cell.arms["ARM_1"].arm, recording.postures["ARM_1"])
+    hand = forward(cell.arms["ARM_1"].arm, recording.configurations["ARM_1"])
     np.testing.assert_allclose(recording.tree.world("ARM_1"), hand, atol=EXACT)
 
 

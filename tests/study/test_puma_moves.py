@@ -18,15 +18,15 @@ from armwright.study.puma_moves import (
     SAMPLES,
     TIMES,
     AngleRow,
+    ConfigurationRow,
     MoveRow,
-    PostureRow,
     angle_table,
+    configuration_table,
     courses,
     joints_along,
     missed_at_b,
     move_table,
     path_of,
-    posture_table,
     sample_times,
     study_poses,
     way_round_table,
@@ -36,8 +36,8 @@ ROUNDING = 1e-12
 
 
 @pytest.fixture(scope="module")
-def postures() -> dict[str, PostureRow]:
-    return {row.pose: row for row in posture_table()}
+def configurations() -> dict[str, ConfigurationRow]:
+    return {row.pose: row for row in configuration_table()}
 
 
 @pytest.fixture(scope="module")
@@ -96,11 +96,11 @@ def test_samples() -> None:
     assert np.diff(t).max() == pytest.approx(0.002)
 
 
-def test_printed_postures(postures: dict[str, PostureRow]) -> None:
+def test_printed_configurations(configurations: dict[str, ConfigurationRow]) -> None:
     """A comes out to the printed digits; B and C as far as two digits of their rotations reach, beside the wrist."""
-    assert postures["A"].farthest < 0.5e-4
-    assert postures["B"].farthest < 1.0
-    assert postures["C"].farthest < 0.3
+    assert configurations["A"].farthest < 0.5e-4
+    assert configurations["B"].farthest < 1.0
+    assert configurations["C"].farthest < 0.3
     for printed, R, place in zip(PRINTED_Q, PRINTED_ROTATIONS, PRINTED_PLACES_CM, strict=True):
         X = forward(load_arm("puma560"), np.radians(printed))
         np.testing.assert_allclose(X[:3, 3] * 100, place, atol=5e-4)
@@ -108,10 +108,10 @@ def test_printed_postures(postures: dict[str, PostureRow]) -> None:
         np.testing.assert_allclose(X[:3, :3], R, atol=0.011)
 
 
-def test_no_branch_for_all(postures: dict[str, PostureRow]) -> None:
+def test_no_branch_for_all(configurations: dict[str, ConfigurationRow]) -> None:
     """A can be held with the wrist one way only, C with the other: every move must turn it over."""
-    assert postures["A"].allowed == ("left, down, no-flip",)
-    assert postures["C"].allowed == ("left, down, flip",)
+    assert configurations["A"].allowed == ("left, down, no-flip",)
+    assert configurations["C"].allowed == ("left, down, flip",)
 
 
 def test_matlab_angles(angles: dict[str, AngleRow]) -> None:
@@ -132,7 +132,7 @@ def test_missed_by_the_formula() -> None:
 
 
 def test_the_two_kinds_of_move(moves: dict[str, MoveRow]) -> None:
-    """The project's discussion in numbers: the joint move solves 3 postures and swings out wide, the Cartesian 501."""
+    """The project's discussion in numbers: the joint move solves 3 poses and swings out wide, the Cartesian 501."""
     joint, seed, nearest, geodesic = moves.values()
 
     assert (joint.inverse, seed.inverse) == (3, 501)

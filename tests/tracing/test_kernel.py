@@ -18,7 +18,7 @@ from armwright.kinematics.inverse_kinematics.solve import BRANCHES
 from armwright.tracing.emit import LANES, emit
 from armwright.tracing.kernel import CalledOff, Kernel, on_cores_for_long
 from armwright.tracing.scalar import atan2, cos, sin
-from oracles.arms import random_arm, random_postures
+from oracles.arms import random_arm, random_configurations
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -153,7 +153,7 @@ def test_random_arm(rng: np.random.Generator) -> None:
     """A general arm with prismatic joints compiles and agrees too."""
     arm = random_arm(rng, 4)
     kernel = Kernel(emitted=emit("random", lambda q, qd, qdd: [newton_euler(arm, q, qd, qdd)], _motion(4)))
-    q, qd, qdd = random_postures(arm, rng, 90).reshape(3, 30, 4)
+    q, qd, qdd = random_configurations(arm, rng, 90).reshape(3, 30, 4)
 
     np.testing.assert_allclose(kernel(q, qd, qdd), inverse_dynamics(arm, q, qd, qdd, drives=False), atol=1e-11)
 

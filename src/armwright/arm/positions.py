@@ -45,8 +45,8 @@ def positions(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> A
     return array
 
 
-def one_posture(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> Array:
-    """Return the joint positions (n,) of one posture; all else as ``positions``.
+def single_configuration(arm: Arm, q: ArrayLike, what: str = "q", *, callers: int = 1) -> Array:
+    """Return the joint positions (n,) of one configuration; all else as ``positions``.
 
     Raises:
         ShapeError: the shape is not (n,).

@@ -28,11 +28,11 @@ class Press(NamedTuple):
 class Hardware(Protocol):
     """A cell at work. Times are in [s] of the cell's own clock, poses (4, 4) in the world."""
 
-    def posture(self, arm: str, now: float) -> Array:
+    def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) that the sensors of an arm read."""
 
     def begin(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
-        """Let an arm follow a trajectory that begins at its posture, in place of what it does now.
+        """Let an arm follow a trajectory that begins at its configuration, in place of what it does now.
 
         Args:
             arm: its name.

@@ -22,7 +22,7 @@ _CORNER_DEVIATIONS = 20.0
 Around: TypeAlias = Literal["via", "damped"]
 
 
-def _posture(value: ArrayLike) -> Array:
+def _configuration(value: ArrayLike) -> Array:
     q = floats(value, "start")
     q.setflags(write=False)
     return q
@@ -51,7 +51,7 @@ class CellArm:
 
     arm: Arm
     base: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
-    start: Array = attrs.field(converter=_posture)
+    start: Array = attrs.field(converter=_configuration)
     open_time: float = 0.3
     grasp_time: float = 0.3
 

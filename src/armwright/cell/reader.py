@@ -171,19 +171,19 @@ def _arm(table: Table, folder: Path) -> CellArm:
 
 def _start(table: Table, arm: Arm, base: Array) -> Array:
     """Read where an arm stands at the start: joint by joint, or by the pose of its hand in the world."""
-    if "posture" in table:
+    if "joint_positions" in table:
         if "hand" in table:
-            raise table.error("hand", "the start is given twice, as hand and as posture")
+            raise table.error("hand", "the start is given twice, as hand and as joint_positions")
         table.allow("hand")
-        q = table.vector("posture", arm.n)
+        q = table.vector("joint_positions", arm.n)
         if mistake := degrees_by_mistake(arm, q):
-            raise table.error("posture", mistake)
+            raise table.error("joint_positions", mistake)
         for fault in violations(arm, q):
-            raise table.error("posture", str(fault))
+            raise table.error("joint_positions", str(fault))
         return q
-    table.allow("posture")
+    table.allow("joint_positions")
     if "hand" not in table:
-        raise table.error("hand", "missing; give the pose of the hand at the start, or the joints as posture")
+        raise table.error("hand", "missing; give the pose of the hand at the start, or the joints as joint_positions")
     solution = inverse(arm, inverse_pose(base) @ _pose(table, "hand"))
     if not solution.allowed:
         raise table.error("hand", solution.explain())

@@ -15,10 +15,10 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.motion.trajectory import Trajectory, hold
 
 # A trajectory must begin where the arm is; this is rounding [rad] or [m].
-_SAME_POSTURE = 1e-9
+_SAME_CONFIGURATION = 1e-9
 # What is less deep in the plane than this only touches it, as after a motion that ended on it [m].
 _TOUCHES = 1e-9
-# Postures that are worked out together.
+# Configurations that are worked out together.
 _AT_ONCE = 16384
 
 
@@ -84,15 +84,15 @@ class Simulator:
         other._answers = {name: list(answers) for name, answers in self._answers.items()}
         return other
 
-    def posture(self, arm: str, now: float) -> Array:
+    def configuration(self, arm: str, now: float) -> Array:
         """Return the joint positions (n,) of an arm."""
         run = self._runs[arm]
         return run.trajectory(run.local(now))
 
     def begin(self, arm: str, trajectory: Trajectory, now: float, tip: Array) -> None:
-        """Let an arm follow a trajectory that begins at its posture."""
-        gap = np.abs(trajectory(0.0) - self.posture(arm, now)).max()
-        assert gap <= _SAME_POSTURE, f"{arm} stands {gap:.3g} away from where its trajectory begins"  # noqa: S101
+        """Let an arm follow a trajectory that begins at its configuration."""
+        gap = np.abs(trajectory(0.0) - self.configuration(arm, now)).max()
+        assert gap <= _SAME_CONFIGURATION, f"{arm} stands {gap:.3g} away from where its trajectory begins"  # noqa: S101
         pressing = [one.pose for one in self._runs[arm].tips if self._depth(arm, one, now) > _TOUCHES]
         self._runs[arm] = _Run(t0=now, trajectory=trajectory, tips=self._tips(arm, trajectory, tip, pressing))
 

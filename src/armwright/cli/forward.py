@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.options import ArmName, Json, Posture, Rows
+from armwright.cli.options import ArmName, Configuration, Json, Rows
 from armwright.cli.shell_completion import one_of
 from armwright.cli.tables import ColumnMap, SkipIncomplete, TableFile, table_file
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def forward(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    posture: Posture = None,
+    configuration: Configuration = None,
     csv: Rows = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
@@ -32,7 +32,7 @@ def forward(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.spatial.poses import to_noap
 
     model = load_arm(arm)
-    for q in postures(model, posture, table_file(csv, columns, skip_incomplete=skip_incomplete)):
+    for q in configurations(model, configuration, table_file(csv, columns, skip_incomplete=skip_incomplete)):
         X = tool_pose(model, q)
         if as_json:
             print(json.dumps({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()}))
@@ -45,7 +45,7 @@ def forward(  # noqa: PLR0917 - Typer reads one parameter per option
 
 def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    posture: Posture = None,
+    configuration: Configuration = None,
     csv: Rows = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
@@ -66,7 +66,7 @@ def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
     model = load_arm(arm)
     if frame not in ("base", "tool"):
         raise typer.BadParameter(f"expected base or tool, got {frame}", param_hint="--frame")
-    for q in postures(model, posture, table_file(csv, columns, skip_incomplete=skip_incomplete)):
+    for q in configurations(model, configuration, table_file(csv, columns, skip_incomplete=skip_incomplete)):
         J = tool_jacobian(model, q, "tool" if frame == "tool" else "base")
         if as_json:
             print(json.dumps({"q": q.tolist(), "frame": frame, "jacobian": J.tolist()}))
@@ -81,13 +81,13 @@ def _per_rate(model: "Arm") -> list[str]:
     return [f"j{i} {'rad/s' if joint.revolute else 'm/s'}" for i, joint in enumerate(model.joints, 1)]
 
 
-def postures(model: "Arm", posture: str | None, file: TableFile | None) -> "list[Array]":
+def configurations(model: "Arm", configuration: str | None, file: TableFile | None) -> "list[Array]":
     """Return the joint positions asked for: from the option, or one per row of a file."""
     from armwright.cli.joints import joint_values, rows
 
-    if (posture is None) == (file is None):
+    if (configuration is None) == (file is None):
         raise typer.BadParameter("give the joint positions, either here or as --csv FILE", param_hint="-q")
     if file is not None:
         return list(rows(model, file, ("q",))[0])
-    assert posture is not None  # noqa: S101 - one of the two is given
-    return [joint_values(model, posture, "-q")]
+    assert configuration is not None  # noqa: S101 - one of the two is given
+    return [joint_values(model, configuration, "-q")]

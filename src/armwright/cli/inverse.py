@@ -36,11 +36,11 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
-    from armwright.kinematics.inverse_kinematics.solve import inverse as postures
+    from armwright.kinematics.inverse_kinematics.solve import inverse as solutions
 
     model = load_arm(arm)
     X = _pose(xyz, rpy, noap)
-    solution = postures(model, X, None if near is None else joint_values(model, near, "--near"))
+    solution = solutions(model, X, None if near is None else joint_values(model, near, "--near"))
     if as_json:
         branches = [
             {
@@ -87,11 +87,11 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
 def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
     """Say that a place out of reach would be in reach in the other unit, if it would."""
     from armwright.kinematics.inverse_kinematics.solution import Outcome
-    from armwright.kinematics.inverse_kinematics.solve import inverse as postures
+    from armwright.kinematics.inverse_kinematics.solve import inverse as solutions
 
     other = X.copy()
     other[:3, 3] *= 1e-3 if metres else 1e3
-    if postures(model, other).outcome is not Outcome.OUT_OF_REACH:
+    if solutions(model, other).outcome is not Outcome.OUT_OF_REACH:
         option, unit, typed = ("--noap", "m", "mm") if metres else ("--xyz", "mm", "m")
         print(f"note: {option} is in {unit}; in {typed} the pose would be in reach")
 

@@ -228,7 +228,9 @@ def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: b
 
 def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> dict[str, Any]:
     """Return a move in short, as plain data in SI units."""
-    passed = zip(file.names, planned.times.tolist(), planned.postures.tolist(), planned.misses.tolist(), strict=True)
+    passed = zip(
+        file.names, planned.times.tolist(), planned.configurations.tolist(), planned.misses.tolist(), strict=True
+    )
     return {
         "arm": planned.arm.name,
         "duration": planned.trajectory.duration,
@@ -258,9 +260,9 @@ def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> 
     shown = table(("pose", "s", *unit_names(planned.arm), *(["missed mm"] if planned.hand else [])))
     scale = units(planned.arm)
     for i, pose in enumerate(file.names):
-        postures = [f"{q:z.1f}" for q in planned.postures[i] / scale]
+        configurations = [f"{q:z.1f}" for q in planned.configurations[i] / scale]
         missed = [f"{planned.misses[i] * 1e3:.1f}"] if planned.hand else []
-        shown.add_row(pose, f"{planned.times[i]:.3f}", *postures, *missed, end_section=i == len(file.names) - 1)
+        shown.add_row(pose, f"{planned.times[i]:.3f}", *configurations, *missed, end_section=i == len(file.names) - 1)
     for limit, use in uses.items():
         parts = [Text(f"{part:.0%}", style="bold red" if part > 1 + _ROUNDING else "") for part in use]
         shown.add_row(limit, "", *parts)

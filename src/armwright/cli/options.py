@@ -11,7 +11,7 @@ ArmName: TypeAlias = Annotated[
     str,
     typer.Argument(help="Name in the catalogue, or path of an arm file.", autocompletion=arms, show_default=False),
 ]
-Posture: TypeAlias = Annotated[
+Configuration: TypeAlias = Annotated[
     str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
 ]
 Rows: TypeAlias = Annotated[

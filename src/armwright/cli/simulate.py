@@ -37,7 +37,9 @@ class Method(enum.StrEnum):
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    posture: Annotated[str, typer.Option("-q", help="Where it starts, degrees and mm: 10,20,30.", show_default=False)],
+    configuration: Annotated[
+        str, typer.Option("-q", help="Where it starts, degrees and mm: 10,20,30.", show_default=False)
+    ],
     speeds: Annotated[str | None, typer.Option("--qd", help="Speeds at the start, degrees/s and mm/s.")] = None,
     duration: Annotated[float, typer.Option(help="How long, in s.")] = 1.0,
     drives: Annotated[Drives, typer.Option(help="Off, or holding the arm's weight.")] = Drives.OFF,
@@ -67,7 +69,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     within(step_ms, (0.001, 1000), "--step-ms")
     found = run(
         model,
-        joint_values(model, posture, "-q"),
+        joint_values(model, configuration, "-q"),
         None if speeds is None else joint_values(model, speeds, "--qd"),
         duration=duration,
         controller=gravity_compensation(model) if drives is Drives.GRAVITY else no_effort(model),

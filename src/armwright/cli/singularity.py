@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def singularity(
     arm: ArmName,
-    posture: Annotated[
+    configuration: Annotated[
         str, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
     ],
     as_json: Json = False,
@@ -27,7 +27,7 @@ def singularity(
     from armwright.kinematics.singularity_analysis import singularities
 
     model = load_arm(arm)
-    found = singularities(model, joint_values(model, posture, "-q"))
+    found = singularities(model, joint_values(model, configuration, "-q"))
     if as_json:
         factors = {one.name: {"value": one.value, "scale": one.scale, "near": one.near} for one in found.factors}
         lists = {"singular_values": found.singular_values, "lost": found.lost, "idle": found.idle}

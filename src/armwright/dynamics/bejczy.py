@@ -152,16 +152,16 @@ def bejczy_efforts(
     Source:
         TR-83-008, appendix III; Bejczy (1974).
     """
-    postures, accelerations = together(joint_array(q, 6), joint_array(qdd, 6, "qdd"), "q", "qdd")
-    lead = postures.shape[:-1]
-    q_, qdd_ = per_joint(postures), per_joint(accelerations)
+    configurations, accelerations = together(joint_array(q, 6), joint_array(qdd, 6, "qdd"), "q", "qdd")
+    lead = configurations.shape[:-1]
+    q_, qdd_ = per_joint(configurations), per_joint(accelerations)
     holding = bejczy_gravity(coefficients, q_, gravity)
     moving = [D * a for D, a in zip(bejczy_inertias(coefficients, q_), qdd_, strict=True)]
     return stack([a + b for a, b in zip(moving, holding, strict=True)], lead)
 
 
 def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
-    """Return the constants with which the model is nearest to an arm, by least squares over postures.
+    """Return the constants with which the model is nearest to an arm, by least squares over configurations.
 
     The mass that the slide carries, b4 and k2, is what the links weigh; the rest is fitted to the diagonal of the
     mass matrix and to gravity. D55 gives only the sum of b17 and b18: b18 is the inertia of the hand about the wrist,
@@ -169,11 +169,11 @@ def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
 
     Args:
         arm: a Stanford arm that stands upright, rotors included.
-        q: (m, 6) postures to fit to.
+        q: (m, 6) configurations to fit to.
 
     Raises:
         KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
-        ShapeError: ``q`` is not (m, 6), or has fewer postures than there are constants.
+        ShapeError: ``q`` is not (m, 6), or has fewer configurations than there are constants.
         InvalidValueError: a number is NaN or infinite.
         UnsupportedArmError: the arm has other joints than a Stanford arm.
     """
@@ -181,7 +181,9 @@ def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
         raise UnsupportedArmError(f"arm '{arm.name}' is no Stanford arm: of six joints, the third alone must slide")
     q = positions(arm, q)
     if q.ndim != 2 or len(q) < len(attrs.fields(Coefficients)):
-        raise ShapeError(f"q: expected (m, 6) postures, as many as there are constants to fit or more, got {q.shape}")
+        raise ShapeError(
+            f"q: expected (m, 6) configurations, as many as there are constants to fit or more, got {q.shape}"
+        )
     D = np.diagonal(mass_matrix(arm, q), axis1=-2, axis2=-1).T
     G = gravity_efforts(arm, q).T / arm.gravity[2]
     carried = sum(link.mass for link in arm.links[2:])

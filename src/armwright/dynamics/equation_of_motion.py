@@ -81,7 +81,7 @@ class Terms:
 def terms(
     arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, load: Link = _NO_LOAD, wrench: ArrayLike | None = None
 ) -> Terms:
-    """Return the efforts of one posture or of a whole motion by their cause.
+    """Return the efforts of one configuration or of a whole motion by their cause.
 
     Args:
         arm: the arm, with n joints.

@@ -8,7 +8,7 @@ from .differential import (
     DifferentialInverse as DifferentialInverse,
 )
 from .differential import (
-    SingularPostureError as SingularPostureError,
+    SingularConfigurationError as SingularConfigurationError,
 )
 from .differential import (
     differential_inverse as differential_inverse,

@@ -1,4 +1,4 @@
-"""Joint rates for a twist of the tool that stay bounded at and near singular postures."""
+"""Joint rates for a twist of the tool that stay bounded at and near singular configurations."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class DampedRates:
 def damped_rates(
     arm: Arm, q: ArrayLike, twist: ArrayLike, *, damping: float = 0.05, length: float = 1.0, frame: Axes = "base"
 ) -> DampedRates:
-    """Return joint rates that make a twist of the tool, or come near it where the posture is nearly singular.
+    """Return joint rates that make a twist of the tool, or come near it where the configuration is nearly singular.
 
     Along a direction in which the arm moves the hand well, with a singular value s of ``damping`` or more, the twist
     is met exactly. Below that the gain is 2 s / (s² + damping²) instead of 1 / s: it goes on from 1 / damping

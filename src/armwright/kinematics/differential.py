@@ -46,7 +46,7 @@ class Motion(NamedTuple):
     w: Vector
 
 
-class SingularPostureError(ArmwrightError, ValueError):
+class SingularConfigurationError(ArmwrightError, ValueError):
     """No joint rates make the twist: a factor of the determinant vanishes.
 
     Attributes:
@@ -54,9 +54,9 @@ class SingularPostureError(ArmwrightError, ValueError):
     """
 
     def __init__(self, factor: str, value: float, place: tuple[int, ...]) -> None:
-        """Name the factor, its value and which of many postures it is."""
+        """Name the factor, its value and which of many configurations it is."""
         self.factor = factor
-        which = f"posture {', '.join(str(i) for i in place)}" if place else "the posture"
+        which = f"configuration {', '.join(str(i) for i in place)}" if place else "the configuration"
         super().__init__(
             f"{which} is singular at the {factor}: its factor of the determinant is {value:.3g}, expected at least "
             f"{SINGULAR_FACTOR:g}; damped_rates gives bounded rates there"
@@ -68,7 +68,7 @@ class DifferentialInverse:
     """Joint rates, and whether there are any.
 
     Attributes:
-        rates: (..., 6) joint speeds [rad/s]; NaN where the posture is singular.
+        rates: (..., 6) joint speeds [rad/s]; NaN where the configuration is singular.
         factors: (..., 3) shoulder [m], elbow [m] and wrist: the factors of the determinant.
         singular: (..., 3) which of them vanish.
     """
@@ -83,11 +83,11 @@ class DifferentialInverse:
         """Return the rates (..., 6), all of which make their twist.
 
         Raises:
-            SingularPostureError: one does not; the text names the factor that vanishes.
+            SingularConfigurationError: one does not; the text names the factor that vanishes.
         """
         if self.singular.any():
             *place, factor = (int(i) for i in np.argwhere(self.singular)[0])
-            raise SingularPostureError(_FACTORS[factor], float(self.factors[*place, factor]), tuple(place))
+            raise SingularConfigurationError(_FACTORS[factor], float(self.factors[*place, factor]), tuple(place))
         return self.rates
 
 

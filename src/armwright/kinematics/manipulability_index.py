@@ -1,4 +1,4 @@
-"""How well a posture can move the hand: measures of the Jacobian that are 0 where a direction is lost."""
+"""How well a configuration can move the hand: measures of the Jacobian that are 0 where a direction is lost."""
 
 from __future__ import annotations
 

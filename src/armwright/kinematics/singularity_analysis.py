@@ -1,4 +1,4 @@
-"""Singular postures and their cause: which factor of the determinant vanishes, what is lost, what moves for nothing."""
+"""Singular configurations: which factor of the determinant vanishes, which twists are lost, which motions are idle."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import known_arm, one_posture, positions
+from armwright.arm.positions import known_arm, positions, single_configuration
 from armwright.arrays import Array, ArrayLike, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import per_joint, stack
@@ -27,7 +27,7 @@ class Factor:
     Attributes:
         name: ``shoulder``, ``elbow``, ``slide``, ``wrist``, or ``singular value 6``.
         value: [m], or a plain number for the wrist.
-        scale: what it is compared with, in the same unit: its value in a good posture.
+        scale: what it is compared with, in the same unit: its value in a good configuration.
         near: whether it is near zero.
     """
 
@@ -39,15 +39,15 @@ class Factor:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Singularities:
-    """How near one posture is to a singularity, and what that costs.
+    """How near one configuration is to a singularity, and what that costs.
 
     Attributes:
         factors: the factors of the determinant, or the singular values, largest first.
         singular_values: (min(6, n)) of the Jacobian with its angular rows in metres, largest first [m].
         lost: (k, 6) twists, base axes, that the hand cannot make: at a right angle to all it can, and to each other.
-            Of a singular posture one at least; of an arm with fewer than six joints those that it never can as well.
+            At least one where the configuration is singular; with fewer than six joints also those never possible.
         idle: (k, n) joint motions that leave the hand where it is, each of length 1, at right angles to each other.
-            Of a singular posture one at least; of an arm with more than six joints those that always do as well.
+            At least one where the configuration is singular; with more than six joints also the self-motions.
     """
 
     factors: tuple[Factor, ...]
@@ -77,7 +77,7 @@ def determinant_factors(geometry: ClosedFormGeometry, angles: Sequence[Scalar]) 
     """Return the three factors of the determinant of the Jacobian, over abstract scalars.
 
     The determinant is their product, times the length of the upper arm where there is one, with one sign for all
-    postures of an arm:
+    configurations of an arm:
 
     - shoulder: distance of the wrist centre from the axis of joint 1, in the plane of the arm; of the PUMA
       a2·c2 + a3·c23 + d4·s23, of the Stanford arm d3·s2;
@@ -105,7 +105,7 @@ def determinant_factors(geometry: ClosedFormGeometry, angles: Sequence[Scalar]) 
 
 
 def singularity_factors(arm: Arm, q: ArrayLike) -> Array:
-    """Return the three factors of the determinant of the Jacobian for many postures.
+    """Return the three factors of the determinant of the Jacobian for many configurations.
 
     Args:
         arm: an arm of 6 joints with a closed form: see ``find_geometry``.
@@ -131,7 +131,7 @@ def singularity_factors(arm: Arm, q: ArrayLike) -> Array:
 
 
 def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: float = 1.0) -> Singularities:
-    """Say how near one posture is to a singularity, by which factor, what is lost and what moves for nothing.
+    """Say how near one configuration is to a singularity, by which factor, what is lost and what moves for nothing.
 
     Args:
         arm: the arm, with n joints.
@@ -155,7 +155,7 @@ def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: fl
     threshold, length = number(threshold, "threshold"), number(length, "length")
     if not 0 < threshold < 1:
         raise InvalidValueError(f"threshold: expected a part of the scale between 0 and 1, got {threshold}")
-    q = one_posture(arm, q)
+    q = single_configuration(arm, q)
     U, sigma, Vt = np.linalg.svd(scaled_rows(jacobian(arm, q), length))
     small = int(np.count_nonzero(sigma < threshold * sigma[0]))
     factors = _factors(arm, q, threshold) or tuple(

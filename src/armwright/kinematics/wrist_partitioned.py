@@ -14,7 +14,7 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import known_arm, positions
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import UnsupportedArmError
-from armwright.kinematics.differential import SINGULAR_FACTOR, SingularPostureError
+from armwright.kinematics.differential import SINGULAR_FACTOR, SingularConfigurationError
 from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.singularity_analysis import determinant_factors
@@ -63,7 +63,7 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
         the axes of the forearm.
 
     Raises:
-        SingularPostureError: a factor of the determinant vanishes; it is named.
+        SingularConfigurationError: a factor of the determinant vanishes; it is named.
         KindError: ``arm`` is no arm, or ``q`` something else than real numbers.
         UnsupportedArmError: the arm is not built like the PUMA.
         ShapeError: the last axis of ``q`` is not 6 long.
@@ -77,7 +77,7 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     factors = np.stack(np.broadcast_arrays(*determinant_factors(geometry, _angles(geometry, q))), axis=-1)
     for index in np.argwhere(np.abs(factors) < SINGULAR_FACTOR).tolist():
         *which, factor = index
-        raise SingularPostureError(_FACTORS[factor], float(factors[*index]), tuple(which))
+        raise SingularConfigurationError(_FACTORS[factor], float(factors[*index]), tuple(which))
     J = _blocks(geometry, q)
     out, plane, bend = factors[..., 0], geometry.upper_arm * factors[..., 1], factors[..., 2]
     inverse = np.zeros_like(J)

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import one_posture
+from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import IncapableArmError, one_of
 from armwright.kinematics.damping import damped_rates
@@ -136,7 +136,7 @@ def line_or_detour(
     """
     one_of("way round", by, ("via", "damped"))
     solver = solver_of(arm)
-    q, B = one_posture(solver.arm, q_start, "q_start"), exact_pose(X_goal)
+    q, B = single_configuration(solver.arm, q_start, "q_start"), exact_pose(X_goal)
     allowed = tolerance(deviation)
     asked = asked_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
     straight: Detour | None = None
@@ -279,14 +279,14 @@ def _nearest(line: StraightPath, X: Array) -> float:
 def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle: PathError) -> Detour | None:
     """Follow the line by damped rates; None where the end is not met, or a joint cannot keep its limits."""
     solver = solver_of(arm)
-    times, postures = _integrated(solver, line, q, damping)
-    if postures is None:
+    times, configurations = _integrated(solver, line, q, damping)
+    if configurations is None:
         return None
     fractions = line.progress(np.minimum(times, line.duration))
     for _ in range(_EASINGS):
-        trajectory = xspline(times, postures)
+        trajectory = xspline(times, configurations)
         times = np.append(0.0, np.cumsum(np.diff(times) * _easing(solver.arm, trajectory)))
-    trajectory = xspline(times, postures)
+    trajectory = xspline(times, configurations)
     lowest, highest = trajectory.extremes(0)
     if (lowest < solver.arm.limit("lower")).any() or (highest > solver.arm.limit("upper")).any():
         return None
@@ -326,13 +326,13 @@ def _integrated(solver: Solver, line: StraightPath, q: Array, damping: float) ->
     """
     h = line.duration / _STEPS
     lower, upper = solver.arm.limit("lower"), solver.arm.limit("upper")
-    postures, t = [q], 0.0
+    configurations, t = [q], 0.0
     while t < line.duration * (1 + _AFTER) and not ((q < lower) | (q > upper)).any():
         ahead = line(np.minimum([t, t + h], line.duration))
         twist = np.concatenate([ahead[1, :3, 3] - ahead[0, :3, 3], _turn(ahead[0], ahead[1])]) / h
         missing = _missing(solver.forward(q), ahead[0])
         if t >= line.duration and np.abs(missing * np.repeat((1.0, 1 / ROTATION_PER_METRE), 3)).max() < _ARRIVED:
-            return np.asarray(h * np.arange(len(postures))), np.array(postures)
+            return np.asarray(h * np.arange(len(configurations))), np.array(configurations)
         # What is missing at the end is little, so that bounded rates need no more than a little damping there.
         damping_now = damping if t < line.duration else _LITTLE * damping
         rates = damped_rates(solver.arm, q, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates
@@ -342,7 +342,7 @@ def _integrated(solver: Solver, line: StraightPath, q: Array, damping: float) ->
         rates = damped_rates(solver.arm, middle, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates
         q = q + rates * h
         t += h
-        postures.append(q)
+        configurations.append(q)
     return np.empty(0), None
 
 

@@ -9,13 +9,14 @@ import attrs
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import one_posture
+from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
 from armwright.kinematics.inverse_kinematics.candidates import typed_poses
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.kinematics.inverse_kinematics.wrapping import joint_distance, mid_range
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
+from armwright.motion.branch_selection import configurations_at, configurations_through
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified import certificate_of, limit_peaks
 from armwright.motion.detour import By, Detour, line_or_detour
@@ -23,7 +24,6 @@ from armwright.motion.hand_path import HandPath, Orientation, hand_path
 from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.obstruction import PathError, cause_of
 from armwright.motion.path import NEGLIGIBLE, Path
-from armwright.motion.postures import postures_at, postures_through
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.tolerance import Tolerance, tolerance
 from armwright.motion.tracking import Task, Tracking, path_error, track
@@ -60,7 +60,7 @@ class Move:
     arm: Arm
     poses: Array
     times: Array
-    postures: Array
+    configurations: Array
     label: str
     trajectory: Trajectory
     misses: Array
@@ -121,19 +121,19 @@ def joint_move(
     """
     solver = solver_of(arm)
     X = exact_poses(poses)
-    postures = postures_through(solver.arm, X, _near(solver.arm, near))
-    q = np.array([posture.q for posture in postures])
+    configurations = configurations_through(solver.arm, X, _near(solver.arm, near))
+    q = np.array([configuration.q for configuration in configurations])
     if times is None:
         _refuse_blend(blend)
         t, b = blend_timing(q, solver.arm.limit("speed"), solver.arm.limit("acceleration"), ends=ends)
     else:
         t, b = _timing(times, blend, len(X))
-    labels = [posture.label for posture in postures]
+    labels = [configuration.label for configuration in configurations]
     move = Move(
         arm=solver.arm,
         poses=X,
         times=t,
-        postures=q,
+        configurations=q,
         label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
         trajectory=blended(t, q, b, ends=ends),
         misses=via_distances(t, q, b, ends=ends),
@@ -205,7 +205,7 @@ def along(
         arm=solver.arm,
         poses=X,
         times=times,
-        postures=found.trajectory(times),
+        configurations=found.trajectory(times),
         label=label,
         trajectory=found.trajectory,
         misses=via_distances(times, X[:, :3, 3], blend, ends=ends),
@@ -244,7 +244,7 @@ def stopping_move(
     if Path(poses=X).lengths().max() <= NEGLIGIBLE:
         raise InvalidValueError("poses: all of them are the same, so there is no way to go")
     first: PathError | None = None
-    for start in postures_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
+    for start in configurations_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
         try:
             legs = _legs(arm, start.q, X, by=by, deviation=deviation, speed=speed)
         except PathError as error:
@@ -286,7 +286,7 @@ def exact_poses(poses: ArrayLike) -> Array:
 
 
 def _near(arm: Arm, near: ArrayLike | None) -> Array:
-    return mid_range(arm) if near is None else one_posture(arm, near, "near")
+    return mid_range(arm) if near is None else single_configuration(arm, near, "near")
 
 
 def _timing(times: ArrayLike, blend: ArrayLike | None, count: int) -> tuple[Array, Array]:
@@ -373,13 +373,13 @@ def _legs(arm: AnyArm, q: Array, X: Array, *, by: By, deviation: float, speed: f
 
 def _stopping(arm: Arm, X: Array, q_start: Array, legs: Sequence[Detour]) -> Move:
     times = np.concatenate([[0.0], np.cumsum([leg.trajectory.duration for leg in legs])])
-    postures = np.array([q_start, *(leg.trajectory(leg.trajectory.duration) for leg in legs)])
-    labels = [inverse(arm, each, q).best.label for each, q in zip(X, postures, strict=True)]
+    configurations = np.array([q_start, *(leg.trajectory(leg.trajectory.duration) for leg in legs)])
+    labels = [inverse(arm, each, q).best.label for each, q in zip(X, configurations, strict=True)]
     return Move(
         arm=arm,
         poses=X,
         times=times,
-        postures=postures,
+        configurations=configurations,
         label=labels[0] if len(set(labels)) == 1 else " -> ".join(labels),
         trajectory=join([leg.trajectory for leg in legs]),
         misses=np.zeros(len(X)),

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import one_posture
+from armwright.arm.positions import single_configuration
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, number, one_per_joint
 from armwright.errors import ArmwrightError, InvalidValueError, MissingExtraError
 from armwright.kinematics.inverse_kinematics.solution import violations
@@ -99,7 +99,7 @@ def retarget(
     Source:
         Berscheid & Kroeger, "Jerk-limited real-time trajectory generation with arbitrary target states" (2021).
     """
-    start, goal = one_posture(arm, q, "q"), one_posture(arm, q_goal, "q_goal")
+    start, goal = single_configuration(arm, q, "q"), single_configuration(arm, q_goal, "q_goal")
     n = arm.n
     task = _Task(
         start,
@@ -160,7 +160,7 @@ def replace_goal(
         InvalidValueError: the time is before the start, or after the end of a motion that does not end at rest.
         OnlineError: as in ``retarget``, and so are all others.
     """
-    goal = one_posture(arm, q_goal, "q_goal")
+    goal = single_configuration(arm, q_goal, "q_goal")
     checked(arm, running, "running")
     before = _up_to(running, number(t, "t"))
     q, qd, qdd = (before(before.duration, order) for order in (0, 1, 2))

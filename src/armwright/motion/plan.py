@@ -206,7 +206,9 @@ def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -
         raise StageError(number, _at_pose("reach", f"the pose is {far.max():.3g} m away", worst, poses[worst]))
     if goal.kind == "PTP":
         # Planned as they are asked for: nearly always the first one does.
-        yield from (_direct(arm, q, posture, manner) for posture in _postures(arm, poses[0], q, number))
+        yield from (
+            _direct(arm, q, configuration, manner) for configuration in _configurations(arm, poses[0], q, number)
+        )
         return
     path = Path(poses=np.concatenate([np.asarray(solver_of(arm).forward(q))[None], poses]))
     try:
@@ -306,14 +308,14 @@ def hand_length(arm: AnyArm, trajectory: Trajectory) -> float:
     return _length(solver_of(arm).forward(trajectory(np.linspace(0.0, trajectory.duration, _LOOKS))))
 
 
-def _postures(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]:
+def _configurations(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]:
     """Return the postures inside the limits that reach a pose, whole turns included, nearest first."""
     model = solver_of(arm).arm
     solution = inverse(model, X, q)
     if not solution.allowed:
         raise StageError(number, _at_pose(cause_of(solution), solution.explain(), 0, X))
-    postures = [image for branch in solution.allowed for image in equivalent_configurations(model, branch.q)]
-    return sorted(postures, key=lambda posture: joint_distance(model, q, posture))
+    configurations = [image for branch in solution.allowed for image in equivalent_configurations(model, branch.q)]
+    return sorted(configurations, key=lambda configuration: joint_distance(model, q, configuration))
 
 
 def _direct(arm: AnyArm, q: Array, goal: Array, manner: Manner) -> Stage:

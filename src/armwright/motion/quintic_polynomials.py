@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import one_posture
+from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike, joint_array, number
 from armwright.errors import IncapableArmError, InvalidValueError
 from armwright.motion.knots import NOWHERE, check_duration, two_ends
@@ -73,7 +73,7 @@ def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float
         TR-83-008, "point to point motion"; the meaning of 120 from its section on MOVE.
     """
     speed = check_speed(speed)
-    start, goal = one_posture(arm, q_start, "q_start"), one_posture(arm, q_goal, "q_goal")
+    start, goal = single_configuration(arm, q_start, "q_start"), single_configuration(arm, q_goal, "q_goal")
     way = goal - start
     if np.abs(way).max() <= NOWHERE:
         return hold(start, 0.0)

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import one_posture
+from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import IncapableArmError
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
@@ -94,7 +94,7 @@ def certified_line(
         weak: as for ``fastest``.
     """
     solver = solver_of(arm)
-    q, B = one_posture(solver.arm, q_start, "q_start"), exact_pose(X_goal)
+    q, B = single_configuration(solver.arm, q_start, "q_start"), exact_pose(X_goal)
     for violation in violations(solver.arm, q):
         reason = str(violation)
         raise PathError("limits", 0, 0.0, f"at the start {reason}", joint=violation.joint, reason=reason)

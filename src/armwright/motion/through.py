@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from armwright.arm.positions import one_posture
+from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike
 from armwright.motion.certified import CertifiedMotion, slowed_alike, standstill
 from armwright.motion.ends import check_ends
@@ -54,7 +54,7 @@ def through_frames(
         TR-83-008, "continuous motion".
     """
     solver = solver_of(arm)
-    q = one_posture(solver.arm, q_start, "q_start")
+    q = single_configuration(solver.arm, q_start, "q_start")
     goals = exact_poses(frames)
     path = Path(poses=np.concatenate([np.asarray(solver.forward(q))[None], goals]))
     return through(arm, path, q, deviation=deviation, speed=speed)

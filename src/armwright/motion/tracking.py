@@ -184,10 +184,14 @@ def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
 
 def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Obstruction:
     """Put knots until the hand stays within the tolerance everywhere, near the configurations of a diagnosis if any."""
-    arm, postures = task.solver.arm, None if guide is None else guide.guide
+    arm, configurations = task.solver.arm, None if guide is None else guide.guide
     for _ in range(_ROUNDS):
         X = task.motion(knots)
-        q, missed = chain(task.solver, X, task.q_start) if postures is None else beside(task.solver, X, postures(knots))
+        q, missed = (
+            chain(task.solver, X, task.q_start)
+            if configurations is None
+            else beside(task.solver, X, configurations(knots))
+        )
         q = _whole_turns(arm, q, missed) if task.whole_turns else q
         obstruction = beyond_limits(arm, q[:missed], knots)
         if obstruction is None and missed is not None:
@@ -214,7 +218,7 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
             break
         knots = divided(knots, parts)
         if task.solver.inverse_branches is None:  # from where they nearly are already they are found at once
-            postures = trajectory
+            configurations = trajectory
     return too_far(task, tracking)
 
 

@@ -91,8 +91,8 @@ def frames(recording: Recording, code: Code) -> dict[str, Any]:
             "world": _numbers(to_noap(tree.world(name))) if known else None,
             "relation": _numbers(to_noap(tree.relation(name, parent))) if known else None,
         }
-    postures = {name: _numbers(q) for name, q in recording.postures.items()}
-    return {"units": "m, rad", "pose": "columns n, o, a, p", "frames": table, "postures": postures}
+    configurations = {name: _numbers(q) for name, q in recording.configurations.items()}
+    return {"units": "m, rad", "pose": "columns n, o, a, p", "frames": table, "configurations": configurations}
 
 
 def ending(recording: Recording, code: Code) -> dict[str, Any]:

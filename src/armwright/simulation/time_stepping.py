@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import one_posture
+from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike, exact_shape, number, one_per_joint
 from armwright.dynamics.accelerations import check_pivots, eliminated
 from armwright.dynamics.energy import kinetic_energy, potential_energy
@@ -81,7 +81,7 @@ def simulate(
         TR-83-008, section 4 and appendix V; Gill (1951). The friction is Coulomb's, with dry friction at rest as
         large as in motion.
     """
-    start = one_posture(arm, q)
+    start = single_configuration(arm, q)
     speed = np.zeros(arm.n) if qd is None else one_per_joint(qd, arm.n, "qd")
     duration, period = _time(duration, "duration"), _time(period, "period")
     if duration / period > _MOMENTS:

@@ -128,11 +128,11 @@ def touched(attitude: str, *, noise: float = NOISE, seed: int = 0) -> Touched:
     """Return what is read when the true arm touches the points of a board."""
     rng = np.random.default_rng([seed, list(ATTITUDES).index(attitude)])
     points = board(attitude)
-    q = postures(truth(), points)
+    q = configurations(truth(), points)
     return Touched(q=q, points=points + noise * rng.standard_normal(points.shape))
 
 
-def postures(errors: Array, points: Array) -> Array:
+def configurations(errors: Array, points: Array) -> Array:
     """Return (m, 3) joint positions at which an arm with these errors has its tool at points (m, 3)."""
     found, guess = [], _START
     for point in points:
@@ -145,7 +145,7 @@ def postures(errors: Array, points: Array) -> Array:
     return np.array(found)
 
 
-# A posture over the board [rad].
+# A configuration over the board [rad].
 _START = np.array([-0.65, 0.2, 0.4])
 
 
@@ -180,7 +180,7 @@ def full_fit(attitudes: tuple[str, ...]) -> Calibration:
 def verified(errors: Array) -> tuple[float, ...]:
     """Return how far the true arm is from six places when it is led by a model with these errors [mm]."""
     places = np.array(PRINTED_POINTS) / 1e3
-    reached = chain().forward(postures(errors, places), truth()).position
+    reached = chain().forward(configurations(errors, places), truth()).position
     return tuple(float(x) * 1e3 for x in np.linalg.norm(reached - places, axis=1))
 
 

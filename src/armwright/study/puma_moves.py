@@ -93,7 +93,7 @@ def poses_along(way: Way, t: Array) -> Array:
 
 
 def joints_along(way: Way) -> Trajectory:
-    """Return what the joints do, through the postures at the 501 moments, whatever their limits."""
+    """Return what the joints do, through the configurations at the 501 moments, whatever their limits."""
     if way == "joint":
         return joint_trajectory()
     t = sample_times()
@@ -114,13 +114,13 @@ def _wide(arm: Arm) -> Arm:
 
 
 @attrs.frozen(kw_only=True)
-class PostureRow:
-    """A printed posture beside the one that its printed pose gives.
+class ConfigurationRow:
+    """A printed configuration beside the one that its printed pose gives.
 
     Attributes:
         pose: A, B or C.
         printed: (6) joint positions as printed [deg].
-        computed: (6) of the nearest posture that the pose allows [deg].
+        computed: (6) of the nearest configuration that the pose allows [deg].
         branch: that it belongs to.
         farthest: largest difference [deg].
         allowed: all branches inside the limits there.
@@ -134,14 +134,14 @@ class PostureRow:
     allowed: tuple[str, ...]
 
 
-def posture_table() -> list[PostureRow]:
-    """Return printed and computed postures: the printed rotations have two digits, which near the wrist is a degree."""
+def configuration_table() -> list[ConfigurationRow]:
+    """Return printed and computed configurations: two printed digits of a rotation are a degree near the wrist."""
     arm, rows = load_arm("puma560-seed"), []
     for name, printed, X in zip(NAMES, PRINTED_Q, study_poses(), strict=True):
         found = inverse(arm, X, np.radians(printed))
         computed = np.degrees(found.best.q)
         rows.append(
-            PostureRow(
+            ConfigurationRow(
                 pose=name,
                 printed=printed,
                 computed=tuple(computed.tolist()),
@@ -191,7 +191,7 @@ class MoveRow:
 
     Attributes:
         way: what it is.
-        inverse: number of postures that are solved for.
+        inverse: number of configurations that are solved for.
         length: way of the hand [m].
         off: farthest that the hand is from the straight ways A B C [m].
         turn: by how much the hand turns altogether [rad].
@@ -292,7 +292,7 @@ def way_round_table() -> list[WayRoundRow]:
 
 
 def missed_at_b() -> Array:
-    """Return by how much the joint move misses the posture B when it is passed (6,) [rad], by the formula."""
+    """Return by how much the joint move misses the configuration B when it is passed (6,) [rad], by the formula."""
     return np.asarray(via_deviations(TIMES, np.radians(PRINTED_Q), BLEND, ends="running")[1])
 
 

@@ -24,7 +24,7 @@ class PumaMoves:
         detours: straight lines with stops, and detours around the singularity.
     """
 
-    configurations: list[puma_moves.PostureRow]
+    configurations: list[puma_moves.ConfigurationRow]
     angles: list[puma_moves.AngleRow]
     moves: list[puma_moves.MoveRow]
     detours: list[puma_moves.WayRoundRow]
@@ -40,7 +40,7 @@ class PumaMoves:
     def run(cls, progress: Callable[[str, float], None] | None = None) -> "PumaMoves":  # noqa: ARG003 - takes seconds
         """Run the study."""
         return cls(
-            configurations=puma_moves.posture_table(),
+            configurations=puma_moves.configuration_table(),
             angles=puma_moves.angle_table(),
             moves=puma_moves.move_table(),
             detours=puma_moves.way_round_table(),
@@ -137,7 +137,7 @@ def _films() -> dict[str, bytes]:
         arm=load_arm("puma560-seed"),
         poses=puma_moves.study_poses(),
         times=np.array(puma_moves.TIMES),
-        postures=np.radians(puma_moves.PRINTED_Q),
+        configurations=np.radians(puma_moves.PRINTED_Q),
         label="",
         trajectory=puma_moves.joint_trajectory(),
         misses=np.zeros(len(puma_moves.NAMES)),

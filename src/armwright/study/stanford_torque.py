@@ -32,9 +32,9 @@ DURATION = 1.0  # s
 # The largest load: a cube with its centre in the origin of the hand frame.
 LOAD_MASS = 1.8  # kg
 LOAD_VOLUME = 422e-6  # m³
-# Seed and number of the postures that constants are fitted to.
+# Seed and number of the configurations that constants are fitted to.
 SEED = 83008
-POSTURES = 2000
+CONFIGURATIONS = 2000
 # A printed number that agrees is this near, or to half a unit of its last digit; one that is near may have been
 # rounded on the way.
 AGREES = 0.01
@@ -200,16 +200,16 @@ def _mean(course: Array) -> Array:
     return np.asarray(np.sqrt(np.mean(course**2, axis=0)))
 
 
-def study_postures() -> Array:
-    """Return the postures that constants are fitted to, (m, 6), spread over the joint limits."""
+def fit_configurations() -> Array:
+    """Return the configurations that constants are fitted to, (m, 6), spread over the joint limits."""
     arm = study_arm()
     rng = np.random.default_rng(SEED)
-    return rng.uniform(arm.limits.lower, arm.limits.upper, size=(POSTURES, arm.n))
+    return rng.uniform(arm.limits.lower, arm.limits.upper, size=(CONFIGURATIONS, arm.n))
 
 
 def fitted_coefficients() -> Coefficients:
     """Return the constants of Bejczy's model that fit the arm best."""
-    return fitted(study_arm(), study_postures())
+    return fitted(study_arm(), fit_configurations())
 
 
 @attrs.frozen(kw_only=True)
@@ -303,7 +303,7 @@ class FormRow:
     Attributes:
         form: in letters.
         residual: root of the mean square [kg m²].
-        share: of the spread of D11 over the postures that stays unexplained.
+        share: of the spread of D11 over the configurations that stays unexplained.
     """
 
     form: str
@@ -317,7 +317,7 @@ def form_table() -> list[FormRow]:
     Source:
         TR-83-008, appendix III.
     """
-    q = study_postures()
+    q = fit_configurations()
     D11 = mass_matrix(study_arm(), q)[:, 0, 0]
     s2, q3, c5 = np.sin(q[:, 1]), q[:, 2], np.cos(q[:, 4])
     boom = np.stack([np.ones_like(q3), q3, q3 * c5, q3**2], axis=1)

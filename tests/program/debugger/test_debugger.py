@@ -142,13 +142,13 @@ def test_ticks_show_the_arm_on_its_way() -> None:
     for count in range(1, 4):
         debugger.run("tick")
         assert debugger.time == pytest.approx(begun + count * debugger.machine.cell.period)
-    posture = debugger.machine.hardware.posture("ARM_1", debugger.time)
+    configuration = debugger.machine.hardware.configuration("ARM_1", debugger.time)
     cell = debugger.machine.cell.arms["ARM_1"]
 
     from armwright.kinematics.forward_kinematics import forward
 
     np.testing.assert_allclose(
-        debugger.view.state.tree.world("ARM_1"), cell.base @ forward(cell.arm, posture), atol=ROUNDING
+        debugger.view.state.tree.world("ARM_1"), cell.base @ forward(cell.arm, configuration), atol=ROUNDING
     )
     np.testing.assert_array_equal(debugger.machine.state.tree.world("ARM_1"), before)
     assert line(debugger) == 11

@@ -52,7 +52,7 @@ def places(machine: Machine) -> dict[str, list[float] | None]:
 def everything(talk: Session) -> tuple[object, ...]:
     """Return all that an error or an undo has to bring back, as plain data."""
     machine = talk.state.machine
-    postures = {name: machine.hardware.posture(name, machine.now).tolist() for name in machine.state.hands}
+    configurations = {name: machine.hardware.configuration(name, machine.now).tolist() for name in machine.state.hands}
     parents = {name: machine.state.tree.parent(name) for name in machine.state.tree}
     values = {name: np.asarray(value).tolist() for name, value in machine.state.values.items()}
     hands = {name: (hand.at, hand.holds) for name, hand in machine.state.hands.items()}
@@ -63,7 +63,7 @@ def everything(talk: Session) -> tuple[object, ...]:
         len(machine.state.effects),
         len(machine.state.trees),
     )
-    return places(machine), parents, postures, values, hands, *rest, talk.program()
+    return places(machine), parents, configurations, values, hands, *rest, talk.program()
 
 
 # ---- values and statements -----------------------------------------------------------------------------------------
@@ -167,13 +167,13 @@ def test_a_session_is_a_program(name: str) -> None:
     again.load(Source("again", text))
 
     assert recording.duration == pytest.approx(talk.state.machine.now, abs=1e-9)
-    np.testing.assert_allclose(recording.postures["ARM_1"], _posture(talk), atol=EXACT)
+    np.testing.assert_allclose(recording.configurations["ARM_1"], _configuration(talk), atol=EXACT)
     assert again.program("saved") == text
 
 
-def _posture(talk: Session) -> np.ndarray:
+def _configuration(talk: Session) -> np.ndarray:
     machine = talk.state.machine
-    return machine.hardware.posture("ARM_1", machine.now)
+    return machine.hardware.configuration("ARM_1", machine.now)
 
 
 def test_branches_side_by_side() -> None:

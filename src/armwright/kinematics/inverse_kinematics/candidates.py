@@ -127,6 +127,6 @@ def rank(
         outcome=outcome,
         branches=tuple(branches),
         distance=float(np.linalg.norm(nearest[:3, 3] - X[:3, 3])),
-        turn=float(angle_between(X[:3, :3], nearest[:3, :3])),
+        rotation_error=float(angle_between(X[:3, :3], nearest[:3, :3])),
         nearest_pose=nearest,
     )

@@ -104,7 +104,7 @@ class InverseSolution:
         distance: how far the pose is out of reach [m]; 0 where it is in reach.
         nearest_pose: (4, 4) the pose in reach nearest to the asked one: with a closed form of the same orientation,
             else the best that was found.
-        turn: how far the nearest pose is turned from the asked one [rad].
+        rotation_error: angle between the orientations of the nearest and the requested pose [rad].
     """
 
     arm: Arm
@@ -112,7 +112,7 @@ class InverseSolution:
     branches: tuple[Branch, ...]
     distance: float
     nearest_pose: Array = attrs.field(converter=read_only, eq=array_key)
-    turn: float = 0.0
+    rotation_error: float = 0.0
 
     __reduce__ = reduce_by_fields
 
@@ -142,14 +142,14 @@ class InverseSolution:
         """Say in one sentence why no configuration can be taken."""
         if self.outcome is Outcome.OUT_OF_REACH:
             x, y, z = self.nearest_pose[:3, 3] * 1e3
-            turned = f" and {math.degrees(self.turn):.2f} deg" if self.turn > _SHOWN_TURN else ""
+            turned = f" and {math.degrees(self.rotation_error):.2f} deg" if self.rotation_error > _SHOWN_TURN else ""
             return (
                 f"the pose is {self.distance * 1e3:.1f} mm{turned} out of reach of '{self.arm.name}'; "
                 f"the nearest in reach has its origin at ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
             )
         least = min(self.branches, key=_worst_violation)
         faults = "; ".join(str(violation) for violation in least.violations)
-        return f"no posture of '{self.arm.name}' is inside the joint limits; in the closest, {faults}"
+        return f"no configuration of '{self.arm.name}' is inside the joint limits; in the closest, {faults}"
 
     def _repr_html_(self) -> str:
         """Show the outcome, and every branch with its configuration and what keeps it from being taken."""

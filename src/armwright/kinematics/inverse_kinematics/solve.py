@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from armwright.arm.model import Arm
-from armwright.arm.positions import known_arm, one_posture, positions
+from armwright.arm.positions import known_arm, positions, single_configuration
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import ShapeError
 from armwright.kinematics.forward_kinematics import per_joint, stack
@@ -84,7 +84,7 @@ def inverse(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -> Inverse
         Paul (1981) ch. 3; Hawkins (2013) for three parallel axes; spec of this project, mechanics §3.2.
     """
     X = exact_pose(X_BT)
-    reference = mid_range(known_arm(arm)) if near is None else one_posture(arm, near, "near")
+    reference = mid_range(known_arm(arm)) if near is None else single_configuration(arm, near, "near")
     geometry = find_geometry(arm)
     return numeric_inverse(arm, X, reference) if geometry is None else _closed(arm, geometry, X, reference)
 

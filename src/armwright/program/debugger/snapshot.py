@@ -33,7 +33,7 @@ def seen(machine: Machine, ticks: int) -> Machine:
         if name not in moving and (last is None or view.now > last.t0 + last.duration):
             # It rests, and the frame table knows where.
             continue
-        X_BH = forward(arm.arm, machine.hardware.posture(name, view.now))
+        X_BH = forward(arm.arm, machine.hardware.configuration(name, view.now))
         view.state.tree = view.state.tree.place(name, view.state.tree.world(base_name(name)) @ X_BH)
     return view
 

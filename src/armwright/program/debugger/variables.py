@@ -229,7 +229,7 @@ class _Elements(Sequence[Shown]):
 
 def _arm(machine: Machine, name: str) -> Shown:
     arm = machine.cell.arms[name].arm
-    q = machine.hardware.posture(name, machine.now)
+    q = machine.hardware.configuration(name, machine.now)
     joints = [
         Shown(
             name=f"joint {number}",

@@ -59,7 +59,7 @@ def arms(session: Session) -> list[str]:
     """Return the arms as lines: the position of each joint [deg] or [mm], and what the hand is at and holds."""
     machine, lines = session.state.machine, []
     for name, place in machine.cell.arms.items():
-        q = machine.hardware.posture(name, machine.now)
+        q = machine.hardware.configuration(name, machine.now)
         shown = [
             f"{_degrees(value)} deg" if joint.revolute else f"{_number(value * 1e3, 2)} mm"
             for joint, value in zip(place.arm.joints, q.tolist(), strict=True)

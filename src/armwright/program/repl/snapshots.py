@@ -78,7 +78,7 @@ def new_warnings(before: Machine, after: Machine) -> tuple[Diagnostic, ...]:
         stages=stages,
         streams=(),
         trees=tuple(after.state.trees),
-        postures={},
+        configurations={},
     )
     return warnings(recording)
 

@@ -35,8 +35,8 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
 
 def _arms(before: Machine, after: Machine) -> list[str]:
     """Return the arms that stand otherwise after than before."""
-    places = ((name, before.hardware.posture(name, before.now)) for name in after.state.hands)
-    return [name for name, q in places if np.abs(q - after.hardware.posture(name, after.now)).max() > _ROUNDING]
+    places = ((name, before.hardware.configuration(name, before.now)) for name in after.state.hands)
+    return [name for name, q in places if np.abs(q - after.hardware.configuration(name, after.now)).max() > _ROUNDING]
 
 
 def _frames(before: Machine, after: Machine) -> list[str]:

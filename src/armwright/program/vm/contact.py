@@ -42,7 +42,7 @@ def stop(machine: Machine, process: Process, span: Span) -> int:
         if runs and local < runs[-1].duration - _ROUNDING:
             motion.rest += _stop_on_the_way(machine, motion, local)
         else:
-            _begin(machine, motion, hold(machine.hardware.posture(motion.arm, machine.now), period))
+            _begin(machine, motion, hold(machine.hardware.configuration(motion.arm, machine.now), period))
     end = max(motion.rest, machine.state.ticks)
     machine.set_hand(motion.arm, span, at=end)
     return end

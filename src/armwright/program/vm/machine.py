@@ -124,7 +124,7 @@ class Machine:
                 for name, place in cell.arms.items()
             ),
             trees=tuple(self.state.trees),
-            postures={name: self.hardware.posture(name, self.now) for name in cell.arms},
+            configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
         )
 
     # ---- names and values ------------------------------------------------------------------------------------------
@@ -244,7 +244,7 @@ class Machine:
 
     def set_hand(self, arm: str, span: Span, *, at: int | None = None) -> None:
         """Let the frame table know where an arm is now, or will be at a later tick."""
-        q = self.hardware.posture(arm, self.now if at is None else at * self.cell.period)
+        q = self.hardware.configuration(arm, self.now if at is None else at * self.cell.period)
         X_BH = forward(self.cell.arms[arm].arm, q)
         self.grow(self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH), arm, span)
 
@@ -256,7 +256,7 @@ class Machine:
         mover = next((one for one in self.state.processes if one.motion and one.motion.arm == arm), None)
         # A condition of a MOVE finds the arm of this MOVE where it is.
         if arm is not None and mover is not None and not (mover is process and process.now.kind == "condition"):
-            X_BH = forward(self.cell.arms[arm].arm, self.hardware.posture(arm, self.now))
+            X_BH = forward(self.cell.arms[arm].arm, self.hardware.configuration(arm, self.now))
             self.state.tree = self.state.tree.place(arm, self.state.tree.world(base_name(arm)) @ X_BH)
 
     def grow(self, tree: FrameTree, name: str, span: Span) -> None:

@@ -220,7 +220,7 @@ def _plan(
     ]
     manner = Manner(speed=asked.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
     try:
-        stages = plan(place.arm, machine.hardware.posture(arm, machine.now), goals, manner)
+        stages = plan(place.arm, machine.hardware.configuration(arm, machine.now), goals, manner)
     except StageError as error:
         _fail_move(machine, process, error.obstacle, asked=asked, stage=plans[error.stage], arm=arm)
     except IncapableArmError as error:

@@ -208,7 +208,7 @@ class Recording:
     stages: tuple[RunStage, ...]
     streams: tuple[Stream, ...]
     trees: tuple[tuple[float, FrameTree], ...]
-    postures: Mapping[str, Array]
+    configurations: Mapping[str, Array]
     failure: Failure | None = None
 
     @property
@@ -270,18 +270,18 @@ def stream(
     q = np.empty((ticks, arm.n))
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
     tau, known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
-    first, posture = 0, place.start
+    first, configuration = 0, place.start
     for run in runs:
         # A run that was stopped by an obstacle ends between two ticks.
         begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _ON_A_TICK)
-        q[first:begin] = posture
+        q[first:begin] = configuration
         local = np.arange(end - begin) * period
         q[begin:end], qd[begin:end], qdd[begin:end] = (run.trajectory(local, order) for order in range(3))
         if run.tau is not None:
             done = min(end - begin, len(run.tau))
             tau[begin : begin + done], known[begin : begin + done] = run.tau[:done], True
-        first, posture = end, run.trajectory(run.duration)
-    q[first:] = posture
+        first, configuration = end, run.trajectory(run.duration)
+    q[first:] = configuration
     t: Array = np.arange(ticks, dtype=np.float64) * period
     wrench = np.zeros((ticks, 6))
     for push in pushes:

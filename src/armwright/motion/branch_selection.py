@@ -14,14 +14,14 @@ from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configur
 from armwright.motion.obstruction import PathError, cause_of
 
 
-class Posture(NamedTuple):
+class LabelledConfiguration(NamedTuple):
     """Joint positions (n,) inside the limits, and the branch that they belong to."""
 
     label: str
     q: Array
 
 
-def postures_at(arm: Arm, X: Array, near: Array) -> list[list[Posture]]:
+def configurations_at(arm: Arm, X: Array, near: Array) -> list[list[LabelledConfiguration]]:
     """Return the postures inside the limits at every pose, whole turns included.
 
     Args:
@@ -32,19 +32,23 @@ def postures_at(arm: Arm, X: Array, near: Array) -> list[list[Posture]]:
     Raises:
         PathError: a pose has none; ``segment`` is the way that leads to it, from 0.
     """
-    layers: list[list[Posture]] = []
+    layers: list[list[LabelledConfiguration]] = []
     for i, each in enumerate(X):
         solution = inverse(arm, each, near)
         if not solution.allowed:
             raise PathError(cause_of(solution), max(i - 1, 0), min(i, 1.0), f"pose {i + 1}: {solution.explain()}")
         layers.append(
-            [Posture(branch.label, q) for branch in solution.allowed for q in equivalent_configurations(arm, branch.q)]
+            [
+                LabelledConfiguration(branch.label, q)
+                for branch in solution.allowed
+                for q in equivalent_configurations(arm, branch.q)
+            ]
         )
         near = layers[-1][0].q
     return layers
 
 
-def postures_through(arm: Arm, X: Array, near: Array) -> list[Posture]:
+def configurations_through(arm: Arm, X: Array, near: Array) -> list[LabelledConfiguration]:
     """Return a posture for every pose: of one branch where it is inside the limits throughout, else of any.
 
     Of all such ways the shortest is taken, measured by the sum of the times that the joints need for it.
@@ -57,8 +61,8 @@ def postures_through(arm: Arm, X: Array, near: Array) -> list[Posture]:
     Raises:
         PathError: a pose has no posture inside the limits.
     """
-    layers = postures_at(arm, X, near)
-    kept = set.intersection(*({posture.label for posture in layer} for layer in layers))
+    layers = configurations_at(arm, X, near)
+    kept = set.intersection(*({configuration.label for configuration in layer} for layer in layers))
     if kept:
         one = [[[p for p in layer if p.label == label] for layer in layers] for label in sorted(kept)]
         ways = [_shortest(arm, near, same) for same in one]
@@ -66,13 +70,15 @@ def postures_through(arm: Arm, X: Array, near: Array) -> list[Posture]:
     return _shortest(arm, near, layers)[1]
 
 
-def _shortest(arm: Arm, near: Array, layers: Sequence[Sequence[Posture]]) -> tuple[float, list[Posture]]:
+def _shortest(
+    arm: Arm, near: Array, layers: Sequence[Sequence[LabelledConfiguration]]
+) -> tuple[float, list[LabelledConfiguration]]:
     """Return the shortest way through one posture of every layer, and its length."""
     speed = arm.limit("speed")
     weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
     places, lengths, came = near[None], np.zeros(1), []
     for layer in layers:
-        here = np.array([posture.q for posture in layer])
+        here = np.array([configuration.q for configuration in layer])
         ways = lengths[:, None] + np.linalg.norm((here - places[:, None]) * weight, axis=-1)
         came.append(ways.argmin(axis=0))
         places, lengths = here, ways.min(axis=0)
