@@ -6,7 +6,7 @@ import numpy as np
 
 from armwright.arm.load import load_arm
 from armwright.simulation.integrators import Adaptive, Gill
-from armwright.simulation.time_stepping import simulate
+from armwright.simulation.simulator import simulate
 
 DURATION = 5.0
 

@@ -27,8 +27,7 @@ WATCHED = ["armwright.program", "armwright.cell", "armwright.files", "armwright.
 with atheris.instrument_imports(include=WATCHED):
     from armwright.cell.reader import read_cell
     from armwright.errors import ArmwrightError, FileFormatError
-    from armwright.program import Source
-    from armwright.program import compile as translate
+    from armwright.program import Source, compile as translate
     from armwright.program.bytecode.assembler import assemble, assembly
     from armwright.program.diagnostics.render import render
     from armwright.program.formatter.format import formatted

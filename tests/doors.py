@@ -11,7 +11,7 @@ from armwright.dynamics.bejczy import bejczy_efforts
 from armwright.dynamics.energy import kinetic_energy, potential_energy
 from armwright.dynamics.lagrange_euler import coriolis_matrix, coriolis_tensor
 from armwright.dynamics.shares import coriolis_efforts, gravity_efforts
-from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.differential import differential_inverse
 from armwright.kinematics.jacobians import jacobian_rate, tool_twist
 from armwright.kinematics.manipulability_index import manipulability

@@ -21,7 +21,7 @@ from armwright.errors import (
     UnknownNameError,
     UnsupportedArmError,
 )
-from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.differential import differential_inverse
 from armwright.kinematics.jacobians import jacobian_rate, tool_twist
 from armwright.kinematics.manipulability_index import manipulability

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import armwright
-from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.differential import differential_inverse
 from doors import OTHER, PUMA, Q
 

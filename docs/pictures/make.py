@@ -18,8 +18,7 @@ from armwright.clearance.linkage import Place
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare
-from armwright.clearance.simulation import Simulation as Rattling
-from armwright.clearance.simulation import simulate as simulate_play
+from armwright.clearance.simulation import Simulation as Rattling, simulate as simulate_play
 from armwright.kinematics import forward, inverse, link_poses
 from armwright.kinematics.inverse_kinematics.solution import Branch
 from armwright.motion.plan import Manner, StageGoal, plan

@@ -23,7 +23,7 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.simulation.controllers import gravity_compensation
-from armwright.simulation.time_stepping import simulate
+from armwright.simulation.simulator import simulate
 from urdf_texts import ARM_WITH_GRIPPER, LIMIT, MASS, joint, link, one, robot
 
 ROUNDING = 1e-12

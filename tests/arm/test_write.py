@@ -7,8 +7,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from armwright.arm.load import arm_names, load_arm
 from armwright.arm.model import Arm, Joint, Limits, Link, Motor

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 import pytest
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.stats import norm, t as student
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm

@@ -31,12 +31,10 @@ from armwright.motion.efforts import effort_peaks, lasting_efforts, slowing_for_
 from armwright.motion.quintic_polynomials import point_to_point
 from armwright.motion.solver import solver_of
 from armwright.motion.straight import straight_line
-from armwright.program import Source, known_cell
-from armwright.program import compile as compile_program
-from armwright.program.vm.interpreter import interpret
-from armwright.program.vm.interpreter import warnings as warnings_of
+from armwright.program import Source, compile as compile_program, known_cell
+from armwright.program.vm.interpreter import interpret, warnings as warnings_of
 from armwright.program.vm.recording import Recording
-from armwright.simulation.time_stepping import simulate
+from armwright.simulation.simulator import simulate
 from armwright.spatial.poses import homogeneous
 from oracles.with_pinocchio import pinocchio_model, with_load, with_rotors
 from samples import Sample

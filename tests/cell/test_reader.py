@@ -8,16 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from armwright.cell.frames import WORLD
 from armwright.cell.model import Cell, base_name
 from armwright.cell.reader import read_cell
 from armwright.errors import FileFormatError
 from armwright.kinematics.forward_kinematics import forward
-from armwright.program import Source, known_cell
-from armwright.program import compile as compile_program
+from armwright.program import Source, compile as compile_program, known_cell
 
 CORPUS = Path(__file__).parent / "corpus"
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -6,8 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 
 from armwright.clearance import ideal
 from armwright.clearance.five_bar import (

@@ -14,7 +14,7 @@ from armwright.cli.app import main
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.dynamics.payloads import payload
 from armwright.errors import FileFormatError
-from armwright.simulation.time_stepping import simulate
+from armwright.simulation.simulator import simulate
 from cli_calls import armwright
 
 Q = "10,20,30,40,50,60"

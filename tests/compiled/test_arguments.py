@@ -15,7 +15,7 @@ from armwright.compiled.arm import CompiledArm, compile_arm
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.errors import ArmwrightError, InvalidValueError, ShapeError, UnitWarning
 from armwright.kinematics.forward_kinematics import forward
-from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations
 from armwright.kinematics.jacobians import jacobian
 from samples import Sample
 

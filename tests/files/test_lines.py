@@ -5,8 +5,7 @@ import tomllib
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.files.lines import Keys, TwinKeyError, json_lines, toml_lines
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.errors import FileFormatError, IncompleteRowsWarning, InvalidValueError, UnknownNameError
 from armwright.files.column_map import column_map

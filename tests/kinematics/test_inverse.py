@@ -10,9 +10,9 @@ from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations
 from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Outcome
 from armwright.kinematics.inverse_kinematics.solve import inverse, inverse_branches
-from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
 from oracles.arms import random_configurations

@@ -11,9 +11,9 @@ from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE
 from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
+from armwright.kinematics.inverse_kinematics.revolutions import mid_range
 from armwright.kinematics.inverse_kinematics.solution import NoSolutionError, Outcome
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.kinematics.jacobians import jacobian
 from armwright.spatial.poses import homogeneous
 from oracles.arms import random_arm, random_configurations

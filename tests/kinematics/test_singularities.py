@@ -3,13 +3,12 @@
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Joint
 from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
-from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.inverse_kinematics.recognise import find_geometry
 from armwright.kinematics.jacobians import jacobian, tool_twist
 from armwright.kinematics.singularity_analysis import singularities, singularity_factors

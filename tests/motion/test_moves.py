@@ -5,8 +5,7 @@ from pathlib import Path
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm

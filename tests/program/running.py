@@ -8,8 +8,7 @@ from armwright.arrays import Array
 from armwright.cell.model import Cell
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.program import Source, known_cell
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate, known_cell
 from armwright.program.bytecode.instructions import Code
 from armwright.program.language.words import Standard
 from armwright.program.vm.interpreter import Limits, RunError, interpret

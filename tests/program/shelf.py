@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from armwright.errors import FileFormatError
-from armwright.program import Compilation, KnownCell, Source
-from armwright.program import compile as translate
+from armwright.program import Compilation, KnownCell, Source, compile as translate
 from armwright.program.language.words import Standard
 from armwright.program.semantics.cell_symbols import Imported, ReadImport
 

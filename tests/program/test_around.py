@@ -14,8 +14,7 @@ from armwright.cell.simulator import Simulator
 from armwright.kinematics.forward_kinematics import forward
 from armwright.motion import detour
 from armwright.motion.path import report_speed
-from armwright.program import compile as compile_program
-from armwright.program import known_cell
+from armwright.program import compile as compile_program, known_cell
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source
 from armwright.program.vm.interpreter import RunError, interpret, warnings

@@ -4,19 +4,16 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
-from armwright.program import Source, known_cell
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate, known_cell
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Code, listing
 from armwright.program.vm.interpreter import RunError, interpret
 from program.running import cell_of, code_of, corpus_text
-from program.shelf import ACCEPTED
-from program.shelf import cell_of as told_cell
+from program.shelf import ACCEPTED, cell_of as told_cell
 
 CELLS = {"p07": "jam", "p08": "cell2"}
 PROGRAMS = [f"p0{number}" for number in range(1, 9)]

@@ -6,8 +6,7 @@ import pytest
 
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.formatter.format import formatted
 from armwright.program.syntax import tree
 from armwright.program.vm.interpreter import interpret

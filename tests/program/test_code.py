@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from armwright.program import KnownCell, Source
-from armwright.program import compile as translate
+from armwright.program import KnownCell, Source, compile as translate
 from armwright.program.bytecode.instructions import Code, Constant, MotionKind, Op, listing
 from armwright.program.language.kinds import VariableKind, VariableType
 from program.shelf import BARE

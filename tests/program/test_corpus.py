@@ -2,8 +2,7 @@
 
 import pytest
 
-from armwright.program import Compilation, Source, known_cell
-from armwright.program import compile as translate
+from armwright.program import Compilation, Source, compile as translate, known_cell
 from armwright.program.bytecode.instructions import Op, listing
 from armwright.program.diagnostics.render import render
 from armwright.program.language.words import Standard

@@ -4,8 +4,7 @@ import re
 from pathlib import Path
 
 import armwright.program
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from program.shelf import ACCEPTED, BARE, REJECTED, compile_program, expectations
 
 SOURCES = Path(armwright.program.__file__).parent

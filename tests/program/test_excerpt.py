@@ -1,7 +1,6 @@
 """What a run did, in the first and the last of it."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.program.vm.excerpt import excerpt, listed, more, one_line
 

@@ -5,14 +5,12 @@ from collections.abc import Iterator
 import pytest
 
 from armwright.cell.simulator import Simulator
-from armwright.program import Compilation, KnownCell, Source, known_cell
-from armwright.program import compile as translate
+from armwright.program import Compilation, KnownCell, Source, compile as translate, known_cell
 from armwright.program.bytecode.codegen import generate as code_of
 from armwright.program.bytecode.instructions import Code
 from armwright.program.flow_analysis.context import Context
 from armwright.program.language.diagnostic import Diagnostic
-from armwright.program.vm.interpreter import Limits, Machine, RunError
-from armwright.program.vm.interpreter import run as run_on
+from armwright.program.vm.interpreter import Limits, Machine, RunError, run as run_on
 from program.running import cell_of
 from program.shelf import BARE, compile_program
 from program.wandering import Wandering

@@ -4,8 +4,7 @@ import gc
 import time
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.language.source import Source, Span

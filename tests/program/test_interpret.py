@@ -12,8 +12,7 @@ from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
-from armwright.program import compile as compile_program
-from armwright.program import known_cell
+from armwright.program import compile as compile_program, known_cell
 from armwright.program.language.source import Source
 from armwright.program.vm.interpreter import RunError, interpret, warnings
 from armwright.program.vm.recording import Recording

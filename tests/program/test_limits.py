@@ -3,8 +3,7 @@
 import attrs
 import pytest
 
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.formatter.format import formatted
 from armwright.program.syntax import tree
 from armwright.program.vm.interpreter import Limits

@@ -4,8 +4,7 @@ import pytest
 
 from armwright.errors import FileFormatError, InvalidValueError
 from armwright.files.limits import raised
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.diagnostics.render import render
 from armwright.program.language.diagnostic import MOST_OF_A_CODE, Findings, to_json
 from armwright.program.language.source import Span

@@ -8,8 +8,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.vm.interpreter import Limits
 from armwright.program.vm.recording import Recording
 from program.running import cell_of, corpus_text, down, expect, failure, printed, run
@@ -312,8 +311,7 @@ def test_time_limit() -> None:
 
 def test_hand_over_is_the_corpus_program() -> None:
     """The program of the corpus has no warning."""
-    from armwright.program import Source, known_cell
-    from armwright.program import compile as translate
+    from armwright.program import Source, compile as translate, known_cell
 
     compiled = translate(Source("p08.rlo", corpus_text("p08")), known_cell(cell_of("cell2")))
 

@@ -4,11 +4,9 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from armwright.program import Compilation, Source
-from armwright.program import compile as translate
+from armwright.program import Compilation, Source, compile as translate
 from armwright.program.diagnostics.render import render
 from armwright.program.language.diagnostic import Fix
 from program.shelf import ACCEPTED, BARE, CORPUS, REJECTED, compile_file

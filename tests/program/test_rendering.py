@@ -5,8 +5,7 @@ import time
 
 import pytest
 
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.diagnostics.render import MOST_SHOWN, render, render_rich
 from armwright.program.language.diagnostic import Diagnostic, Fix, Label, Severity, to_json
 from armwright.program.language.source import Span

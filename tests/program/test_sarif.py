@@ -2,8 +2,7 @@
 
 import json
 
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.diagnostics.sarif import to_sarif
 from program.shelf import BARE, CORPUS
 

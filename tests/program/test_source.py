@@ -1,11 +1,9 @@
 """Texts as editors leave them: line ends, marks at the start, numbers in front."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.language.source import Span
 from armwright.program.syntax.line_numbers import without_numbers
 

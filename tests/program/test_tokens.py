@@ -3,8 +3,7 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.program.language.source import Source, Span
 from armwright.program.language.words import VOCABULARIES, Standard

@@ -9,16 +9,14 @@ import pytest
 
 from armwright.cell.simulator import Simulator
 from armwright.errors import FileFormatError
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.bytecode.assembler import assemble, assembly
 from armwright.program.bytecode.instructions import Op
 from armwright.program.bytecode.verifier import CodeError
 from armwright.program.bytecode.verify import verify
 from armwright.program.vm.interpreter import Limits, RunError, interpret
 from program.running import cell_of, code_of, corpus_text
-from program.shelf import ACCEPTED
-from program.shelf import cell_of as told_cell
+from program.shelf import ACCEPTED, cell_of as told_cell
 from samples import Sample
 
 # Programs with each kind of statement in them.

@@ -6,8 +6,7 @@ import math
 import attrs
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.errors import ArmwrightError, InvalidValueError, ShapeError, UnknownNameError
 from armwright.report.markup import json_text

@@ -18,7 +18,7 @@ from armwright.simulation.controllers import (
     standing,
 )
 from armwright.simulation.integrators import Adaptive, Gill
-from armwright.simulation.time_stepping import simulate
+from armwright.simulation.simulator import simulate
 from oracles.arms import random_arm
 
 

@@ -14,7 +14,7 @@ from armwright.dynamics.shares import gravity_efforts
 from armwright.simulation.controllers import gravity_compensation, pd, standing
 from armwright.simulation.integrators import Adaptive, Gill
 from armwright.simulation.result import Brake, JointState, Status
-from armwright.simulation.time_stepping import simulate
+from armwright.simulation.simulator import simulate
 from oracles.arms import random_arm
 from oracles.with_pinocchio import pinocchio_model
 from simulation.machines import balanced, block, free, lawful, lift, pendulum

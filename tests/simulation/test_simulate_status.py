@@ -8,7 +8,7 @@ from armwright.errors import InvalidValueError, ShapeError, UnsupportedArmError
 from armwright.simulation.controllers import pd, standing
 from armwright.simulation.integrators import Adaptive, Gill
 from armwright.simulation.result import Brake, Status
-from armwright.simulation.time_stepping import simulate
+from armwright.simulation.simulator import simulate
 from simulation.machines import block, lawful, lift, pendulum, rough
 
 COARSE = Gill(length=1e-2)

@@ -1,7 +1,7 @@
 """What was measured of an arm: points, poses, planes that were touched, distances.
 
 A reading is a posture and one thing that was measured in it: where the tool was, or with it how it was turned; that
-it touched a plane; or how far it was from a fixed anchor, or from where it was in another posture. Points may be told
+it touched a plane; or how far it was from a fixed anchor, or from where it was in another configuration. Points may be told
 in several frames, such as those of a board that was set up three times; where these stand is found with the rest.
 """
 
@@ -42,9 +42,9 @@ class Readings:
         rotations: (m, 3, 3) how it was turned.
         frame: (m,) number of the frame in which that is told; the first is that of the measurements.
         plane: (m,) number of the plane that was touched.
-        distances: (m,) from an anchor, or from where the tool was in another posture [m].
+        distances: (m,) from an anchor, or from where the tool was in another configuration [m].
         anchor: (m,) number of the anchor.
-        other: (m, n) the other posture [rad] or [m].
+        other: (m, n) the other configuration [rad] or [m].
         frames: names of the frames.
         planes: names of the planes.
         anchors: names of the anchors.
@@ -107,9 +107,9 @@ def readings(
         points: (m, 3) where the tool was [m], or (m, 4, 4) how it stood.
         frame: (m,) names of the frames in which that is told; one frame for all when left out.
         plane: (m,) names of the planes that the tool touched.
-        distances: (m,) how far the tool was from an anchor or another posture [m].
+        distances: (m,) how far the tool was from an anchor or another configuration [m].
         anchor: (m,) names of the anchors.
-        other: (m, n) the other postures [rad] or [m].
+        other: (m, n) the other configurations [rad] or [m].
 
     Raises:
         ShapeError: they are not as many.
@@ -132,7 +132,7 @@ def readings(
     if points is None and plane is None and distances is None:
         raise InvalidValueError("expected points, poses, planes or distances, got none of them")
     if (distances is not None) != ((anchor is not None) or (other is not None)) or None not in (anchor, other):
-        raise InvalidValueError("distances: tell from which anchor they are, or from which other posture")
+        raise InvalidValueError("distances: tell from which anchor they are, or from which other configuration")
     in_frame, frames = _numbered([""] * m if frame is None and points is not None else frame, m, "frame")
     on_plane, planes = _numbered(plane, m, "plane")
     from_anchor, anchors = _numbered(anchor, m, "anchor")

@@ -24,8 +24,7 @@ from armwright.files.inputs import regular
 from armwright.files.limits import beyond, limit
 from armwright.kinematics.inverse_kinematics.solution import violations
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.spatial.poses import from_noap, homogeneous
-from armwright.spatial.poses import inverse as inverse_pose
+from armwright.spatial.poses import from_noap, homogeneous, inverse as inverse_pose
 from armwright.spatial.rotations import nearest_rotation, orthonormality_error
 
 # Two bases nearer than this are in one another [m].

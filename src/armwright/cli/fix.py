@@ -74,8 +74,7 @@ def fix(
 
 def _translator(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":
     """Return what finds out what is wrong with a program: in a cell, or in the one it IMPORTs."""
-    from armwright.program import compile as translate
-    from armwright.program import known_cell
+    from armwright.program import compile as translate, known_cell
     from armwright.program.api import import_reader
 
     def find(source: "Source") -> "Compilation":

@@ -49,8 +49,7 @@ def counting(title: str, *, quiet: bool = False) -> "Iterator[Callable[..., None
     Yields:
         told: takes how many are done, of how many, and more words; None where nobody watches.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
-    from rich.progress import Progress as Bar
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bar, TextColumn
 
     console = watched_console(quiet=quiet)
     if console is None:

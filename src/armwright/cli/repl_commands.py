@@ -185,8 +185,7 @@ class Commands:
     def _report(self, folder: Path) -> None:
         from armwright.cli.programs import imported_files
         from armwright.files.output import write_folder
-        from armwright.program import Source, run
-        from armwright.program import compile as compile_program
+        from armwright.program import Source, compile as compile_program, run
         from armwright.program.api import import_reader
         from armwright.program.vm.interpreter import warnings
         from armwright.report.files import Origin, result_files, run_record

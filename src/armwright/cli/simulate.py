@@ -60,7 +60,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.report.motion_table import motion_csv
     from armwright.simulation.controllers import gravity_compensation, no_effort
     from armwright.simulation.integrators import Adaptive, Gill
-    from armwright.simulation.time_stepping import simulate as run
+    from armwright.simulation.simulator import simulate as run
 
     model = load_arm(arm)
     if load is not None:

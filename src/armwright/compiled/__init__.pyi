@@ -1,6 +1,1 @@
-from .arm import (
-    CompiledArm as CompiledArm,
-)
-from .arm import (
-    compile_arm as compile_arm,
-)
+from .arm import CompiledArm as CompiledArm, compile_arm as compile_arm

@@ -1,117 +1,30 @@
 from .blends import (
     blend_timing as blend_timing,
-)
-from .blends import (
     blended as blended,
-)
-from .blends import (
     via_deviations as via_deviations,
-)
-from .blends import (
     via_distances as via_distances,
 )
-from .braking import (
-    brake as brake,
-)
-from .certificate import (
-    Certificate as Certificate,
-)
-from .certified import (
-    CertifiedMotion as CertifiedMotion,
-)
-from .continuity_report import (
-    Continuity as Continuity,
-)
-from .continuity_report import (
-    continuity as continuity,
-)
-from .cubic_polynomials import (
-    cubic as cubic,
-)
-from .cubic_polynomials import (
-    cubic_through as cubic_through,
-)
-from .detour import (
-    Detour as Detour,
-)
-from .detour import (
-    line_or_detour as line_or_detour,
-)
-from .efforts import (
-    effort_peaks as effort_peaks,
-)
-from .efforts import (
-    slowing_for_efforts as slowing_for_efforts,
-)
-from .limit_utilization import (
-    limit_use as limit_use,
-)
-from .limit_utilization import (
-    slowing_for_limits as slowing_for_limits,
-)
+from .braking import brake as brake
+from .certificate import Certificate as Certificate
+from .certified import CertifiedMotion as CertifiedMotion
+from .continuity_report import Continuity as Continuity, continuity as continuity
+from .cubic_polynomials import cubic as cubic, cubic_through as cubic_through
+from .detour import Detour as Detour, line_or_detour as line_or_detour
+from .efforts import effort_peaks as effort_peaks, slowing_for_efforts as slowing_for_efforts
+from .limit_utilization import limit_use as limit_use, slowing_for_limits as slowing_for_limits
 from .moves import (
     Move as Move,
-)
-from .moves import (
     cartesian_move as cartesian_move,
-)
-from .moves import (
     joint_move as joint_move,
-)
-from .moves import (
     stopping_move as stopping_move,
 )
-from .obstruction import (
-    PathError as PathError,
-)
-from .online import (
-    OnlineError as OnlineError,
-)
-from .online import (
-    replace_goal as replace_goal,
-)
-from .online import (
-    retarget as retarget,
-)
-from .quintic_polynomials import (
-    point_to_point as point_to_point,
-)
-from .quintic_polynomials import (
-    quintic as quintic,
-)
-from .straight import (
-    straight_line as straight_line,
-)
-from .through import (
-    through_frames as through_frames,
-)
-from .time_optimal_path import (
-    TimeOptimal as TimeOptimal,
-)
-from .time_optimal_path import (
-    time_optimal as time_optimal,
-)
-from .trajectory import (
-    Samples as Samples,
-)
-from .trajectory import (
-    Trajectory as Trajectory,
-)
-from .trajectory import (
-    hold as hold,
-)
-from .trajectory import (
-    join as join,
-)
-from .trapezoidal_profile import (
-    trapezoid as trapezoid,
-)
-from .xspline_online import (
-    xspline_kernel as xspline_kernel,
-)
-from .xspline_path import (
-    xspline as xspline,
-)
-from .xspline_path import (
-    xspline_along as xspline_along,
-)
+from .obstruction import PathError as PathError
+from .online import OnlineError as OnlineError, replace_goal as replace_goal, retarget as retarget
+from .quintic_polynomials import point_to_point as point_to_point, quintic as quintic
+from .straight import straight_line as straight_line
+from .through import through_frames as through_frames
+from .time_optimal_path import TimeOptimal as TimeOptimal, time_optimal as time_optimal
+from .trajectory import Samples as Samples, Trajectory as Trajectory, hold as hold, join as join
+from .trapezoidal_profile import trapezoid as trapezoid
+from .xspline_online import xspline_kernel as xspline_kernel
+from .xspline_path import xspline as xspline, xspline_along as xspline_along

@@ -9,8 +9,8 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations
 from armwright.motion.obstruction import PathError, cause_of
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from armwright.arm.model import Arm
 from armwright.arrays import Array, Flags
 from armwright.kinematics.inverse_kinematics.numeric import descend_from
-from armwright.kinematics.inverse_kinematics.wrapping import joint_distances, wrapped_near
+from armwright.kinematics.inverse_kinematics.revolutions import joint_distances, wrapped_near
 from armwright.motion.solver import Solver
 from armwright.motion.tolerance import Tolerance
 from armwright.spatial.poses import between

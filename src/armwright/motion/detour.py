@@ -13,11 +13,11 @@ from armwright.arm.model import Arm
 from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike, Flags
 from armwright.errors import IncapableArmError, one_of
-from armwright.kinematics.damping import damped_rates
+from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.forward_kinematics import forward
 from armwright.kinematics.inverse_kinematics.candidates import exact_pose
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, joint_distance
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, joint_distance
 from armwright.motion.certified import CertifiedMotion
 from armwright.motion.deviation import cubic_peaks, hand_bounds, tracking_error
 from armwright.motion.limit_utilization import slowing_for_limits

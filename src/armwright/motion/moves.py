@@ -13,8 +13,8 @@ from armwright.arm.positions import single_configuration
 from armwright.arrays import Array, ArrayLike, floats, of_shape
 from armwright.errors import InvalidValueError, RotationWarning, ShapeError, one_of
 from armwright.kinematics.inverse_kinematics.candidates import typed_poses
+from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, mid_range
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import joint_distance, mid_range
 from armwright.motion.blends import Ends, blend_timing, blended, via_distances
 from armwright.motion.branch_selection import configurations_at, configurations_through
 from armwright.motion.certificate import Certificate

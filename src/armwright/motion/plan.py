@@ -10,8 +10,8 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, joint_array, of_shape, read_only
 from armwright.errors import ArmwrightError, IncapableArmError
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, joint_distance
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, joint_distance
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified import joined
 from armwright.motion.detour import By, Detour, line_or_detour

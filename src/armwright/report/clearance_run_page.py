@@ -15,8 +15,7 @@ from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_of
 from armwright.clearance.linkage import GROUND, Guide, Linkage, Pin, Place
 from armwright.report.clearance_run_figures import round_number
-from armwright.report.elements import badge, facts, figures, pairs, table
-from armwright.report.elements import notes as shown_notes
+from armwright.report.elements import badge, facts, figures, notes as shown_notes, pairs, table
 from armwright.report.figures import Drawing
 from armwright.report.markup import asset, page_html
 from armwright.version import __version__

@@ -3,8 +3,7 @@
 from collections.abc import Iterable
 
 from armwright.files.result_table import ResultTable
-from armwright.report.elements import badge, card, facts, figures, table
-from armwright.report.elements import notes as shown_notes
+from armwright.report.elements import badge, card, facts, figures, notes as shown_notes, table
 from armwright.report.figures import Drawing
 from armwright.report.markup import page_html
 from armwright.version import __version__

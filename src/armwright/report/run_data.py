@@ -15,8 +15,7 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
 from armwright.program.vm.move_diagnostics import note_of
-from armwright.program.vm.recording import Effect as RunEffect
-from armwright.program.vm.recording import Recording, RunStage, Stream
+from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
 from armwright.report.page import (
     Animation,
     ArmRecord,

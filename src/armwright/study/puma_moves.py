@@ -15,8 +15,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.errors import UnknownNameError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.revolutions import mid_range
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import mid_range
 from armwright.motion.blends import blended, via_deviations
 from armwright.motion.chain import chain
 from armwright.motion.detour import By

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from armwright.program import Compilation, Source
-from armwright.program import compile as translate
+from armwright.program import Compilation, Source, compile as translate
 from armwright.program.diagnostics.fixes import Fixed, apart, fixed
 from armwright.program.language.diagnostic import Diagnostic, Fix
 from armwright.program.language.source import Span

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from armwright.program import Source
-from armwright.program import compile as translate
+from armwright.program import Source, compile as translate
 from armwright.program.formatter.format import UnformattableError, formatted
 from armwright.program.formatter.partial import formatted_around
 from program.shelf import ACCEPTED, CORPUS, REJECTED, compile_file

@@ -1,8 +1,7 @@
 """Places in texts, as editors and as programs count them."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span

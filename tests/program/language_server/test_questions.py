@@ -7,8 +7,7 @@ import attrs
 import pytest
 
 from armwright.errors import InvalidValueError
-from armwright.program import KnownCell, Source
-from armwright.program import compile as translate
+from armwright.program import KnownCell, Source, compile as translate
 from armwright.program.language.position_codec import PositionCodec
 from armwright.program.language.source import Span
 from armwright.program.language.text_edits import apply_edits

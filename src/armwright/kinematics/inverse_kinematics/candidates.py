@@ -11,8 +11,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import LARGEST, Array, ArrayLike, of_shape
 from armwright.errors import InvalidValueError, ShapeError
 from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, same_configuration
 from armwright.kinematics.inverse_kinematics.solution import Branch, InverseSolution, Outcome, violations
-from armwright.kinematics.inverse_kinematics.wrapping import joint_distance, same_configuration
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, nearest_rotation, orthonormality_error
 

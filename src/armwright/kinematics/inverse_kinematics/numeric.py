@@ -11,8 +11,8 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.kinematics.forward_kinematics import forward, link_frames, per_joint, stack, tool_frame
 from armwright.kinematics.inverse_kinematics.candidates import POSE_TOLERANCE, Candidate, pose_errors, rank
+from armwright.kinematics.inverse_kinematics.revolutions import joint_distance, midpoints, nearest_equivalent
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution
-from armwright.kinematics.inverse_kinematics.wrapping import joint_distance, midpoints, nearest_equivalent
 from armwright.kinematics.jacobians import frame_columns
 from armwright.spatial.rotations import rotation_vector
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from armwright.arm.model import Arm
 from armwright.arrays import Array
-from armwright.kinematics.inverse_kinematics.wrapping import nearest_equivalent
+from armwright.kinematics.inverse_kinematics.revolutions import nearest_equivalent
 
 # Positions of a free joint that are tried for one inside the limits; then, where none is, the neighbourhoods of those
 # that pass the limits least are looked at, each time four times closer: down to 1e-9 of the step.

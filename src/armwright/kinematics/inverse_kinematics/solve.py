@@ -17,9 +17,9 @@ from armwright.kinematics.inverse_kinematics.geometry import ClosedFormGeometry,
 from armwright.kinematics.inverse_kinematics.numeric import numeric_inverse
 from armwright.kinematics.inverse_kinematics.reach import nearest_wrist_centre
 from armwright.kinematics.inverse_kinematics.recognise import closed_form_geometry, find_geometry
+from armwright.kinematics.inverse_kinematics.revolutions import mid_range, nearest_equivalent
 from armwright.kinematics.inverse_kinematics.self_motion import counter_rotate_within_limits, search_within_limits
 from armwright.kinematics.inverse_kinematics.solution import InverseSolution, violations
-from armwright.kinematics.inverse_kinematics.wrapping import mid_range, nearest_equivalent
 from armwright.tracing.scalar import select
 
 # Joint positions closer than this are the same configuration.

@@ -7,8 +7,7 @@ import attrs
 
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
-from armwright.program.api import Compilation
-from armwright.program.api import compile as translate
+from armwright.program.api import Compilation, compile as translate
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.language_server.analysis import Analysis

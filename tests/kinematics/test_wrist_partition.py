@@ -11,7 +11,7 @@ from armwright.errors import UnsupportedArmError
 from armwright.kinematics.differential import SingularConfigurationError
 from armwright.kinematics.forward_kinematics import link_poses
 from armwright.kinematics.jacobians import jacobian
-from armwright.kinematics.wrist_partitioned import wrist_partitioned_inverse, wrist_partitioned_jacobian
+from armwright.kinematics.wrist_partition import wrist_partitioned_inverse, wrist_partitioned_jacobian
 from oracles.arms import random_pose
 
 ROUNDING = 1e-12

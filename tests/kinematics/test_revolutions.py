@@ -7,8 +7,8 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm, Limits
 from armwright.kinematics.forward_kinematics import forward
+from armwright.kinematics.inverse_kinematics.revolutions import equivalent_configurations, nearest_equivalent
 from armwright.kinematics.inverse_kinematics.solve import inverse
-from armwright.kinematics.inverse_kinematics.wrapping import equivalent_configurations, nearest_equivalent
 
 Q = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 

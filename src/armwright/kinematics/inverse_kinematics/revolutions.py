@@ -1,4 +1,4 @@
-"""Wrapped angles: which of those equivalent by whole turns to take, and how far apart two configurations are."""
+"""Joint positions that are equal but for whole revolutions, and the distance between joint configurations."""
 
 from __future__ import annotations
 
