@@ -1,8 +1,8 @@
 """What was measured of an arm: points, poses, planes that were touched, distances.
 
-A reading is a posture and one thing that was measured in it: where the tool was, or with it how it was turned; that
-it touched a plane; or how far it was from a fixed anchor, or from where it was in another configuration. Points may be told
-in several frames, such as those of a board that was set up three times; where these stand is found with the rest.
+A reading is a joint configuration and what was measured in it: the position of the tool, or its pose; contact with a
+plane; or the distance from a fixed anchor, or from the position of the tool in another configuration. Points may refer
+to several frames, such as those of a board that was set up three times; the poses of these frames are estimated too.
 """
 
 from __future__ import annotations
