@@ -83,7 +83,7 @@ def designs() -> None:
         begin = time.perf_counter()
         # One path after the other: the torques of one are as large as a hundred runs.
         for path in paths:
-            _swept(FeatureSweep(linkage=linkage, paths=(path,), twins=0), points)
+            _swept(FeatureSweep(linkage=linkage, paths=(path,), replicates=0), points)
         seconds = time.perf_counter() - begin
         runs = len(points) * len(paths)
         rows.append([title, f"{runs:,}", f"{seconds:.1f}", f"{runs / seconds:.0f}", f"{_peak() - before:.0f}"])

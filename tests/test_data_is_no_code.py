@@ -10,7 +10,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.clearance.kernel import Layout, emit_simulation
-from armwright.clearance.linkage import Linkage, Place
+from armwright.clearance.linkage import Linkage, BodyPoint
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings
 from armwright.compiled.arm import compile_arm
@@ -53,7 +53,7 @@ def renamed(linkage: Linkage, name: str) -> Linkage:
     """The same linkage with that name, and with every part called after it too."""
     new = {body.name: f"{body.name}{name}" for body in linkage.bodies}
 
-    def moved(place: Place) -> Place:
+    def moved(place: BodyPoint) -> BodyPoint:
         return place._replace(body=new.get(place.body, place.body))
 
     return attrs.evolve(
@@ -66,7 +66,7 @@ def renamed(linkage: Linkage, name: str) -> Linkage:
             for pin in linkage.pins
         ],
         drives=[attrs.evolve(drive, body=new[drive.body]) for drive in linkage.drives],
-        loads=[attrs.evolve(load, at=moved(load.at)) for load in linkage.loads],
+        loads=[attrs.evolve(load, point=moved(load.point)) for load in linkage.loads],
         tip=moved(linkage.tip),
         assembly={new[body]: place for body, place in linkage.assembly.items()},
     )

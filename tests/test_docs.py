@@ -12,7 +12,7 @@ import pytest
 import armwright
 from armwright.arm.load import read_arm, read_load
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measurement_file import RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import RestMeasurement, read_measured
 from armwright.clearance.ideal import closed, tip_of
 from armwright.clearance.reader import read_linkage
 from armwright.clearance.scenario import assembly_guess
@@ -148,7 +148,7 @@ def test_measurements_of_the_page(name: str, tmp_path: Path) -> None:
     if name == "pose":
         (tmp_path / "today.csv").write_text("\n".join([head, *rows[1:]]), encoding="utf-8")
         found = read_measured(tmp_path / "today.csv")
-        assert isinstance(found, RestMeasured)
+        assert isinstance(found, RestMeasurement)
         assert found.readings == (2, 1)
         mixed = "\n".join([head.replace(",x_mm,y_mm", ",x_m,y_m"), *rows[1:]])
         assert f"    armwright: {said(tmp_path / 'today.csv', mixed, read_measured)}\n" in PLAY

@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.calibration.assessment import assess_calibration
 from armwright.calibration.measurements import read_measurements
 from armwright.clearance.ideal import point_of, tip_of
-from armwright.clearance.linkage import Place
+from armwright.clearance.linkage import BodyPoint
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import prepare
@@ -349,8 +349,8 @@ def past_frames() -> Figure:
 def draw_linkage(axes: Axes, run: Rattling) -> None:
     """Draw the five-bar at the start, its path, and the path taken with the error magnified."""
     linkage, q = run.scenario.linkage, run.scenario.ideal.q
-    corners = [Place("ground", "J1"), Place("link1", "J2"), Place("link2", "J3")]
-    others = [Place("ground", "J5"), Place("link4", "J4"), Place("link3", "J3")]
+    corners = [BodyPoint("ground", "J1"), BodyPoint("link1", "J2"), BodyPoint("link2", "J3")]
+    others = [BodyPoint("ground", "J5"), BodyPoint("link4", "J4"), BodyPoint("link3", "J3")]
     for way in (corners, others):
         ends = np.array([point_of(linkage, place, q[0]) for place in way]) * 1e3
         axes.plot(*ends.T, color="#c3cad2", linewidth=7, solid_capstyle="round", zorder=1)

@@ -41,7 +41,7 @@ def five_bar() -> Linkage:
 @pytest.fixture(scope="session")
 def swept(five_bar: Linkage) -> Swept:
     pytest.importorskip("sklearn")
-    task = FeatureSweep(linkage=five_bar, paths=PATHS, settings_of=CENTRE, twins=0)
+    task = FeatureSweep(linkage=five_bar, paths=PATHS, simulation_settings=CENTRE, replicates=0)
     design = sobol(dict.fromkeys(task.parameters, RANGE), RUNS, 0)
     values = task(design.points)
     names = [f"{path}_{feature}" for path in PATHS for feature in FEATURES]

@@ -117,8 +117,8 @@ def _body(mbs: Any, body: Any, linkage: Linkage, q: np.ndarray) -> int:
             )
         )
     for load in linkage.loads:
-        if load.at.body == body.name:
-            places.append(_local(linkage, load.at)[:2])
+        if load.point.body == body.name:
+            places.append(_local(linkage, load.point)[:2])
             weights.append(np.array((*load.force, 0.0)))
     for place, weight in zip(places, weights, strict=True):
         marker = mbs.AddMarker(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from armwright.arrays import Array
 from armwright.clearance.equations import Contact, ContactMemory, FrictionModel, State, rates
-from armwright.clearance.linkage import Body, Drive, Guide, Linkage, Material, Pin, Place, Play
+from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Guide, Linkage, Material, Pin
 from armwright.clearance.paths import Path
 from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings, contact_stiffness
@@ -34,20 +34,20 @@ def block(
         ground=ORIGIN,
         bodies=[Body(name="cross", mass=1.0, points={"P": (0, 0)}), Body(name="block", mass=1.0, points={"P": (0, 0)})],
         joints=[
-            Guide(body="cross", point="P", on=Place("ground", "O")),
-            Guide(body="block", point="P", on=Place("cross", "P"), direction=np.pi / 2),
+            Guide(body="cross", point="P", on=BodyPoint("ground", "O")),
+            Guide(body="block", point="P", on=BodyPoint("cross", "P"), direction=np.pi / 2),
         ],
         pins=[
-            Play(
+            ClearancePin(
                 name="hole",
-                bearing=Place("ground", "O"),
-                journal=Place("block", "P"),
+                bearing=BodyPoint("ground", "O"),
+                journal=BodyPoint("block", "P"),
                 clearance=clearance,
                 journal_radius=0.01,
             )
         ],
         drives=[],
-        tip=Place("block", "P"),
+        tip=BodyPoint("block", "P"),
         gravity=(0.0, -gravity),
         material=Material(restitution=restitution, friction=friction),
     )
@@ -61,10 +61,10 @@ def pendulum() -> Linkage:
         name="pendulum",
         ground=ORIGIN,
         bodies=[bar],
-        joints=[Pin(body="bar", point="O", on=Place("ground", "O"))],
+        joints=[Pin(body="bar", point="O", on=BodyPoint("ground", "O"))],
         pins=[],
         drives=[Drive(body="bar")],
-        tip=Place("bar", "P"),
+        tip=BodyPoint("bar", "P"),
     )
 
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from armwright.clearance.linkage import Body, Drive, Linkage, Load, Pin, Place, Play
+from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Linkage, Load, Pin
 
 A, B, C = (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)
 D, DA, E, EA, RR, RA = 0.028, 0.0115, 0.02, 0.01421, 0.007, 0.00092
@@ -100,20 +100,22 @@ def squeezer(gamma: float) -> Linkage:
             Body(name=name, mass=MASSES[i], inertia=INERTIAS[i], centre=centre, points=points)
             for i, (name, centre, points) in zip(numbers, bodies, strict=True)
         ],
-        joints=[Pin(body=name, point=place.split(":")[1], on=Place(*place.split(":"))) for name, place in hung.items()],
+        joints=[
+            Pin(body=name, point=place.split(":")[1], on=BodyPoint(*place.split(":"))) for name, place in hung.items()
+        ],
         pins=[
-            Play(
+            ClearancePin(
                 name=name,
-                bearing=Place(name, "E"),
-                journal=Place("K2", "E"),
+                bearing=BodyPoint(name, "E"),
+                journal=BodyPoint("K2", "E"),
                 clearance=1e-5,
                 journal_radius=1e-3,
             )
             for name in ("K3", "K4", "K6")
         ],
         drives=[Drive(body="K1")],
-        loads=[Load(at=Place("K3", "D"), force=-SPRING * (length - UNSTRETCHED) / length * pull)],
-        tip=Place("K2", "E"),
+        loads=[Load(point=BodyPoint("K3", "D"), force=-SPRING * (length - UNSTRETCHED) / length * pull)],
+        tip=BodyPoint("K2", "E"),
         gravity=(0.0, 0.0),
     )
 

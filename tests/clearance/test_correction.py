@@ -13,9 +13,9 @@ from armwright.clearance.correction import (
     correct_path,
     leaning_error,
     lost_contacts,
-    misses,
     shifted,
     tip_at,
+    tip_errors,
 )
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import Path, PickAndPlace, named_path, straight
@@ -54,7 +54,7 @@ def y1(clearance: float = 0.5e-3, friction: float = 0.05) -> Simulation:
 def missed(path: Path, clearances: Array, settings: Settings = CENTRE) -> Array:
     """How far the tip is from the three targets [m]."""
     run = simulate(prepare(linkage(), path, settings), clearances)
-    return np.asarray(np.linalg.norm(misses(run, PickAndPlace().nodes), axis=-1))
+    return np.asarray(np.linalg.norm(tip_errors(run, PickAndPlace().nodes), axis=-1))
 
 
 def test_known_clearances() -> None:
@@ -67,7 +67,7 @@ def test_known_clearances() -> None:
     # Each round makes it a hundred times smaller: a fixed point, not a search.
     assert np.all(np.diff(np.log10(found.history)) < -2)
     assert told == list(found.history)
-    np.testing.assert_array_equal(found.path.at(found.path.targets).at, found.nodes)
+    np.testing.assert_array_equal(found.path.evaluate(found.path.targets).position, found.nodes)
 
 
 def test_estimated_clearances() -> None:
@@ -106,7 +106,7 @@ def test_whole_path() -> None:
     # Up to where the acceleration turns round and throws the journals across, all of it.
     told = simulate(prepare(linkage(), found.path, CENTRE), ARM_A)
     before = told.time < 0.195
-    wanted = named_path("y1").at(told.time).at
+    wanted = named_path("y1").evaluate(told.time).position
     off = np.linalg.norm(told.tip - wanted, axis=-1)[before]
     assert np.sqrt(np.mean(off**2)) < 0.02e-3
     assert found.path.duration == named_path("y1").duration
@@ -126,8 +126,10 @@ class TestShifted:
         """At its knots the path is moved by just the shift, and it begins and ends at rest."""
         path, shifts = self.moved(rng)
 
-        np.testing.assert_allclose(path.at(self.TIMES).at, named_path("y1").at(self.TIMES).at + shifts, atol=1e-15)
-        np.testing.assert_allclose(path.at([0.0, 0.25]).velocity, 0.0, atol=1e-14)
+        np.testing.assert_allclose(
+            path.evaluate(self.TIMES).position, named_path("y1").evaluate(self.TIMES).position + shifts, atol=1e-15
+        )
+        np.testing.assert_allclose(path.evaluate([0.0, 0.25]).velocity, 0.0, atol=1e-14)
 
     def test_smooth(self, rng: np.random.Generator) -> None:
         """Place and speed go on over every knot, those of the path and those of the shift."""
@@ -135,11 +137,11 @@ class TestShifted:
         knots = path.knots[1:-1]
         pieces = np.arange(len(knots))
 
-        came, goes = path.at(knots, pieces), path.at(knots, pieces + 1)
+        came, goes = path.evaluate(knots, pieces), path.evaluate(knots, pieces + 1)
 
         # Nine of the shift, four of the path, and two of these are the same.
         assert len(path.knots) == 11
-        np.testing.assert_allclose(goes.at, came.at, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(goes.position, came.position, rtol=0, atol=1e-14)
         np.testing.assert_allclose(goes.velocity, came.velocity, rtol=0, atol=1e-11)
 
     def test_no_shift(self) -> None:
@@ -147,7 +149,7 @@ class TestShifted:
         path, same = named_path("y1"), shifted(named_path("y1"), self.TIMES, np.zeros((9, 2)))
         times = np.linspace(0.001, 0.249, 117)
 
-        for wanted, found in zip(path.at(times), same.at(times), strict=True):
+        for wanted, found in zip(path.evaluate(times), same.evaluate(times), strict=True):
             np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11)
 
     def test_even_shift(self) -> None:
@@ -155,7 +157,9 @@ class TestShifted:
         moved = shifted(PickAndPlace().path(), np.array((0.0, 0.5)), np.full((2, 2), 1e-3))
         times = np.linspace(0.0, 0.5, 60)
 
-        np.testing.assert_allclose(moved.at(times).at, PickAndPlace().path().at(times).at + 1e-3, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(
+            moved.evaluate(times).position, PickAndPlace().path().evaluate(times).position + 1e-3, rtol=0, atol=1e-14
+        )
 
 
 def test_contacts_that_are_lost() -> None:
@@ -234,7 +238,7 @@ def test_between_samples() -> None:
 def test_bad_input() -> None:
     """Goals that do not fit, too few knots, and clearances in a wrong shape are told."""
     with pytest.raises(InvalidValueError, match="expected one target for each of 3 goals, got 1"):
-        misses(y1(), PickAndPlace().nodes)
+        tip_errors(y1(), PickAndPlace().nodes)
     with pytest.raises(InvalidValueError, match="knots: expected 2 to 1000, got 1"):
         correct_path(linkage(), named_path("y1"), ARM_A, CENTRE, knots=1)
     with pytest.raises(InvalidValueError, match=r"knots: expected 2 to 1000, got 10{30}"):
@@ -257,7 +261,7 @@ def test_diverging() -> None:
     """A linkage whose simulation diverges has no path that puts it right."""
     run = simulate(prepare(linkage(), named_path("y1"), CENTRE), ARM_A, frictions=1e4)
     with pytest.raises(InvalidValueError, match="the simulation diverged; the path cannot be corrected"):
-        misses(run, named_path("y1").at([0.25]).at)
+        tip_errors(run, named_path("y1").evaluate([0.25]).position)
 
 
 def test_best_round_is_kept() -> None:
@@ -267,8 +271,8 @@ def test_best_round_is_kept() -> None:
     assert found.best == int(np.argmin(found.history))
     assert found.after.mean() == min(found.history)
     run = simulate(prepare(linkage(), found.path), perturbed(np.array((0.3e-3, 0.2e-3, 0.25e-3))))
-    goals = named_path("y2").at(np.array(found.path.targets)).at
-    assert np.linalg.norm(misses(run, goals), axis=-1).mean() == min(found.history)
+    goals = named_path("y2").evaluate(np.array(found.path.targets)).position
+    assert np.linalg.norm(tip_errors(run, goals), axis=-1).mean() == min(found.history)
 
 
 def test_mean_over_runs_that_nobody_can_tell_apart() -> None:
@@ -282,7 +286,7 @@ def test_mean_over_runs_that_nobody_can_tell_apart() -> None:
     assert found.before.shape == found.after.shape == (16, 12)
     others = ARM_A + np.random.default_rng(3).uniform(-1e-9, 1e-9, (64, 3))
     run = simulate(prepare(linkage(), found.path, CENTRE), others)
-    away = np.linalg.norm(misses(run, path.at(np.array(found.path.targets)).at), axis=-1)
+    away = np.linalg.norm(tip_errors(run, path.evaluate(np.array(found.path.targets)).position), axis=-1)
     late = slice(6, None)
     assert found.after.std(axis=0, ddof=1)[late].max() > 1e-6
     expected = np.sqrt(np.mean(found.after.var(axis=0, ddof=1)[late] * (1 / 16 + 1 / 64)))
@@ -295,7 +299,7 @@ def test_no_round_that_makes_it_worse(monkeypatch: pytest.MonkeyPatch) -> None:
     """A path that every round makes worse is left as it is."""
     errors = iter((1e-4, 3e-4, 2e-4, 5e-4))
     monkeypatch.setattr(
-        "armwright.clearance.correction.misses", lambda _run, goals: np.full((16, *goals.shape), next(errors))
+        "armwright.clearance.correction.tip_errors", lambda _run, goals: np.full((16, *goals.shape), next(errors))
     )
 
     found = correct_nodes(linkage(), PickAndPlace(), ARM_A, COARSE, rounds=3)

@@ -19,7 +19,7 @@ from armwright.clearance.equations import (
     mass_matrix,
     rates,
 )
-from armwright.clearance.linkage import Body, Drive, Linkage, Place, Play
+from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Linkage
 from armwright.clearance.placement import Placement
 from clearance.trees import to_pinocchio, tree
 
@@ -42,8 +42,8 @@ def pressed(linkage: Linkage, rng: np.random.Generator, depth: float = DEPTH) ->
     pin, way = linkage.pins[0], rng.uniform(-np.pi, np.pi)
     placed = Placement(linkage, list(q), list(qd))
     hole, shaft = placed.point(pin.bearing), placed.point(pin.journal)
-    wanted = hole.at.plus(type(hole.at)(math.cos(way), math.sin(way)).times(pin.clearance + depth))
-    q[-3:-1] += np.array(wanted.minus(shaft.at))
+    wanted = hole.position.plus(type(hole.position)(math.cos(way), math.sin(way)).times(pin.clearance + depth))
+    q[-3:-1] += np.array(wanted.minus(shaft.position))
     # The wall is not left in haste: their speeds differ by some centimetres a second.
     qd[-3:-1] += np.array(hole.velocity.minus(shaft.velocity)) + rng.uniform(-0.03, 0.03, 2)
     return q, qd
@@ -176,7 +176,7 @@ class TestWhatMotionKeeps:
         now = found(linkage, q, qd)
         qdd = np.array(now.qdd).reshape(2, 3)
         pin = linkage.pins[0]
-        hole = Placement(linkage, list(q), list(qd)).point(pin.bearing).at
+        hole = Placement(linkage, list(q), list(qd)).point(pin.bearing).position
         gap = np.array(now.pins[0].gap)
         touch = np.array(hole) + gap / np.linalg.norm(gap) * (pin.clearance + pin.journal_radius)
         for body, (x, y, turn), at in zip(linkage.bodies, qdd, q.reshape(2, 3), strict=True):
@@ -192,7 +192,9 @@ def pair(rng: np.random.Generator) -> Linkage:
     def body(name: str) -> Body:
         return Body(name=name, mass=rng.uniform(0.5, 2), inertia=rng.uniform(0.01, 0.05), points={"p": (0.2, 0.1)})
 
-    eye = Play(name="eye", bearing=Place("one", "p"), journal=Place("other", "p"), clearance=1e-3, journal_radius=0.02)
+    eye = ClearancePin(
+        name="eye", bearing=BodyPoint("one", "p"), journal=BodyPoint("other", "p"), clearance=1e-3, journal_radius=0.02
+    )
     return Linkage(
         name="pair",
         ground=Body(name="ground"),
@@ -200,7 +202,7 @@ def pair(rng: np.random.Generator) -> Linkage:
         joints=[],
         pins=[eye],
         drives=[],
-        tip=Place("one", "p"),
+        tip=BodyPoint("one", "p"),
         gravity=(0.0, 0.0),
     )
 

@@ -29,7 +29,7 @@ from armwright.clearance.five_bar_workspace import (
     transmission,
     workspace,
 )
-from armwright.clearance.linkage import Body, Drive, Guide, Linkage, Pin, Place, Play
+from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Guide, Linkage, Pin
 from armwright.clearance.paths import thesis_path
 from armwright.clearance.placement import Vec2
 from armwright.clearance.reader import load_linkage
@@ -231,9 +231,9 @@ def test_along_a_test_path(linkage: Linkage, bar: FiveBar) -> None:
     """All along path x3 the closed form is the motion that the simulation was prepared with."""
     task = prepare(linkage, thesis_path("x3"))
     t = np.arange(task.steps + 1) * task.h
-    at = task.path.at(t)
+    at = task.path.evaluate(t)
 
-    angles = inverse(bar, at.at)
+    angles = inverse(bar, at.position)
 
     np.testing.assert_allclose(angles, task.ideal.q[:, [0, 3, 6, 7]], atol=ROUNDING)
     np.testing.assert_allclose(speeds(bar, angles, at.velocity), task.ideal.qd[:, [0, 3, 6, 7]], atol=1e-10)
@@ -243,11 +243,11 @@ def test_along_a_test_path(linkage: Linkage, bar: FiveBar) -> None:
 def test_configuration_chooses_the_mode(linkage: Linkage, bar: FiveBar, mode: Any) -> None:
     """A path can be prepared in any mode: the guess chooses it, and the path keeps it."""
     path = thesis_path("y4")
-    guess = configuration(linkage, inverse(bar, path.at(0.0).at, mode))
+    guess = configuration(linkage, inverse(bar, path.evaluate(0.0).position, mode))
 
     task = prepare(linkage, path, guess=guess)
 
-    angles = inverse(bar, path.at(path.duration).at, mode)
+    angles = inverse(bar, path.evaluate(path.duration).position, mode)
     np.testing.assert_allclose(np.sin(task.ideal.q[-1] - configuration(linkage, angles))[[0, 3, 6, 7]], 0, atol=1e-9)
 
 
@@ -468,12 +468,12 @@ def test_others_are_none() -> None:
 def test_tip_drives_and_pins(linkage: Linkage) -> None:
     """Another tip, motors elsewhere, or a pin more or less make a linkage no five-bar."""
     with pytest.raises(InvalidValueError, match="its tip is link2:J2, not link2:J3"):
-        FiveBar.of(changed(linkage, tip=Place("link2", "J2")))
+        FiveBar.of(changed(linkage, tip=BodyPoint("link2", "J2")))
     with pytest.raises(InvalidValueError, match="its drives turn link1, not link1 and link4"):
         FiveBar.of(changed(linkage, drives=[Drive(body="link1")]))
     with pytest.raises(InvalidValueError, match="it has 4 pins, not 5"):
         FiveBar.of(changed(linkage, pins=linkage.pins[:2]))
-    twice = attrs.evolve(linkage.pins[2], bearing=Place("link2", "J2"), journal=Place("link3", "J4"))
+    twice = attrs.evolve(linkage.pins[2], bearing=BodyPoint("link2", "J2"), journal=BodyPoint("link3", "J4"))
     with pytest.raises(InvalidValueError, match="body link2 has 3 pins, not 2"):
         FiveBar.of(changed(linkage, pins=[*linkage.pins[:2], twice]))
 
@@ -491,18 +491,18 @@ def test_any_naming_and_axes(bar: FiveBar) -> None:
         bodies=bodies,
         ground=Body(name="ground", points={"a": [0.1, 0.0], "b": [-0.1, 0.0]}),
         joints=[
-            Pin(body="right arm", point="m", on=Place("ground", "a")),
-            Pin(body="left arm", point="m", on=Place("ground", "b")),
-            Pin(body="left rod", point="e", on=Place("left arm", "e")),
+            Pin(body="right arm", point="m", on=BodyPoint("ground", "a")),
+            Pin(body="left arm", point="m", on=BodyPoint("ground", "b")),
+            Pin(body="left rod", point="e", on=BodyPoint("left arm", "e")),
         ],
         pins=[
-            Play(name="T", bearing=Place("right rod", "t"), journal=Place("left rod", "t"), clearance=1e-4,
+            ClearancePin(name="T", bearing=BodyPoint("right rod", "t"), journal=BodyPoint("left rod", "t"), clearance=1e-4,
                  journal_radius=0.01),
-            Play(name="E", bearing=Place("right arm", "e"), journal=Place("right rod", "e"), clearance=1e-4,
+            ClearancePin(name="E", bearing=BodyPoint("right arm", "e"), journal=BodyPoint("right rod", "e"), clearance=1e-4,
                  journal_radius=0.01),
         ],
         drives=[Drive(body="right arm"), Drive(body="left arm")],
-        tip=Place("left rod", "t"),
+        tip=BodyPoint("left rod", "t"),
     )  # fmt: skip
 
     found = FiveBar.of(other)
@@ -517,6 +517,6 @@ def test_any_naming_and_axes(bar: FiveBar) -> None:
 
 def test_guide_in_the_loop(linkage: Linkage) -> None:
     """Four bodies of which one slides are no five-bar either."""
-    slide = Guide(body="link4", point="J5", on=Place("ground", "J5"))
+    slide = Guide(body="link4", point="J5", on=BodyPoint("ground", "J5"))
     with pytest.raises(InvalidValueError, match="body link4 slides along a guide"):
         FiveBar.of(changed(linkage, joints=[linkage.joints[0], slide]))

@@ -19,8 +19,8 @@ from armwright.clearance.ideal import (
     sensitivity,
     tip_of,
 )
-from armwright.clearance.linkage import Body, Drive, Linkage, Pin, Place, Play
-from armwright.clearance.paths import Path, hermite, thesis_path, turning
+from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Linkage, Pin
+from armwright.clearance.paths import Path, constant_speed_path, hermite, thesis_path
 from armwright.clearance.placement import Placement
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import assembly_guess, prepare
@@ -100,11 +100,11 @@ def bars() -> Linkage:
     def bar(name: str) -> Body:
         return Body(name=name, mass=1.0, inertia=1 / 12, centre=(0.5, 0), points={"a": (0, 0), "b": (1, 0)})
 
-    def eye(name: str, bearing: str, journal: str) -> Play:
-        return Play(
+    def eye(name: str, bearing: str, journal: str) -> ClearancePin:
+        return ClearancePin(
             name=name,
-            bearing=Place(bearing, "b"),
-            journal=Place(journal, "b"),
+            bearing=BodyPoint(bearing, "b"),
+            journal=BodyPoint(journal, "b"),
             clearance=1e-4,
             journal_radius=0.01,
         )
@@ -115,15 +115,15 @@ def bars() -> Linkage:
         bodies=[bar(name) for name in ("first", "second", "third", "left", "right")],
         joints=[
             *(
-                Pin(body=name, point="a", on=Place("ground", str(i)))
+                Pin(body=name, point="a", on=BodyPoint("ground", str(i)))
                 for i, name in enumerate(("first", "second", "third"))
             ),
-            Pin(body="left", point="a", on=Place("first", "b")),
-            Pin(body="right", point="a", on=Place("second", "b")),
+            Pin(body="left", point="a", on=BodyPoint("first", "b")),
+            Pin(body="right", point="a", on=BodyPoint("second", "b")),
         ],
         pins=[eye("one", "second", "left"), eye("two", "third", "right")],
         drives=[Drive(body="first")],
-        tip=Place("first", "b"),
+        tip=BodyPoint("first", "b"),
     )
 
 
@@ -177,7 +177,7 @@ class TestSliderCrank:
     def test_all_round(self) -> None:
         """The slider is at r cos θ + √(l² - r² sin² θ), all round."""
         linkage = load_linkage("slider-crank")
-        task = prepare(linkage, turning("round", 0.0, self.SPEED, 0.012), Settings(step=1e-5))
+        task = prepare(linkage, constant_speed_path("round", 0.0, self.SPEED, 0.012), Settings(step=1e-5))
 
         crank = task.ideal.q[:, 0]
         np.testing.assert_allclose(crank, self.SPEED * np.linspace(0.0, 0.012, len(crank)), rtol=0, atol=1e-11)
@@ -225,7 +225,7 @@ class TestFiveBar:
 
 
 def four_bar_path() -> Path:
-    return turning("round", np.radians(60.0), 7.0, 0.3)
+    return constant_speed_path("round", np.radians(60.0), 7.0, 0.3)
 
 
 def five_bar_path() -> Path:
@@ -234,7 +234,11 @@ def five_bar_path() -> Path:
 
 @pytest.mark.parametrize(
     ("name", "path"),
-    [("five-bar", five_bar_path()), ("four-bar", four_bar_path()), ("slider-crank", turning("round", 0.3, 40.0, 0.3))],
+    [
+        ("five-bar", five_bar_path()),
+        ("four-bar", four_bar_path()),
+        ("slider-crank", constant_speed_path("round", 0.3, 40.0, 0.3)),
+    ],
     ids=lambda one: one if isinstance(one, str) else "",
 )
 def test_drives_give_the_energy(name: str, path: Path) -> None:
@@ -287,7 +291,7 @@ def test_tip_or_drives_lead_alike() -> None:
 def test_speeds_and_accelerations_are_slopes() -> None:
     """Speeds and accelerations along a path are the slopes of its coordinates in time."""
     linkage = load_linkage("four-bar")
-    task = prepare(linkage, turning("round", 1.0, 5.0, 0.02), Settings(step=1e-5))
+    task = prepare(linkage, constant_speed_path("round", 1.0, 5.0, 0.02), Settings(step=1e-5))
     q, qd, qdd = task.ideal.q, task.ideal.qd, task.ideal.qdd
 
     np.testing.assert_allclose((q[2:] - q[:-2]) / (2 * task.h), qd[1:-1], rtol=0, atol=1e-7)
@@ -312,7 +316,7 @@ def test_places_of_points() -> None:
     """A point is where its body is: the elbow of a crank that hangs down is 0.3 m below its pin."""
     linkage = load_linkage("five-bar")
 
-    np.testing.assert_allclose(point_of(linkage, Place("link1", "J2"), np.zeros(8)), (-0.1, -0.3), atol=ROUNDING)
+    np.testing.assert_allclose(point_of(linkage, BodyPoint("link1", "J2"), np.zeros(8)), (-0.1, -0.3), atol=ROUNDING)
 
 
 class TestRefused:
@@ -339,13 +343,15 @@ class TestRefused:
             for body in linkage.bodies
         ]
         with pytest.raises(InvalidValueError, match="four-bar: the drives cannot be followed"):
-            prepare(attrs.evolve(linkage, bodies=long), turning("round", 1.0, 20.0, 0.3), Settings(step=1e-3))
+            prepare(
+                attrs.evolve(linkage, bodies=long), constant_speed_path("round", 1.0, 20.0, 0.3), Settings(step=1e-3)
+            )
 
     def test_two_goals(self) -> None:
         """Either the tip has a goal or the drives have."""
         linkage = load_linkage("five-bar")
         for goals in ({}, {"tip": [0.0, -0.6], "drives": [0.0, 0.0]}):
-            with pytest.raises(ShapeError, match="expected either where the tip is to be, or the driven coordinates"):
+            with pytest.raises(ShapeError, match="expected either the position of the tip, or the driven coordinates"):
                 closed(linkage, assembly_guess(linkage), **goals)
 
     def test_wrong_number_of_drives(self) -> None:
@@ -361,7 +367,7 @@ class TestRefused:
         q = closed(linkage, assembly_guess(linkage), tip=[0.0, -0.6])
         with pytest.raises(InvalidValueError, match="one drive for each freedom, got 1 drives for 2 freedoms"):
             balance(lame, q, np.zeros(8), np.zeros(8))
-        with pytest.raises(InvalidValueError, match="it has 2 freedoms, and its drives tell 1; expected as many"):
+        with pytest.raises(InvalidValueError, match="it has 2 freedoms, and its drives fix 1; expected as many"):
             closed(lame, q, drives=[0.0])
 
     def test_tip_of_one_drive(self) -> None:

@@ -8,6 +8,8 @@ import pytest
 
 from armwright.clearance.linkage import (
     Body,
+    BodyPoint,
+    ClearancePin,
     Coordinate,
     Drive,
     Guide,
@@ -15,8 +17,6 @@ from armwright.clearance.linkage import (
     Load,
     Material,
     Pin,
-    Place,
-    Play,
     exact,
 )
 from armwright.clearance.reader import load_linkage
@@ -64,7 +64,7 @@ class TestWhatItIs:
 
     def test_places_are_written_with_a_colon(self) -> None:
         """The end of link 1 is link1:J2."""
-        assert str(Place("link1", "J2")) == "link1:J2"
+        assert str(BodyPoint("link1", "J2")) == "link1:J2"
 
     def test_right_angles_are_exact(self) -> None:
         """The cosine of a right angle is 0, not 6e-17."""
@@ -89,19 +89,19 @@ class TestWhatItCannotBe:
     def test_unknown_point(self, five_bar: Linkage) -> None:
         """A journal at a point that its body does not have is refused with those that it has."""
         with pytest.raises(UnknownNameError, match=r"no point of link2 'J4'.*J2, J3"):
-            changed(five_bar, "pins", 0, journal=Place("link2", "J4"))
+            changed(five_bar, "pins", 0, journal=BodyPoint("link2", "J4"))
 
     @pytest.mark.parametrize("what", ["tip", "loads"])
     def test_loads_and_tip_have_a_place(self, five_bar: Linkage, what: str) -> None:
         """Tip and loads are at points of bodies."""
-        nowhere = Place("link3", "end")
-        wrong: Any = nowhere if what == "tip" else [Load(at=nowhere, force=(0, -1))]
+        nowhere = BodyPoint("link3", "end")
+        wrong: Any = nowhere if what == "tip" else [Load(point=nowhere, force=(0, -1))]
         with pytest.raises(UnknownNameError, match="no point of link3 'end'"):
             attrs.evolve(five_bar, **{what: wrong})
 
     def test_order(self, five_bar: Linkage) -> None:
         """A body cannot hang on one that comes later: so there are no rings of ideal joints."""
-        joints = [Pin(body="link1", point="J1", on=Place("link2", "J2")), *five_bar.joints[1:]]
+        joints = [Pin(body="link1", point="J1", on=BodyPoint("link2", "J2")), *five_bar.joints[1:]]
         with pytest.raises(InvalidValueError, match="body link1 hangs on link2, which must be named before it"):
             attrs.evolve(five_bar, joints=joints)
 
@@ -198,8 +198,10 @@ class TestWhatItCannotBe:
 
 def test_guides_may_turn(five_bar: Linkage) -> None:
     """A guide has a direction, and the body on it an angle of its own; both are along the axis when left out."""
-    guide = Guide(body="link2", point="J2", on=Place("link1", "J2"))
-    play = Play(name="eye", bearing=guide.on, journal=Place("link2", "J3"), clearance=0.0, journal_radius=1e-3)
+    guide = Guide(body="link2", point="J2", on=BodyPoint("link1", "J2"))
+    play = ClearancePin(
+        name="eye", bearing=guide.on, journal=BodyPoint("link2", "J3"), clearance=0.0, journal_radius=1e-3
+    )
 
     assert (guide.direction, guide.angle) == (0.0, 0.0)
     assert attrs.evolve(five_bar, joints=[five_bar.joints[0], guide], pins=[play], drives=[]).driven == ()

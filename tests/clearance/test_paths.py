@@ -9,11 +9,11 @@ from armwright.clearance.paths import (
     TEST_PATHS,
     TOP_SPEED,
     PickAndPlace,
+    constant_speed_path,
     hermite,
     named_path,
     straight,
     thesis_path,
-    turning,
 )
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
 
@@ -29,9 +29,9 @@ class TestStraight:
 
         assert path.duration == pytest.approx(0.25)
         np.testing.assert_allclose(path.knots, (0.0, 0.05, 0.2, 0.25), atol=ROUNDING)
-        now = path.at([0.0, 0.025, 0.05, 0.125, 0.225, 0.25])
+        now = path.evaluate([0.0, 0.025, 0.05, 0.125, 0.225, 0.25])
         heights = -0.7 + np.array((0.0, 0.009375, 0.0375, 0.15, 0.290625, 0.3))
-        np.testing.assert_allclose(now.at, np.stack([np.full(6, -0.15), heights], axis=-1), rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(now.position, np.stack([np.full(6, -0.15), heights], axis=-1), rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(now.velocity[:, 1], (0, 0.75, 1.5, 1.5, 0.75, 0), rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(now.acceleration[[0, 3, 4], 1], (30.0, 0.0, -30.0), rtol=0, atol=ROUNDING)
 
@@ -41,14 +41,14 @@ class TestStraight:
         path = thesis_path(name)
         start, goal = TEST_PATHS[name]
 
-        ends = path.at([0.0, path.duration])
-        np.testing.assert_allclose(ends.at, (start, goal), rtol=0, atol=ROUNDING)
+        ends = path.evaluate([0.0, path.duration])
+        np.testing.assert_allclose(ends.position, (start, goal), rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(ends.velocity, 0.0, atol=ROUNDING)
         inside = path.knots[1:-1]
-        after, before = (path.at(inside, np.arange(len(inside)) + i) for i in (1, 0))
-        np.testing.assert_allclose(after.at, before.at, rtol=0, atol=ROUNDING)
+        after, before = (path.evaluate(inside, np.arange(len(inside)) + i) for i in (1, 0))
+        np.testing.assert_allclose(after.position, before.position, rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(after.velocity, before.velocity, rtol=0, atol=ROUNDING)
-        assert np.linalg.norm(path.at(path.duration / 2).velocity) == pytest.approx(TOP_SPEED)
+        assert np.linalg.norm(path.evaluate(path.duration / 2).velocity) == pytest.approx(TOP_SPEED)
 
     def test_there_are_24(self) -> None:
         """Ten along x and fourteen along y, each there and back."""
@@ -62,7 +62,7 @@ class TestStraight:
 
         assert len(path.pieces) == 2
         assert path.duration == pytest.approx(2 * RAMP)
-        np.testing.assert_allclose(path.at(path.duration).at, (TOP_SPEED * RAMP, 0), atol=ROUNDING)
+        np.testing.assert_allclose(path.evaluate(path.duration).position, (TOP_SPEED * RAMP, 0), atol=ROUNDING)
 
     def test_too_short(self) -> None:
         """10 mm are not enough to reach 1.5 m/s in 0.05 s: 75 mm are."""
@@ -95,10 +95,10 @@ class TestHermite:
         spline = CubicHermiteSpline(self.TIMES, places, velocities)
         t = np.linspace(0.0, 0.4, 83)
 
-        now = path.at(t)
+        now = path.evaluate(t)
 
         assert path.targets == (0.1, 0.4)
-        np.testing.assert_allclose(now.at, spline(t), rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(now.position, spline(t), rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(now.velocity, spline(t, 1), rtol=0, atol=1e-10)
         np.testing.assert_allclose(now.acceleration, spline(t, 2), rtol=0, atol=1e-7)
 
@@ -117,34 +117,34 @@ class TestHermite:
         """It picks at (-180, -600), passes (0, -575) at 1.5 m/s, and places at (180, -600) mm, 0.25 s apart."""
         path = PickAndPlace().path()
 
-        now = path.at(path.targets)
+        now = path.evaluate(path.targets)
         np.testing.assert_allclose(path.targets, (0.0, 0.25, 0.5), atol=ROUNDING)
-        np.testing.assert_allclose(now.at, ((-0.18, -0.6), (0, -0.575), (0.18, -0.6)), rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(now.position, ((-0.18, -0.6), (0, -0.575), (0.18, -0.6)), rtol=0, atol=ROUNDING)
         np.testing.assert_allclose(now.velocity, ((0, 0), (1.5, 0), (0, 0)), rtol=0, atol=1e-10)
-        np.testing.assert_allclose(path.at((0.05, 0.45)).velocity, ((0, 0.3), (0, -0.3)), rtol=0, atol=1e-10)
+        np.testing.assert_allclose(path.evaluate((0.05, 0.45)).velocity, ((0, 0.3), (0, -0.3)), rtol=0, atol=1e-10)
 
 
 def test_turning() -> None:
     """A crank at 3 rad/s is 0.6 rad farther after 0.2 s."""
-    path = turning("round", 1.0, 3.0, 0.5)
+    path = constant_speed_path("round", 1.0, 3.0, 0.5)
 
-    now = path.at(0.2)
-    assert path.of == "drives"
-    assert (now.at[0], now.velocity[0], now.acceleration[0]) == pytest.approx((1.6, 3.0, 0.0))
+    now = path.evaluate(0.2)
+    assert path.follower == "drives"
+    assert (now.position[0], now.velocity[0], now.acceleration[0]) == pytest.approx((1.6, 3.0, 0.0))
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, np.nan])
 def test_turning_for_no_time(duration: float) -> None:
     """A path takes time."""
     with pytest.raises(InvalidValueError, match="path round: expected a duration above 0"):
-        turning("round", 0.0, 1.0, duration)
+        constant_speed_path("round", 0.0, 1.0, duration)
 
 
 def test_before_and_after() -> None:
     """Before the start and after the end the tip is where the path begins and ends."""
     path = thesis_path("x1")
 
-    np.testing.assert_array_equal(path.at([-1.0, 9.0]).at, path.at([0.0, path.duration]).at)
+    np.testing.assert_array_equal(path.evaluate([-1.0, 9.0]).position, path.evaluate([0.0, path.duration]).position)
 
 
 @pytest.mark.parametrize("steps", [10, 25, 40, 2500])
@@ -154,8 +154,8 @@ def test_no_step_sees_a_jump(steps: int) -> None:
 
     after, before = path.halves(steps)
 
-    assert after.at.shape == (2 * steps + 1, 2)
-    np.testing.assert_allclose(after.at, before.at, rtol=0, atol=ROUNDING)
+    assert after.position.shape == (2 * steps + 1, 2)
+    np.testing.assert_allclose(after.position, before.position, rtol=0, atol=ROUNDING)
     jumps = np.flatnonzero(np.any(after.acceleration != before.acceleration, axis=-1))
     times = np.linspace(0.0, path.duration, 2 * steps + 1)
     hit = [i for i, t in enumerate(times) if np.abs(path.knots[1:-1] - t).min() < ROUNDING]

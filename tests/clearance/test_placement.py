@@ -5,7 +5,7 @@ import cmath
 import numpy as np
 import pytest
 
-from armwright.clearance.linkage import Linkage, Place
+from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.placement import Placement, Point, Vec2
 from armwright.clearance.reader import load_linkage
 from clearance.trees import tree
@@ -13,7 +13,7 @@ from clearance.trees import tree
 ROUNDING = 1e-12
 # Central differences over 1e-5 s, of speeds around 1.
 DIFFERENCE = 1e-8
-PLACES = [Place(body, "c") for body in ("arm", "sledge", "lever", "finger", "bolt", "loose")]
+PLACES = [BodyPoint(body, "c") for body in ("arm", "sledge", "lever", "finger", "bolt", "loose")]
 
 
 def by_hand(linkage: Linkage, q: np.ndarray) -> dict[str, complex]:
@@ -63,7 +63,7 @@ class TestTree:
 
         wanted = by_hand(linkage, q)
         for place, point in zip(PLACES, points(linkage, q, 0 * q), strict=True):
-            assert complex(*point.at) == pytest.approx(wanted[place.body], abs=ROUNDING)
+            assert complex(*point.position) == pytest.approx(wanted[place.body], abs=ROUNDING)
 
     def test_velocities(self, seed: int) -> None:
         """A point's velocity is the change of its place in time, and its partial derivatives times the speeds."""
@@ -75,7 +75,7 @@ class TestTree:
         later, sooner = (points(linkage, q + s * dt * qd, qd) for s in (1, -1))
         for one, after, before in zip(now, later, sooner, strict=True):
             np.testing.assert_allclose(
-                one.velocity, (np.array(after.at) - np.array(before.at)) / (2 * dt), rtol=0, atol=DIFFERENCE
+                one.velocity, (np.array(after.position) - np.array(before.position)) / (2 * dt), rtol=0, atol=DIFFERENCE
             )
             summed = sum(np.array(partial) * qd[i] for i, partial in one.partials.items())
             np.testing.assert_allclose(summed, one.velocity, rtol=0, atol=ROUNDING)
@@ -96,20 +96,20 @@ class TestTree:
 def test_hanging_crank() -> None:
     """At angle 0 the thesis' crank hangs down from its motor; at 90 degrees it points to the right."""
     linkage = load_linkage("five-bar")
-    place = Place("link1", "J2")
+    place = BodyPoint("link1", "J2")
 
     down = Placement(linkage, [0.0] * 8, [0.0] * 8).point(place)
     right = Placement(linkage, [np.pi / 2] + [0.0] * 7, [2.0] + [0.0] * 7).point(place)
 
-    assert down.at == pytest.approx((-0.1, -0.3), abs=ROUNDING)
-    assert right.at == pytest.approx((0.2, 0.0), abs=ROUNDING)
+    assert down.position == pytest.approx((-0.1, -0.3), abs=ROUNDING)
+    assert right.position == pytest.approx((0.2, 0.0), abs=ROUNDING)
     assert right.velocity == pytest.approx((0.0, 0.6), abs=ROUNDING)
     assert right.bias == pytest.approx((-1.2, 0.0), abs=ROUNDING)
 
 
 def test_ground_stands_still() -> None:
     """A point of the ground moves with nothing."""
-    point = Placement(load_linkage("five-bar"), [1.0] * 8, [1.0] * 8).point(Place("ground", "J1"))
+    point = Placement(load_linkage("five-bar"), [1.0] * 8, [1.0] * 8).point(BodyPoint("ground", "J1"))
 
     assert point.partials == {}
     assert point.velocity == point.bias == (0.0, 0.0)
@@ -123,5 +123,5 @@ def test_pairs() -> None:
     assert a.minus(b) == (4.0, 1.5)
     assert a.times(2.0) == (2.0, 4.0)
     assert a.dot(b) == -2.0
-    assert a.turned() == (-2.0, 1.0)
-    assert a.dot(a.turned()) == 0.0
+    assert a.perpendicular() == (-2.0, 1.0)
+    assert a.dot(a.perpendicular()) == 0.0

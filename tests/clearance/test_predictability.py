@@ -5,7 +5,7 @@ import pytest
 
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.paths import TEST_PATHS, thesis_path
-from armwright.clearance.predictability import APART, perturbed, with_outlook
+from armwright.clearance.predictability import APART, perturbed, simulate_with_predictability
 from armwright.clearance.scenario import prepare
 from armwright.clearance.settings import Settings
 from armwright.clearance.simulation import simulate
@@ -24,11 +24,11 @@ def test_claim_holds_against_other_runs(five_bar: Linkage, sample: Sample) -> No
     for rng in sample.cases(30):
         path, c = thesis_path(str(rng.choice(list(TEST_PATHS)))), rng.uniform(0.1e-3, 0.5e-3, 3)
         task = prepare(five_bar, path, Settings())
-        run, outlook = with_outlook(task, c)
+        run, predictability = simulate_with_predictability(task, c)
         others = c + np.concatenate([[(15e-12, 0.0, 0.0)], rng.uniform(-1e-9, 1e-9, (15, 3))])
         finer = prepare(five_bar, path, Settings(step=task.h / 4), guess=task.ideal.q[0])
         errors = [*simulate(task, others).error, simulate(finer, c).error]
-        until = run.time <= outlook.until
+        until = run.time <= predictability.until
         apart = [float(np.linalg.norm(one[until] - run.error[until], axis=-1).max()) for one in errors]
         for name, far in zip(worst, (max(apart[1:-1]), apart[0], apart[-1]), strict=True):
             worst[name] = max(worst[name], far)
@@ -44,14 +44,14 @@ def test_bits_beside_others(five_bar: Linkage) -> None:
     task, c = prepare(five_bar, thesis_path("x4"), Settings()), np.array((3e-4, 4.8e-4, 1.6e-4))
 
     alone = simulate(task, c)
-    runs = [with_outlook(task, c, threads=threads) for threads in (1, 2)]
+    runs = [simulate_with_predictability(task, c, threads=threads) for threads in (1, 2)]
 
-    for run, outlook in runs:
+    for run, predictability in runs:
         np.testing.assert_array_equal(run.q, alone.q)
         np.testing.assert_array_equal(run.works["driven"], alone.works["driven"])
-        assert outlook.until == runs[0][1].until
-        assert not outlook.to_the_end
-        assert outlook.spread.max() > APART
+        assert predictability.until == runs[0][1].until
+        assert not predictability.to_the_end
+        assert predictability.spread.max() > APART
 
 
 def test_perturbations() -> None:

@@ -10,7 +10,7 @@ import pytest
 from armwright.clearance import simulation
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.correction import correct_nodes, tip_at
-from armwright.clearance.estimation.measurement_file import PathsMeasured, RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement, read_measured
 from armwright.clearance.estimation.static import estimate_at_rest, rest_matrix
 from armwright.clearance.feature_sweep import FeatureSweep, is_sweep_of
 from armwright.clearance.features import spectrum
@@ -123,14 +123,14 @@ def test_dwell(tmp_path: Path) -> None:
 
     def written(end: float) -> Path:
         times = np.arange(0.0, end, 1e-3)
-        places = way.at(times).at * 1e3 + times[:, None]
+        places = way.evaluate(times).position * 1e3 + times[:, None]
         rows = (f"y1,{t:.4f},{x:.9f},{y:.9f}" for t, (x, y) in zip(times, places, strict=True))
         file.write_text("\n".join(["path,t_s,x_mm,y_mm", *rows]), encoding="utf-8")
         return file
 
     short, long = (read_measured(written(end)) for end in (0.2505, 2.0))
-    assert isinstance(short, PathsMeasured)
-    assert isinstance(long, PathsMeasured)
+    assert isinstance(short, PathMeasurement)
+    assert isinstance(long, PathMeasurement)
     assert len(short.times["y1"]) == 251
     np.testing.assert_array_equal(long.features()["y1"], short.features()["y1"])
     with pytest.raises(FileFormatError, match=r"path y1 takes 0\.25 s; got 0 to 0\.229 s"):
@@ -180,6 +180,6 @@ def test_uneven_readings(tmp_path: Path) -> None:
     file.write_text("\n".join(lines), encoding="utf-8")
     found = read_measured(file)
 
-    assert isinstance(found, RestMeasured)
+    assert isinstance(found, RestMeasurement)
     # The deviation of 8000 numbers is told to about a hundredth.
     assert found.noise == pytest.approx(1e-5, rel=0.05)

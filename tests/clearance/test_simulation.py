@@ -9,8 +9,8 @@ import pytest
 from armwright.clearance import simulation
 from armwright.clearance.contact import stiffness
 from armwright.clearance.equations import FrictionModel
-from armwright.clearance.linkage import Linkage, Place
-from armwright.clearance.paths import thesis_path, turning
+from armwright.clearance.linkage import BodyPoint, Linkage
+from armwright.clearance.paths import constant_speed_path, thesis_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
@@ -109,7 +109,7 @@ CLEARANCES = np.array((5e-4, 2e-4, 1e-4, 5e-5))
 def found() -> Simulation:
     """Two turns of the slider-crank."""
     settings = Settings(step=2e-6, sample=1e-5, start="centred")
-    task = prepare(load_linkage("slider-crank"), turning("round", 0.0, SPEED, 0.024), settings)
+    task = prepare(load_linkage("slider-crank"), constant_speed_path("round", 0.0, SPEED, 0.024), settings)
     return simulate(task, CLEARANCES[:, None])
 
 
@@ -226,7 +226,7 @@ def test_names_of_points_count() -> None:
     """A linkage whose journal lies where another's guide is, under each other's names, is another linkage."""
     linkage = block()
     cross, falling = linkage.bodies
-    pin = attrs.evolve(linkage.pins[0], journal=Place("block", "Q"))
+    pin = attrs.evolve(linkage.pins[0], journal=BodyPoint("block", "Q"))
     settings = Settings(step=5e-5, sample=1e-3, start="centred")
     for first, second in (("P", "Q"), ("Q", "P")):
         body = attrs.evolve(falling, points={first: (0.0, 0.0), second: (0.0, 0.1)})
@@ -281,7 +281,7 @@ class TestRefused:
     def test_path_for_other_axes(self, five_bar: Linkage) -> None:
         """A path for one drive does not lead an arm with two."""
         with pytest.raises(ShapeError, match="path round: expected 2 axes for the drives, got 1"):
-            prepare(five_bar, turning("round", 0.0, 1.0, 0.1))
+            prepare(five_bar, constant_speed_path("round", 0.0, 1.0, 0.1))
 
     def test_path_out_of_reach(self, five_bar: Linkage) -> None:
         """A path in millimetres, read as metres, leads nowhere."""

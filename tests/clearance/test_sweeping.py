@@ -31,7 +31,7 @@ STUCK = 1e4
 
 @pytest.fixture(scope="module")
 def task(five_bar: Linkage) -> FeatureSweep:
-    return FeatureSweep(linkage=five_bar, paths=("y1",), settings_of=CENTRE)
+    return FeatureSweep(linkage=five_bar, paths=("y1",), simulation_settings=CENTRE)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def bits(results: Any) -> dict[str, bytes]:
 
 def test_features_of_the_simulation(five_bar: Linkage, task: FeatureSweep) -> None:
     """Without runs beside it a row has the features of the simulation with those clearances, bit for bit."""
-    rows = attrs.evolve(task, twins=0)(np.array([ARM_B, ARM_A]))
+    rows = attrs.evolve(task, replicates=0)(np.array([ARM_B, ARM_A]))
 
     alone = simulate(prepare(five_bar, named_path("y1"), CENTRE), ARM_A)
     for name, value in features(alone)._asdict().items():
@@ -57,7 +57,7 @@ def test_features_of_the_simulation(five_bar: Linkage, task: FeatureSweep) -> No
 
 def test_means_and_spreads_over_runs_that_nobody_can_tell_apart(five_bar: Linkage) -> None:
     """On y9 a row is the mean of four runs a nanometre apart, with their spread and until when they are together."""
-    task = FeatureSweep(linkage=five_bar, paths=("y9",), settings_of=CENTRE)
+    task = FeatureSweep(linkage=five_bar, paths=("y9",), simulation_settings=CENTRE)
 
     rows = task(np.array([ARM_B, ARM_A]))
 
@@ -121,7 +121,7 @@ def test_said_beforehand(task: FeatureSweep) -> None:
     plain = json.loads(json.dumps(dict(both.settings)))
     assert plain["simulation"]["friction"]["velocity"] == "centre"
     assert plain["linkage"]["bodies"][0]["mass"] == 2.5
-    assert plain["twins"] == 3
+    assert plain["replicates"] == 3
 
 
 def test_feature_vector(task: FeatureSweep) -> None:
@@ -217,7 +217,7 @@ def test_folder_of_other_settings(task: FeatureSweep, design: Design, tmp_path: 
     pytest.importorskip("xarray")
     few = attrs.evolve(design, points=design.points[:2])
     run(task, few, tmp_path / "out", workers=1)
-    other = attrs.evolve(task, settings_of=attrs.evolve(CENTRE, threshold=2e-2))
+    other = attrs.evolve(task, simulation_settings=attrs.evolve(CENTRE, threshold=2e-2))
 
     with pytest.raises(SweepError, match=r"settings\.simulation"):
         run(other, few, tmp_path / "out", workers=1)
@@ -231,9 +231,9 @@ def test_unknown_path(five_bar: Linkage) -> None:
     for name in ("y15", "pick-and-place"):
         with pytest.raises(UnknownNameError, match=f"no test path '{name}'"):
             FeatureSweep(linkage=five_bar, paths=("y1", name))
-    with pytest.raises(InvalidValueError, match="paths: 'y1' stands there twice"):
+    with pytest.raises(InvalidValueError, match="paths: 'y1' occurs twice"):
         FeatureSweep(linkage=five_bar, paths=("y1", "y3", "y1"))
     with pytest.raises(InvalidValueError, match="paths: expected one or more, got none"):
         FeatureSweep(linkage=five_bar, paths=())
-    with pytest.raises(InvalidValueError, match="twins: expected 0 to 15, got 16"):
-        FeatureSweep(linkage=five_bar, paths=("y1",), twins=16)
+    with pytest.raises(InvalidValueError, match="replicates: expected 0 to 15, got 16"):
+        FeatureSweep(linkage=five_bar, paths=("y1",), replicates=16)

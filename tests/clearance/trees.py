@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio
 
-from armwright.clearance.linkage import Body, Drive, Guide, Linkage, Load, Pin, Place, Play
+from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Guide, Linkage, Load, Pin
 
 
 def tree(rng: np.random.Generator) -> Linkage:
@@ -25,7 +25,7 @@ def tree(rng: np.random.Generator) -> Linkage:
 
     def guide(name: str, on: str) -> Guide:
         direction, angle = rng.uniform(-np.pi, np.pi, 2)
-        return Guide(body=name, point="a", on=Place(on, "b"), direction=direction, angle=angle)
+        return Guide(body=name, point="a", on=BodyPoint(on, "b"), direction=direction, angle=angle)
 
     return Linkage(
         name="tree",
@@ -33,24 +33,24 @@ def tree(rng: np.random.Generator) -> Linkage:
         ground=Body(name="ground", points={"O": (0.1, -0.2)}),
         bodies=[body(name) for name in ("arm", "sledge", "lever", "finger", "bolt", "loose")],
         joints=[
-            Pin(body="arm", point="a", on=Place("ground", "O")),
+            Pin(body="arm", point="a", on=BodyPoint("ground", "O")),
             guide("sledge", "arm"),
-            Pin(body="lever", point="a", on=Place("sledge", "b")),
-            Pin(body="finger", point="a", on=Place("lever", "b")),
+            Pin(body="lever", point="a", on=BodyPoint("sledge", "b")),
+            Pin(body="finger", point="a", on=BodyPoint("lever", "b")),
             guide("bolt", "finger"),
         ],
         pins=[
-            Play(
+            ClearancePin(
                 name="eye",
-                bearing=Place("bolt", "c"),
-                journal=Place("loose", "b"),
+                bearing=BodyPoint("bolt", "c"),
+                journal=BodyPoint("loose", "b"),
                 clearance=1e-3,
                 journal_radius=0.02,
             )
         ],
         drives=[Drive(body="arm"), Drive(body="sledge"), Drive(body="lever")],
-        loads=[Load(at=Place("bolt", "b"), force=rng.uniform(-5, 5, 2))],
-        tip=Place("loose", "c"),
+        loads=[Load(point=BodyPoint("bolt", "b"), force=rng.uniform(-5, 5, 2))],
+        tip=BodyPoint("loose", "c"),
         gravity=rng.uniform(-10, 10, 2),
     )
 

@@ -73,7 +73,7 @@ def test_estimate_at_rest() -> None:
     """The example's readings tell its clearances to a hundredth, with intervals that hold them."""
     found = json.loads(armwright("clearance", "estimate", "five-bar", REST, "--json").stdout)
 
-    assert found["by"] == "rest"
+    assert found["method"] == "rest"
     check(found, 0.99)
     assert found["notes"][0].startswith("4 poses, 40 readings; ")
 
@@ -85,7 +85,7 @@ def test_table_of_an_estimate() -> None:
     assert done.returncode == 0, done.stderr
     lines = {line.split()[0]: line for line in done.stdout.splitlines() if line.strip()}
     assert "90 % interval mm" in lines["pin"]
-    assert "identified" in lines["pin"]
+    assert "identifiable" in lines["pin"]
     mean, deviation = (float(x) for x in lines["J4"].split()[1:3])
     assert mean == pytest.approx(0.483, abs=0.01)
     # 20 µm, ten readings: some 2 to 10 µm.
@@ -101,11 +101,11 @@ def test_estimate_on_paths(folder: Path) -> None:
 
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found["by"] == "paths"
+    assert found["method"] == "paths"
     check(found, 0.985)
     assert found["notes"][0] == "15 features of 3 paths, learnt from 64 simulations"
     assert found["notes"][1].startswith("predictable until, in half of the simulations: y1 0.2")
-    assert found["left_out"] == []
+    assert found["random_features"] == []
     assert set(found["predictable_until"]) == {"y1", "y3", "y7"}
 
 
@@ -192,8 +192,8 @@ def test_correct(tmp_path: Path) -> None:
     assert found["clearances"] == pytest.approx(PLAY)
     assert np.mean(found["before"]) == pytest.approx(0.559e-3, rel=0.01)
     assert np.mean(found["after"]) < 5e-6
-    assert len(found["mean errors"]) == 2
-    assert (found["runs"], found["of"]) == (16, "whose clearances nobody can tell apart")
+    assert len(found["mean_errors"]) == 2
+    assert (found["runs"], found["sampling"]) == (16, "indistinguishable clearances")
     assert max(found["after_spread"][:2]) < 1e-8
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"path.csv", "summary.json", "paths.svg", "run.json"}
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == found
@@ -226,7 +226,7 @@ def test_estimates_that_are_none(text: str, tmp_path: Path) -> None:
     done = armwright("clearance", "correct", "five-bar", "--estimate", tmp_path / "estimate.json")
 
     assert done.returncode == 4
-    assert "expected what `armwright clearance estimate --json` prints for five-bar" in done.stderr
+    assert "expected the output of `armwright clearance estimate --json` for five-bar" in done.stderr
 
 
 MISTAKES = [
@@ -238,7 +238,7 @@ MISTAKES = [
     (("sweep", "five-bar", "-n", "100"), "a Sobol design has a power of two of points, got 100"),
     (("sweep", "five-bar", "--from-mm", "0.5", "--to-mm", "0.1"), "bounds of c_J2: they are reversed"),
     (("sweep", "five-bar", "--step", "1e-3"), "step: 0.001 s is too long for contacts of "),
-    (("sweep", "five-bar", "--twins", "16"), "twins: expected 0 to 15, got 16"),
+    (("sweep", "five-bar", "--replicates", "16"), "replicates: expected 0 to 15, got 16"),
     (("sweep", "four-bar"), "four-bar: with its pins closed it has 1 freedom"),
     (("sweep", "five-bra"), "no linkage 'five-bra'. Did you mean 'five-bar'?"),
     (("estimate", "five-bar", "none.csv"), "none.csv: no such file"),
@@ -246,7 +246,7 @@ MISTAKES = [
     (("estimate", "five-bar", PATHS, "--sweep", "SWEEP"), "--noise-um: expected the standard deviation"),
     (("estimate", "five-bar", PATHS, "--sweep", "none", "--noise-um", "2"), "'none': the sweep is not there"),
     (("estimate", "five-bar", "x2.csv", "--sweep", "SWEEP", "--noise-um", "2"), "the sweep has no path x2; sweep the"),
-    (("estimate", "five-bar", REST, "--noise-um", "-1"), "--noise-um: expected a number above 0, got -1"),
+    (("estimate", "five-bar", REST, "--noise-um", "-1"), "noise: expected a standard deviation above 0, got -1"),
     (("estimate", "slider-crank", REST), "slider-crank: with its pins closed it has 1 freedom"),
     (("correct", "five-bar", "--path", "y99"), "no path 'y99'. Did you mean 'y9'?"),
     (("correct", "five-bar", "--clearance", "J7=0.3"), "no pin 'J7'. Known: J2, J3, J4."),
@@ -265,7 +265,7 @@ def answers(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> list[tupl
     seconds = np.linspace(0.0, 0.29, 30)
     from armwright.clearance.paths import named_path
 
-    places = named_path("x2").at(seconds).at * 1e3
+    places = named_path("x2").evaluate(seconds).position * 1e3
     rows = [f"x2,{t:.4f},{x:.4f},{y:.4f}" for t, (x, y) in zip(seconds, places, strict=True)]
     (place / "x2.csv").write_text("\n".join([text[0], *rows]) + "\n", encoding="utf-8")
     calls = [

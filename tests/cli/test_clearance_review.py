@@ -119,7 +119,7 @@ def test_sweep_of_another_linkage(tmp_path: Path) -> None:
         "clearance", "sweep", "five-bar", "--paths", "y1,y1", "-n", "2", "--workers", "1", "--json", "-o", folder
     )
     way = thesis_path("y1")
-    places = ((t, *way.at(t).at * 1e3) for t in np.linspace(0.0, way.duration, 51))
+    places = ((t, *way.evaluate(t).position * 1e3) for t in np.linspace(0.0, way.duration, 51))
     rows = [f"y1,{t:.6f},{x:.6f},{y:.6f}" for t, x, y in places]
     measured.write_text("\n".join(["path,t_s,x_mm,y_mm", *rows]))
     done = armwright("clearance", "estimate", "slider-crank", measured, "--sweep", folder, "--noise-um", "2")

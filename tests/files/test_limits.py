@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from armwright.arm.load import load_arm, load_urdf, read_arm
 from armwright.cell.reader import read_cell
-from armwright.clearance.estimation.measurement_file import RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import RestMeasurement, read_measured
 from armwright.clearance.reader import read_linkage
 from armwright.cli.app import app
 from armwright.errors import ArmwrightError, FileFormatError, InvalidValueError, UnknownNameError
@@ -148,7 +148,7 @@ def test_poses_of_a_linkage(tmp_path: Path) -> None:
     table.write_text(f"pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm\n{rows}")
 
     found = read_measured(table)
-    assert isinstance(found, RestMeasured)
+    assert isinstance(found, RestMeasurement)
     assert len(found.poses) == 3
     with raised(entries=2):
         assert "rest.csv:6: pose: too many: more, and at most 2 entries are read" in refused(

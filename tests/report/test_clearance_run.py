@@ -12,8 +12,8 @@ import pytest
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.five_bar import FiveBar
 from armwright.clearance.ideal import tip_of
-from armwright.clearance.linkage import Pin, Place
-from armwright.clearance.paths import thesis_path, turning
+from armwright.clearance.linkage import Pin, BodyPoint
+from armwright.clearance.paths import thesis_path, constant_speed_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings
@@ -53,7 +53,7 @@ def cranked() -> dict[str, ClearanceRun]:
     for name, speed in (("slider-crank", 60.0), ("four-bar", 12.0)):
         linkage = load_linkage(name)
         at = linkage.assembly[linkage.drives[0].body]
-        path = turning("half a turn", at, speed, np.pi / speed)
+        path = constant_speed_path("half a turn", at, speed, np.pi / speed)
         found[name] = ClearanceRun.of(simulate(prepare(linkage, path, Settings(start="centred"))))
     return found
 
@@ -266,10 +266,10 @@ def test_other_linkages(cranked: dict[str, ClearanceRun], name: str) -> None:
 def test_bearing_in_the_ground() -> None:
     """A bearing in the ground has a place on it, and moves with no body."""
     linkage = load_linkage("four-bar")
-    joints = [*linkage.joints[:2], Pin(body="rocker", point="B", on=Place("coupler", "B"))]
-    pin = attrs.evolve(linkage.pins[0], name="C$", bearing=Place("ground", "C"), journal=Place("rocker", "C"))
+    joints = [*linkage.joints[:2], Pin(body="rocker", point="B", on=BodyPoint("coupler", "B"))]
+    pin = attrs.evolve(linkage.pins[0], name="C$", bearing=BodyPoint("ground", "C"), journal=BodyPoint("rocker", "C"))
     other = attrs.evolve(linkage, joints=joints, pins=[pin])
-    path = turning("a little", linkage.assembly["crank"], 12.0, 0.05)
+    path = constant_speed_path("a little", linkage.assembly["crank"], 12.0, 0.05)
 
     run = ClearanceRun.of(simulate(prepare(other, path, Settings(start="centred"))))
 

@@ -13,7 +13,7 @@ from armwright.arrays import Array
 from armwright.clearance.contact import damping, restitution_of
 from armwright.clearance.energy_balance import EnergyBalance, energy_balance
 from armwright.clearance.features import spectrum
-from armwright.clearance.predictability import APART, FINER, Outlook
+from armwright.clearance.predictability import APART, FINER, Predictability
 from armwright.clearance.simulation import Simulation, Status
 from armwright.errors import ShapeError
 from armwright.files.result_table import ResultTable
@@ -32,7 +32,7 @@ class ClearanceRun:
     Attributes:
         simulation: of one run, without leading axes.
         rows: how many samples are finite, counted from the start.
-        outlook: until when it is a prediction; None where that was not looked at.
+        predictability: until when it is a prediction; None where that was not looked at.
         energy: its energy balance.
         gaps: (s, p, 2) from the middle of each bearing to that of its journal [m].
         depths: (s, p) indentation of each journal into its bearing; below 0 in free flight [m].
@@ -40,13 +40,13 @@ class ClearanceRun:
 
     simulation: Simulation
     rows: int
-    outlook: Outlook | None
+    predictability: Predictability | None
     energy: EnergyBalance
     gaps: Array
     depths: Array
 
     @classmethod
-    def of(cls, simulation: Simulation, outlook: Outlook | None = None) -> ClearanceRun:
+    def of(cls, simulation: Simulation, predictability: Predictability | None = None) -> ClearanceRun:
         """Return a run with its energy balance, gaps and indentations.
 
         Raises:
@@ -60,7 +60,9 @@ class ClearanceRun:
         # Forces and energies become infinite before positions do.
         finite = np.isfinite(np.concatenate(numbers, axis=-1)).all(axis=-1)
         rows = len(simulation.time) if finite.all() else max(1, int(np.argmin(finite)))
-        return cls(simulation=simulation, rows=rows, outlook=outlook, energy=energy, gaps=gaps, depths=depths)
+        return cls(
+            simulation=simulation, rows=rows, predictability=predictability, energy=energy, gaps=gaps, depths=depths
+        )
 
     @property
     def finished(self) -> bool:
@@ -91,7 +93,7 @@ class ClearanceRun:
                 f"the run diverged: a number became infinite or the tip left its path by a metre; "
                 f"shown until {self.time[-1]:.4g} s"
             )
-        notes.extend(_outlook_notes(self))
+        notes.extend(_predictability_notes(self))
         energy, rows = self.energy, slice(self.rows)
         # The error of the integration has to be small beside the losses, not beside the work that went through.
         lost = float((energy.impact_loss + energy.friction_loss)[rows][-1])
@@ -119,7 +121,7 @@ class ClearanceRun:
             "duration": scenario.path.duration,
             "status": Status(int(simulation.status)).name.lower(),
             "sound_until": float(self.time[-1]),
-            "predictable_until": None if self.outlook is None else self.outlook.until,
+            "predictable_until": None if self.predictability is None else self.predictability.until,
             "pins": {pin.name: _pin(self, i) for i, pin in enumerate(scenario.linkage.pins)},
             "error": {
                 "largest": float(self.distance.max()),
@@ -224,16 +226,16 @@ def targets(run: ClearanceRun) -> list[dict[str, Any]]:
             continue
         x, y = (float(np.interp(t, run.time, run.error[:, i])) for i in range(2))
         target = {"time": float(t), "error_x": x, "error_y": y, "distance": float(np.hypot(x, y)), "nearest": None}
-        if path.of == "tip":
-            distance = np.linalg.norm(run.simulation.tip[: run.rows] - path.at(t).at, axis=-1)
+        if path.follower == "tip":
+            distance = np.linalg.norm(run.simulation.tip[: run.rows] - path.evaluate(t).position, axis=-1)
             target["nearest"] = float(distance.min())
-        if run.outlook is not None:
+        if run.predictability is not None:
             target["mean_x"], target["mean_y"], target["spread_x"], target["spread_y"] = (
                 _finite(np.interp(t, run.simulation.time, values[:, i]))
-                for values in (run.outlook.mean, run.outlook.spread)
+                for values in (run.predictability.mean, run.predictability.spread)
                 for i in range(2)
             )
-            target["predictable"] = run.outlook.to_the_end or t <= run.outlook.until
+            target["predictable"] = run.predictability.to_the_end or t <= run.predictability.until
         found.append(target)
     return found
 
@@ -266,18 +268,18 @@ def settings(run: ClearanceRun) -> dict[str, Any]:
     return data
 
 
-def _outlook_notes(run: ClearanceRun) -> Iterator[str]:
+def _predictability_notes(run: ClearanceRun) -> Iterator[str]:
     """Say until when a run is a prediction, and what holds afterwards."""
-    outlook = run.outlook
-    if outlook is None:
+    predictability = run.predictability
+    if predictability is None:
         return
-    what = f"clearances a nanometre away{' or a smaller step' if outlook.finer else ''}"
-    apart = f"{APART * 1e6:g} µm{f' ({APART / FINER * 1e6:g} µm for a smaller step)' if outlook.finer else ''}"
-    if outlook.to_the_end:
+    what = f"clearances a nanometre away{' or a smaller step' if predictability.finer else ''}"
+    apart = f"{APART * 1e6:g} µm{f' ({APART / FINER * 1e6:g} µm for a smaller step)' if predictability.finer else ''}"
+    if predictability.to_the_end:
         yield f"predictable to the end: runs with {what} stay within {apart}"
         return
     yield (
-        f"predictable until t = {outlook.until:.4g} s: then a run with {what} is more than {apart} away; "
+        f"predictable until t = {predictability.until:.4g} s: then a run with {what} is more than {apart} away; "
         f"what comes later is one of many indistinguishable runs"
     )
     for target in targets(run):

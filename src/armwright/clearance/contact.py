@@ -1,9 +1,9 @@
-"""What presses and rubs when a journal touches its bearing: stiffness, damping by impact speed, friction.
+"""The contact law of a journal in its bearing: stiffness, damping by impact speed, friction.
 
     F_N = K δ^1.5 (1 + χ δ̇ / v0)
 
-with the indentation δ, and v0 the speed at which the journal came; χ stands for what an impact loses, and each law has
-its own. The force is never negative.
+with the indentation δ and the impact speed v0; χ stands for the loss of an impact, and each law has its own. The force
+is never negative.
 
 Source:
     Thesis eq. (3.17)-(3.20); Lankarani & Nikravesh (1990); spec of the clearance, 1.1 and 2.2.
@@ -29,14 +29,14 @@ ImpactLaw: TypeAlias = Literal[
 FrictionLaw: TypeAlias = Literal["linear", "tanh", "lugre"]
 
 FRICTION_LAWS: tuple[FrictionLaw, ...] = ("linear", "tanh", "lugre")
-# Slower impacts count as impacts of this speed: the law divides by it [m/s].
+# The lower limit of the impact speed, by which the law divides [m/s].
 SLOWEST_IMPACT = 1e-3
-# A χ so small that the closed forms are lost in rounding.
-_NEXT_TO_NONE = 1e-6
+# A χ below which rounding makes the closed forms useless.
+_NEGLIGIBLE = 1e-6
 
 
 def exact_damping(restitution: float) -> float:
-    """Return the χ of which exactly this restitution comes: the root of the closed form."""
+    """Return the χ that yields exactly this restitution: the root of the closed form."""
     if restitution == 1:
         return 0.0
 
@@ -51,7 +51,7 @@ def exact_damping(restitution: float) -> float:
     return float(brentq(excess, min(1e-9, 1e-3 * (1 - restitution)), largest, xtol=1e-15, rtol=1e-14))
 
 
-# χ by what is asked to remain of the speed, as the papers give it.
+# χ by the requested restitution, after the papers of its authors.
 _LAWS: Mapping[str, Callable[[float], float]] = {
     "hunt-crossley": lambda e: 3 * (1 - e) / 2,
     "lankarani-nikravesh": lambda e: 3 * (1 - e * e) / 4,
@@ -67,11 +67,11 @@ IMPACT_LAWS = tuple(_LAWS)
 
 
 def damping(law: str, restitution: float) -> float:
-    """Return χ, which says how much of an impact is lost.
+    """Return χ, the damping that determines the loss of an impact.
 
     Args:
-        law: whose; ``exact`` gives back exactly the restitution that is asked for.
-        restitution: asked for, above 0, at most 1.
+        law: name of the impact law; ``exact`` yields exactly the requested restitution.
+        restitution: requested, above 0, at most 1.
 
     Raises:
         UnknownNameError: there is no such law.
@@ -83,9 +83,9 @@ def damping(law: str, restitution: float) -> float:
 
 
 def restitution_of(chi: float) -> float:
-    """Return what remains of the speed of an impact: the root e of 1 + e = ln[(1 + χ) / (1 - χ e)] / χ."""
-    if chi < _NEXT_TO_NONE:
-        # The equation is lost in rounding, its series is not.
+    """Return the restitution of an impact: the root e of 1 + e = ln[(1 + χ) / (1 - χ e)] / χ."""
+    if chi < _NEGLIGIBLE:
+        # Rounding spoils the equation, but not its series.
         return 1.0 - chi * 2 / 3
 
     def excess(e: float) -> float:
@@ -100,19 +100,19 @@ def deepest(mass: float, stiffness: float, speed: float, chi: float) -> float:
     """Return the largest indentation of an impact [m].
 
     Args:
-        mass: that hits a wall [kg].
+        mass: of the body that hits a wall [kg].
         stiffness: K [N/m^1.5].
         speed: of the impact [m/s].
         chi: see ``damping``.
     """
-    part = 0.5 if chi < _NEXT_TO_NONE else (chi - math.log1p(chi)) / chi**2
+    part = 0.5 if chi < _NEGLIGIBLE else (chi - math.log1p(chi)) / chi**2
     return float((2.5 * mass * speed**2 / stiffness * part) ** 0.4)
 
 
 def impact_time(mass: float, stiffness: float, speed: float) -> float:
-    """Return how long an impact without loss lasts [s]: 2.94328 δ_max / v0; see ``deepest`` for the arguments."""
-    whole = 2 * math.sqrt(math.pi) * math.gamma(0.4) / (2.5 * math.gamma(0.9))
-    return whole * deepest(mass, stiffness, speed, 0.0) / speed
+    """Return the duration of an impact without loss [s]: 2.94328 δ_max / v0; see ``deepest`` for the arguments."""
+    factor = 2 * math.sqrt(math.pi) * math.gamma(0.4) / (2.5 * math.gamma(0.9))
+    return factor * deepest(mass, stiffness, speed, 0.0) / speed
 
 
 def stiffness(clearance: ArrayLike, journal_radius: float, young: float, poisson: float) -> Array:
@@ -125,7 +125,7 @@ def stiffness(clearance: ArrayLike, journal_radius: float, young: float, poisson
         poisson: ratio.
 
     Raises:
-        InvalidValueError: a clearance is not above 0: then the law has no meaning.
+        InvalidValueError: a clearance is not above 0, so that the law has no meaning.
 
     Source:
         Thesis eq. (3.18), (3.19); the π of the paper cancels.
@@ -138,7 +138,7 @@ def stiffness(clearance: ArrayLike, journal_radius: float, young: float, poisson
 
 
 def normal_force(depth: Scalar, rate: Scalar, impact_speed: Scalar, K: Scalar, chi: Scalar) -> Scalar:
-    """Return the force with which journal and bearing press on one another [N], never negative.
+    """Return the normal force between journal and bearing [N], never negative.
 
     Args:
         depth: δ, above 0 where they touch [m].
@@ -188,7 +188,7 @@ def falling(x: Scalar) -> Scalar:
 
 
 class Bristles:
-    """The LuGre law: bristles that bend before they slip.
+    """The LuGre law: bristles that deflect before they slip.
 
     Attributes:
         stiffness: σ0 [1/m].
@@ -208,18 +208,18 @@ class Bristles:
     static_ratio = 1.2
 
     @classmethod
-    def step(cls, bend: Scalar, speed: Scalar, friction: Scalar) -> tuple[Scalar, Scalar]:
-        """Return the coefficient of friction and the rate at which the bristles bend [m/s].
+    def step(cls, deflection: Scalar, speed: Scalar, friction: Scalar) -> tuple[Scalar, Scalar]:
+        """Return the coefficient of friction and the rate of the bristle deflection [m/s].
 
         Args:
-            bend: of the bristles [m].
+            deflection: of the bristles [m].
             speed: of sliding [m/s].
             friction: coefficient of sliding.
         """
         ratio = speed / cls.stribeck
         limit = friction * (1.0 + (cls.static_ratio - 1.0) * falling(ratio * ratio))
-        # Without friction the bristles have nothing to lean on.
-        some = select(limit > 0.0, limit, 1.0)
-        rate = speed - cls.stiffness * abs(speed) * bend / some
-        force = cls.stiffness * bend + cls.damping * rate + cls.viscosity * speed
+        # Without friction the deflection has no limit to refer to.
+        divisor = select(limit > 0.0, limit, 1.0)
+        rate = speed - cls.stiffness * abs(speed) * deflection / divisor
+        force = cls.stiffness * deflection + cls.damping * rate + cls.viscosity * speed
         return select(limit > 0.0, force, 0.0), select(limit > 0.0, rate, 0.0)

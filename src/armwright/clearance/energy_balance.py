@@ -1,4 +1,4 @@
-"""The energy ledger of a linkage with play: what the drives gave, what is stored, what was lost."""
+"""The energy balance of a linkage with clearance: work of the drives, stored energy, losses."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from armwright.clearance.simulation import Simulation
 
 @attrs.frozen(kw_only=True, eq=False)
 class EnergyBalance:
-    """Where the energy of a run is at each sample; the leading axes are those of the runs.
+    """The energy of a run at each sample; the leading axes are those of the runs.
 
     Attributes:
-        driven: (..., s) what the drives have given [J].
+        driven: (..., s) work of the drives [J].
         kinetic: (..., s) of all bodies [J].
         potential: (..., s) of gravity and loads, from the start [J].
         stored: (..., s) in the walls of the bearings [J].
-        impact_loss: (..., s) what impacts have taken [J].
-        friction_loss: (..., s) what friction has taken [J].
+        impact_loss: (..., s) lost in impacts [J].
+        friction_loss: (..., s) lost in friction [J].
     """
 
     driven: Array
@@ -34,13 +34,13 @@ class EnergyBalance:
 
     @property
     def imbalance(self) -> Array:
-        """(..., s) what the books do not explain: the error of the integration [J]."""
+        """(..., s) the residual of the balance: the error of the integration [J]."""
         energy = self.kinetic + self.potential + self.stored
         return np.asarray(energy - energy[..., :1] - self.driven + self.impact_loss + self.friction_loss)
 
 
 def energy_balance(simulation: Simulation) -> EnergyBalance:
-    """Return the energy ledger of a simulation."""
+    """Return the energy balance of a simulation."""
     linkage = simulation.scenario.linkage
     q, qd = ([x[..., i] for i in range(x.shape[-1])] for x in (simulation.q, simulation.qd))
     placement = Placement(linkage, q, qd)

@@ -1,8 +1,8 @@
-"""The motion of a linkage with play, over abstract scalars: what its bodies do under drives, loads and contacts.
+"""The equations of motion of a linkage with clearance, over abstract scalars: under drives, loads and contacts.
 
 Source:
     Thesis eq. (3.22)-(3.35) with the corrections of docs/errata.md, in coordinates that need no Lagrange multipliers:
-    ideal joints hang the bodies in trees, and pins with play are forces.
+    ideal joints connect the bodies to trees, and pins with clearance are forces.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from armwright.clearance.contact import (
     normal_force,
     smooth_slip,
 )
-from armwright.clearance.linkage import Guide, Linkage, Pin, Play
+from armwright.clearance.linkage import GROUND, ClearancePin, Coordinate, Linkage
 from armwright.clearance.placement import Placement, Vec2
 from armwright.tracing.scalar import Scalar, select, sqrt
 
 SlipSpeed: TypeAlias = Literal["surface", "centre"]
 
 SLIP_SPEEDS: tuple[SlipSpeed, ...] = ("surface", "centre")
-# Works that are added up while a linkage moves [J].
+# Works that are integrated along with the motion [J].
 WORKS = ("driven", "impact loss", "friction loss")
 # A journal nearer to the middle of its bearing has no direction [m].
 _TINY = 1e-12
-# Bristles that nothing bends straighten in this time [s].
+# Time constant with which bristles without a force straighten [s].
 _STRAIGHTENING = 1e-3
 _SLIP: Mapping[str, Callable[[Scalar, Scalar], Scalar]] = {"linear": linear_slip, "tanh": smooth_slip}
 
 
 @attrs.frozen(kw_only=True)
 class FrictionModel:
-    """How friction is worked out.
+    """The law of friction and its sliding speed.
 
     Attributes:
         law: ``linear`` or ``tanh`` in the sliding speed, or ``lugre``.
-        velocity: which speed slides: of the ``surface``, as it is, or of the ``centre``, as the thesis has it.
+        velocity: the sliding speed: that of the ``surface``, as in nature, or of the ``centre``, as in the thesis.
     """
 
     law: FrictionLaw = "linear"
@@ -51,7 +51,7 @@ class FrictionModel:
 
 
 class Contact(NamedTuple):
-    """What the law of a contact needs to know of one pin.
+    """The parameters of the contact law of one pin.
 
     Attributes:
         clearance: [m].
@@ -69,31 +69,31 @@ class Contact(NamedTuple):
 
 
 class ContactMemory(NamedTuple):
-    """What is kept of a contact from step to step.
+    """The part of a contact's state that passes from step to step.
 
     Attributes:
         touching: 1 where they touched at the start of the step, else 0.
-        speed: with which they came [m/s].
-        bend: of the bristles of LuGre [m]; 0 for other laws.
+        speed: impact speed [m/s].
+        deflection: of the bristles of LuGre [m]; 0 for other laws.
     """
 
     touching: Scalar
     speed: Scalar
-    bend: Scalar = 0.0
+    deflection: Scalar = 0.0
 
 
 class State(NamedTuple):
-    """What a linkage with play is doing.
+    """The state of a linkage with clearance.
 
     Attributes:
         q: (n) coordinates [rad, m].
         qd: (n) their speeds [rad/s, m/s].
-        touches: of each pin what is kept.
+        memories: of the contacts, one for each pin.
     """
 
     q: Sequence[Scalar]
     qd: Sequence[Scalar]
-    touches: Sequence[ContactMemory]
+    memories: Sequence[ContactMemory]
 
 
 class PinContact(NamedTuple):
@@ -105,9 +105,9 @@ class PinContact(NamedTuple):
         rate: δ̇ [m/s].
         normal: force with which they press on one another [N].
         sliding: speed of the surfaces on one another [m/s].
-        touch: what to keep.
-        bending: rate of the bristles of LuGre [m/s]; 0 for other laws.
-        pushes: generalised forces, by coordinate.
+        memory: of the contact, for the next step.
+        deflection_rate: of the bristles of LuGre [m/s]; 0 for other laws.
+        forces: generalised forces, by coordinate.
         losses: power lost in the impact and in sliding [W].
         stored: energy of the indentation [J].
     """
@@ -117,22 +117,22 @@ class PinContact(NamedTuple):
     rate: Scalar
     normal: Scalar
     sliding: Scalar
-    touch: ContactMemory
-    bending: Scalar
-    pushes: dict[int, Scalar]
+    memory: ContactMemory
+    deflection_rate: Scalar
+    forces: dict[int, Scalar]
     losses: tuple[Scalar, Scalar]
     stored: Scalar
 
 
 class Rates(NamedTuple):
-    """What a linkage with play does at one moment.
+    """The rates of a linkage with clearance, and the forces and energies that belong to them.
 
     Attributes:
         qdd: accelerations of its coordinates.
         efforts: of its drives [N m, N].
         powers: of ``WORKS`` [W].
-        pins: what is going on in each.
-        tip: where the tip is [m].
+        pins: the contact in each.
+        tip: position of the tip [m].
         energy: kinetic energy, that of gravity and loads, and that in the contacts [J].
     """
 
@@ -145,35 +145,36 @@ class Rates(NamedTuple):
 
 
 def rates(
-    linkage: Linkage, rubbing: FrictionModel, state: State, drives: Sequence[Scalar], contacts: Sequence[Contact]
+    linkage: Linkage, friction: FrictionModel, state: State, drives: Sequence[Scalar], contacts: Sequence[Contact]
 ) -> Rates:
-    """Return what a linkage with play does.
+    """Return the accelerations, efforts, powers and energies of a linkage with clearance.
 
     Args:
         linkage: with n coordinates.
-        rubbing: how friction is worked out.
-        state: what it is doing.
-        drives: of each drive its effort [N m, N], or its acceleration where its motion is given.
-        contacts: of each pin what its law needs.
+        friction: the friction model.
+        state: of the linkage.
+        drives: of each drive its effort [N m, N], or its acceleration where its motion is prescribed.
+        contacts: parameters of the contact law of each pin.
     """
     placement = Placement(linkage, state.q, state.qd)
     force = free_forces(placement)
-    pins, lost, rubbed, stored = [], 0.0, 0.0, 0.0
-    for pin, contact, touch in zip(linkage.pins, contacts, state.touches, strict=True):
-        pressed = _pressed(placement, rubbing, pin, contact, touch)
-        for i, push in pressed.pushes.items():
+    pins, impact_loss, friction_loss, stored = [], 0.0, 0.0, 0.0
+    for parameters in zip(linkage.pins, contacts, state.memories, strict=True):
+        pin = _pin_contact(placement, friction, *parameters)
+        for i, push in pin.forces.items():
             force[i] = force[i] + push
-        pins.append(pressed)
-        lost = lost + pressed.losses[0]
-        rubbed = rubbed + pressed.losses[1]
-        stored = stored + pressed.stored
-    qdd, efforts = _driven(linkage, mass_matrix(placement), force, drives)
+        pins.append(pin)
+        impact_loss = impact_loss + pin.losses[0]
+        friction_loss = friction_loss + pin.losses[1]
+        stored = stored + pin.stored
+    qdd, efforts = _accelerations(linkage, mass_matrix(placement), force, drives)
     driven = 0.0
     for drive, effort in zip(linkage.drives, efforts, strict=True):
         for i, weight in drive_weights(linkage, drive.body).items():
             driven = driven + effort * weight * state.qd[i]
     energy = [kinetic_energy(placement), potential_energy(placement), stored]
-    return Rates(qdd, efforts, [driven, lost, rubbed], pins, placement.point(linkage.tip).at, energy)
+    tip = placement.point(linkage.tip).position
+    return Rates(qdd, efforts, [driven, impact_loss, friction_loss], pins, tip, energy)
 
 
 # ---- bodies --------------------------------------------------------------------------------------------------------
@@ -191,25 +192,25 @@ def free_forces(placement: Placement) -> list[Scalar]:
             force[i] += partial.dot(push)
     for load in linkage.loads:
         push = Vec2(*map(float, load.force))
-        for i, partial in placement.point(load.at).partials.items():
+        for i, partial in placement.point(load.point).partials.items():
             force[i] += partial.dot(push)
     return force
 
 
 def mass_matrix(placement: Placement) -> dict[tuple[int, int], Scalar]:
-    """Return the entries of the mass matrix that are not 0 whatever the configuration, row not above column."""
+    """Return the entries on and below the diagonal of the mass matrix, but for those that are always 0."""
     entries: dict[tuple[int, int], Scalar] = {}
     for body in placement.linkage.bodies:
-        partials, turns = placement.centre(body).partials, placement.frames[body.name].turns
-        for i, one in partials.items():
+        partials, rotations = placement.centre(body).partials, placement.frames[body.name].angle_partials
+        for i, partial in partials.items():
             for j, other in partials.items():
                 if i >= j:
-                    entries[i, j] = entries.get((i, j), 0.0) + body.mass * one.dot(other)
-        for i, weight in turns.items():
-            for j, other_weight in turns.items():
+                    entries[i, j] = entries.get((i, j), 0.0) + body.mass * partial.dot(other)
+        for i, weight in rotations.items():
+            for j, other_weight in rotations.items():
                 if i >= j:
                     entries[i, j] = entries.get((i, j), 0.0) + body.inertia * weight * other_weight
-    return {place: entry for place, entry in entries.items() if not (isinstance(entry, float) and entry == 0)}
+    return {index: entry for index, entry in entries.items() if not (isinstance(entry, float) and entry == 0)}
 
 
 def kinetic_energy(placement: Placement) -> Scalar:
@@ -226,49 +227,45 @@ def potential_energy(placement: Placement) -> Scalar:
     linkage, energy = placement.linkage, 0.0
     gravity = Vec2(*map(float, linkage.gravity))
     for body in linkage.bodies:
-        energy = energy - body.mass * gravity.dot(placement.centre(body).at)
+        energy = energy - body.mass * gravity.dot(placement.centre(body).position)
     for load in linkage.loads:
-        energy = energy - Vec2(*map(float, load.force)).dot(placement.point(load.at).at)
+        energy = energy - Vec2(*map(float, load.force)).dot(placement.point(load.point).position)
     return energy
 
 
 def drive_weights(linkage: Linkage, body: str) -> dict[int, float]:
-    """Return how the effort of a drive acts on the coordinates: against the body that carries it, too."""
-    numbers = {coordinate: i for i, coordinate in enumerate(linkage.coordinates)}
-    joint = linkage.joint(body)
-    own = next(i for one, i in numbers.items() if one.body == body)
-    weights = {own: 1.0}
-    if isinstance(joint, Pin):
-        # What slides on a guide turns with the body that has it.
-        carrier = joint.on.body
-        while isinstance(guide := linkage.joint(carrier), Guide):
-            carrier = guide.on.body
-        turning = next((i for one, i in numbers.items() if one.body == carrier and one.kind == "angle"), None)
-        if turning is not None:
-            weights[turning] = -1.0
+    """Return the weights of a drive's effort on the coordinates, also on that of the body that carries it."""
+    coordinates = linkage.coordinates
+    weights = {next(i for i, coordinate in enumerate(coordinates) if coordinate.body == body): 1.0}
+    carrier_angle = Coordinate(linkage.rotation_carrier(body) or GROUND, "angle")
+    if carrier_angle in coordinates:
+        weights[coordinates.index(carrier_angle)] = -1.0
     return weights
 
 
-def _driven(
+def _accelerations(
     linkage: Linkage, M: Mapping[tuple[int, int], Scalar], force: list[Scalar], drives: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
-    """Return accelerations and efforts, of drives whose effort or whose motion is given."""
-    given: dict[int, Scalar] = {}
+    """Return the accelerations of the coordinates and the efforts of the drives."""
+    prescribed: dict[int, Scalar] = {}
     efforts: list[Scalar] = []
     for drive, number, value in zip(linkage.drives, linkage.driven, drives, strict=True):
         if drive.kind == "motion":
-            given[number] = value
+            prescribed[number] = value
         else:
             for i, weight in drive_weights(linkage, drive.body).items():
                 force[i] = force[i] + weight * value
         efforts.append(value)
-    free = [i for i in range(len(force)) if i not in given]
-    inner = {place: entry for place, entry in M.items() if not given.keys() & set(place)}
-    right = {i: force[i] - sum(_entry(M, i, j) * given[j] for j in given if (max(i, j), min(i, j)) in M) for i in free}
+    free = [i for i in range(len(force)) if i not in prescribed]
+    inner = {index: entry for index, entry in M.items() if not prescribed.keys() & set(index)}
+    right = {
+        i: force[i] - sum(_entry(M, i, j) * prescribed[j] for j in prescribed if (max(i, j), min(i, j)) in M)
+        for i in free
+    }
     solved = solve({i: n for n, i in enumerate(free)}, inner, right)
-    qdd = [given[i] if i in given else solved[i] for i in range(len(force))]
-    # What is carried comes after what carries it, which takes its drive's counter-effort.
-    moving = {i: k for k, i in enumerate(linkage.driven) if i in given}
+    qdd = [prescribed[i] if i in prescribed else solved[i] for i in range(len(force))]
+    # A carried body comes after its carrier, on which its drive's counter-effort acts.
+    moving = {i: k for k, i in enumerate(linkage.driven) if i in prescribed}
     for number in sorted(moving, reverse=True):
         row = [_entry(M, number, j) * qdd[j] for j in range(len(qdd)) if (max(number, j), min(number, j)) in M]
         efforts[moving[number]] = effort = sum(row) - force[number]
@@ -285,14 +282,14 @@ def _entry(M: Mapping[tuple[int, int], Scalar], i: int, j: int) -> Scalar:
 def solve(
     order: Mapping[int, int], M: Mapping[tuple[int, int], Scalar], right: Mapping[int, Scalar]
 ) -> dict[int, Scalar]:
-    """Solve a symmetric positive definite system by LDLᵀ, without touching what is 0.
+    """Solve a symmetric positive definite system by LDLᵀ, skipping the entries that are 0.
 
     Args:
         order: the unknowns, in the order in which they are eliminated.
         M: entries on and below the diagonal.
         right: the right side.
     """
-    names = sorted(order, key=lambda one: order[one])
+    names = sorted(order, key=order.__getitem__)
     work = dict(M)
     x = dict(right)
     factors: dict[tuple[int, int], Scalar] = {}
@@ -319,54 +316,54 @@ def solve(
 # ---- contacts ------------------------------------------------------------------------------------------------------
 
 
-def _pressed(
-    placement: Placement, rubbing: FrictionModel, pin: Play, contact: Contact, touch: ContactMemory
+def _pin_contact(
+    placement: Placement, friction: FrictionModel, pin: ClearancePin, contact: Contact, memory: ContactMemory
 ) -> PinContact:
-    """Return what is going on in a pin.
+    """Return the contact in a pin.
 
-    Both bodies are pushed at one point, on the wall of the bearing, so that no couple is left over.
+    The forces on both bodies act at one point, on the wall of the bearing, so that no net couple remains.
     """
     bearing, journal = placement.point(pin.bearing), placement.point(pin.journal)
     hole, shaft = placement.frames[pin.bearing.body], placement.frames[pin.journal.body]
-    gap = journal.at.minus(bearing.at)
+    gap = journal.position.minus(bearing.position)
     distance = sqrt(gap.dot(gap))
     outward = gap.times(1.0 / select(distance > _TINY, distance, _TINY))
-    along = outward.turned()
+    along = outward.perpendicular()
     velocity = journal.velocity.minus(bearing.velocity)
     depth, rate = distance - contact.clearance, velocity.dot(outward)
     wall = contact.clearance + pin.journal_radius
     inside = wall - distance
     centre_slip = velocity.dot(along)
     surface_slip = centre_slip + shaft.spin * inside - hole.spin * wall
-    slip = surface_slip if rubbing.velocity == "surface" else centre_slip
-    speed = select(touch.touching > 0.5, touch.speed, select(rate > SLOWEST_IMPACT, rate, SLOWEST_IMPACT))
+    slip = surface_slip if friction.velocity == "surface" else centre_slip
+    speed = select(memory.touching > 0.5, memory.speed, select(rate > SLOWEST_IMPACT, rate, SLOWEST_IMPACT))
     normal = normal_force(depth, rate, speed, contact.stiffness, contact.damping)
-    bending = 0.0
-    if rubbing.law == "lugre":
-        coefficient, bending = Bristles.step(touch.bend, slip, contact.friction)
-        # In flight nothing bends the bristles: they straighten.
-        bending = select(depth > 0.0, bending, touch.bend * (-1.0 / _STRAIGHTENING))
+    deflection_rate = 0.0
+    if friction.law == "lugre":
+        coefficient, deflection_rate = Bristles.step(memory.deflection, slip, contact.friction)
+        # In free flight no force acts on the bristles: they straighten.
+        deflection_rate = select(depth > 0.0, deflection_rate, memory.deflection * (-1.0 / _STRAIGHTENING))
     else:
-        coefficient = contact.friction * _SLIP[rubbing.law](slip, contact.threshold)
-    rub = coefficient * normal
-    push = outward.times(normal).plus(along.times(rub))
-    pushes: dict[int, Scalar] = {}
+        coefficient = contact.friction * _SLIP[friction.law](slip, contact.threshold)
+    tangential = coefficient * normal
+    push = outward.times(normal).plus(along.times(tangential))
+    forces: dict[int, Scalar] = {}
     for i, partial in hole.shifted(bearing, outward.times(wall)).partials.items():
-        pushes[i] = partial.dot(push)
+        forces[i] = partial.dot(push)
     for i, partial in shaft.shifted(journal, outward.times(inside)).partials.items():
-        pushes[i] = pushes.get(i, 0.0) - partial.dot(push)
+        forces[i] = forces.get(i, 0.0) - partial.dot(push)
     touching = depth > 0.0
-    pressed = select(touching, depth, 0.0)
-    spring = elastic_force(pressed, contact.stiffness)
+    indentation = select(touching, depth, 0.0)
+    spring = elastic_force(indentation, contact.stiffness)
     return PinContact(
         gap=gap,
         depth=depth,
         rate=rate,
         normal=normal,
         sliding=surface_slip,
-        touch=ContactMemory(select(touching, 1.0, 0.0), speed),
-        bending=bending,
-        pushes=pushes,
-        losses=((normal - spring) * rate, rub * surface_slip),
-        stored=0.4 * spring * pressed,
+        memory=ContactMemory(select(touching, 1.0, 0.0), speed),
+        deflection_rate=deflection_rate,
+        forces=forces,
+        losses=((normal - spring) * rate, tangential * surface_slip),
+        stored=0.4 * spring * indentation,
     )

@@ -1,17 +1,17 @@
-"""The part of a compiled simulation that finds where in a step a journal comes down on its wall.
+"""The part of a compiled simulation that locates impacts of journals within a step.
 
-The law of an impact divides by the speed with which the journal came. Without this part a simulation learns that speed
-at the end of the step in which the journal came, when the wall has already taken some of it. With it such a step is
-made again, in two parts: the first ends where the depth is 0, and there the speed is taken. That point comes of the
-cubic through depth and rate at both ends of the step, and of a correction by Newton. Two pins that come down in
-one step are found one after the other.
+The law of an impact divides by the speed with which the journal came. Without this part a simulation takes that speed
+at the end of the step of the impact, when the wall has already reduced it. With it such a step is repeated in two
+parts: the first ends where the depth is 0, and the speed there is the impact speed. That time follows from the cubic
+through depth and rate at both ends of the step, and from one correction by Newton's method. Impacts of two pins in one
+step are located one after the other.
 
-All lanes make the parts together, and those in which nothing came down are put back: they keep their bits.
+All lanes make the parts together; those without an impact are reset, so that their bits do not change.
 
 The functions are emitted for a linkage, see ``lane_layout``. What they share: ``x``, ``y``, ``state`` and ``change``
 are those of the loop; ``table`` holds the drives and ``h`` is the length of the step; ``done`` (LANES,) is the fraction
-of the step that each lane has made for good, ``part`` (LANES,) the fraction it makes next, and ``hit`` (LANES,) the pin
-that came down in it, or -1.
+of the step that each lane has completed, ``part`` (LANES,) the fraction it makes next, and ``hit`` (LANES,) the pin
+with an impact in it, or -1.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from armwright.clearance.lane_layout import (
 )
 
 
-def come_down(
+def resolve_impacts(
     x: Array,
     y: Array,
     state: Array,
@@ -53,7 +53,7 @@ def come_down(
     row: npt.NDArray[np.int64],
     runs: int,
 ) -> None:
-    """Make the step before ``step`` again for the lanes in which pins came down, and count those of the first runs."""
+    """Repeat the step before ``step`` for the lanes with impacts, and count the impacts of the first runs."""
     steps, h = table.shape[0], lengths[step - 1]
     ending = np.zeros(LANES)
     done[:] = 0.0
@@ -138,24 +138,24 @@ def crossing_fraction(d0: float, r0: float, d1: float, r1: float) -> float:
 def find_impacts(
     x: Array, y: Array, depths: Array, done: Array, part: Array, hit: npt.NDArray[np.int64], h: float
 ) -> int:
-    """Find of each lane the first pin that came down since ``done``, and at which part; return how many lanes have one.
+    """Find the first impact of each lane since ``done``, and its fraction of the step; return how many lanes have one.
 
     ``depths`` (2 · PINS · LANES,) are the depths, and their rates, that the pins had then.
     """
-    found = 0
+    count = 0
     for k in range(LANES):
         hit[k], part[k] = -1, 0.0
         for i in range(PINS):
             if y[(STATES + 3 * i) * LANES + k] > x[(FIRST_MEMORY + 2 * i) * LANES + k]:
-                rest = (1.0 - done[k]) * h
+                remaining = (1.0 - done[k]) * h
                 j = (FIRST_DEPTH + 2 * i) * LANES + k
                 d0, r0 = depths[2 * i * LANES + k], depths[(2 * i + 1) * LANES + k]
-                fraction = (1.0 - done[k]) * crossing_fraction(d0, r0 * rest, y[j], y[j + LANES] * rest)
+                fraction = (1.0 - done[k]) * crossing_fraction(d0, r0 * remaining, y[j], y[j + LANES] * remaining)
                 if hit[k] < 0 or fraction < part[k]:
                     hit[k], part[k] = i, fraction
         if hit[k] >= 0:
-            found += 1
-    return found
+            count += 1
+    return count
 
 
 def locate_impacts(
@@ -173,7 +173,7 @@ def locate_impacts(
     step: int,
     h: float,
 ) -> None:
-    """Make a step again from the state ``before``, up to the impacts that were found and from there to its end."""
+    """Repeat a step from the state ``before``, up to the impacts and from there to its end."""
     after[:] = state
     moment = np.zeros(LANES)
     for correction in range(2):
@@ -203,7 +203,7 @@ def locate_impacts(
 
 
 def correct(y: Array, done: Array, part: Array, hit: npt.NDArray[np.int64], h: float) -> None:
-    """Correct the parts by one step of Newton on the depth that was reached."""
+    """Correct the parts by one Newton step on the depth at their ends."""
     for k in range(LANES):
         if hit[k] >= 0:
             j = (FIRST_DEPTH + 2 * hit[k]) * LANES + k

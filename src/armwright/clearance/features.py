@@ -1,4 +1,4 @@
-"""What an error curve says in a few numbers: slope and intercept of its straight part, its mean, its largest wave.
+"""Features of an error curve: slope and intercept of its straight part, its mean, its largest harmonic.
 
 Source:
     Thesis, 4.5.1; spec of the clearance, 1.2.
@@ -14,7 +14,7 @@ from armwright.arrays import Array
 from armwright.clearance.simulation import Simulation
 from armwright.errors import InvalidValueError
 
-# Where the thesis fits its straight line: on paths along y, while the speed is constant [s].
+# The window of the thesis' straight line: on paths along y, while the speed is constant [s].
 WINDOW = (0.07, 0.12)
 
 
@@ -39,7 +39,7 @@ class Features(NamedTuple):
     offset_y: Array
 
 
-# In what each feature is told.
+# The unit of each feature.
 UNITS = {"slope": "m/s", "intercept": "m", "amp_dc": "m", "amp_ac": "m", "offset_x": "m", "offset_y": "m"}
 
 
@@ -53,8 +53,8 @@ def features_of(time: Array, error: Array, window: tuple[float, float] = WINDOW)
 
     Args:
         time: (s,) equally spaced [s].
-        error: (..., s, 2) by how much the tip is off [m].
-        window: from when to when the curve is taken for straight [s].
+        error: (..., s, 2) error of the tip [m].
+        window: start and end of the straight part of the curve [s].
 
     Raises:
         InvalidValueError: fewer than two samples lie in the window.
@@ -79,8 +79,8 @@ def features_of(time: Array, error: Array, window: tuple[float, float] = WINDOW)
 def spectrum(curve: Array) -> Array:
     """Return the one-sided amplitudes 2 |X| / N of curves (..., s), the constant part first and counted twice.
 
-    The fastest wave that an even number of samples tells, up and down from one to the next, has no twin either: it is
-    counted once.
+    The wave at the Nyquist frequency, which an even number of samples resolves, is counted once like the constant
+    part of a two-sided spectrum.
     """
     amplitudes = np.asarray(2.0 * np.abs(np.fft.rfft(curve, axis=-1)) / curve.shape[-1], dtype=np.float64)
     if curve.shape[-1] % 2 == 0:

@@ -131,7 +131,7 @@ def arm_angles(reach: Vec2, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngl
     square = reach.dot(reach)
     along = 0.5 * ((crank * crank - rod * rod) / square + 1.0)
     across = -sign * sqrt(crank * crank / square - along * along)
-    elbow = reach.times(along).plus(reach.turned().times(across))
+    elbow = reach.times(along).plus(reach.perpendicular().times(across))
     rest = reach.minus(elbow)
     return ArmAngles(atan2(elbow.x, -elbow.y), atan2(rest.x, -rest.y))
 
@@ -148,7 +148,7 @@ def joined_at(elbows: tuple[Vec2, Vec2], rods: tuple[Scalar, Scalar], sign: Scal
     square = base.dot(base)
     along = 0.5 * ((rods[0] * rods[0] - rods[1] * rods[1]) / square + 1.0)
     across = sign * sqrt(rods[0] * rods[0] / square - along * along)
-    return elbows[0].plus(base.times(along)).plus(base.turned().times(across))
+    return elbows[0].plus(base.times(along)).plus(base.perpendicular().times(across))
 
 
 def arm_rates(angles: ArmAngles, crank: Scalar, rod: Scalar, target: Vec2) -> ArmAngles:

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
-from armwright.clearance.linkage import GROUND, Guide, Linkage, Place
+from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage
 from armwright.errors import InvalidValueError, ShapeError
 
 
@@ -119,9 +119,9 @@ def _turned(point: Array, angle: Array) -> Array:
     return np.stack([c * point[0] - s * point[1], s * point[0] + c * point[1]], axis=-1)
 
 
-def _loop(linkage: Linkage) -> list[Place]:
+def _loop(linkage: Linkage) -> list[BodyPoint]:
     """Return the ten places where pins sit, in the order in which one comes to them from the ground to the ground."""
-    pins = [(Place(joint.body, joint.point), joint.on) for joint in linkage.joints if not isinstance(joint, Guide)]
+    pins = [(BodyPoint(joint.body, joint.point), joint.on) for joint in linkage.joints if not isinstance(joint, Guide)]
     pins += [(pin.bearing, pin.journal) for pin in linkage.pins]
     if len(pins) != 5:
         raise _no_five_bar(linkage, f"it has {len(pins)} pins, not 5")
@@ -129,7 +129,7 @@ def _loop(linkage: Linkage) -> list[Place]:
         held = sum(place.body == body for ends in pins for place in ends)
         if held != 2:
             raise _no_five_bar(linkage, f"{_called(body)} has {held} pins, not 2")
-    way: list[Place] = []
+    way: list[BodyPoint] = []
     here, left = GROUND, list(pins)
     while left:
         ends = next((ends for ends in left if here in (ends[0].body, ends[1].body)), None)

@@ -1,7 +1,7 @@
-"""The linkage without play: where its bodies go when a path is followed, what its drives give, what its pins carry.
+"""The linkage without clearance: its motion on a path, the efforts of its drives, and the reactions in its pins.
 
-All pins are closed. Positions come of Newton's iteration on the closure of the loops, speeds and accelerations of its
-derivatives, drives and reactions of the balance of every body; all for many moments at once.
+All pins are closed. Positions follow from Newton's iteration on the closure of the loops, speeds and accelerations from
+its derivatives, efforts and reactions from the balance of every body; all for many samples at once.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.equations import drive_weights, free_forces, mass_matrix
-from armwright.clearance.linkage import Linkage, Place
+from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.placement import Placement, Point
 from armwright.errors import InvalidValueError, ShapeError, counted
 from armwright.tracing.scalar import Scalar
@@ -22,15 +22,15 @@ from armwright.tracing.scalar import Scalar
 # Newton's iteration ends when no coordinate moves by more [rad, m].
 _CLOSED = 1e-13
 _MOST_ITERATIONS = 50
-# A step of a coordinate is cut to this, so that another assembly is not jumped to [rad, m].
+# A Newton step is limited to this, so that it does not jump to another assembly [rad, m].
 _LONGEST_STEP = 0.3
-# So many moments are worked on together: what they need stays near the processor.
-_TOGETHER = 8192
+# Samples per block: the arrays of a block fit the cache of the processor.
+_BLOCK = 8192
 
 
 @attrs.frozen(eq=False)
 class IdealMotion:
-    """A motion without play.
+    """A motion without clearance.
 
     Attributes:
         q: (..., n) coordinates [rad, m].
@@ -60,53 +60,53 @@ def closed(
     Args:
         linkage: with n coordinates and d drives.
         guess: (..., n) coordinates to start from.
-        tip: (..., 2) where its tip is to be [m]; or else
+        tip: (..., 2) position of its tip [m]; or else
         drives: (..., d) the driven coordinates [rad, m].
-        gaps: (..., p, 2) from bearing to journal [m], for pins that are to be open.
+        gaps: (..., p, 2) from bearing to journal [m], for open pins.
 
     Returns:
         (..., n) coordinates.
 
     Raises:
-        InvalidValueError: that place cannot be reached, or only through a singular configuration.
+        InvalidValueError: the position cannot be reached, or only through a singular configuration.
     """
     goal = _goal(linkage, tip=tip, drives=drives)
-    given = floats(guess, "guess")
-    lead = np.broadcast_shapes(given.shape[:-1], goal.shape[:-1], np.shape(gaps)[:-2])
+    start = floats(guess, "guess")
+    lead = np.broadcast_shapes(start.shape[:-1], goal.shape[:-1], np.shape(gaps)[:-2])
     n, p = len(linkage.coordinates), len(linkage.pins)
-    q = np.array(np.broadcast_to(given, (*lead, n))).reshape(-1, n)
+    q = np.array(np.broadcast_to(start, (*lead, n))).reshape(-1, n)
     goals = np.broadcast_to(goal, (*lead, goal.shape[-1])).reshape(len(q), goal.shape[-1])
     apart = np.broadcast_to(gaps, (*lead, p, 2)).reshape(len(q), 2 * p)
-    for some in _pieces(len(q)):
-        worst = _close(linkage, q[some], goals[some], apart[some], by_tip=tip is not None)
+    for block in _blocks(len(q)):
+        worst = _close(linkage, q[block], goals[block], apart[block], by_tip=tip is not None)
         if worst is not None:
             what = "the path" if tip is not None else "the drives"
             raise InvalidValueError(
-                f"{linkage.name}: {what} cannot be followed: at moment {some.start + worst} the loops do not close "
+                f"{linkage.name}: {what} cannot be followed: at sample {block.start + worst} the loops do not close "
                 f"(out of reach, or at a singular configuration)"
             )
     return q.reshape(*lead, n)
 
 
 def _close(linkage: Linkage, q: Array, goal: Array, apart: Array, *, by_tip: bool) -> int | None:
-    """Close the loops of some configurations (s, n) where they stand; return which is farthest from it, if one is."""
+    """Close the loops of configurations (s, n) in place; return the index of the worst, if any stays open."""
     done = np.zeros((len(q), 1), dtype=bool)
     for _ in range(_MOST_ITERATIONS):
         placement = _placed(linkage, q)
-        misses = _misses(placement, goal, by_tip=by_tip)
-        misses[..., : apart.shape[-1]] -= apart
+        residuals = _residuals(placement, goal, by_tip=by_tip)
+        residuals[..., : apart.shape[-1]] -= apart
         with np.errstate(invalid="ignore"):
-            step = _solved(_closure(placement, by_tip), -misses)
+            step = _solved(_closure(placement, by_tip), -residuals)
         size = np.abs(step).max(axis=-1, keepdims=True, initial=0.0)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(size, 1e-300))
         q += np.where(done, 0.0, step)
         if not np.all(np.isfinite(q)):
             break
-        # One that is closed stays as it is, however long others take: its bits are its own.
+        # A closed configuration stays unchanged while others are iterated: its bits depend on it alone.
         done |= size < _CLOSED
         if np.all(done):
             return None
-    return int(np.nan_to_num(np.abs(misses).max(axis=-1), nan=np.inf).argmax())
+    return int(np.nan_to_num(np.abs(residuals).max(axis=-1), nan=np.inf).argmax())
 
 
 def ideal_motion(
@@ -119,7 +119,7 @@ def ideal_motion(
         q: (..., n) closed coordinates.
         velocity: (..., 2) of the tip [m/s], or (..., d) of the driven coordinates.
         acceleration: likewise.
-        by_tip: which of both.
+        by_tip: whether both are those of the tip.
 
     Raises:
         InvalidValueError: a configuration is singular, or the freedoms are not as many as the drives.
@@ -128,12 +128,14 @@ def ideal_motion(
     lead = q.shape[:-1]
     motions = [np.broadcast_to(floats(x, "motion"), (*lead, np.shape(x)[-1])) for x in (velocity, acceleration)]
     flat = [x.reshape(math.prod(lead), x.shape[-1]) for x in (q, *motions)]
-    found = [_moving(linkage, *(x[some] for x in flat), by_tip=by_tip) for some in _pieces(len(flat[0]))]
-    joined = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    blocks = [_block_motion(linkage, *(x[rows] for x in flat), by_tip=by_tip) for rows in _blocks(len(flat[0]))]
+    joined = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     return IdealMotion(*(x.reshape(*lead, *x.shape[1:]) for x in joined))
 
 
-def _moving(linkage: Linkage, q: Array, speeds: Array, pulls: Array, *, by_tip: bool) -> tuple[Array, ...]:
+def _block_motion(
+    linkage: Linkage, q: Array, speeds: Array, accelerations: Array, *, by_tip: bool
+) -> tuple[Array, ...]:
     """Return the parts of ``IdealMotion`` for configurations (s, n)."""
     lead = q.shape[:-1]
     still = [np.zeros((*lead, 2 * len(linkage.pins)))]
@@ -143,19 +145,18 @@ def _moving(linkage: Linkage, q: Array, speeds: Array, pulls: Array, *, by_tip: 
     bias = [_gap(moving, i).bias for i in range(len(linkage.pins))] + (
         [moving.point(linkage.tip).bias] if by_tip else []
     )
-    against = _stacked(lead, [x for pair in bias for x in pair])
-    against = against if by_tip else np.concatenate([against, np.zeros((*lead, len(linkage.drives)))], axis=-1)
-    qdd = _solved(A, np.concatenate([*still, pulls], axis=-1) - against)
+    biases = [x for pair in bias for x in pair] + [0.0] * (0 if by_tip else len(linkage.drives))
+    qdd = _solved(A, np.concatenate([*still, accelerations], axis=-1) - _stacked(lead, biases))
     efforts, reactions = balance(linkage, q, qd, qdd)
     return q, qd, qdd, efforts, reactions
 
 
 def balance(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, Array]:
-    """Return the drives and reactions with which a linkage moves as it does.
+    """Return the efforts and reactions that belong to a motion.
 
     Args:
         linkage: with n coordinates, d drives and p pins.
-        q: (..., n) coordinates; the journals may lie beside the middles of their bearings.
+        q: (..., n) coordinates; the journals may be eccentric in their bearings.
         qd: (..., n) speeds.
         qdd: (..., n) accelerations.
 
@@ -185,30 +186,29 @@ def balance(linkage: Linkage, q: Array, qd: Array, qdd: Array) -> tuple[Array, A
         for i, partial in _gap(moving, k).partials.items():
             A[..., i, d + 2 * k] = -partial.x
             A[..., i, d + 2 * k + 1] = -partial.y
-    found = _solved(A, need)
-    return found[..., :d], found[..., d:].reshape(*lead, p, 2)
+    solution = _solved(A, need)
+    return solution[..., :d], solution[..., d:].reshape(*lead, p, 2)
 
 
 def tip_of(linkage: Linkage, q: Array) -> Array:
-    """Return (..., 2) where the tip is [m] at coordinates (..., n)."""
-    return _stacked(q.shape[:-1], list(_placed(linkage, q).point(linkage.tip).at))
+    """Return (..., 2) the position of the tip [m] at coordinates (..., n)."""
+    return point_of(linkage, linkage.tip, q)
 
 
-def point_of(linkage: Linkage, place: Place, q: Array) -> Array:
-    """Return (..., 2) where a place of a body is [m] at coordinates (..., n)."""
-    return _stacked(q.shape[:-1], list(_placed(linkage, q).point(place).at))
+def point_of(linkage: Linkage, point: BodyPoint, q: Array) -> Array:
+    """Return (..., 2) the position of a point of a body [m] at coordinates (..., n)."""
+    return _stacked(q.shape[:-1], _placed(linkage, q).point(point).position)
 
 
 def gaps_of(linkage: Linkage, q: Array) -> Array:
-    """Return (..., p, 2) from the middle of each bearing to that of its journal [m] at coordinates (..., n)."""
-    placed = _placed(linkage, q)
-    p = len(linkage.pins)
-    gaps = [x for i in range(p) for x in _gap(placed, i).at]
+    """Return (..., p, 2) from the centre of each bearing to that of its journal [m] at coordinates (..., n)."""
+    placement, p = _placed(linkage, q), len(linkage.pins)
+    gaps = [x for i in range(p) for x in _gap(placement, i).position]
     return _stacked(q.shape[:-1], gaps).reshape(*q.shape[:-1], p, 2)
 
 
 def sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
-    """Return how the tip shifts with the gaps of the pins while the drives are held.
+    """Return the derivative of the tip position with respect to the gaps of the pins, with locked drives.
 
     Args:
         linkage: with p pins.
@@ -235,16 +235,15 @@ def sensitivity(linkage: Linkage, q: ArrayLike) -> Array:
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def _pieces(count: int) -> list[slice]:
-    """Part so many moments, at least one piece, into those that are worked on together."""
-    return [slice(start, min(start + _TOGETHER, count)) for start in range(0, max(count, 1), _TOGETHER)]
+def _blocks(count: int) -> list[slice]:
+    """Split samples into blocks, at least one."""
+    return [slice(start, min(start + _BLOCK, count)) for start in range(0, max(count, 1), _BLOCK)]
 
 
 def _placed(linkage: Linkage, q: Array, qd: Array | None = None) -> Placement:
-    """Place the bodies for many configurations at once, at rest where no speeds are given."""
-    n = q.shape[-1]
-    speeds = [0.0] * n if qd is None else [qd[..., i] for i in range(n)]
-    return Placement(linkage, [q[..., i] for i in range(n)], speeds)
+    """Return the bodies in many configurations at once, at rest without speeds."""
+    speeds = [0.0] * q.shape[-1] if qd is None else list(np.moveaxis(qd, -1, 0))
+    return Placement(linkage, list(np.moveaxis(q, -1, 0)), speeds)
 
 
 def _gap(placement: Placement, number: int) -> Point:
@@ -255,7 +254,7 @@ def _gap(placement: Placement, number: int) -> Point:
     for i, partial in bearing.partials.items():
         partials[i] = partials[i].minus(partial) if i in partials else partial.times(-1.0)
     return Point(
-        journal.at.minus(bearing.at),
+        journal.position.minus(bearing.position),
         partials,
         journal.velocity.minus(bearing.velocity),
         journal.bias.minus(bearing.bias),
@@ -263,9 +262,9 @@ def _gap(placement: Placement, number: int) -> Point:
 
 
 def _goal(linkage: Linkage, *, tip: ArrayLike | None, drives: ArrayLike | None) -> Array:
-    """Return (..., 2) where the tip is to be, or (..., d) what the driven coordinates are to be."""
+    """Return the goal: (..., 2) position of the tip, or (..., d) driven coordinates."""
     if (tip is None) == (drives is None):
-        raise ShapeError("expected either where the tip is to be, or the driven coordinates")
+        raise ShapeError("expected either the position of the tip, or the driven coordinates")
     goal = floats(tip if tip is not None else drives, "tip" if tip is not None else "drives")  # type: ignore[arg-type]
     size = 2 if tip is not None else len(linkage.drives)
     if goal.ndim == 0 or goal.shape[-1] != size:
@@ -273,13 +272,13 @@ def _goal(linkage: Linkage, *, tip: ArrayLike | None, drives: ArrayLike | None) 
     return goal
 
 
-def _misses(placement: Placement, goal: Array, *, by_tip: bool) -> Array:
-    """Return by how much the loops are open and the goal is missed."""
+def _residuals(placement: Placement, goal: Array, *, by_tip: bool) -> Array:
+    """Return the residuals of the closure: gaps of the loops, and distance from the goal."""
     linkage = placement.linkage
-    reached = placement.point(linkage.tip).at if by_tip else [placement.q[i] for i in linkage.driven]
-    misses = [x for i in range(len(linkage.pins)) for x in _gap(placement, i).at]
-    misses += [x - goal[..., i] for i, x in enumerate(reached)]
-    return _stacked(np.shape(placement.q[0]), misses)
+    reached = placement.point(linkage.tip).position if by_tip else [placement.q[i] for i in linkage.driven]
+    residuals = [x for i in range(len(linkage.pins)) for x in _gap(placement, i).position]
+    residuals += [x - goal[..., i] for i, x in enumerate(reached)]
+    return _stacked(np.shape(placement.q[0]), residuals)
 
 
 def _closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of two kinds of equations
@@ -290,14 +289,11 @@ def _closure(placement: Placement, by_tip: bool) -> Array:  # noqa: FBT001 - of 
     if by_tip:
         rows.append(_jacobian(lead, [placement.point(linkage.tip)], n))
     else:
-        picked = np.zeros((*lead, len(linkage.drives), n))
-        for k, i in enumerate(linkage.driven):
-            picked[..., k, i] = 1.0
-        rows.append(picked)
+        rows.append(np.broadcast_to(np.eye(n)[list(linkage.driven)], (*lead, len(linkage.drives), n)))
     A = np.concatenate(rows, axis=-2)
     if A.shape[-2] != n:
         freedoms = n - 2 * len(linkage.pins)
-        what = "a place of the tip tells 2" if by_tip else f"its drives tell {len(linkage.drives)}"
+        what = "a position of the tip fixes 2" if by_tip else f"its drives fix {len(linkage.drives)}"
         raise InvalidValueError(
             f"{linkage.name}: with its pins closed it has {counted(freedoms, 'freedom')}, and {what}; expected as many"
         )
@@ -313,6 +309,7 @@ def _jacobian(lead: tuple[int, ...], points: Sequence[Point], n: int) -> Array:
 
 
 def _stacked(lead: tuple[int, ...], numbers: Sequence[Scalar]) -> Array:
+    """Return numbers and arrays, broadcast to the leading axes, along a last axis."""
     stacked = np.zeros((*lead, len(numbers)))
     for i, x in enumerate(numbers):
         stacked[..., i] = x

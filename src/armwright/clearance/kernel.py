@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from itertools import islice
 from typing import Literal, TypeAlias
 
 import attrs
@@ -43,7 +44,7 @@ _EVENTS = (
     event_location.find_impacts,
     event_location.correct,
     event_location.locate_impacts,
-    event_location.come_down,
+    event_location.resolve_impacts,
 )
 _PARTS = (
     simulation_loop.begin_lanes,
@@ -57,17 +58,17 @@ _PARTS = (
 
 @attrs.frozen(kw_only=True)
 class Layout:
-    """How the numbers of a simulation are laid out.
+    """The layout of the numbers of a simulation.
 
     Attributes:
-        linkage: what moves.
-        rubbing: how friction is worked out.
-        control: what the drives do.
-        located: whether it is found where in a step a journal comes to its wall; see ``event_location``.
+        linkage: that moves.
+        friction: the friction model.
+        control: of the drives.
+        located: whether impacts are located within a step; see ``event_location``.
     """
 
     linkage: Linkage
-    rubbing: FrictionModel
+    friction: FrictionModel
     control: Control
     located: bool = False
 
@@ -78,52 +79,54 @@ class Layout:
 
     @property
     def pins(self) -> int:
-        """The number of pins with play."""
+        """The number of pins with clearance."""
         return len(self.linkage.pins)
 
     @property
-    def bends(self) -> int:
-        """The number of bends of bristles that are part of the state."""
-        return self.pins if self.rubbing.law == "lugre" else 0
+    def deflections(self) -> int:
+        """The number of bristle deflections that are part of the state."""
+        return self.pins if self.friction.law == "lugre" else 0
 
     @property
     def states(self) -> int:
-        """Coordinates, speeds, bends of bristles, works."""
-        return 2 * self.n + self.bends + len(WORKS)
+        """The number of coordinates, speeds, bristle deflections and works."""
+        return 2 * self.n + self.deflections + len(WORKS)
 
     @property
     def columns(self) -> int:
-        """Numbers of a table for one moment: of each drive an effort or acceleration; for a controller also a goal."""
+        """The length of a table row: an effort or acceleration per drive, for a controller also goal and speed."""
         return len(self.linkage.drives) * (3 if self.control == "pd+ff" else 1)
 
     @property
     def gains(self) -> int:
-        """Numbers of the controller: of each drive one for the place and one for the speed."""
+        """The number of controller gains: stiffness and damping of each drive."""
         return 2 * len(self.linkage.drives) if self.control == "pd+ff" else 0
 
     @property
     def sampled(self) -> int:
-        """Numbers of a sample: the state, and of each pin the force."""
+        """The length of a sample: the state, and the force of each pin."""
         return self.states + self.pins
 
     def unpack(self, x: Sequence[Scalar]) -> tuple[State, list[Scalar], list[Contact]]:
         """Return state, drives and contacts of a row of numbers."""
-        n, rest = self.n, iter(x)
-        q, qd = ([next(rest) for _ in range(n)] for _ in range(2))
-        bends = [next(rest) for _ in range(self.bends)] or [0.0] * self.pins
-        for _ in WORKS:
-            next(rest)
-        kept = [(next(rest), next(rest)) for _ in range(self.pins)]
-        contacts = [Contact(*(next(rest) for _ in Contact._fields)) for _ in range(self.pins)]
-        gains = [next(rest) for _ in range(self.gains)]
-        columns = [next(rest) for _ in range(self.columns)]
-        touches = [ContactMemory(touching, speed, bend) for (touching, speed), bend in zip(kept, bends, strict=True)]
-        return State(q, qd, touches), self._drives(q, qd, gains, columns), contacts
+        numbers = iter(x)
+
+        def take(count: int) -> list[Scalar]:
+            return list(islice(numbers, count))
+
+        q, qd = take(self.n), take(self.n)
+        deflections = take(self.deflections) or [0.0] * self.pins
+        take(len(WORKS))
+        impacts = [(take(1)[0], take(1)[0]) for _ in range(self.pins)]
+        contacts = [Contact(*take(len(Contact._fields))) for _ in range(self.pins)]
+        gains, columns = take(self.gains), take(self.columns)
+        memories = [ContactMemory(*pair, bend) for pair, bend in zip(impacts, deflections, strict=True)]
+        return State(q, qd, memories), self._drives(q, qd, gains, columns), contacts
 
     def _drives(
         self, q: Sequence[Scalar], qd: Sequence[Scalar], gains: Sequence[Scalar], columns: Sequence[Scalar]
     ) -> list[Scalar]:
-        """Return what the drives do: as in the table, or what brings them to the goal too."""
+        """Return the efforts or accelerations of the drives: those of the table, plus the feedback of a controller."""
         if self.control == "effort":
             return list(columns)
         drives = []
@@ -133,13 +136,14 @@ class Layout:
         return drives
 
     def rates(self, x: Sequence[Scalar]) -> list[Scalar]:
-        """Return the rates of the state, of each pin what is kept and its force; depths and their rates if located."""
+        """Return the rates of the state, memory and force of each pin, and, where located, depths and their rates."""
         state, drives, contacts = self.unpack(x)
-        found = rates(self.linkage, self.rubbing, state, drives, contacts)
-        bending = [pin.bending for pin in found.pins][: self.bends]
-        kept = [[pin.touch.touching, pin.touch.speed, pin.normal] for pin in found.pins]
-        depths = [one for pin in found.pins for one in (pin.depth, pin.rate)] if self.located else []
-        return [*state.qd, *found.qdd, *bending, *found.powers, *(one for pin in kept for one in pin), *depths]
+        linkage_rates = rates(self.linkage, self.friction, state, drives, contacts)
+        pins = linkage_rates.pins
+        bristles = [pin.deflection_rate for pin in pins][: self.deflections]
+        impacts = [x for pin in pins for x in (pin.memory.touching, pin.memory.speed, pin.normal)]
+        depths = [x for pin in pins for x in (pin.depth, pin.rate)] if self.located else []
+        return [*state.qd, *linkage_rates.qdd, *bristles, *linkage_rates.powers, *impacts, *depths]
 
 
 def emit_simulation(layout: Layout, integrator: Integrator) -> str:

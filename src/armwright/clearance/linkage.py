@@ -1,4 +1,4 @@
-"""What a planar linkage is: bodies, ideal joints that hang them in trees, pins with play that close the loops.
+"""Planar linkages: bodies, ideal joints that connect them to trees, pins with clearance that close the loops.
 
 Lengths are in metres, angles in radians, counter-clockwise positive. The axis of a body at angle θ points along
 (cos(θ + zero), sin(θ + zero)); with ``zero`` = -π/2 angles are measured from the downward vertical. The axis of the
@@ -8,7 +8,7 @@ ground points along x.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal, NamedTuple, TypeAlias
 
 import attrs
@@ -22,6 +22,7 @@ GROUND = "ground"
 GRAVITY = (0.0, -9.81)
 
 DriveKind: TypeAlias = Literal["effort", "motion"]
+CoordinateKind: TypeAlias = Literal["angle", "slide", "x", "y"]
 
 
 def _pair(value: ArrayLike) -> Array:
@@ -42,20 +43,20 @@ def not_negative(value: float, what: str, *, zero: bool = True) -> float:
     Raises:
         InvalidValueError: it is not.
     """
-    found = number(value, what)
-    if not 0 <= found <= LARGEST or (found == 0 and not zero):
-        raise InvalidValueError(f"{what}: expected a number {'not below' if zero else 'above'} 0, got {found:g}")
-    return found
+    checked = number(value, what)
+    if not 0 <= checked <= LARGEST or (checked == 0 and not zero):
+        raise InvalidValueError(f"{what}: expected a number {'not below' if zero else 'above'} 0, got {checked:g}")
+    return checked
 
 
-class Place(NamedTuple):
+class BodyPoint(NamedTuple):
     """A point of a body, written ``body:point``."""
 
     body: str
     point: str
 
     def __str__(self) -> str:
-        """Return the place as a file writes it."""
+        """Return the point as a file writes it."""
         return f"{self.body}:{self.point}"
 
 
@@ -68,7 +69,7 @@ class Body:
         mass: [kg].
         inertia: about its centre of mass [kg m²].
         centre: (2,) centre of mass, along the axis of the body and across it [m].
-        points: (2,) places on it by name, in the same axes [m].
+        points: (2,) points of it by name, in the same axes [m].
     """
 
     name: str
@@ -85,53 +86,53 @@ class Body:
 
 @attrs.frozen(kw_only=True)
 class Pin:
-    """An ideal pin: a point of a body stays at a place of another.
+    """An ideal pin: a point of a body stays on a point of another.
 
     Attributes:
         body: the body it hangs.
         point: the point of that body.
-        on: where it hangs.
+        on: the point of the other body.
     """
 
     body: str
     point: str
-    on: Place
+    on: BodyPoint
 
 
 @attrs.frozen(kw_only=True)
 class Guide:
-    """An ideal guide: a body slides along a line of another, without turning on it.
+    """An ideal guide: a body slides along a line of another, without rotating on it.
 
     Attributes:
         body: the body that slides.
         point: the point of it that stays on the line.
-        on: a place on the line.
+        on: a point of the other body, on the line.
         direction: of the line, from the axis of the body that has it [rad].
         angle: of the body's axis, from the same axis [rad].
     """
 
     body: str
     point: str
-    on: Place
+    on: BodyPoint
     direction: float = 0.0
     angle: float = 0.0
 
 
 @attrs.frozen(kw_only=True)
-class Play:
-    """A pin whose journal is smaller than its bearing.
+class ClearancePin:
+    """A pin with clearance: its journal is smaller than its bearing.
 
     Attributes:
         name: of the pin.
         bearing: the middle of the hole.
-        journal: the middle of what turns in it.
+        journal: the middle of the shaft in it.
         clearance: radius of the bearing minus that of the journal [m].
         journal_radius: [m].
     """
 
     name: str
-    bearing: Place
-    journal: Place
+    bearing: BodyPoint
+    journal: BodyPoint
     clearance: float
     journal_radius: float
 
@@ -146,7 +147,7 @@ class Drive:
     """A motor at the ideal joint of a body.
 
     Attributes:
-        body: what it turns or pushes against the body that carries it.
+        body: the body that it moves against the body that carries it.
         kind: ``effort`` when a torque or force is given, ``motion`` when the motion is.
     """
 
@@ -159,11 +160,11 @@ class Load:
     """A constant force on a point.
 
     Attributes:
-        at: the point.
+        point: on which the force acts.
         force: (2,) in the axes of the ground [N].
     """
 
-    at: Place
+    point: BodyPoint
     force: Array = attrs.field(converter=_pair)
 
 
@@ -197,11 +198,19 @@ class Coordinate(NamedTuple):
     """One number of a configuration: an ``angle``, a ``slide`` along a guide, or ``x`` and ``y`` of a centre."""
 
     body: str
-    kind: Literal["angle", "slide", "x", "y"]
+    kind: CoordinateKind
 
     def __str__(self) -> str:
         """Return the name under which it is shown."""
         return f"{self.body}.{self.kind}"
+
+
+# The coordinates of a body by its ideal joint.
+_JOINT_COORDINATES: Mapping[type, tuple[CoordinateKind, ...]] = {
+    Pin: ("angle",),
+    Guide: ("slide",),
+    type(None): ("x", "y", "angle"),
+}
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -212,26 +221,26 @@ class Linkage:
         name: of the linkage.
         bodies: all but the ground; each after the one it hangs on.
         ground: what stands still.
-        joints: ideal ones; at most one for each body, none for a body that only pins with play hold.
-        pins: those with play.
+        joints: ideal ones; at most one for each body, none for a body that only pins with clearance hold.
+        pins: those with clearance.
         drives: the motors.
         loads: constant forces.
         tip: the point that is to follow a path.
         gravity: (2,) [m/s²].
         zero: direction of a body's axis at angle 0 [rad].
         material: of bearings and journals.
-        assembly: roughly where the bodies are, by name: angles [rad], slides along guides [m]; it says which of
-            several ways to put the linkage together is meant.
+        assembly: roughly where the bodies are, by name: angles [rad], slides along guides [m]; this chooses among
+            several assemblies of the linkage.
     """
 
     name: str
     bodies: tuple[Body, ...] = attrs.field(converter=_parts)
     ground: Body
     joints: tuple[Pin | Guide, ...] = attrs.field(converter=_parts)
-    pins: tuple[Play, ...] = attrs.field(converter=_parts)
+    pins: tuple[ClearancePin, ...] = attrs.field(converter=_parts)
     drives: tuple[Drive, ...] = attrs.field(converter=_parts)
     loads: tuple[Load, ...] = attrs.field(converter=_parts, default=())
-    tip: Place
+    tip: BodyPoint
     gravity: Array = attrs.field(converter=_pair, default=GRAVITY)
     zero: float = 0.0
     material: Material = attrs.field(factory=Material)
@@ -240,10 +249,10 @@ class Linkage:
     def __attrs_post_init__(self) -> None:
         """Check that everything named is there and that the ideal joints make trees."""
         names = [GROUND, *(body.name for body in self.bodies)]
-        _no_twins("body", names)
-        _no_twins("pin", [pin.name for pin in self.pins])
-        _no_twins("joint of body", [joint.body for joint in self.joints])
-        _no_twins("drive of body", [drive.body for drive in self.drives])
+        _check_unique("body", names)
+        _check_unique("pin", [pin.name for pin in self.pins])
+        _check_unique("joint of body", [joint.body for joint in self.joints])
+        _check_unique("drive of body", [drive.body for drive in self.drives])
         known = {GROUND}
         for body in self.bodies:
             joint = self.joint(body.name)
@@ -254,15 +263,19 @@ class Linkage:
                 raise InvalidValueError(f"body {body.name}: mass and inertia must be above 0")
             known.add(body.name)
         for joint in self.joints:
-            self.point(Place(one_of("body", joint.body, names[1:]), joint.point))
-        places = [*(joint.on for joint in self.joints), *(load.at for load in self.loads), self.tip]
-        for place in (*places, *(pin.bearing for pin in self.pins), *(pin.journal for pin in self.pins)):
-            self.point(place)
+            self.point(BodyPoint(one_of("body", joint.body, names[1:]), joint.point))
+        for point in (
+            *(joint.on for joint in self.joints),
+            *(load.point for load in self.loads),
+            *(end for pin in self.pins for end in (pin.bearing, pin.journal)),
+            self.tip,
+        ):
+            self.point(point)
         for drive in self.drives:
             if self.joint(drive.body) is None:
                 raise InvalidValueError(f"drive of {drive.body}: it hangs on no ideal joint, so nothing drives it")
             one_of("kind of drive", drive.kind, ("effort", "motion"))
-            self._can_be_moved(drive)
+            self._check_prescribed(drive)
         for name in self.assembly:
             one_of("body", name, names[1:])
 
@@ -276,30 +289,31 @@ class Linkage:
         Raises:
             UnknownNameError: there is none of that name.
         """
-        found = {GROUND: self.ground, **{body.name: body for body in self.bodies}}
-        return found[one_of("body", name, found)]
+        bodies = {GROUND: self.ground, **{body.name: body for body in self.bodies}}
+        return bodies[one_of("body", name, bodies)]
 
-    def point(self, place: Place) -> Array:
-        """Return (2,) where a place lies on its body [m].
+    def point(self, point: BodyPoint) -> Array:
+        """Return (2,) the position of a point in the axes of its body [m].
 
         Raises:
             UnknownNameError: there is no such body or no such point on it.
         """
-        points = self.body(place.body).points
-        if place.point not in points:
-            raise UnknownNameError(f"point of {place.body}", place.point, points)
-        return points[place.point]
+        points = self.body(point.body).points
+        if point.point not in points:
+            raise UnknownNameError(f"point of {point.body}", point.point, points)
+        return points[point.point]
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """What a configuration consists of, in order."""
-        return tuple(self._coordinates())
+        """The coordinates of a configuration, in order."""
+        bodies = [(body.name, _JOINT_COORDINATES[type(self.joint(body.name))]) for body in self.bodies]
+        return tuple(Coordinate(body, kind) for body, kinds in bodies for kind in kinds)
 
     @property
     def driven(self) -> tuple[int, ...]:
         """The numbers of the driven coordinates, in the order of the drives."""
-        place = {one.body: i for i, one in enumerate(self.coordinates) if one.kind in ("angle", "slide")}
-        return tuple(place[drive.body] for drive in self.drives)
+        numbers = {body: i for i, (body, kind) in enumerate(self.coordinates) if kind in ("angle", "slide")}
+        return tuple(numbers[drive.body] for drive in self.drives)
 
     @property
     def clearances(self) -> dict[str, float]:
@@ -318,35 +332,34 @@ class Linkage:
         pins = tuple(attrs.evolve(pin, clearance=clearances.get(pin.name, pin.clearance)) for pin in self.pins)
         return attrs.evolve(self, pins=pins)
 
-    def _can_be_moved(self, drive: Drive) -> None:
-        """Refuse a motion that is given of what turns on a body whose own motion is not."""
-        joint = self.joint(drive.body)
-        if drive.kind != "motion" or not isinstance(joint, Pin):
-            return
+    def rotation_carrier(self, body: str) -> str | None:
+        """Return the body whose angle the drive of a body acts against; None where its joint is no pin.
+
+        A body that slides on a guide rotates with the body that carries the guide.
+        """
+        joint = self.joint(body)
+        if not isinstance(joint, Pin):
+            return None
         carrier = joint.on.body
         while isinstance(guide := self.joint(carrier), Guide):
             carrier = guide.on.body
-        given = [one.body for one in self.drives if one.kind == "motion"]
-        if carrier != GROUND and carrier not in given:
+        return carrier
+
+    def _check_prescribed(self, drive: Drive) -> None:
+        """Refuse a prescribed motion of a body on a pin whose carrier has no prescribed motion."""
+        carrier = self.rotation_carrier(drive.body) if drive.kind == "motion" else None
+        prescribed = [drive.body for drive in self.drives if drive.kind == "motion"]
+        if carrier not in (None, GROUND, *prescribed):
             raise InvalidValueError(
                 f"drive of {drive.body}: its motion can be given only if that of {carrier} is, which carries it"
             )
 
-    def _coordinates(self) -> Iterator[Coordinate]:
-        for body in self.bodies:
-            match self.joint(body.name):
-                case Pin():
-                    yield Coordinate(body.name, "angle")
-                case Guide():
-                    yield Coordinate(body.name, "slide")
-                case _:
-                    yield from (Coordinate(body.name, "x"), Coordinate(body.name, "y"), Coordinate(body.name, "angle"))
 
-
-def _no_twins(kind: str, names: list[str]) -> None:
+def _check_unique(kind: str, names: list[str]) -> None:
+    """Refuse a name that occurs twice."""
     for i, name in enumerate(names):
         if name in names[:i]:
-            raise InvalidValueError(f"{kind} '{name}' is given twice")
+            raise InvalidValueError(f"{kind} '{name}' is defined twice")
 
 
 def exact(x: float) -> float:

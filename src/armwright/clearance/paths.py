@@ -1,4 +1,4 @@
-"""Paths in the plane for a tip to follow: pieces of polynomials in time, with jumps of the acceleration between them.
+"""Paths in the plane for a tip to follow: piecewise polynomials in time whose acceleration may jump between pieces.
 
 Source:
     Thesis, 4.2 (24 test paths) and 5.2.2 (pick and place); spec of the clearance, 1.2.
@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from armwright.arrays import LARGEST, Array, ArrayLike, exact_shape, floats
-from armwright.errors import InvalidValueError, ShapeError, UnknownNameError
+from armwright.errors import InvalidValueError, ShapeError, one_of
 
 # The thesis' test paths: where they run [m], how fast [m/s], and how long they speed up [s].
 TOP_SPEED = 1.5
@@ -22,20 +22,20 @@ _X_ROWS = (-0.7, -0.65, -0.6, -0.55, -0.5)
 _Y_COLUMNS = (-0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15)
 
 
-# Times that differ by less than this part of a step are one.
+# Times that differ by less than this part of a step are equal.
 ROUNDING = 1e-9
 
 
-class Moment(NamedTuple):
-    """Places, speeds and accelerations of a path.
+class PathState(NamedTuple):
+    """Positions, velocities and accelerations of a path.
 
     Attributes:
-        at: (..., 2) [m].
+        position: (..., 2) [m].
         velocity: (..., 2) [m/s].
         acceleration: (..., 2) [m/s²].
     """
 
-    at: Array
+    position: Array
     velocity: Array
     acceleration: Array
 
@@ -57,22 +57,22 @@ class Path:
         knots: (m + 1,) times at which its pieces begin and end, the first 0 [s].
         pieces: (m, a, k) of each piece and axis the coefficients, of 1, t, t² ... with t from the start of the piece.
         targets: times at which the tip is to be at its goals [s].
-        of: what moves along it: the ``tip`` in the plane, or the ``drives``, one axis for each.
+        follower: what follows it: the ``tip`` in the plane, or the ``drives``, one axis for each.
     """
 
     name: str
     knots: Array
     pieces: Array
     targets: tuple[float, ...] = ()
-    of: Literal["tip", "drives"] = "tip"
+    follower: Literal["tip", "drives"] = "tip"
 
     @property
     def duration(self) -> float:
         """How long it takes [s]."""
         return float(self.knots[-1])
 
-    def at(self, t: ArrayLike, piece: ArrayLike | None = None) -> Moment:
-        """Return places, speeds and accelerations.
+    def evaluate(self, t: ArrayLike, piece: ArrayLike | None = None) -> PathState:
+        """Return positions, velocities and accelerations.
 
         Args:
             t: times [s], any shape; one before the start or after the end counts as that.
@@ -82,17 +82,17 @@ class Path:
         number = np.searchsorted(self.knots, times, side="right") - 1 if piece is None else np.asarray(piece)
         number = np.clip(number, 0, len(self.pieces) - 1)
         u = (times - self.knots[number])[..., None]
-        found = []
+        derivatives = []
         coefficients = self.pieces[number]
         for _ in range(3):
             value = np.zeros((*times.shape, self.pieces.shape[1]))
             for i in range(coefficients.shape[-1] - 1, -1, -1):
                 value = value * u + coefficients[..., i]
-            found.append(value)
+            derivatives.append(value)
             coefficients = coefficients[..., 1:] * np.arange(1, coefficients.shape[-1])
-        return Moment(*found)
+        return PathState(*derivatives)
 
-    def halves(self, steps: int) -> tuple[Moment, Moment]:
+    def halves(self, steps: int) -> tuple[PathState, PathState]:
         """Return the path at the ends and middles of equal steps.
 
         Where the acceleration jumps at one of these times there are two: an integrator sees no jump that falls on the
@@ -108,11 +108,11 @@ class Path:
         rounding = ROUNDING * self.duration / steps
         after = np.searchsorted(self.knots, times + rounding, side="right") - 1
         before = np.searchsorted(self.knots, times - rounding, side="right") - 1
-        return self.at(times, after), self.at(times, before)
+        return self.evaluate(times, after), self.evaluate(times, before)
 
 
-def turning(name: str, start: float, speed: float, duration: float) -> Path:
-    """Return the path of one drive that turns, or pushes, at constant speed.
+def constant_speed_path(name: str, start: float, speed: float, duration: float) -> Path:
+    """Return the path of one drive at constant speed.
 
     Args:
         name: of the path.
@@ -123,7 +123,7 @@ def turning(name: str, start: float, speed: float, duration: float) -> Path:
     if not duration > 0:
         raise InvalidValueError(f"path {name}: expected a duration above 0, got {duration:g} s")
     pieces = np.array([[[start, speed]]])
-    return Path(name=name, knots=np.array([0.0, duration]), pieces=pieces, of="drives")
+    return Path(name=name, knots=np.array([0.0, duration]), pieces=pieces, follower="drives")
 
 
 def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP_SPEED, ramp: float = RAMP) -> Path:
@@ -139,7 +139,7 @@ def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP
     Raises:
         InvalidValueError: it is too short for that speed, or has no length.
     """
-    a, b = _place(start, "start"), _place(goal, "goal")
+    a, b = (exact_shape(end, (2,), what, LARGEST) for end, what in ((start, "start"), (goal, "goal")))
     length = float(np.linalg.norm(b - a))
     if not (speed > 0 and ramp > 0):
         raise InvalidValueError(f"path {name}: speed and ramp must be above 0, got {speed:g} m/s and {ramp:g} s")
@@ -152,9 +152,9 @@ def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP
     direction, pull = (b - a) / length, speed / ramp
     s = [(0.0, 0.0, pull / 2), (speed * ramp / 2, speed, 0.0), (length - speed * ramp / 2, speed, -pull / 2)]
     knots = np.array([0.0, ramp, ramp + max(cruise, 0.0), 2 * ramp + max(cruise, 0.0)])
-    # Where there is just room, rounding may leave a rest of constant speed.
+    # Where the length just suffices, rounding may leave a tiny piece of constant speed.
     keep = np.diff(knots) > 1e-12
-    pieces = np.array([direction[:, None] * np.array(one) for one in s])
+    pieces = np.array([direction[:, None] * np.array(coefficients) for coefficients in s])
     pieces[..., 0] += a
     return Path(
         name=name, knots=np.append(knots[:-1][keep], knots[-1]), pieces=pieces[keep], targets=(float(knots[-1]),)
@@ -162,25 +162,25 @@ def straight(name: str, start: ArrayLike, goal: ArrayLike, *, speed: float = TOP
 
 
 def hermite(
-    name: str, times: Sequence[float], places: ArrayLike, velocities: ArrayLike, targets: Sequence[int]
+    name: str, times: Sequence[float], positions: ArrayLike, velocities: ArrayLike, targets: Sequence[int]
 ) -> Path:
-    """Return a path of cubic pieces through places with given velocities.
+    """Return a path of cubic pieces through positions with specified velocities.
 
     Args:
         name: of the path.
-        times: (m + 1) at the places, the first 0, increasing [s].
-        places: (m + 1, 2) [m].
+        times: (m + 1) of the positions, the first 0, increasing [s].
+        positions: (m + 1, 2) [m].
         velocities: (m + 1, 2) [m/s].
-        targets: numbers of the places that are goals.
+        targets: indices of the positions that are goals.
 
     Raises:
         ShapeError: the arrays do not fit together.
         InvalidValueError: the times do not increase from 0.
     """
-    t, p, v = floats(times, "times"), floats(places, "places"), floats(velocities, "velocities")
+    t, p, v = floats(times, "times"), floats(positions, "positions"), floats(velocities, "velocities")
     if t.ndim != 1 or len(t) < 2 or p.shape != (len(t), 2) or v.shape != p.shape:
         raise ShapeError(
-            f"path {name}: expected (m + 1) times and (m + 1, 2) places and velocities, "
+            f"path {name}: expected (m + 1) times and (m + 1, 2) positions and velocities, "
             f"got {t.shape}, {p.shape} and {v.shape}"
         )
     if t[0] != 0 or np.any(np.diff(t) <= 0):
@@ -199,7 +199,7 @@ def hermite(
 
 @attrs.frozen(kw_only=True, eq=False)
 class PickAndPlace:
-    """A pick-and-place path: up, over, down; its goals are where it picks, passes, and places.
+    """A pick-and-place path: up, over, down; its goals are its first, middle and last node.
 
     Between its five nodes it is cubic. It leaves the first and comes to the last vertically, ``lift`` above them within
     ``lift_time``.
@@ -213,7 +213,7 @@ class PickAndPlace:
         speed: horizontal, in the middle [m/s].
 
     Source:
-        Thesis table 5.9. It leaves the way between nodes, and how the last is come to, open: here the end mirrors the
+        Thesis table 5.9. It leaves open how the path runs between nodes and ends: here the end mirrors the
         start (spec of the clearance, 1.2).
     """
 
@@ -228,10 +228,10 @@ class PickAndPlace:
         """Return it as a path with three targets."""
         first, middle, last = self.nodes
         lift = np.array([0.0, self.lift_speed * self.lift_time / 2])
-        places = [first, first + lift, middle, last + lift, last]
+        positions = [first, first + lift, middle, last + lift, last]
         velocities = [(0, 0), (0, self.lift_speed), (self.speed, 0), (0, -self.lift_speed), (0, 0)]
         times: list[float] = np.cumsum([0.0, self.lift_time, self.rise_time, self.fall_time, self.lift_time]).tolist()
-        return hermite("pick and place", times, places, velocities, (0, 2, 4))
+        return hermite(PICK_AND_PLACE, times, positions, velocities, (0, 2, 4))
 
 
 def thesis_path(name: str) -> Path:
@@ -240,10 +240,7 @@ def thesis_path(name: str) -> Path:
     Raises:
         UnknownNameError: there is none of that name.
     """
-    if name not in TEST_PATHS:
-        raise UnknownNameError("test path", name, TEST_PATHS)
-    start, goal = TEST_PATHS[name]
-    return straight(name, start, goal)
+    return straight(name, *TEST_PATHS[one_of("test path", name, TEST_PATHS)])
 
 
 def named_path(name: str) -> Path:
@@ -254,22 +251,13 @@ def named_path(name: str) -> Path:
     """
     if name == PICK_AND_PLACE:
         return PickAndPlace().path()
-    if name not in TEST_PATHS:
-        raise UnknownNameError("path", name, (*TEST_PATHS, PICK_AND_PLACE))
-    return thesis_path(name)
+    return thesis_path(one_of("path", name, (*TEST_PATHS, PICK_AND_PLACE)))
 
 
 def _test_paths() -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
     rows = [((-0.18, y), (0.18, y)) for y in _X_ROWS] + [((0.18, y), (-0.18, y)) for y in _X_ROWS]
     columns = [((x, -0.7), (x, -0.4)) for x in _Y_COLUMNS] + [((x, -0.4), (x, -0.7)) for x in _Y_COLUMNS]
-    return {f"x{i}": one for i, one in enumerate(rows, 1)} | {f"y{i}": one for i, one in enumerate(columns, 1)}
+    return {f"{axis}{i}": ends for axis, lines in (("x", rows), ("y", columns)) for i, ends in enumerate(lines, 1)}
 
 
 TEST_PATHS = _test_paths()
-
-
-def _place(value: ArrayLike, what: str) -> Array:
-    place = floats(value, what)
-    if place.shape != (2,):
-        raise ShapeError(f"{what}: expected two numbers, got shape {place.shape}")
-    return place

@@ -1,6 +1,6 @@
 """Where the bodies of a linkage are and how they move, over abstract scalars: positions, speeds, partial derivatives.
 
-The coordinates are angles of bodies against the ground, slides along guides, and the places of free centres. So the
+The coordinates are angles of bodies against the ground, slides along guides, and the positions of free centres. So the
 velocity of a point is linear in the speeds, with the partial derivatives of its position; the rest of its
 acceleration, which is there while no speed changes, is its bias.
 """
@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from armwright.clearance.linkage import GROUND, Body, Guide, Linkage, Pin, Place, exact
+from armwright.clearance.linkage import GROUND, Body, BodyPoint, Guide, Linkage, Pin, exact
 from armwright.tracing.scalar import Scalar, cos, sin
 
 
@@ -37,8 +37,8 @@ class Vec2(NamedTuple):
         """Return the scalar product."""
         return self.x * other.x + self.y * other.y
 
-    def turned(self) -> Vec2:
-        """Return it turned by a right angle, counter-clockwise."""
+    def perpendicular(self) -> Vec2:
+        """Return the vector rotated by a right angle, counter-clockwise."""
         return Vec2(-self.y, self.x)
 
 
@@ -49,13 +49,13 @@ class Point(NamedTuple):
     """A point that moves with the linkage.
 
     Attributes:
-        at: where it is.
+        position: of the point.
         partials: of its position by the coordinates that move it, by their numbers.
         velocity: its own.
         bias: its acceleration while no speed changes.
     """
 
-    at: Vec2
+    position: Vec2
     partials: dict[int, Vec2]
     velocity: Vec2
     bias: Vec2
@@ -66,13 +66,13 @@ class Frame(NamedTuple):
 
     Attributes:
         axis: its direction.
-        turns: partial derivatives of its angle, by the numbers of the coordinates that turn it.
+        angle_partials: partial derivatives of its angle, by the numbers of the coordinates that rotate it.
         spin: its angular velocity.
         origin: the point from which its own points are measured.
     """
 
     axis: Vec2
-    turns: dict[int, float]
+    angle_partials: dict[int, float]
     spin: Scalar
     origin: Point
 
@@ -82,26 +82,26 @@ class Frame(NamedTuple):
 
     def arm(self, along: float, across: float) -> Vec2:
         """Return a vector of the body in the axes of the ground."""
-        return self.axis.times(along).plus(self.axis.turned().times(across))
+        return self.axis.times(along).plus(self.axis.perpendicular().times(across))
 
     def shifted(self, point: Point, arm: Vec2) -> Point:
         """Return the point of the body that lies by ``arm`` beside another of its points."""
-        across = arm.turned()
+        across = arm.perpendicular()
         partials = dict(point.partials)
-        for number, weight in self.turns.items():
+        for number, weight in self.angle_partials.items():
             partials[number] = partials.get(number, NOWHERE).plus(across.times(weight))
         if isinstance(self.spin, float) and self.spin == 0:
-            return Point(point.at.plus(arm), partials, point.velocity, point.bias)
+            return Point(point.position.plus(arm), partials, point.velocity, point.bias)
         velocity = point.velocity.plus(across.times(self.spin))
         bias = point.bias.minus(arm.times(self.spin * self.spin))
-        return Point(point.at.plus(arm), partials, velocity, bias)
+        return Point(point.position.plus(arm), partials, velocity, bias)
 
 
 class Placement:
     """All bodies of a linkage in one configuration."""
 
     def __init__(self, linkage: Linkage, q: Sequence[Scalar], qd: Sequence[Scalar]) -> None:
-        """Place the bodies, each after the one it hangs on.
+        """Determine the poses of the bodies, each after the body it hangs on.
 
         Args:
             linkage: what moves.
@@ -111,57 +111,56 @@ class Placement:
         self.linkage, self.q = linkage, q
         still = Point(NOWHERE, {}, NOWHERE, NOWHERE)
         self.frames = {GROUND: Frame(Vec2(1.0, 0.0), {}, 0.0, still)}
-        self._points: dict[Place, Point] = {}
+        self._points: dict[BodyPoint, Point] = {}
         number = 0
         for body in linkage.bodies:
             joint = linkage.joint(body.name)
             if isinstance(joint, Pin):
-                frame = self._turning(number, q, qd)
-                at = self.point(joint.on)
+                frame = self._rotating(number, q, qd)
+                joint_point = self.point(joint.on)
                 number += 1
             elif isinstance(joint, Guide):
-                frame, at = self._sliding(joint, number, q, qd)
+                frame, joint_point = self._sliding(joint, number, q, qd)
                 number += 1
             else:
-                frame = self._turning(number + 2, q, qd)
-                at = Point(
+                frame = self._rotating(number + 2, q, qd)
+                joint_point = Point(
                     Vec2(q[number], q[number + 1]),
                     {number: Vec2(1.0, 0.0), number + 1: Vec2(0.0, 1.0)},
                     Vec2(qd[number], qd[number + 1]),
                     NOWHERE,
                 )
                 number += 3
-            held = body.centre if joint is None else body.points[joint.point]
-            origin = frame.shifted(at, frame.arm(*map(float, held)).times(-1.0))
+            own_point = body.centre if joint is None else body.points[joint.point]
+            origin = frame.shifted(joint_point, frame.arm(*map(float, own_point)).times(-1.0))
             self.frames[body.name] = frame._replace(origin=origin)
 
-    def point(self, place: Place) -> Point:
-        """Return a place of a body."""
-        if place not in self._points:
-            along, across = map(float, self.linkage.point(place))
-            self._points[place] = self.frames[place.body].point(along, across)
-        return self._points[place]
+    def point(self, point: BodyPoint) -> Point:
+        """Return a point of a body."""
+        if point not in self._points:
+            along, across = map(float, self.linkage.point(point))
+            self._points[point] = self.frames[point.body].point(along, across)
+        return self._points[point]
 
     def centre(self, body: Body) -> Point:
         """Return the centre of mass of a body."""
         return self.frames[body.name].point(*map(float, body.centre))
 
-    def _turning(self, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Frame:
-        zero = self.linkage.zero
-        axis = _turned(Vec2(cos(q[number]), sin(q[number])), zero)
+    def _rotating(self, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Frame:
+        axis = _rotated(Vec2(cos(q[number]), sin(q[number])), self.linkage.zero)
         return Frame(axis, {number: 1.0}, qd[number], Point(NOWHERE, {}, NOWHERE, NOWHERE))
 
     def _sliding(self, guide: Guide, number: int, q: Sequence[Scalar], qd: Sequence[Scalar]) -> tuple[Frame, Point]:
-        """Return the frame of what slides along a guide, and its point on the line."""
+        """Return the frame of a body that slides along a guide, and its point on the line."""
         carrier, line = self.frames[guide.on.body], self.point(guide.on)
-        along = _turned(carrier.axis, guide.direction)
-        frame = carrier._replace(axis=_turned(carrier.axis, guide.angle))
-        at = carrier.shifted(line, along.times(q[number]))
-        at.partials[number] = along
-        velocity = at.velocity.plus(along.times(qd[number]))
-        bias = at.bias.plus(along.turned().times(2.0 * carrier.spin * qd[number]))
-        return frame, at._replace(velocity=velocity, bias=bias)
+        along = _rotated(carrier.axis, guide.direction)
+        frame = carrier._replace(axis=_rotated(carrier.axis, guide.angle))
+        point = carrier.shifted(line, along.times(q[number]))
+        point.partials[number] = along
+        velocity = point.velocity.plus(along.times(qd[number]))
+        bias = point.bias.plus(along.perpendicular().times(2.0 * carrier.spin * qd[number]))
+        return frame, point._replace(velocity=velocity, bias=bias)
 
 
-def _turned(axis: Vec2, angle: float) -> Vec2:
-    return axis.times(exact(math.cos(angle))).plus(axis.turned().times(exact(math.sin(angle))))
+def _rotated(axis: Vec2, angle: float) -> Vec2:
+    return axis.times(exact(math.cos(angle))).plus(axis.perpendicular().times(exact(math.sin(angle))))

@@ -1,8 +1,8 @@
-"""Until when a run can be predicted: impacts magnify what nobody knows, until two runs have nothing in common.
+"""The predictability of a run: impacts magnify unknown differences, until two runs have nothing in common.
 
-A run is made again with clearances that differ by a nanometre, which no workshop and no instrument tells, and with a
-half and a third of the step. Until all of them are still together the run is a prediction; afterwards only their mean
-and their spread are.
+A run is repeated with clearances that differ by a nanometre, which no workshop and no instrument resolves, and with a
+half and a third of the step. As long as all repetitions agree the run is a prediction; afterwards only their mean and
+their spread are.
 
 Source:
     Spec of the clearance, 1.6: after the first impacts trajectories are chaotic.
@@ -20,21 +20,21 @@ from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.simulation import Simulation, simulate
 from armwright.errors import InvalidValueError
 
-# By how much the clearances of runs differ that nobody can tell apart [m], and how many runs fill a vector.
-PERTURBATION, TWINS = 1e-9, 15
-# Runs that are farther from one another have parted [m]. With smaller steps they must be nearer by a factor: after an
+# The difference of the clearances of indistinguishable runs [m], and how many of them beside the first fill a vector.
+PERTURBATION, MAX_REPLICATES = 1e-9, 15
+# Runs that are farther from one another have diverged [m]. With smaller steps they must be nearer by a factor: after an
 # impact the error of a step is of first order, half as much again as what a third of it changes, and chance more than
 # doubles that. One of them may meet an impact at the same part of its step as the whole one, and hardly both.
 APART, PARTS, FINER = 1e-5, (2, 3), 4.0
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Outlook:
-    """How far ahead a run tells what would happen.
+class Predictability:
+    """The time until which a run is a prediction, and the scatter of its repetitions.
 
     Attributes:
-        until: the last time at which all runs beside it are within ``APART`` of it, and those with smaller steps
-            within a quarter of that [s].
+        until: the last time at which all repetitions are within ``APART`` of it, and those with smaller steps within a
+            quarter of that [s].
         mean: (s, 2) mean error of the tip over all of them [m].
         spread: (s, 2) its standard deviation over them [m].
         to_the_end: whether the whole run is a prediction.
@@ -48,22 +48,22 @@ class Outlook:
     finer: bool
 
 
-def perturbed(clearances: Array, count: int = TWINS) -> Array:
-    """Return (count + 1, ..., p) clearances: as they are, and others a nanometre or less away, always the same."""
+def perturbed(clearances: Array, count: int = MAX_REPLICATES) -> Array:
+    """Return (count + 1, ..., p) clearances: the original ones, then the same others at most a nanometre away."""
     shifts = np.random.default_rng(0).uniform(-PERTURBATION, PERTURBATION, (count, clearances.shape[-1]))
     lead = (count, *(1,) * (clearances.ndim - 1), clearances.shape[-1])
-    # Contact needs some play.
+    # Contact needs a clearance above 0.
     others = np.maximum(clearances + shifts.reshape(lead), clearances / 2)
     return np.concatenate([clearances[None], others])
 
 
-def with_outlook(
+def simulate_with_predictability(
     scenario: Scenario, clearances: Array, *, friction: float | None = None, threads: int | None = None
-) -> tuple[Simulation, Outlook]:
-    """Return a run, its bits as ``simulate`` has them alone, and until when it is a prediction.
+) -> tuple[Simulation, Predictability]:
+    """Return a run, bit by bit that of ``simulate`` alone, and its predictability.
 
     Args:
-        scenario: the path, made ready.
+        scenario: the prepared path.
         clearances: (p,) of the pins [m].
         friction: coefficient of friction; that of the material when left out.
         threads: how many cores to use.
@@ -73,23 +73,24 @@ def with_outlook(
     """
     rows = perturbed(np.asarray(clearances, dtype=np.float64))
     own = simulate(scenario, rows, frictions=friction, threads=threads)
-    finer = []
+    smaller_steps = []
     for parts in PARTS:
         settings = attrs.evolve(scenario.settings, step=scenario.h / parts, sample=scenario.stride * scenario.h)
-        # There may be more steps than are ever made.
+        # The steps may be more than the limit.
         with contextlib.suppress(InvalidValueError):
             again = prepare(scenario.linkage, scenario.path, settings, guess=scenario.ideal.q[0])
-            finer.append(simulate(again, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
-    known = len(finer) == len(PARTS) and all(error.shape == own.error.shape for error in finer)
-    return taken(own, 0), _outlook(own.time, own.error, np.concatenate(finer) if known else None)
+            smaller_steps.append(simulate(again, rows, frictions=friction, threads=threads).error[:, : len(own.time)])
+    complete = len(smaller_steps) == len(PARTS) and all(error.shape == own.error.shape for error in smaller_steps)
+    finer = np.concatenate(smaller_steps) if complete else None
+    return select_run(own, 0), _predictability(own.time, own.error, finer)
 
 
-def taken(simulation: Simulation, number: int) -> Simulation:
+def select_run(simulation: Simulation, number: int) -> Simulation:
     """Return one run of several side by side."""
     names = ("clearances", "frictions", "q", "qd", "tip", "error", "forces", "impacts", "peaks", "status")
     return attrs.evolve(
         simulation,
-        works={name: one[number] for name, one in simulation.works.items()},
+        works={name: work[number] for name, work in simulation.works.items()},
         **{name: getattr(simulation, name)[number] for name in names},
     )
 
@@ -99,26 +100,26 @@ def together_until(time: Array, errors: Array, within: float) -> Array:
 
     Args:
         time: (s,) of the samples [s].
-        errors: (r, ..., s, 2) of r runs; those of the first are what the others are held against [m].
-        within: how far they may be from it [m].
+        errors: (r, ..., s, 2) of r runs; the others are compared with the first [m].
+        within: largest distance from it [m].
     """
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.linalg.norm(errors - errors[0], axis=-1).max(axis=0)
-        # What is infinite or no number is not near.
+        # Infinite distances and NaN are not near.
         near = apart <= within
     first = np.where(near.all(axis=-1), len(time), np.argmin(near, axis=-1))
     return np.asarray(time[np.maximum(first - 1, 0)], dtype=np.float64)
 
 
-def _outlook(time: Array, own: Array, finer: Array | None) -> Outlook:
-    """Return what runs (r, s, 2) say of the first of them, and those with smaller steps, if there are any."""
+def _predictability(time: Array, own: Array, finer: Array | None) -> Predictability:
+    """Return the predictability of the first of r runs (r, s, 2), compared with the others and with smaller steps."""
     until, all_of_them = together_until(time, own, APART), own
     if finer is not None:
         all_of_them = np.concatenate([own, finer])
         until = np.minimum(until, together_until(time, np.concatenate([own[:1], finer]), APART / FINER))
     with np.errstate(invalid="ignore", over="ignore"):
         mean, spread = all_of_them.mean(axis=0), all_of_them.std(axis=0)
-    return Outlook(
+    return Predictability(
         until=float(until),
         mean=np.asarray(mean, dtype=np.float64),
         spread=np.asarray(spread, dtype=np.float64),

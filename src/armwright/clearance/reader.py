@@ -9,14 +9,14 @@ from armwright.clearance.linkage import (
     GRAVITY,
     GROUND,
     Body,
+    BodyPoint,
+    ClearancePin,
     Drive,
     Guide,
     Linkage,
     Load,
     Material,
     Pin,
-    Place,
-    Play,
 )
 from armwright.errors import ArmwrightError, UnknownNameError
 from armwright.files.document import Document, Table
@@ -57,14 +57,14 @@ def read_linkage(path: Path) -> Linkage:
     ground = Body(name=GROUND, points=_points(top.table("ground", required=True)))
     bodies = tuple(_body(table) for table in top.tables("body", "bodies"))
     joints = tuple(_joint(table) for table in top.tables("joint", "bodies"))
-    pins = tuple(_play(table) for table in top.tables("play", "bodies"))
+    pins = tuple(_clearance_pin(table) for table in top.tables("play", "bodies"))
     drives = tuple(_drive(table) for table in top.tables("drive", "bodies"))
     loads = tuple(_load(table) for table in (top.tables("load", "bodies") if "load" in top else ()))
     material = _material(top.table("material"))
     name = top.text("name", default=path.stem)
     zero = math.radians(top.number("zero_deg", default=0.0))
     assembly = _assembly(top.table("assembly"))
-    gravity, tip = top.vector("gravity", 2, default=GRAVITY), _place(top, "tip")
+    gravity, tip = top.vector("gravity", 2, default=GRAVITY), _body_point(top, "tip")
     top.finish()
     try:
         return Linkage(
@@ -85,19 +85,19 @@ def read_linkage(path: Path) -> Linkage:
         raise top.error(None, str(error)) from error
 
 
-def _place(table: Table, key: str) -> Place:
+def _body_point(table: Table, key: str) -> BodyPoint:
     text = table.text(key)
     body, colon, point = text.partition(":")
     if not (body and colon and point):
-        raise table.error(key, f"expected a place such as 'link1:J2', got {text!r}")
-    return Place(body, point)
+        raise table.error(key, f"expected a point of a body such as 'link1:J2', got {text!r}")
+    return BodyPoint(body, point)
 
 
 def _points(table: Table) -> dict[str, list[float]]:
     points = table.table("points")
-    found = {key: [float(x) for x in points.vector(key, 2)] for key in points.free_keys()}
+    positions = {key: [float(x) for x in points.vector(key, 2)] for key in points.free_keys()}
     table.finish()
-    return found
+    return positions
 
 
 def _body(table: Table) -> Body:
@@ -109,7 +109,7 @@ def _body(table: Table) -> Body:
 
 def _joint(table: Table) -> Pin | Guide:
     kind = table.choice("kind", ("pin", "guide"))
-    body, point, on = table.text("body"), table.text("point"), _place(table, "on")
+    body, point, on = table.text("body"), table.text("point"), _body_point(table, "on")
     joint: Pin | Guide = Pin(body=body, point=point, on=on)
     if kind == "guide":
         direction, angle = (math.radians(table.number(key, default=0.0)) for key in ("direction_deg", "angle_deg"))
@@ -118,12 +118,12 @@ def _joint(table: Table) -> Pin | Guide:
     return joint
 
 
-def _play(table: Table) -> Play:
-    name, bearing, journal = table.text("name"), _place(table, "bearing"), _place(table, "journal")
+def _clearance_pin(table: Table) -> ClearancePin:
+    name, bearing, journal = table.text("name"), _body_point(table, "bearing"), _body_point(table, "journal")
     clearance = table.number("clearance_mm", lower=0.0) * 1e-3
     radius = table.positive("journal_radius_mm") * 1e-3
     table.finish()
-    return Play(name=name, bearing=bearing, journal=journal, clearance=clearance, journal_radius=radius)
+    return ClearancePin(name=name, bearing=bearing, journal=journal, clearance=clearance, journal_radius=radius)
 
 
 def _drive(table: Table) -> Drive:
@@ -133,21 +133,21 @@ def _drive(table: Table) -> Drive:
 
 
 def _load(table: Table) -> Load:
-    load = Load(at=_place(table, "at"), force=table.vector("force", 2))
+    load = Load(point=_body_point(table, "at"), force=table.vector("force", 2))
     table.finish()
     return load
 
 
 def _assembly(table: Table) -> dict[str, float]:
-    """Return where the bodies are: ``link1_deg = -70``, and ``slider_mm = 170`` of what slides."""
-    found = {}
+    """Return approximate coordinates by body: an angle as ``link1_deg = -70``, a slide as ``slider_mm = 170``."""
+    values = {}
     for key in table.free_keys():
         body, _, unit = key.rpartition("_")
         if not body or unit not in ("deg", "mm"):
             raise table.error(key, "expected the name of a body with its unit, such as link1_deg or slider_mm")
-        found[body] = math.radians(table.number(key)) if unit == "deg" else table.number(key) * 1e-3
+        values[body] = math.radians(table.number(key)) if unit == "deg" else table.number(key) * 1e-3
     table.finish()
-    return found
+    return values
 
 
 def _material(table: Table) -> Material:

@@ -1,8 +1,8 @@
-"""How a linkage with play lies at rest: drives held, journals leaning where gravity and loads press them.
+"""The static equilibrium of a linkage with clearance: drives locked, journals pressed to their walls by loads.
 
-Without friction the force in each pin goes through the middles of bearing and journal. So a journal leans in the
-direction of the force that it carries, as deep in the wall as that force asks for; the direction changes the geometry
-a little and the geometry the direction, and a few rounds settle it.
+Without friction the force in each pin acts through the centres of bearing and journal. So a journal is displaced in the
+direction of the force that it carries, and indents the wall as that force requires; direction and geometry depend a
+little on each other, and a few iterations find both.
 
 Source:
     Spec of the clearance, 0.1 and 4.3.
@@ -18,24 +18,24 @@ from armwright.clearance.ideal import balance, closed, gaps_of, tip_of
 from armwright.clearance.linkage import Linkage
 from armwright.errors import InvalidValueError, ShapeError
 
-_MOST_ROUNDS = 60
-# The rounds end when no coordinate moves by more [rad, m].
-_SETTLED = 1e-14
-# What rounding keeps in motion beyond that is no movement; this is [rad, m].
-_RESTLESS = 1e-9
-# A pin that carries less has no side on which its journal leans [N].
+_MOST_ITERATIONS = 60
+# The iteration ends when no coordinate changes by more [rad, m].
+_CONVERGED = 1e-14
+# Changes below this are rounding; an iteration that ends with larger ones has not converged [rad, m].
+_ROUNDING = 1e-9
+# A pin that carries less force has no contact direction [N].
 _NO_FORCE = 1e-9
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Rest:
-    """A linkage with play at rest.
+class StaticEquilibrium:
+    """A linkage with clearance at rest.
 
     Attributes:
         q: (..., n) coordinates [rad, m].
-        tip: (..., 2) where its tip is [m].
-        gaps: (..., p, 2) from the middle of each bearing to that of its journal [m].
-        forces: (..., p) with which they press on one another [N].
+        tip: (..., 2) position of its tip [m].
+        gaps: (..., p, 2) from the centre of each bearing to that of its journal [m].
+        forces: (..., p) normal force of each contact [N].
     """
 
     q: Array
@@ -46,12 +46,12 @@ class Rest:
 
 def at_rest(
     linkage: Linkage, ideal: ArrayLike, clearances: ArrayLike | None = None, stiffness: ArrayLike | None = None
-) -> Rest:
-    """Return how a linkage lies at rest with its drives held where they would be without play.
+) -> StaticEquilibrium:
+    """Return the equilibrium of a linkage with its drives locked at the coordinates without clearance.
 
     Args:
         linkage: with n coordinates and p pins.
-        ideal: (..., n) coordinates with closed pins, which tell where the drives are held.
+        ideal: (..., n) coordinates with closed pins, at which the drives are locked.
         clearances: (..., p) [m]; those of the linkage when left out.
         stiffness: (..., p) of the contacts [N/m^1.5]; rigid ones when left out.
 
@@ -69,33 +69,33 @@ def at_rest(
     K = np.inf if stiffness is None else floats(stiffness, "stiffness")
     lead = np.broadcast_shapes(start.shape[:-1], c.shape[:-1])
     q = np.array(np.broadcast_to(start, (*lead, start.shape[-1])))
-    held = q[..., list(linkage.driven)]
+    drives = q[..., list(linkage.driven)]
     still = np.zeros_like(q)
-    settled = np.zeros((*lead, 1), dtype=bool)
-    for _ in range(_MOST_ROUNDS):
+    converged = np.zeros((*lead, 1), dtype=bool)
+    for _ in range(_MOST_ITERATIONS):
         _, reactions = balance(linkage, q, still, still)
         size = forces_of(linkage, reactions)
         gaps = reactions * ((c + (size / K) ** (2 / 3)) / size)[..., None]
-        new = closed(linkage, q, drives=held, gaps=gaps)
+        new = closed(linkage, q, drives=drives, gaps=gaps)
         moved = np.abs(new - q).max(axis=-1, keepdims=True)
-        q = np.where(settled, q, new)
-        # One that lies stays as it is, however long others take.
-        settled |= moved < _SETTLED
-        if np.all(settled):
+        q = np.where(converged, q, new)
+        # A converged configuration stays unchanged while others are iterated.
+        converged |= moved < _CONVERGED
+        if np.all(converged):
             break
-    if np.any(~settled & (moved > _RESTLESS)):
+    if np.any(~converged & (moved > _ROUNDING)):
         raise InvalidValueError(
-            f"{linkage.name} does not come to rest: after {_MOST_ROUNDS} rounds it still moves by {moved.max():.2g}; "
-            f"expected drives held away from singular configurations"
+            f"{linkage.name} has no equilibrium: after {_MOST_ITERATIONS} iterations it still moves by "
+            f"{moved.max():.2g}; expected drives locked away from singular configurations"
         )
-    return Rest(q=q, tip=tip_of(linkage, q), gaps=gaps_of(linkage, q), forces=size)
+    return StaticEquilibrium(q=q, tip=tip_of(linkage, q), gaps=gaps_of(linkage, q), forces=size)
 
 
 def forces_of(linkage: Linkage, reactions: Array) -> Array:
-    """Return (..., p) how large the reactions (..., p, 2) of the pins at rest are [N].
+    """Return (..., p) the magnitudes of the reactions (..., p, 2) of the pins at rest [N].
 
     Raises:
-        InvalidValueError: a pin carries no force, so that its journal has no side to lean on.
+        InvalidValueError: a pin carries no force, so that its contact has no direction.
     """
     size = np.asarray(np.linalg.norm(reactions, axis=-1), dtype=np.float64)
     if not np.all(size > _NO_FORCE):

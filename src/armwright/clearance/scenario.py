@@ -1,4 +1,4 @@
-"""Making a path ready to be simulated many times: what the linkage without play does, and what its drives give."""
+"""The preparation of a path for many simulations: the motion and the drive efforts without clearance."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from armwright.arrays import Array, ArrayLike, floats
 from armwright.clearance.ideal import IdealMotion, closed, ideal_motion
-from armwright.clearance.linkage import Linkage
+from armwright.clearance.linkage import Coordinate, Linkage
 from armwright.clearance.paths import ROUNDING, Path
 from armwright.clearance.placement import Placement
 from armwright.clearance.settings import Settings
 from armwright.errors import InvalidValueError, ShapeError
 
-# So many places of a path are solved one after the other; all between them at once, from there.
+# So many points of a path are solved one after the other, and from them all points between at once.
 _COARSE = 60
 # A path that takes less time is none, and nothing could be worked out on it [s].
 _SHORTEST = 1e-9
@@ -26,21 +26,21 @@ _JUMP = 0.05
 
 @attrs.frozen(kw_only=True, eq=False)
 class Scenario:
-    """A path made ready for many runs.
+    """A path prepared for many runs.
 
     Attributes:
-        linkage: what is to move.
+        linkage: that moves.
         path: for its tip or its drives.
-        settings: how.
+        settings: of the simulation.
         steps: how many there are.
         h: how long each is [s].
         stride: how many of them lie between two samples; the last sample is at the end.
-        table: (rows, 3, columns) what the drives are told at the start, the middle and the end of each row. A row is a
+        table: (rows, 3, columns) commands of the drives at the start, the middle and the end of each row. A row is a
             step, or a part of one: a step in which the acceleration jumps is made in parts that meet at the jump, since
             no rule of integration keeps its order across one.
         lengths: (rows,) how long each is [s].
         marks: (rows + 1,) the number of the step that begins with each row, and the end; -1 within a step.
-        ideal: the motion without play at the start of each step and at the end of the last.
+        ideal: the motion without clearance at the start of each step and at the end of the last.
     """
 
     linkage: Linkage
@@ -58,12 +58,12 @@ class Scenario:
 def prepare(
     linkage: Linkage, path: Path, settings: Settings | None = None, *, guess: ArrayLike | None = None
 ) -> Scenario:
-    """Work out what the drives have to do for a path without play.
+    """Determine the commands of the drives that follow a path without clearance.
 
     Args:
-        linkage: what is to move.
+        linkage: that moves.
         path: for its tip or its drives.
-        settings: how it will be simulated.
+        settings: of the simulation.
         guess: (n,) coordinates near those at the start, which choose the assembly; that of the linkage when left out.
 
     Raises:
@@ -73,28 +73,27 @@ def prepare(
     settings = settings or Settings()
     if not _SHORTEST <= path.duration < math.inf:
         raise InvalidValueError(f"path {path.name}: expected a duration from {_SHORTEST:g} s, got {path.duration:g} s")
-    axes = 2 if path.of == "tip" else len(linkage.drives)
+    by_tip = path.follower == "tip"
+    axes = 2 if by_tip else len(linkage.drives)
     if path.pieces.shape[1] != axes:
-        raise ShapeError(f"path {path.name}: expected {axes} axes for the {path.of}, got {path.pieces.shape[1]}")
+        raise ShapeError(f"path {path.name}: expected {axes} axes for the {path.follower}, got {path.pieces.shape[1]}")
     steps = settings.steps(path.duration)
     stride = min(steps, max(1, round(settings.sample * steps / path.duration)))
     # A few more, where that is needed for the last sample to be at the end.
     steps = -(-steps // stride) * stride
     after, before = path.halves(steps)
-    by_tip = path.of == "tip"
-    q = closed_along(
-        linkage, after.at, assembly_guess(linkage) if guess is None else floats(guess, "guess"), by_tip=by_tip
-    )
+    start = assembly_guess(linkage) if guess is None else floats(guess, "guess")
+    q = closed_along(linkage, after.position, start, by_tip=by_tip)
     ideal = ideal_motion(linkage, q, after.velocity, after.acceleration, by_tip=by_tip)
-    told = _told(linkage, settings, ideal)
-    table = np.stack([told[:-1:2], told[1::2], told[2::2]], axis=1)
-    # A step that ends where the acceleration jumps is told what held before the jump.
+    commands = _commands(linkage, settings, ideal)
+    table = np.stack([commands[:-1:2], commands[1::2], commands[2::2]], axis=1)
+    # A step that ends where the acceleration jumps ends with the command before the jump.
     jumps = np.flatnonzero(np.any(after.acceleration != before.acceleration, axis=-1))
     jumps = jumps[(jumps > 0) & (jumps % 2 == 0)]
     if len(jumps):
         came = ideal_motion(linkage, q[jumps], before.velocity[jumps], before.acceleration[jumps], by_tip=by_tip)
-        table[jumps // 2 - 1, 2] = _told(linkage, settings, came)
-    table, lengths, marks = _parted(linkage, path, settings, q[::2], table)
+        table[jumps // 2 - 1, 2] = _commands(linkage, settings, came)
+    table, lengths, marks = _split_at_jumps(linkage, path, settings, q[::2], table)
     return Scenario(
         linkage=linkage,
         path=path,
@@ -105,36 +104,32 @@ def prepare(
         table=np.ascontiguousarray(table),
         lengths=lengths,
         marks=marks,
-        ideal=IdealMotion(**{one.name: getattr(ideal, one.name)[::2] for one in attrs.fields(IdealMotion)}),
+        ideal=IdealMotion(**{name: x[::2] for name, x in attrs.asdict(ideal, recurse=False).items()}),
     )
 
 
 def assembly_guess(linkage: Linkage) -> Array:
-    """Return coordinates near those of the linkage put together as its ``assembly`` says.
+    """Return coordinates near those of the assembly that ``assembly`` of the linkage describes.
 
-    Free bodies are put where the first pin wants them that joins them to one that has its place.
+    Each free body is placed so that the first pin that joins it to a placed body is closed.
     """
     coordinates = linkage.coordinates
-    numbers = {coordinate: i for i, coordinate in enumerate(coordinates)}
-    q = np.array(
-        [linkage.assembly.get(one.body, 0.0) if one.kind in ("angle", "slide") else 0.0 for one in coordinates]
-    )
-    free = [body.name for body in linkage.bodies if linkage.joint(body.name) is None]
-    waiting = list(free)
+    q = np.array([linkage.assembly.get(body, 0.0) if kind in ("angle", "slide") else 0.0 for body, kind in coordinates])
+    waiting = [body.name for body in linkage.bodies if linkage.joint(body.name) is None]
     while waiting:
         placement = Placement(linkage, list(q), [0.0] * len(q))
         for pin in linkage.pins:
             ends = [pin.bearing, pin.journal]
-            loose = next((place for place in ends if place.body in waiting), None)
-            other = next((place for place in ends if place.body not in waiting), None)
+            loose = next((end for end in ends if end.body in waiting), None)
+            other = next((end for end in ends if end.body not in waiting), None)
             if loose is not None and other is not None:
-                shift = placement.point(other).at.minus(placement.point(loose).at)
-                for kind, by in zip(("x", "y"), shift, strict=True):
-                    q[next(i for one, i in numbers.items() if one.body == loose.body and one.kind == kind)] += by
+                shift = placement.point(other).position.minus(placement.point(loose).position)
+                x = coordinates.index(Coordinate(loose.body, "x"))
+                q[x : x + 2] += shift
                 waiting.remove(loose.body)
                 break
         else:
-            raise InvalidValueError(f"{linkage.name}: no pin joins {', '.join(waiting)} to the rest")
+            raise InvalidValueError(f"{linkage.name}: no pin joins {', '.join(waiting)} to the other bodies")
     return q
 
 
@@ -145,34 +140,34 @@ def closed_along(linkage: Linkage, goals: Array, guess: Array, *, by_tip: bool) 
         InvalidValueError: the path leaves what can be reached, or passes a singular configuration.
     """
 
-    def at(start: Array, goal: Array) -> Array:
+    def closed_at(start: Array, goal: Array) -> Array:
         return closed(linkage, start, tip=goal) if by_tip else closed(linkage, start, drives=goal)
 
     picks = np.unique(np.linspace(0, len(goals) - 1, min(_COARSE, len(goals))).astype(int))
-    coarse = [at(guess, goals[0])]
+    coarse = [closed_at(guess, goals[0])]
     for pick in picks[1:]:
-        # The way that was taken last goes on, and its end is put right.
+        # The last step is extrapolated, then corrected.
         ahead = 2 * coarse[-1] - coarse[-2] if len(coarse) > 1 else coarse[-1]
-        coarse.append(at(ahead, goals[pick]))
+        coarse.append(closed_at(ahead, goals[pick]))
     known = np.array(coarse)
     if len(picks) == 1:
         return known
     between = [np.interp(np.arange(len(goals)), picks, known[:, i]) for i in range(known.shape[1])]
-    q = at(np.stack(between, axis=-1), goals)
+    q = closed_at(np.stack(between, axis=-1), goals)
     jumps = np.abs(np.diff(q, axis=0)).max(axis=-1)
-    # From one moment to the next a body goes hardly farther than on its way on average; to another assembly it jumps.
+    # Between neighbouring times a body moves about as far as on average; to another assembly it jumps.
     if jumps.max() > _JUMP + 50 * jumps.mean():
         raise InvalidValueError(
-            f"{linkage.name}: at moment {int(jumps.argmax())} of {len(goals)} the path comes to a singular "
-            f"configuration, where the linkage goes over to another assembly"
+            f"{linkage.name}: the path reaches a singular configuration at sample {int(jumps.argmax())} of "
+            f"{len(goals)}, at which the linkage changes to another assembly"
         )
     return q
 
 
-def _parted(
+def _split_at_jumps(
     linkage: Linkage, path: Path, settings: Settings, q: Array, table: Array
 ) -> tuple[Array, Array, npt.NDArray[np.int64]]:
-    """Return a table whose steps are parted where the acceleration jumps within one, and what else tells its rows."""
+    """Return the table with its steps split where the acceleration jumps within them; lengths and marks of its rows."""
     steps = len(table)
     h = path.duration / steps
     grid = np.linspace(0.0, path.duration, steps + 1)
@@ -187,21 +182,21 @@ def _parted(
     if len(parts):
         times = ends[parts, None] + lengths[parts, None] * (0.0, 0.5, 1.0)
         piece = np.searchsorted(path.knots, times[:, 1], side="right") - 1
-        moment = path.at(times, np.broadcast_to(piece[:, None], times.shape))
-        by_tip = path.of == "tip"
+        moment = path.evaluate(times, np.broadcast_to(piece[:, None], times.shape))
+        by_tip = path.follower == "tip"
         near = np.broadcast_to(q[number[parts], None], (*times.shape, q.shape[1]))
-        there = closed(linkage, near, **{"tip" if by_tip else "drives": moment.at})
+        there = closed(linkage, near, **{"tip" if by_tip else "drives": moment.position})
         ideal = ideal_motion(linkage, there, moment.velocity, moment.acceleration, by_tip=by_tip)
-        rows[parts] = _told(linkage, settings, ideal)
+        rows[parts] = _commands(linkage, settings, ideal)
     return rows, lengths, marks
 
 
-def _told(linkage: Linkage, settings: Settings, ideal: IdealMotion) -> Array:
-    """Return what the drives are told: efforts, or accelerations where their motion is given; and goals."""
+def _commands(linkage: Linkage, settings: Settings, ideal: IdealMotion) -> Array:
+    """Return the commands of the drives: efforts or prescribed accelerations; for a controller also goals."""
     driven = list(linkage.driven)
-    given = np.array([drive.kind == "motion" for drive in linkage.drives])
-    told = np.where(given, ideal.qdd[..., driven], ideal.efforts)
+    prescribed = np.array([drive.kind == "motion" for drive in linkage.drives])
+    commands = np.where(prescribed, ideal.qdd[..., driven], ideal.efforts)
     if settings.control == "effort":
-        return told
-    parts = np.stack([told, ideal.q[..., driven], ideal.qd[..., driven]], axis=-1)
+        return commands
+    parts = np.stack([commands, ideal.q[..., driven], ideal.qd[..., driven]], axis=-1)
     return parts.reshape(*parts.shape[:-2], -1)

@@ -1,4 +1,4 @@
-"""How a linkage with play is simulated, and whether the step can be right for its contacts."""
+"""The settings of a simulation with clearance, and the check of its step against the contacts."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from armwright.errors import InvalidValueError, one_of
 Start: TypeAlias = Literal["rest", "rigid", "centred"]
 STARTS: tuple[Start, ...] = ("rest", "rigid", "centred")
 
-# The force at which a resting contact is judged [N], and what a step may be of the time in which it swings.
+# The force of a typical contact at rest [N], and the largest step times its angular frequency.
 _USUAL_FORCE, _LARGEST_PART = 20.0, 0.7
-# A path of more steps is a slip of units.
+# A path of more steps has a mistaken unit.
 _MOST_STEPS = 20_000_000
 
 
 @attrs.frozen(kw_only=True)
 class Settings:
-    """How a linkage with play is simulated.
+    """The settings of a simulation with clearance.
 
     Attributes:
         step: of the integrator [s].
         integrator: ``rk4`` or ``semi-implicit``.
-        control: ``effort``, the drives give what the ideal linkage needs; ``pd+ff``, a controller helps.
-        gains: of the controller, stiffness [N m/rad] and damping [N m s/rad]; of a drive whose motion is given they add
-            to its acceleration [1/s², 1/s].
+        control: ``effort``, the drives give the efforts of the ideal linkage; ``pd+ff``, plus a controller's.
+        gains: of the controller, stiffness [N m/rad] and damping [N m s/rad]; of a drive with prescribed motion they
+            add to its acceleration [1/s², 1/s].
         impact: law of the loss in an impact.
-        friction: how friction is worked out.
+        friction: the friction model.
         threshold: sliding speed below which friction fades [m/s].
-        start: lying at ``rest`` on elastic walls, at rest on ``rigid`` ones, or with ``centred`` journals.
+        start: at ``rest`` on elastic walls, at rest on ``rigid`` walls, or with ``centred`` journals.
         sample: time between samples [s]; rounded to whole steps.
-        located: whether a step in which a journal comes to its wall is made in two parts, so that the speed of the
-            impact is taken where it comes and not up to a step later.
+        located: whether a step with an impact is made in two parts, so that the impact speed is taken at the impact
+            and not up to a step later.
     """
 
     step: float = 1e-5
@@ -72,7 +72,7 @@ class Settings:
         """Return how many equal steps a duration [s] takes.
 
         Raises:
-            InvalidValueError: more than anybody means.
+            InvalidValueError: they are more than the limit.
         """
         count = duration / self.step - 1e-9
         steps = max(1, int(np.ceil(min(count, 2.0 * _MOST_STEPS))))
@@ -97,10 +97,11 @@ def contact_stiffness(linkage: Linkage, clearances: Array) -> Array:
 
 
 def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
-    """Refuse a step that cannot follow what the contacts do.
+    """Refuse a step that is too long for the contacts.
 
-    A contact under load swings with ω² = k / m, where k is the slope of the Hertz force at that load and m the lighter
-    side. Runge-Kutta and the semi-implicit rule hold while ω h stays below 2 to 2.8; a third of that is followed well.
+    A contact under load oscillates with ω² = k / m, where k is the slope of the Hertz force at that load and m the
+    lighter side. Runge-Kutta and the semi-implicit rule are stable while ω h stays below 2 to 2.8, and accurate at a
+    third of that.
 
     Args:
         linkage: with p pins.
@@ -118,7 +119,7 @@ def check_step(linkage: Linkage, settings: Settings, K: Array) -> None:
     if settings.step > longest:
         depth = deepest(lightest, float(K.max()), 1.0, 0.0)
         raise InvalidValueError(
-            f"step: {settings.step:g} s is too long for contacts of {K.max():.3g} N/m^1.5, which swing in "
+            f"step: {settings.step:g} s is too long for contacts of {K.max():.3g} N/m^1.5, which oscillate in "
             f"{2 * np.pi * np.sqrt(lightest / slope):.2g} s and stop a blow of 1 m/s within {depth * 1e6:.0f} µm; "
             f"expected at most {_shorter(float(longest)):g} s"
         )

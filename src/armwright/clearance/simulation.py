@@ -1,6 +1,6 @@
-"""Simulating linkages with play: one run, or many with other clearances side by side.
+"""The simulation of linkages with clearance: one run, or many with other clearances side by side.
 
-The drives give what a linkage without play would need for the path; what the tip then does differently is the error.
+The drives give what a linkage without clearance would need for the path; the deviation of the tip is the error.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from armwright.errors import InvalidValueError, ShapeError
 from armwright.tracing.cache import compiled
 from armwright.tracing.kernel import on_cores_for_long
 
-# A tip that is farther off than this has left its path for good [m].
-_LOST = 1.0
+# A tip farther from its path than this has diverged [m].
+_DIVERGED = 1.0
 
 
 class Status(IntEnum):
@@ -41,20 +41,20 @@ class Status(IntEnum):
 
 @attrs.frozen(kw_only=True, eq=False)
 class Simulation:
-    """What a linkage with play did; the leading axes are those of clearances and frictions together.
+    """A simulated motion with clearance; the leading axes are those of clearances and frictions together.
 
     Attributes:
-        scenario: what it was to do.
+        scenario: the path and its drives.
         clearances: (..., p) [m].
         frictions: (...) coefficients of friction.
         time: (s,) of the samples [s].
         q: (..., s, n) coordinates [rad, m].
         qd: (..., s, n) their speeds.
-        tip: (..., s, 2) where the tip was [m].
-        error: (..., s, 2) by how much it was off [m].
+        tip: (..., s, 2) position of the tip [m].
+        error: (..., s, 2) its deviation from the path without clearance [m].
         forces: (..., s, p) with which journals and bearings pressed on one another [N].
-        works: by name (..., s) what drives gave and what impacts and friction took [J].
-        impacts: (..., p) how often each journal came down on its wall.
+        works: by name (..., s) the work of the drives and the losses in impacts and friction [J].
+        impacts: (..., p) the number of impacts of each journal.
         peaks: (..., p) the largest force in each pin [N].
         status: (...) how each run ended.
     """
@@ -75,7 +75,7 @@ class Simulation:
 
     @property
     def distance(self) -> Array:
-        """(..., s) how far the tip was off [m]."""
+        """(..., s) distance of the tip from the path without clearance [m]."""
         return np.asarray(np.linalg.norm(self.error, axis=-1), dtype=np.float64)
 
     @property
@@ -85,13 +85,13 @@ class Simulation:
 
     @property
     def depths(self) -> Array:
-        """(..., s, p) how deep each journal is in the wall; below 0 where it flies [m]."""
+        """(..., s, p) indentation of each journal into its wall; below 0 in free flight [m]."""
         size = np.linalg.norm(self.gaps, axis=-1)
         return np.asarray(size - self.clearances[..., None, :], dtype=np.float64)
 
 
 class Record(NamedTuple):
-    """What the compiled simulation fills; one row per run."""
+    """The arrays that the compiled simulation fills; one row per run."""
 
     samples: Array
     impacts: npt.NDArray[np.int64]
@@ -105,10 +105,10 @@ def simulate(
     frictions: ArrayLike | None = None,
     threads: int | None = None,
 ) -> Simulation:
-    """Let a linkage with play do what one without would need for its path.
+    """Simulate a linkage with clearance, driven as one without would be for its path.
 
     Args:
-        scenario: the path, made ready; see ``prepare``.
+        scenario: the prepared path; see ``prepare``.
         clearances: (..., p) of the pins [m]; those of the linkage when left out.
         frictions: (...) coefficients of friction; that of the material when left out.
         threads: how many cores to use; all when left out. The bits do not depend on it.
@@ -122,7 +122,7 @@ def simulate(
     lead = mu.shape
     K = contact_stiffness(linkage, c)
     check_step(linkage, settings, K)
-    layout = Layout(linkage=linkage, rubbing=settings.friction, control=settings.control, located=settings.located)
+    layout = Layout(linkage=linkage, friction=settings.friction, control=settings.control, located=settings.located)
     start = np.zeros((*lead, layout.states))
     start[..., : layout.n] = initial_coordinates(scenario, c, K)
     start[..., layout.n : 2 * layout.n] = scenario.ideal.qd[0]
@@ -130,14 +130,14 @@ def simulate(
     parts = np.broadcast_arrays(c, K, chi, mu[..., None], settings.threshold)
     contacts = np.stack(parts, axis=-1).reshape(mu.size, len(parts) * layout.pins)
     record = _run(scenario, layout, start.reshape(mu.size, layout.states), contacts, threads)
-    return _told(scenario, layout, c, mu, record)
+    return _simulation(scenario, layout, c, mu, record)
 
 
 def initial_coordinates(scenario: Scenario, clearances: Array, K: Array) -> Array:
     """Return (..., n) the coordinates from which runs start.
 
     Args:
-        scenario: what is to be done.
+        scenario: the prepared path.
         clearances: (..., p) [m].
         K: (..., p) stiffness of the contacts [N/m^1.5].
     """
@@ -171,31 +171,24 @@ def _run(scenario: Scenario, layout: Layout, start: Array, contacts: Array, thre
     """Run the compiled simulation, blocks of lanes on several cores."""
     runs, pins, rows = len(start), layout.pins, len(scenario.table)
     marks = scenario.marks[: rows + 1]
-    kept = np.where((marks >= 0) & (marks % scenario.stride == 0), marks // scenario.stride, -1)
+    samples = np.where((marks >= 0) & (marks % scenario.stride == 0), marks // scenario.stride, -1)
     record = Record(
         samples=np.full((runs, scenario.steps // scenario.stride + 1, layout.sampled), np.nan),
         impacts=np.zeros((runs, pins), dtype=np.int64),
         peaks=np.zeros((runs, pins)),
     )
     gains = np.tile(scenario.settings.gains, (runs, len(scenario.linkage.drives) if layout.gains else 0))
-    run = _simulator(layout, scenario.settings.integrator)
-    lengths = scenario.lengths[:rows]
-    on_cores_for_long(
-        lambda a, b, called_off: run(a, b, start, contacts, gains, scenario.table, lengths, kept, *record, called_off),
-        runs,
-        threads,
+    run = _compiled(
+        _LinkageKey(layout.linkage), layout.friction, layout.control, layout.located, scenario.settings.integrator
     )
+    lengths = scenario.lengths[:rows]
+    inputs = (start, contacts, gains, scenario.table, lengths, samples, *record)
+    on_cores_for_long(lambda first, last, cancelled: run(first, last, *inputs, cancelled), runs, threads)
     return record
 
 
-def _simulator(layout: Layout, integrator: Integrator) -> Any:
-    """Return the compiled simulation of a linkage: its numbers alone count, not its clearances or its material."""
-    linkage = layout.linkage
-    return _compiled(_Shape(linkage), layout.rubbing, layout.control, layout.located, integrator)
-
-
-class _Shape:
-    """A linkage as a key: two are equal if their compiled simulations are."""
+class _LinkageKey:
+    """A linkage as a key: two are equal if their compiled simulations are, whatever their clearances and materials."""
 
     def __init__(self, linkage: Linkage) -> None:
         self.linkage = linkage
@@ -205,36 +198,41 @@ class _Shape:
         ]
         ground = tuple((name, *p) for name, p in linkage.ground.points.items())
         pins = [(pin.bearing, pin.journal, pin.journal_radius) for pin in linkage.pins]
-        loads = [(load.at, *load.force) for load in linkage.loads]
-        rest = (linkage.joints, linkage.drives, linkage.tip, *linkage.gravity, linkage.zero)
-        self._key = (tuple(bodies), ground, tuple(pins), tuple(loads), rest)
+        loads = [(load.point, *load.force) for load in linkage.loads]
+        others = (linkage.joints, linkage.drives, linkage.tip, *linkage.gravity, linkage.zero)
+        self._key = (tuple(bodies), ground, tuple(pins), tuple(loads), others)
 
     def __hash__(self) -> int:
         return hash(self._key)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Shape) and self._key == other._key
+        return isinstance(other, _LinkageKey) and self._key == other._key
 
 
 @cache
-def _compiled(shape: _Shape, rubbing: FrictionModel, control: Control, located: bool, integrator: Integrator) -> Any:  # noqa: FBT001 - a part of the key
-    layout = Layout(linkage=shape.linkage, rubbing=rubbing, control=control, located=located)
-    source = emit_simulation(layout, integrator)
-    return compiled(source, "simulate", f"the simulation of {shape.linkage.name}")
+def _compiled(
+    key: _LinkageKey,
+    friction: FrictionModel,
+    control: Control,
+    located: bool,  # noqa: FBT001 - a part of the key
+    integrator: Integrator,
+) -> Any:
+    layout = Layout(linkage=key.linkage, friction=friction, control=control, located=located)
+    return compiled(emit_simulation(layout, integrator), "simulate", f"the simulation of {key.linkage.name}")
 
 
-def _told(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
-    """Return a record in the terms of the linkage."""
+def _simulation(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Record) -> Simulation:
+    """Return a record as motion, forces and works of the linkage."""
     n, lead, linkage = layout.n, mu.shape, scenario.linkage
     samples = record.samples.reshape(*lead, *record.samples.shape[1:])
     q = samples[..., :n]
     number = np.arange(samples.shape[-2]) * scenario.stride
-    # What became infinite has no sine.
+    # Diverged coordinates are infinite and have no sine.
     with np.errstate(invalid="ignore", over="ignore"):
         tip = tip_of(linkage, q)
         error = tip - tip_of(linkage, scenario.ideal.q[number])
-        lost = ~np.all(np.abs(error) < _LOST, axis=(-1, -2))
-    first = 2 * n + layout.bends
+        diverged = ~np.all(np.abs(error) < _DIVERGED, axis=(-1, -2))
+    first = 2 * n + layout.deflections
     return Simulation(
         scenario=scenario,
         clearances=c,
@@ -248,5 +246,5 @@ def _told(scenario: Scenario, layout: Layout, c: Array, mu: Array, record: Recor
         works={name: samples[..., first + i] for i, name in enumerate(WORKS)},
         impacts=record.impacts.reshape(*lead, layout.pins),
         peaks=record.peaks.reshape(*lead, layout.pins),
-        status=np.where(lost, Status.DIVERGED, Status.FINISHED),
+        status=np.where(diverged, Status.DIVERGED, Status.FINISHED),
     )

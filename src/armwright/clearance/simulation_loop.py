@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from armwright.arrays import Array
-from armwright.clearance.event_location import come_down
+from armwright.clearance.event_location import resolve_impacts
 from armwright.clearance.lane_layout import (
     COLUMNS,
     FIRST_DEPTH,
@@ -33,7 +33,7 @@ from armwright.clearance.lane_layout import (
     rates,
 )
 
-# After so many steps a simulation looks whether it is called off.
+# After so many steps a simulation checks whether it is cancelled.
 CHECK_EVERY = 1024
 
 
@@ -45,7 +45,7 @@ def simulate(
     gains: Array,
     table: Array,
     lengths: Array,
-    kept: npt.NDArray[np.int64],
+    sample_at: npt.NDArray[np.int64],
     samples: Array,
     counts: npt.NDArray[np.int64],
     peaks: Array,
@@ -61,7 +61,7 @@ def simulate(
         gains: (runs, GAINS) of the controllers.
         table: (steps, 3, COLUMNS) the drives at the start, the middle and the end of each step.
         lengths: (steps,) of the steps [s].
-        kept: (steps + 1,) the number of the sample that is taken at each step, or -1.
+        sample_at: (steps + 1,) the number of the sample that is taken at each step, or -1.
         samples: (runs, ..., STATES + PINS) to fill: states, and the normal force of each pin.
         counts: (runs, PINS) to fill: impacts.
         peaks: (runs, PINS) to fill: largest normal forces.
@@ -92,13 +92,13 @@ def simulate(
                     if LOCATED:
                         if step > 0:
                             lanes = (x, y, state, before, after, change, depths, done, part, hit)
-                            come_down(*lanes, table, lengths, step, counts, row, last - begin)
+                            resolve_impacts(*lanes, table, lengths, step, counts, row, last - begin)
                         before[:] = state
                         for j in range(2 * PINS * LANES):
                             depths[j] = y[FIRST_DEPTH * LANES + j]
                     remember(step, begin, last, row, x, y, counts, peaks)
-                    if kept[step] >= 0:
-                        take_sample(kept[step], begin, last, row, state, y, samples)
+                    if sample_at[step] >= 0:
+                        take_sample(sample_at[step], begin, last, row, state, y, samples)
                     if step == steps:
                         break
                 if RK4:
@@ -136,7 +136,7 @@ def begin_lanes(
 
 
 def begin_stage(stage: int, step: int, now: int, h: float, x: Array, y: Array, state: Array, table: Array) -> None:
-    """Set drives and state to where a stage of the integrator looks; behind the last step, to its end."""
+    """Set drives and state to those at which a stage evaluates the rates; behind the last step, to its end."""
     moment = 2 if step == table.shape[0] else (stage + 1) // 2
     ahead = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
     for k in range(LANES):
@@ -156,11 +156,11 @@ def remember(
     counts: npt.NDArray[np.int64],
     peaks: Array,
 ) -> None:
-    """Remember which pins touch and how fast they came, count the impacts and keep the largest forces."""
+    """Remember the pins in contact and their impact speeds, count the impacts and update the largest forces."""
     for i in range(PINS):
         for k in range(LANES):
             touching = y[(STATES + 3 * i) * LANES + k]
-            # What touches at the start has not come with a blow.
+            # A contact at the start is no impact.
             if step > 0 and touching > x[(FIRST_MEMORY + 2 * i) * LANES + k] and begin + k < last:
                 counts[row[k], i] += 1
             x[(FIRST_MEMORY + 2 * i) * LANES + k] = touching
@@ -173,7 +173,7 @@ def remember(
 def take_sample(
     sample: int, begin: int, last: int, row: npt.NDArray[np.int64], state: Array, y: Array, samples: Array
 ) -> None:
-    """Keep the states, and the normal force of each pin, as one sample."""
+    """Store the states and the normal force of each pin as one sample."""
     for k in range(min(LANES, last - begin)):
         for i in range(STATES):
             samples[row[k], sample, i] = state[i * LANES + k]

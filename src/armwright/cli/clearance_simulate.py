@@ -16,7 +16,7 @@ from armwright.cli.shell_completion import paths, setting
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
     from armwright.clearance.paths import Path as TipPath
-    from armwright.clearance.predictability import Outlook
+    from armwright.clearance.predictability import Predictability
     from armwright.clearance.scenario import Scenario
     from armwright.clearance.settings import Settings
     from armwright.clearance.simulation import Simulation
@@ -130,7 +130,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 
 def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: float) -> "TipPath":
     """Return the path of the tip, or of the one drive."""
-    from armwright.clearance.paths import named_path, turning
+    from armwright.clearance.paths import constant_speed_path, named_path
 
     drives = len(model.drives)
     if (path is None) == (speed_rpm is None):
@@ -158,7 +158,7 @@ def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: fl
     speed = speed_rpm * 2 * math.pi / 60
     at = model.assembly.get(model.drives[0].body, 0.0)
     name = f"{turns:g} turn{'' if turns == 1 else 's'} at {speed_rpm:g} rev/min"
-    return turning(name, at, speed, turns * 2 * math.pi / abs(speed))
+    return constant_speed_path(name, at, speed, turns * 2 * math.pi / abs(speed))
 
 
 def _instead(drives: int, wanted: int) -> str:
@@ -170,13 +170,13 @@ def _instead(drives: int, wanted: int) -> str:
 
 def _simulated(
     model: "Linkage", way: "TipPath", settings: "Settings", friction: float | None, *, watched: bool
-) -> "tuple[Simulation, Outlook]":
+) -> "tuple[Simulation, Predictability]":
     """Run it, and beside it runs that nobody could tell from it; a word is on the screen while it is compiled."""
     import numpy as np
 
-    from armwright.clearance.predictability import with_outlook
+    from armwright.clearance.predictability import simulate_with_predictability
     from armwright.clearance.scenario import prepare
 
     with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
         task: Scenario = prepare(model, way, settings)
-        return with_outlook(task, np.array(list(model.clearances.values())), friction=friction)
+        return simulate_with_predictability(task, np.array(list(model.clearances.values())), friction=friction)

@@ -40,7 +40,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
-    twins: Annotated[
+    replicates: Annotated[
         int, typer.Option(help="Runs beside each that nobody can tell from it, 0 to 15: they tell what is chance.")
     ] = 3,
     seed: Annotated[int, typer.Option(help="Of lhs and sobol.")] = 0,
@@ -72,9 +72,9 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     task = FeatureSweep(
         linkage=load_linkage(linkage),
         paths=tuple(dict.fromkeys(name.strip() for name in paths.split(","))),
-        settings_of=settings_of(friction_velocity, threshold_mm_s, step=step),
+        simulation_settings=settings_of(friction_velocity, threshold_mm_s, step=step),
         with_friction=to_friction is not None,
-        twins=twins,
+        replicates=replicates,
     )
     plan = _plan(task, design, (from_mm * 1e-3, to_mm * 1e-3), to_friction, levels=levels, runs=runs, seed=seed)
     # Whatever is wrong with a path is said now, and a step too long for the least play; and the simulation is compiled
@@ -114,7 +114,7 @@ def _chaos(task: "FeatureSweep", found: "Dataset") -> dict[str, dict[str, Any]]:
     from armwright.clearance.paths import thesis_path
 
     done = found["status"].to_numpy() == 0
-    if not task.twins or not done.any():
+    if not task.replicates or not done.any():
         return {}
 
     def numbers(name: str) -> "Array":
@@ -128,7 +128,7 @@ def _chaos(task: "FeatureSweep", found: "Dataset") -> dict[str, dict[str, Any]]:
             "chance": [
                 name
                 for name in Features._fields
-                if is_chance(numbers(f"{path}_{name}"), numbers(f"{path}_{name}_spread"), task.twins + 1)
+                if is_chance(numbers(f"{path}_{name}"), numbers(f"{path}_{name}_spread"), task.replicates + 1)
             ],
         }
         for path in task.paths

@@ -117,8 +117,8 @@ def _error(figure: "Figure", run: ClearanceRun) -> None:
         axis.plot(t, values[some] * 1e3, style, color=colour, linewidth=1.3, label=name)
     for knot in run.simulation.scenario.path.knots[1:-1]:
         axis.axvline(knot, color="0.6", linewidth=0.8, linestyle=":")
-    if run.outlook is not None and not run.outlook.to_the_end:
-        axis.axvline(run.outlook.until, color="C3", linewidth=1.0, linestyle="--", label="predictable until")
+    if run.predictability is not None and not run.predictability.to_the_end:
+        axis.axvline(run.predictability.until, color="C3", linewidth=1.0, linestyle="--", label="predictable until")
     axis.set_xlim(float(t[0]), float(t[-1]) or 1.0)
     axis.legend(fontsize="small")
 

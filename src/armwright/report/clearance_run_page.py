@@ -13,7 +13,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.ideal import point_of
-from armwright.clearance.linkage import GROUND, Guide, Linkage, Pin, Place
+from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage, Pin
 from armwright.report.clearance_run_figures import round_number
 from armwright.report.elements import badge, facts, figures, notes as shown_notes, pairs, table
 from armwright.report.figures import Drawing
@@ -77,7 +77,7 @@ def film(run: ClearanceRun) -> Film:
     stride = max(1, -(-run.rows // _ROWS))
     rows = np.arange(0, run.rows, stride)
     rows = rows if rows[-1] == run.rows - 1 else np.append(rows, run.rows - 1)
-    places = [Place(body.name, point) for body in linkage.bodies for point in body.points]
+    places = [BodyPoint(body.name, point) for body in linkage.bodies for point in body.points]
     q = simulation.q[rows]
     ideal_q = simulation.scenario.ideal.q[rows * simulation.scenario.stride]
     with_play = np.stack([point_of(linkage, place, q) for place in places], axis=1)
@@ -145,7 +145,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
 # ---- the film ------------------------------------------------------------------------------------------------------
 
 
-def _pins(run: ClearanceRun, places: Sequence[Place]) -> list[dict[str, Any]]:
+def _pins(run: ClearanceRun, places: Sequence[BodyPoint]) -> list[dict[str, Any]]:
     """Return the pins; a bearing or journal on the ground has no number, but a place."""
     linkage = run.simulation.scenario.linkage
     found = []
@@ -170,12 +170,12 @@ def _rails(linkage: Linkage) -> list[list[float]]:
     return [[*(float(x) for x in linkage.point(guide.on)), guide.direction] for guide in guides]
 
 
-def _motor(linkage: Linkage, body: str, places: Sequence[Place]) -> int | list[float]:
+def _motor(linkage: Linkage, body: str, places: Sequence[BodyPoint]) -> int | list[float]:
     joint = linkage.joint(body)
     assert joint is not None  # noqa: S101 - a linkage has no drive without one
     if isinstance(joint, Pin) and joint.on.body == GROUND:
         return [float(x) for x in linkage.point(joint.on)]
-    return places.index(Place(joint.body, joint.point))
+    return places.index(BodyPoint(joint.body, joint.point))
 
 
 def _magnification(points: Array, shifts: Array) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 
 from armwright.accuracy.pose import pose_repeatability
 from armwright.arrays import Array
-from armwright.clearance.correction import Correction, correct_nodes, misses
+from armwright.clearance.correction import Correction, correct_nodes, tip_errors
 from armwright.clearance.equations import FrictionModel
 from armwright.clearance.estimation.kriging import Surrogate, check_extra, learn, solve_features
 from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
@@ -140,7 +140,7 @@ def arm() -> Linkage:
 
 def feature_sweep() -> FeatureSweep:
     """Return the task whose 729 points the thesis simulates, once each as it does."""
-    return FeatureSweep(linkage=arm(), paths=PATHS, settings_of=SETTINGS, twins=0)
+    return FeatureSweep(linkage=arm(), paths=PATHS, simulation_settings=SETTINGS, replicates=0)
 
 
 def learnt(progress: Callable[[str, float], None] | None = None, *, levels: Sequence[float] = LEVELS) -> Learnt:
@@ -197,7 +197,7 @@ def estimate_table(found: Learnt) -> list[EstimateRow]:
         seen = _seen(name)
         for feature in FEATURES:
             part = [f"{path}_{feature}" for path in PATHS]
-            rows.append(_estimate(name, feature, solve_features(found.surrogate.chosen(part), _picked(seen, part))))
+            rows.append(_estimate(name, feature, solve_features(found.surrogate.select(part), _picked(seen, part))))
         rows.append(
             _estimate(name, "all nine", solve_features(found.surrogate, _picked(seen, found.surrogate.features)))
         )
@@ -269,7 +269,7 @@ def target_errors(path: Path, clearances: tuple[float, ...] | Array) -> tuple[fl
     """Return how far the tip is from the three targets when it is told to follow a path [mm]."""
     run = simulate(_ready(path), clearances)
     goals = np.array(PickAndPlace().nodes)
-    return tuple(float(one) * 1e3 for one in np.linalg.norm(misses(run, goals), axis=-1))
+    return tuple(float(one) * 1e3 for one in np.linalg.norm(tip_errors(run, goals), axis=-1))
 
 
 @lru_cache(maxsize=8)

@@ -128,7 +128,7 @@ def _corrected(correction: Correction) -> dict[str, str | bytes]:
     for letter, (name, path) in zip("ab", both.items(), strict=True):
         files[f"figure5.12{letter}.svg"] = _torques(f"Figure 5.12 {letter}: drives, {name}", path)
         times = np.linspace(0.0, path.duration, 1001)
-        moment = path.at(times)
+        moment = path.evaluate(times)
         lines = {
             "speed x, m/s": moment.velocity[:, 0],
             "speed y, m/s": moment.velocity[:, 1],

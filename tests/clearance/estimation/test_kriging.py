@@ -57,7 +57,7 @@ def test_slope_of_a_surface(known: Surrogate) -> None:
         (-0.2 * v * np.exp(-u * v), 1 - 0.2 * u * np.exp(-u * v)),
     ]
 
-    found = [process.slope(np.array([u, v])) for process in known.processes]
+    found = [process.gradient(np.array([u, v])) for process in known.processes]
 
     np.testing.assert_allclose(found, by_hand, rtol=0, atol=2e-3)
 
@@ -84,7 +84,7 @@ def test_what_surfaces_miss_together(rng: np.random.Generator) -> None:
 
     assert found.correlation[0, 1] < -0.8
     np.testing.assert_allclose(np.diag(found.correlation), 1.0)
-    assert found.chosen(("g",)).correlation.shape == (1, 1)
+    assert found.select(("g",)).correlation.shape == (1, 1)
 
 
 def test_spread_of_single_runs_is_that_of_neighbours() -> None:
@@ -98,7 +98,7 @@ def test_spread_of_single_runs_is_that_of_neighbours() -> None:
 
     np.testing.assert_allclose(deviation[1], (0.1, 0.0), rtol=0.05, atol=1e-3)
     assert deviation[0].max() < 0.02
-    assert found.chosen(("g",)).predict(points)[1].max() < 1e-3
+    assert found.select(("g",)).predict(points)[1].max() < 1e-3
     with pytest.raises(ShapeError, match=r"spreads: expected \(256, 2\), as the values, got \(256, 1\)"):
         learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads[:, :1])
 
@@ -115,7 +115,7 @@ def test_inverse(known: Surrogate, rng: np.random.Generator) -> None:
 def test_weights(known: Surrogate) -> None:
     """Where the features contradict one another, the one that is known better wins."""
     true = np.array([[2e-4, 0.05]])
-    half = known.chosen(["f", "f", "g"])
+    half = known.select(["f", "f", "g"])
     seen = smooth(true)[0][[0, 0, 1]] + [0.0, 0.1, 0.0]
 
     first = solve_features(half, seen, [1e-4, 1.0, 1e-4])
@@ -167,7 +167,7 @@ class TestFiveBar:
         What impacts do to the amplitude is chance, and the surface says so: nine of ten lie within its 90 %.
         """
         held = rng.uniform(*RANGE, (48, 3))
-        seen = swept.seen(held)
+        seen = swept.feature_values(held)
 
         mean, deviation = swept.surrogate.predict(held)
 
@@ -181,7 +181,7 @@ class TestFiveBar:
     @pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
     def test_all_features(self, swept: Swept, clearances: Array) -> None:
         """All features of the error curves together tell arms A and B to 99.99 % without noise."""
-        found = solve_features(swept.surrogate, swept.seen(clearances)[0])
+        found = solve_features(swept.surrogate, swept.feature_values(clearances)[0])
 
         assert accuracy(found, clearances) > 99.99 > WITHOUT_NOISE
 
@@ -189,7 +189,7 @@ class TestFiveBar:
         """Forty arms that nothing was learnt from are told to 99.99 % on average, the worst to 99.9 %."""
         true = rng.uniform(*RANGE, (40, 3))
 
-        found = [solve_features(swept.surrogate, one) for one in swept.seen(true)]
+        found = [solve_features(swept.surrogate, one) for one in swept.feature_values(true)]
 
         right = accuracy(found, true)
         assert right.mean() > 99.99
@@ -198,12 +198,12 @@ class TestFiveBar:
     def test_more_features_tell_more(self, swept: Swept, rng: np.random.Generator) -> None:
         """The thesis' way, one feature of three paths, tells less than its three features together, and these 99 %."""
         true = rng.uniform(*RANGE, (20, 3))
-        seen = swept.seen(true)
+        seen = swept.feature_values(true)
         names = swept.surrogate.features
 
         def right(chosen: Callable[[str], bool]) -> float:
             some = [i for i, name in enumerate(names) if chosen(name)]
-            part = swept.surrogate.chosen([names[i] for i in some])
+            part = swept.surrogate.select([names[i] for i in some])
             return float(np.median(accuracy([solve_features(part, one) for one in seen[:, some]], true)))
 
         amplitude, nine = right(lambda name: "amp_dc" in name), right(lambda name: "offset" not in name)
@@ -243,8 +243,8 @@ def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
     ("change", "error", "said"),
     [
         ({"values": np.zeros((16, 3))}, ShapeError, r"expected \(m, 2\) points and \(m, 2\) values, got \(16, 2\) and"),
-        ({"points": design(8), "values": smooth(design(8))}, InvalidValueError, "expected 12 or more that ended well"),
-        ({"values": np.full((16, 2), np.nan)}, InvalidValueError, "12 or more that ended well, got 0"),
+        ({"points": design(8), "values": smooth(design(8))}, InvalidValueError, "expected 12 or more simulations that finished"),
+        ({"values": np.full((16, 2), np.nan)}, InvalidValueError, "12 or more simulations that finished, got 0"),
         ({"points": design(16) * [1, 0]}, InvalidValueError, "parameter b does not vary: it is 0 in every run"),
         ({"ranges": [(1e-4, 5e-4)]}, ShapeError, r"ranges: expected shape \(2, 2\), got \(1, 2\)"),
         ({"ranges": [(1e-4, 3e-4), (0.0, 0.2)]}, InvalidValueError, "ranges: a point lies outside"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.measurement_file import PathsMeasured, RestMeasured, read_measured
+from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement, read_measured
 from armwright.clearance.estimation.static import rest_offsets
 from armwright.clearance.features import features_of
 from armwright.clearance.linkage import Linkage
@@ -40,7 +40,7 @@ def test_rest_in_any_unit(unit: str, scale: float, tmp_path: Path, five_bar: Lin
 
     found = read_measured(path)
 
-    assert isinstance(found, RestMeasured)
+    assert isinstance(found, RestMeasurement)
     assert (found.names, found.readings, found.noise) == (("P0", "P1", "P2"), (1, 1, 1), None)
     np.testing.assert_allclose(found.poses, STARTS, rtol=0, atol=WRITTEN)
     np.testing.assert_allclose(found.offsets, offsets, rtol=0, atol=2 * WRITTEN)
@@ -55,7 +55,7 @@ def test_repeated_readings(tmp_path: Path, five_bar: Linkage, rng: np.random.Gen
 
     found = read_measured(rest_file(tmp_path / "rest.csv", "mm", 1e3, offsets, list))
 
-    assert isinstance(found, RestMeasured)
+    assert isinstance(found, RestMeasurement)
     assert found.readings == (count,) * 3
     np.testing.assert_allclose(found.offsets, offsets.mean(axis=1), rtol=0, atol=WRITTEN)
     assert found.noise == pytest.approx(sigma, rel=0.1)
@@ -68,7 +68,7 @@ def path_rows(noise: Array | None = None, name: str = "y1", unit: str = "mm", se
     wanted = named_path(name)
     t = np.linspace(0.0, wanted.duration, round(wanted.duration / 1e-3) + 1)
     scale, tick = {"m": 1.0, "mm": 1e3}[unit], {"s": 1.0, "ms": 1e3}[seconds]
-    places = wanted.at(t).at + (3e-4, -4e-4) + (0.0 if noise is None else noise)
+    places = wanted.evaluate(t).position + (3e-4, -4e-4) + (0.0 if noise is None else noise)
     head = f"path,t_{seconds},x_{unit},y_{unit}"
     return [
         head,
@@ -92,7 +92,7 @@ def test_paths(unit: str, seconds: str, tmp_path: Path) -> None:
 
     found = read_measured(written(tmp_path / "paths.csv", rows))
 
-    assert isinstance(found, PathsMeasured)
+    assert isinstance(found, PathMeasurement)
     assert list(found.errors) == ["y1", "x2"]
     np.testing.assert_allclose(found.errors["x2"], np.broadcast_to((3e-4, -4e-4), (291, 2)), rtol=0, atol=WRITTEN)
     features = found.features()["y1"]
@@ -105,17 +105,17 @@ def test_pick_and_place(tmp_path: Path) -> None:
     """The pick-and-place path can be measured too."""
     found = read_measured(written(tmp_path / "paths.csv", path_rows(name="pick-and-place")))
 
-    assert isinstance(found, PathsMeasured)
+    assert isinstance(found, PathMeasurement)
     assert found.times["pick-and-place"][-1] == pytest.approx(0.5)
 
 
 def test_noise_of_features(tmp_path: Path, rng: np.random.Generator) -> None:
     """What noise of the samples does to the features is what many noisy runs show."""
     found = read_measured(written(tmp_path / "paths.csv", path_rows()))
-    assert isinstance(found, PathsMeasured)
+    assert isinstance(found, PathMeasurement)
     names, noise = ("y1_intercept", "y1_slope", "y1_offset_x"), 10e-6
 
-    covariance = found.noise_of(names, noise, draws=800)
+    covariance = found.feature_covariance(names, noise, draws=800)
 
     error = found.errors["y1"]
     many = features_of(found.times["y1"], error + noise * rng.standard_normal((800, *error.shape)))
@@ -241,7 +241,7 @@ def test_spreadsheets(tmp_path: Path) -> None:
 
     found = read_measured(tmp_path / "rest.csv")
 
-    assert isinstance(found, RestMeasured)
+    assert isinstance(found, RestMeasurement)
     np.testing.assert_allclose(found.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
 
 
@@ -255,7 +255,7 @@ def test_tracker_export(tmp_path: Path) -> None:
     ):
         found = read_measured(written(tmp_path / "rest.csv", rows), columns={"pkt": "pose"}, skip_incomplete=True)
 
-    assert isinstance(found, RestMeasured)
+    assert isinstance(found, RestMeasurement)
     assert found.names == ("P1", "P2")
     np.testing.assert_allclose(found.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
 
@@ -263,7 +263,7 @@ def test_tracker_export(tmp_path: Path) -> None:
 def test_few_readings_make_intervals_wider() -> None:
     """The noise of six readings is itself uncertain: Student's t of six numbers reaches 1.94 deviations, not 1.64."""
     linkage, poses = load_linkage("five-bar"), np.array([(-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7)])
-    readings = RestMeasured(
+    readings = RestMeasurement(
         names=("P1", "P2", "P3"),
         poses=poses,
         offsets=rest_offsets(linkage, poses, np.full(3, 3e-4)),
@@ -284,9 +284,9 @@ def test_unknown_noise_is_what_is_left(rng: np.random.Generator) -> None:
     offsets = rest_offsets(linkage, poses, true) + rng.normal(0.0, 2e-5, poses.shape)
     names = tuple(map(str, range(12)))
 
-    found = RestMeasured(names=names, poses=poses, offsets=offsets, readings=(1,) * 12, noise=None).estimate(linkage)
+    found = RestMeasurement(names=names, poses=poses, offsets=offsets, readings=(1,) * 12, noise=None).estimate(linkage)
 
     assert found.noise == pytest.approx(2e-5, rel=0.5)
-    assert found.freedom == 21
+    assert found.noise_freedom == 21
     low, high = found.interval(0.999).T
     assert np.all((low <= true) & (true <= high))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.measurement_file import PathsMeasured, RestMeasured
+from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement
 from armwright.clearance.estimation.misfit import CONTRADICTION, chance, refuse_contradiction, widening
 from armwright.clearance.estimation.posterior import posterior
 from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
@@ -24,9 +24,9 @@ def doubled(linkage: Linkage) -> Linkage:
     return attrs.evolve(linkage, loads=tuple(attrs.evolve(one, force=2 * np.array(one.force)) for one in linkage.loads))
 
 
-def at_rest(poses: Array, offsets: Array) -> RestMeasured:
+def at_rest(poses: Array, offsets: Array) -> RestMeasurement:
     names = tuple(f"P{i}" for i in range(1, len(poses) + 1))
-    return RestMeasured(names=names, poses=poses, offsets=offsets, readings=(1,) * len(poses), noise=None)
+    return RestMeasurement(names=names, poses=poses, offsets=offsets, readings=(1,) * len(poses), noise=None)
 
 
 def test_chance_and_widening() -> None:
@@ -62,7 +62,7 @@ def test_bound_at_rest(five_bar: Linkage) -> None:
     for step in (1e-7, -1e-7):
         for pin in range(2):
             other = offsets - rest_offsets(five_bar, STARTS, found.values + step * np.eye(3)[pin])
-            assert np.sum(other**2) > np.sum(found.missing**2)
+            assert np.sum(other**2) > np.sum(found.residuals**2)
 
 
 @pytest.mark.parametrize("fault", ["none", "noise understated", "sign", "swapped"])
@@ -99,12 +99,12 @@ def test_attacked_at_rest(five_bar: Linkage, fault: str, sample: Sample) -> None
         assert told < 60 or held >= 0.5 * told
 
 
-def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.Generator) -> PathsMeasured:
+def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.Generator) -> PathMeasurement:
     times, errors = {}, {}
     for path in PATHS:
         run = simulate(prepare(linkage, named_path(path), CENTRE), c)
         times[path], errors[path] = run.time, run.error + noise * rng.standard_normal(run.error.shape)
-    return PathsMeasured(times=times, errors=errors)
+    return PathMeasurement(times=times, errors=errors)
 
 
 @pytest.mark.share(0.05)
@@ -124,7 +124,7 @@ def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: 
         measured = attrs.evolve(measured, errors={name: turned(one) for name, one in measured.errors.items()})
         features = measured.features()
         seen = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
-        found = posterior(swept.surrogate, seen, measured.noise_of(swept.surrogate.features, 2e-6))
+        found = posterior(swept.surrogate, seen, measured.feature_covariance(swept.surrogate.features, 2e-6))
         try:
             found.checked()
         except ContradictionError as error:
@@ -140,7 +140,7 @@ def test_beyond_the_sweep(swept: Swept, five_bar: Linkage, rng: np.random.Genera
     features = measured.features()
     seen = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 
-    found = posterior(swept.surrogate, seen, measured.noise_of(swept.surrogate.features, 2e-6))
+    found = posterior(swept.surrogate, seen, measured.feature_covariance(swept.surrogate.features, 2e-6))
 
     assert found.bounds == {"c_J4": 0.5e-3}
     assert found.identifiable["c_J4"] is False
@@ -152,6 +152,6 @@ def test_arm_of_the_model_is_not_refused(swept: Swept, five_bar: Linkage, rng: n
     features = measured.features()
     seen = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 
-    found = posterior(swept.surrogate, seen, measured.noise_of(swept.surrogate.features, 2e-6)).checked()
+    found = posterior(swept.surrogate, seen, measured.feature_covariance(swept.surrogate.features, 2e-6)).checked()
 
     assert np.all(np.abs(found.mean - ARM_A) < 4 * found.deviations)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from armwright.clearance.estimation.on_paths import learnt_from
+from armwright.clearance.estimation.on_paths import surrogate_from_sweep
 from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.linkage import Linkage
 from armwright.clearance.reader import load_linkage
@@ -36,11 +36,11 @@ def folder(five_bar: Linkage, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_chance_is_left_out_and_named(folder: Path, five_bar: Linkage) -> None:
     """Of two paths the straight part of the one that rattles teaches nothing; all else is learnt with its spread."""
-    found = learnt_from(folder, five_bar, ("y1", "y13"), (*STRAIGHT, "amp_dc"))
+    found = surrogate_from_sweep(folder, five_bar, ("y1", "y13"), (*STRAIGHT, "amp_dc"))
 
-    assert found.chance == ("y13_slope", "y13_intercept")
+    assert found.random_features == ("y13_slope", "y13_intercept")
     assert found.surrogate.features == ("y1_slope", "y1_intercept", "y1_amp_dc", "y13_amp_dc")
-    assert 2 * found.until["y13"] < 0.2 < found.until["y1"]
+    assert 2 * found.predictable_until["y13"] < 0.2 < found.predictable_until["y1"]
     assert found.runs == 32
     assert found.surrogate.spreads is not None
     _, deviation = found.surrogate.predict(np.full((1, 3), 0.3e-3))
@@ -50,16 +50,16 @@ def test_chance_is_left_out_and_named(folder: Path, five_bar: Linkage) -> None:
 
 def test_nothing_but_chance(folder: Path, five_bar: Linkage) -> None:
     """Where all features that were measured are chance they tell nothing, and other paths are asked for."""
-    with pytest.raises(InvalidValueError, match="on y13 all features are chance: runs that nobody can tell apart"):
-        learnt_from(folder, five_bar, ("y13",), STRAIGHT)
+    with pytest.raises(InvalidValueError, match="on y13 all features are chance: they vary more between"):
+        surrogate_from_sweep(folder, five_bar, ("y13",), STRAIGHT)
 
 
 def test_sweep_of_something_else(folder: Path, five_bar: Linkage) -> None:
     """A sweep of another linkage, or without a path that was measured, is refused."""
     with pytest.raises(InvalidValueError, match="the sweep is of another linkage than slider-crank"):
-        learnt_from(folder, load_linkage("slider-crank"), ("y1",), STRAIGHT)
+        surrogate_from_sweep(folder, load_linkage("slider-crank"), ("y1",), STRAIGHT)
     with pytest.raises(InvalidValueError, match="the sweep has no path x2; sweep the paths that were measured"):
-        learnt_from(folder, five_bar, ("y1", "x2"), STRAIGHT)
+        surrogate_from_sweep(folder, five_bar, ("y1", "x2"), STRAIGHT)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,9 @@ def test_sweep_of_something_else(folder: Path, five_bar: Linkage) -> None:
         (lambda data: data.assign_attrs(settings="[1"), "Expecting"),
         (lambda data: data.assign_attrs(settings="[" * 100_000), "not the results of a sweep of clearances"),
         (
-            lambda data: data.assign_attrs(settings=data.attrs["settings"].replace('"twins":', '"twins": "x", "n":')),
+            lambda data: data.assign_attrs(
+                settings=data.attrs["settings"].replace('"replicates":', '"replicates": "x", "n":')
+            ),
             "'x'",
         ),
         (lambda data: data.assign_attrs(design='{"ranges": 3}'), "not the results of a sweep of clearances"),
@@ -90,7 +92,7 @@ def test_foreign_results(
     (tmp_path / "run.json").write_text(record_text({"results.nc": str(sha256(tmp_path / "results.nc"))}, {}))
 
     with pytest.raises(FileFormatError, match=text) as refused:
-        learnt_from(tmp_path, five_bar, ("y1",), STRAIGHT)
+        surrogate_from_sweep(tmp_path, five_bar, ("y1",), STRAIGHT)
 
     assert f"{tmp_path / 'results.nc'}" in str(refused.value)
 
@@ -100,14 +102,14 @@ def test_results_that_are_a_pipe(five_bar: Linkage, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "results.nc")
 
     with pytest.raises(FileFormatError, match=r"results\.nc: expected a file, got a pipe"):
-        learnt_from(tmp_path, five_bar, ("y1",), STRAIGHT)
+        surrogate_from_sweep(tmp_path, five_bar, ("y1",), STRAIGHT)
 
 
 def test_without_runs_beside_each(five_bar: Linkage, tmp_path: Path) -> None:
     """A sweep that has no spread is learnt from as it is."""
-    task = FeatureSweep(linkage=five_bar, paths=("y1",), twins=0)
+    task = FeatureSweep(linkage=five_bar, paths=("y1",), replicates=0)
     run(task, sobol(dict.fromkeys(task.parameters, RANGE), 16, 0), tmp_path / "out", workers=1).close()
 
-    found = learnt_from(tmp_path / "out", five_bar, ("y1",), STRAIGHT)
+    found = surrogate_from_sweep(tmp_path / "out", five_bar, ("y1",), STRAIGHT)
 
-    assert (found.chance, found.until, found.surrogate.spreads) == ((), {}, None)
+    assert (found.random_features, found.predictable_until, found.surrogate.spreads) == ((), {}, None)

@@ -7,7 +7,7 @@ from scipy.stats import binom
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.kriging import Surrogate, learn
-from armwright.clearance.estimation.measurement_file import PathsMeasured
+from armwright.clearance.estimation.measurement_file import PathMeasurement
 from armwright.clearance.estimation.posterior import Posterior, posterior
 from armwright.clearance.feature_sweep import feature_vector
 from armwright.clearance.features import Features, features_of
@@ -31,7 +31,7 @@ class Plane:
 
     def predict(self, unit: Array) -> tuple[Array, Array]:
         """Mean and deviation at points."""
-        return unit @ self.slopes, np.full(len(unit), self.chance)
+        return unit @ self.slopes, np.full(len(unit), self.random_features)
 
     def slope(self, _: Array) -> Array:
         """How the mean changes: everywhere alike."""
@@ -168,10 +168,10 @@ def noisy(run: Simulation, noise: float, rng: np.random.Generator) -> Features:
 def covariance_of(swept: Swept, names: tuple[str, ...], noise: float) -> Array:
     """What noise of the samples does to the features."""
     runs = {path: simulate(task, ARM_A) for path, task in zip(PATHS, swept.task.tasks, strict=True)}
-    measured = PathsMeasured(
+    measured = PathMeasurement(
         times={path: run.time for path, run in runs.items()}, errors={path: run.error for path, run in runs.items()}
     )
-    return measured.noise_of(names, noise)
+    return measured.feature_covariance(names, noise)
 
 
 @pytest.mark.share(0.22)
@@ -212,7 +212,7 @@ def test_unknown_friction(swept: Swept) -> None:
     covariance = covariance_of(swept, names, 2e-6)
 
     free = posterior(surrogate, seen, covariance)
-    sure = posterior(swept.surrogate.chosen(names), seen, covariance)
+    sure = posterior(swept.surrogate.select(names), seen, covariance)
 
     low, high = free.interval(0.99).T
     truth = np.array([*ARM_A, 0.08])

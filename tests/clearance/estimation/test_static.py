@@ -33,7 +33,7 @@ def test_without_noise(five_bar: Linkage, clearances: Array) -> None:
 
     assert accuracy(found.values, clearances) > WITHOUT_NOISE
     np.testing.assert_allclose(found.values, clearances, rtol=1e-9)
-    assert found.residual < 1e-12
+    assert found.residual_rms < 1e-12
     assert found.names == ("J2", "J3", "J4")
 
 
@@ -84,7 +84,7 @@ def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) 
 
     found = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 1e-6, offsets.shape))
 
-    assert np.sqrt(np.mean(found.residual**2)) == pytest.approx(1e-6 * np.sqrt(0.5), rel=0.1)
+    assert np.sqrt(np.mean(found.residual_rms**2)) == pytest.approx(1e-6 * np.sqrt(0.5), rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_a_pose_weighs_as_often_as_it_was_read(five_bar: Linkage, rng: np.random
 
     np.testing.assert_allclose(mean.values, single.values, rtol=1e-9)
     np.testing.assert_allclose(mean.covariance, single.covariance, rtol=1e-9)
-    assert float(mean.square) == pytest.approx(float(single.square), rel=1e-6)
+    assert float(mean.chi_square) == pytest.approx(float(single.chi_square), rel=1e-6)
     with pytest.raises(InvalidValueError, match="readings: expected at least 1 of each pose, got 0"):
         estimate_at_rest(five_bar, STARTS, offsets, 1e-5, 0)
 
@@ -220,8 +220,8 @@ def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatc
     """However many rounds an estimate takes, the loops of each pose are closed one after the other only once."""
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     closings = []
-    posed = static.posed
-    monkeypatch.setattr(static, "posed", lambda *given: (closings.append(given), posed(*given))[1])
+    closed_at_poses = static.closed_at_poses
+    monkeypatch.setattr(static, "closed_at_poses", lambda *given: (closings.append(given), closed_at_poses(*given))[1])
 
     estimate_at_rest(five_bar, STARTS, offsets)
 

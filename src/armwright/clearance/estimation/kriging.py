@@ -1,8 +1,8 @@
-"""What features say of clearances, learnt from simulations: one Gaussian process per feature.
+"""Surrogates of error-curve features as functions of clearances: one Gaussian process per feature.
 
 Source:
     Thesis, 4.5.3 (Kriging); spec of the clearance, 4.2 and 4.4. Anisotropic squared exponential, with a noise of its
-    own: what impacts leave to chance is noise to a smooth surface.
+    own: the chance in impacts is noise to a smooth surface.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from scipy.optimize import least_squares
 from armwright.arrays import Array, ArrayLike, floats, one_core
 from armwright.errors import InvalidValueError, MissingExtraError, ShapeError, TooFewError
 
-# Lengths over which a feature may change, as part of the range of a parameter.
+# Bounds of the length scales, as parts of the range of a parameter.
 _LENGTHS = (0.1, 30.0)
-# What chance adds, as part of the variance of a feature: less than the smallest is lost in rounding, and a feature
-# that impacts leave to chance is nothing but noise. What cannot be told from it teaches nothing.
+# Bounds of the noise, as parts of the variance of a feature: rounding hides less than the smallest, and a feature that
+# is chance alone has the largest.
 _NOISE = (1e-8, 1.0)
 _AMPLITUDE = (1e-2, 1e4)
-# From so many points the surface of a feature is learnt; more cost time with their cube.
+# The largest number of points of a surrogate; the time grows with their cube.
 MOST_POINTS = 300
-# A correlation of what surfaces miss is believed so far: it comes of a few hundred points.
-_SURE = 0.98
-# How much of what chance does to a feature at one place it does at another, as part of the range of a parameter.
-_NEIGHBOURS = 0.2
-# Features are compared at so many points first, and matched from the best of them: fewer starts end in a wrong valley.
-_TRIED, _STARTS = 480, 6
+# The weight of the estimated correlation of residuals, which stems from a few hundred points.
+_CORRELATION_WEIGHT = 0.98
+# The distance over which spreads are averaged, as part of the range of a parameter.
+_NEIGHBOURHOOD = 0.2
+# Features are compared at so many points first, and fitted from the best of them: fewer starts end in a local minimum.
+_CANDIDATES, _STARTS = 480, 6
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -40,14 +40,14 @@ class Process:
     """A fitted Gaussian process over the unit cube.
 
     Attributes:
-        x: (m, k) what it was learnt from.
-        lengths: (k,) over which it changes.
+        x: (m, k) training points.
+        lengths: (k,) length scales.
         amplitude: variance of the smooth part.
-        noise: variance of what chance adds.
+        noise: variance of the noise.
         weights: (m,) of the points.
         whitener: (m, m) W with Wᵀ W the inverse of their covariance; the inverse itself would round far worse.
-        mean: of what was learnt.
-        scale: its deviation, by which all the above is divided.
+        mean: of the training values.
+        scale: their deviation, by which all the above is divided.
     """
 
     x: Array
@@ -64,21 +64,21 @@ class Process:
         a, b = unit / self.lengths, self.x / self.lengths
         apart = (a**2).sum(axis=-1)[:, None] + (b**2).sum(axis=-1) - 2 * a @ b.T
         near = self.amplitude * np.exp(-0.5 * np.maximum(apart, 0.0))
-        left = self.amplitude + self.noise - ((near @ self.whitener.T) ** 2).sum(axis=-1)
-        # Rounding must not make a run surer than chance lets it be.
-        deviation = np.sqrt(np.maximum(left, self.noise))
+        variance = self.amplitude + self.noise - ((near @ self.whitener.T) ** 2).sum(axis=-1)
+        # Rounding must not reduce the variance below that of the noise.
+        deviation = np.sqrt(np.maximum(variance, self.noise))
         return self.mean + self.scale * (near @ self.weights), np.asarray(self.scale * deviation, dtype=np.float64)
 
-    def left_out(self) -> Array:
-        """Return (m,) by how many deviations each point is off where the others alone predict it.
+    def leave_one_out(self) -> Array:
+        """Return (m,) the residual of each point from its prediction by the others, in standard deviations.
 
         Source:
             Rasmussen & Williams (2006), eq. 5.12.
         """
         return np.asarray(self.weights / np.sqrt((self.whitener**2).sum(axis=0)), dtype=np.float64)
 
-    def slope(self, unit: Array) -> Array:
-        """Return (k,) how the mean changes about a point (k,)."""
+    def gradient(self, unit: Array) -> Array:
+        """Return (k,) the gradient of the mean at a point (k,)."""
         apart = (self.x - unit) / self.lengths
         near = self.amplitude * np.exp(-0.5 * (apart**2).sum(axis=-1))
         return np.asarray(self.scale * ((near * self.weights) @ apart) / self.lengths, dtype=np.float64)
@@ -91,13 +91,13 @@ class Surrogate:
     Attributes:
         parameters: k names.
         features: f names.
-        lower: (k,) of the range that was learnt.
-        upper: (k,).
+        lower: (k,) lower ends of the range of the simulations.
+        upper: (k,) its upper ends.
         processes: one per feature.
-        correlation: (f, f) of what the surfaces miss: a run whose slope comes out too large has too small an
-            intercept. Of features that were not learnt together, none.
-        spreads: (m, f) standard deviations over runs that nobody can tell apart, at the points of the processes; None
-            where they are not known.
+        correlation: (f, f) of the residuals: a run with too large a slope has too small an intercept; the identity for
+            features that were not learnt together.
+        spreads: (m, f) standard deviations over indistinguishable runs, at the points of the processes; None where
+            they are not known.
     """
 
     parameters: tuple[str, ...]
@@ -105,34 +105,30 @@ class Surrogate:
     lower: Array
     upper: Array
     processes: tuple[Process, ...]
-    correlation: Array = attrs.field()
+    correlation: Array = attrs.field(default=attrs.Factory(lambda self: np.eye(len(self.features)), takes_self=True))
     spreads: Array | None = None
-
-    @correlation.default
-    def _alone(self) -> Array:
-        return np.eye(len(self.features))
 
     def predict(self, points: ArrayLike) -> tuple[Array, Array]:
         """Return features (m, f) at points (m, k), and their standard deviations.
 
-        The deviation is that of the surface, and of what chance adds to a single run.
+        The deviation contains that of the surface and that of a single run by chance.
         """
         unit = (floats(points, "points") - self.lower) / (self.upper - self.lower)
-        found = [process.predict(unit) for process in self.processes]
-        mean, deviation = (np.stack(one, axis=-1) for one in zip(*found, strict=True))
+        predictions = [process.predict(unit) for process in self.processes]
+        mean, deviation = (np.stack(columns, axis=-1) for columns in zip(*predictions, strict=True))
         return mean, np.asarray(np.hypot(deviation, self._chance(unit)), dtype=np.float64)
 
     def _chance(self, unit: Array) -> Array | float:
-        """Return by how much single runs differ about points (m, k) [standard deviation]: that of their neighbours."""
+        """Return the standard deviation of single runs about points (m, k): a mean over their neighbours."""
         if self.spreads is None:
             return 0.0
-        apart = ((unit[:, None] - self.processes[0].x) ** 2).sum(axis=-1) / _NEIGHBOURS**2
-        # Far from all others the nearest counts.
+        apart = ((unit[:, None] - self.processes[0].x) ** 2).sum(axis=-1) / _NEIGHBOURHOOD**2
+        # Far from all others only the nearest counts.
         near = np.exp(-0.5 * (apart - apart.min(axis=-1, keepdims=True)))
         return np.asarray(np.sqrt(near @ self.spreads**2 / near.sum(axis=-1, keepdims=True)), dtype=np.float64)
 
-    def chosen(self, names: Sequence[str]) -> Surrogate:
-        """Return the surrogate of some of the features."""
+    def select(self, names: Sequence[str]) -> Surrogate:
+        """Return the surrogate of the named features."""
         numbers = [self.features.index(name) for name in names]
         return attrs.evolve(
             self,
@@ -159,15 +155,15 @@ def learn(
 
     Args:
         parameters: k names.
-        points: (m, k) at which was simulated; those that came to nothing (NaN) are left out.
+        points: (m, k) of the simulations; those that failed (NaN) are left out.
         features: f names.
-        values: (m, f) what came of it.
-        spreads: (m, f) standard deviations of it over runs that nobody can tell apart, by which a single run that is
-            measured may be off; none when left out.
-        ranges: (k, 2) of the design; those of the points when left out, which chance leaves a little narrower.
-        seed: which points are taken where there are more than ``MOST_POINTS``.
-        restarts: how often the lengths are sought again from another start.
-        progress: told the name of each feature before it is learnt.
+        values: (m, f) features of the simulations.
+        spreads: (m, f) their standard deviations over indistinguishable runs, which a single measured run has too;
+            none when left out.
+        ranges: (k, 2) of the design; by default those of the points, which are a little narrower.
+        seed: of the choice of points where there are more than ``MOST_POINTS``.
+        restarts: how often the length scales are fitted again from another start.
+        progress: called with the name of each feature before it is learnt.
 
     Raises:
         MissingExtraError: scikit-learn is not installed.
@@ -175,90 +171,90 @@ def learn(
         InvalidValueError: there are too few points, one lies outside the ranges, or a parameter does not vary.
     """
     x, y = floats(points, "points"), np.asarray(values, dtype=np.float64)
-    shaken = None if spreads is None else np.asarray(spreads, dtype=np.float64)
+    deviations = None if spreads is None else np.asarray(spreads, dtype=np.float64)
     if x.ndim != 2 or y.shape != (len(x), len(features)) or x.shape[1] != len(parameters):
         raise ShapeError(
             f"expected (m, {len(parameters)}) points and (m, {len(features)}) values, got {x.shape} and {y.shape}"
         )
-    if shaken is not None and shaken.shape != y.shape:
-        raise ShapeError(f"spreads: expected {y.shape}, as the values, got {shaken.shape}")
-    kept = _kept(y, 4 * (len(parameters) + 1), seed)
-    lower, upper = _ranges(x[kept], ranges)
+    if deviations is not None and deviations.shape != y.shape:
+        raise ShapeError(f"spreads: expected {y.shape}, as the values, got {deviations.shape}")
+    rows = _training_rows(y, 4 * (len(parameters) + 1), seed)
+    lower, upper = _ranges(x[rows], ranges)
     for name, low, high in zip(parameters, lower, upper, strict=True):
         if not low < high:
             raise InvalidValueError(f"parameter {name} does not vary: it is {low:g} in every run")
-    unit = (x[kept] - lower) / (upper - lower)
+    unit = (x[rows] - lower) / (upper - lower)
     processes = []
     for i, name in enumerate(features):
         if progress is not None:
             progress(name)
-        processes.append(_fitted(unit, y[kept, i], seed, restarts))
-    missed = np.stack([process.left_out() for process in processes])
+        processes.append(_fitted(unit, y[rows, i], seed, restarts))
+    correlation = np.atleast_2d(np.corrcoef(np.stack([process.leave_one_out() for process in processes])))
     return Surrogate(
         parameters=tuple(parameters),
         features=tuple(features),
         lower=lower,
         upper=upper,
         processes=tuple(processes),
-        correlation=_SURE * np.atleast_2d(np.corrcoef(missed)) + (1 - _SURE) * np.eye(len(processes)),
-        spreads=None if shaken is None else shaken[kept],
+        correlation=_CORRELATION_WEIGHT * correlation + (1 - _CORRELATION_WEIGHT) * np.eye(len(processes)),
+        spreads=None if deviations is None else deviations[rows],
     )
 
 
-def solve_features(surrogate: Surrogate, seen: ArrayLike, weights: ArrayLike | None = None) -> Array:
-    """Return the parameters (k,) whose features come nearest to those seen: the thesis' way.
+def solve_features(surrogate: Surrogate, measured: ArrayLike, weights: ArrayLike | None = None) -> Array:
+    """Return the parameters (k,) whose features come nearest to measured ones: the method of the thesis.
 
     Args:
         surrogate: with f features.
-        seen: (f,) features.
-        weights: (f,) standard deviations by which to compare, or their covariance (f, f); those of the surrogate when
-            left out.
+        measured: (f,) features.
+        weights: (f,) standard deviations of the features, or their covariance (f, f); by default those of the
+            surrogate.
 
     Raises:
         ShapeError: the features are not f.
     """
-    goal = floats(seen, "seen")
+    goal = floats(measured, "measured")
     if goal.shape != (len(surrogate.features),):
-        raise ShapeError(f"seen: expected {len(surrogate.features)} features, got shape {goal.shape}")
+        raise ShapeError(f"measured: expected {len(surrogate.features)} features, got shape {goal.shape}")
     width = surrogate.upper - surrogate.lower
     middle = (surrogate.lower + surrogate.upper)[None] / 2
     scale = surrogate.predict(middle)[1][0] if weights is None else floats(weights, "weights")
     whitener = np.diag(1 / scale) if scale.ndim == 1 else np.linalg.inv(np.linalg.cholesky(scale))
 
-    def missing(unit: Array) -> Array:
+    def residuals(unit: Array) -> Array:
         mean, _ = surrogate.predict((surrogate.lower + unit * width)[None])
         return np.asarray(whitener @ (mean[0] - goal), dtype=np.float64)
 
-    def slopes(unit: Array) -> Array:
-        # Differences would tell the rounding of the means, which is large where chance adds next to nothing.
-        return np.asarray(whitener @ np.stack([process.slope(unit) for process in surrogate.processes]))
+    def jacobian(unit: Array) -> Array:
+        # Finite differences would amplify the rounding of the means, which is large where the noise is small.
+        return np.asarray(whitener @ np.stack([process.gradient(unit) for process in surrogate.processes]))
 
     rng = np.random.default_rng(0)
-    starts = rng.random((_TRIED, len(width)))
+    starts = rng.random((_CANDIDATES, len(width)))
     with one_core():
         means, _ = surrogate.predict(surrogate.lower + starts * width)
         order = np.argsort((((means - goal) @ whitener.T) ** 2).sum(axis=-1))
-        found = [least_squares(missing, starts[i], slopes, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:_STARTS]]
-    best = min(found, key=lambda one: float(one.cost))
+        fits = [least_squares(residuals, starts[i], jacobian, bounds=(0.0, 1.0), xtol=1e-12) for i in order[:_STARTS]]
+    best = min(fits, key=lambda fit: float(fit.cost))
     return np.asarray(surrogate.lower + best.x * width, dtype=np.float64)
 
 
-def _kept(y: Array, least: int, seed: int) -> npt.NDArray[np.intp]:
-    """Return which rows (m, f) are learnt from: those that ended well, at most ``MOST_POINTS``.
+def _training_rows(y: Array, least: int, seed: int) -> npt.NDArray[np.intp]:
+    """Return the numbers of the rows (m, f) to learn from: those without NaN, at most ``MOST_POINTS``.
 
     Raises:
         TooFewError: there are fewer than ``least``.
     """
-    kept = np.flatnonzero(np.all(np.isfinite(y), axis=-1))
-    if len(kept) < least:
-        raise TooFewError(f"points: expected {least} or more that ended well, got {len(kept)}")
-    if len(kept) > MOST_POINTS:
-        kept = np.sort(np.random.default_rng(seed).choice(kept, MOST_POINTS, replace=False))
-    return kept
+    rows = np.flatnonzero(np.all(np.isfinite(y), axis=-1))
+    if len(rows) < least:
+        raise TooFewError(f"points: expected {least} or more simulations that finished, got {len(rows)}")
+    if len(rows) > MOST_POINTS:
+        rows = np.sort(np.random.default_rng(seed).choice(rows, MOST_POINTS, replace=False))
+    return rows
 
 
 def _ranges(x: Array, ranges: ArrayLike | None) -> tuple[Array, Array]:
-    """Return (k,) the lower and upper ends of what was simulated.
+    """Return (k,) the lower and (k,) the upper ends of the simulated range.
 
     Raises:
         ShapeError: there is not one range for each parameter.
@@ -276,7 +272,7 @@ def _ranges(x: Array, ranges: ArrayLike | None) -> tuple[Array, Array]:
 
 
 def check_extra() -> None:
-    """Import what learning needs.
+    """Import the package that learning needs.
 
     Raises:
         MissingExtraError: it is not installed.
@@ -296,7 +292,7 @@ def _fitted(unit: Array, y: Array, seed: int, restarts: int) -> Process:
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415
 
     kernel = ConstantKernel(10.0, _AMPLITUDE) * RBF([1.0] * unit.shape[1], _LENGTHS) + WhiteKernel(1e-5, _NOISE)
-    # Scaled here, so that the way back is ours too.
+    # Scaled here, since the predictions scale back here too.
     mean, scale = float(y.mean()), float(y.std()) or 1.0
     process = GaussianProcessRegressor(kernel, n_restarts_optimizer=restarts, random_state=seed)
     with warnings.catch_warnings(), one_core():

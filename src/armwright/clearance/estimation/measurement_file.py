@@ -1,8 +1,8 @@
-"""What was measured of a linkage with play: where its tip rests, or how it follows paths; as CSV.
+"""Measurements of a linkage with clearance, as CSV: resting positions of its tip, or its motion on paths.
 
 At rest, one row for each reading: ``pose, commanded_x_mm, commanded_y_mm, x_mm, y_mm``. On paths, one row for each
-sample: ``path, t_s, x_mm, y_mm``; those after the end of the path are left out. Lengths may be in m, mm or um, all of a
-file in the same unit; time in s or ms.
+sample: ``path, t_s, x_mm, y_mm``; samples after the end of the path are ignored. Lengths may be in m, mm or um, all
+of a file in the same unit; time in s or ms.
 """
 
 from __future__ import annotations
@@ -37,25 +37,25 @@ _SCHEMA = Schema(
         ),
     )
 )
-# An error beyond this is no play but another unit, or another arm [m].
+# A larger error is no clearance but another unit, or another arm [m].
 _LARGEST = 0.02
-# No instrument that is meant tells a resting tip to less [m].
+# No instrument measures a resting tip more accurately [m].
 LEAST_NOISE = 1e-6
-# Samples of a measured path, at least, and how much of the path they must tell.
-_FEWEST, _WHOLE = 20, 0.99
+# The smallest number of samples of a measured path, and the part of the path that they must cover.
+_FEWEST, _COVERAGE = 20, 0.99
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class RestMeasured:
+class RestMeasurement:
     """Readings of a resting tip.
 
     Attributes:
         names: of k poses.
-        poses: (k, 2) where the tip was told to be [m].
-        offsets: (k, 2) by how much it was off, mean of the readings [m].
-        readings: (k,) how many there are of each.
-        noise: standard deviation of one coordinate of one reading, from how all readings of a pose differ; None where
-            none was read twice, or no readings differ [m].
+        poses: (k, 2) commanded positions of the tip [m].
+        offsets: (k, 2) from these, means of the readings [m].
+        readings: (k,) the number of readings of each pose.
+        noise: standard deviation of one coordinate of one reading, from the scatter of the readings of each pose; None
+            where no pose was read twice, or no readings differ [m].
     """
 
     names: tuple[str, ...]
@@ -65,48 +65,46 @@ class RestMeasured:
     noise: float | None
 
     def estimate(self, linkage: Linkage, noise: float | None = None) -> Estimate:
-        """Return the clearances that the readings tell.
+        """Return the clearances that explain the readings.
 
         Args:
             linkage: that was measured.
-            noise: standard deviation of one coordinate of one reading; that of the readings themselves without it, and
-                where none of them differ, what is left of the fit [m].
+            noise: standard deviation of one coordinate of one reading; without it that of the readings themselves, and
+                where none of them differ, that of the residuals of the fit [m].
 
         Raises:
             ContradictionError: no clearances explain the readings.
-            TooFewError: the poses do not tell all clearances.
+            TooFewError: the poses do not determine all clearances.
         """
         own = self.noise if noise is None else noise
-        found = estimate_at_rest(linkage, self.poses, self.offsets, own or LEAST_NOISE, self.readings)
+        estimate = estimate_at_rest(linkage, self.poses, self.offsets, own or LEAST_NOISE, self.readings)
         if noise is None and self.noise is not None:
-            found = attrs.evolve(found, freedom=2.0 * sum(n - 1 for n in self.readings))
-        if own is None and found.spare > 0 and found.square > found.spare:
-            # Nothing but what is left says how large the noise is, and it cannot contradict the model too.
-            more = float(found.square) / found.spare
+            estimate = attrs.evolve(estimate, noise_freedom=2.0 * sum(n - 1 for n in self.readings))
+        freedom = estimate.degrees_of_freedom
+        if own is None and freedom > 0 and (ratio := float(estimate.chi_square) / freedom) > 1:
+            # The residuals are the only measure of the noise, so that they cannot contradict the model too.
             return attrs.evolve(
-                found,
-                noise=found.noise * math.sqrt(more),
-                covariance=more * found.covariance,
-                freedom=float(found.spare),
+                estimate,
+                noise=estimate.noise * math.sqrt(ratio),
+                covariance=ratio * estimate.covariance,
+                noise_freedom=float(freedom),
             )
-        off = found.standardised.tolist()
-        farthest = [
-            (f"{axis} of {name}", x)
-            for name, pair in zip(self.names, off, strict=True)
-            for axis, x in zip("xy", pair, strict=True)
+        labels = [f"{axis} of {name}" for name in self.names for axis in "xy"]
+        residuals = zip(labels, estimate.standardised.ravel().tolist(), strict=True)
+        bounds = [
+            f"{name} at 0" for name, is_at_bound in zip(estimate.names, estimate.at_bound, strict=True) if is_at_bound
         ]
-        bounds = [f"{name} at 0" for name, ends in zip(found.names, found.at_bound, strict=True) if ends]
-        refuse_contradiction(float(found.misfit), farthest, bounds)
-        return found
+        refuse_contradiction(float(estimate.misfit), residuals, bounds)
+        return estimate
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class PathsMeasured:
-    """How a tip followed paths.
+class PathMeasurement:
+    """The motion of a tip on paths.
 
     Attributes:
         times: by path (s,) of the samples [s].
-        errors: by path (s, 2) by how much it was off [m].
+        errors: by path (s, 2) of the tip [m].
     """
 
     times: Mapping[str, Array]
@@ -116,13 +114,13 @@ class PathsMeasured:
         """Return the features of each error curve."""
         return {name: features_of(self.times[name], self.errors[name]) for name in self.times}
 
-    def seen(self, names: tuple[str, ...]) -> Array:
+    def feature_values(self, names: tuple[str, ...]) -> Array:
         """Return (f,) features ``path_feature``."""
-        found = self.features()
-        return np.array([getattr(found[path], name) for path, _, name in (one.partition("_") for one in names)])
+        curves = self.features()
+        return np.array([getattr(curves[path], feature) for path, feature in (name.split("_", 1) for name in names)])
 
-    def noise_of(self, names: tuple[str, ...], noise: float, *, draws: int = 200, seed: int = 0) -> Array:
-        """Return the covariance (f, f) that a noise of the samples gives to features ``path_feature``.
+    def feature_covariance(self, names: tuple[str, ...], noise: float, *, draws: int = 200, seed: int = 0) -> Array:
+        """Return the covariance (f, f) of features ``path_feature`` that the noise of the samples causes.
 
         Args:
             names: of the features.
@@ -141,7 +139,7 @@ class PathsMeasured:
 
 def read_measured(
     path: Path | str, *, columns: Mapping[str, str] | None = None, skip_incomplete: bool = False
-) -> RestMeasured | PathsMeasured:
+) -> RestMeasurement | PathMeasurement:
     """Read a file of measurements.
 
     Args:
@@ -150,19 +148,19 @@ def read_measured(
         skip_incomplete: leave out rows with empty cells; an ``IncompleteRowsWarning`` says how many.
 
     Raises:
-        FileFormatError: it is missing or broken; columns are missing or in mixed units; a number is none; the tip is
-            farther off than any play lets it be. The text has file and line.
+        FileFormatError: it is missing or broken; columns are missing or in mixed units; a cell is no number; the tip is
+            farther from its commanded position than any clearance allows. The text has file and line.
     """
     header = read_header(path, _SCHEMA, columns=columns)
     names = header.present(("pose", "path"))
     if len(names) != 1:
         there = "both" if names else "neither"
         raise header.error("pose", f"expected a column pose or a column path, and there are {there}: {header.listing}")
-    wanted = _AT_REST if names[0] == "pose" else _ON_PATHS
-    header.require(wanted)
-    table = header.rows(filled=wanted, skip_incomplete=skip_incomplete)
+    expected = _AT_REST if names[0] == "pose" else _ON_PATHS
+    header.require(expected)
+    table = header.rows(filled=expected, skip_incomplete=skip_incomplete)
     groups = _rows_by_name(table, names[0])
-    numbers = table.numbers(wanted[1:])
+    numbers = table.numbers(expected[1:])
     return _at_rest(table, numbers, groups) if names[0] == "pose" else _on_paths(table, numbers, groups)
 
 
@@ -181,22 +179,22 @@ def _rows_by_name(table: UnitTable, column: str) -> dict[str, list[int]]:
     return groups
 
 
-def _at_rest(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> RestMeasured:
+def _at_rest(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> RestMeasurement:
     poses, offsets, counts, spread = [], [], [], []
     for name, rows in groups.items():
         values = numbers[rows]
         if np.any(np.ptp(values[:, :2], axis=0) > 0):
             raise table.error(rows[0], name, "this pose is commanded at different positions")
-        off = values[:, 2:] - values[:, :2]
-        _refuse_far(table, rows[0], name, off)
+        errors = values[:, 2:] - values[:, :2]
+        _refuse_large_errors(table, rows[0], name, errors)
         poses.append(values[0, :2])
-        offsets.append(off.mean(axis=0))
+        offsets.append(errors.mean(axis=0))
         counts.append(len(rows))
         if len(rows) > 1:
-            spread.append(((off - off.mean(axis=0)) ** 2).sum(axis=0).mean())
-    again = sum(counts) - len(counts)
-    variance = sum(spread) / again if again else 0.0
-    return RestMeasured(
+            spread.append(((errors - errors.mean(axis=0)) ** 2).sum(axis=0).mean())
+    repeated = sum(counts) - len(counts)
+    variance = sum(spread) / repeated if repeated else 0.0
+    return RestMeasurement(
         names=tuple(groups),
         poses=np.array(poses),
         offsets=np.array(offsets),
@@ -205,12 +203,12 @@ def _at_rest(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) 
     )
 
 
-def _on_paths(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> PathsMeasured:
+def _on_paths(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]]) -> PathMeasurement:
     times: dict[str, Array] = {}
     errors: dict[str, Array] = {}
     for name, rows in groups.items():
         try:
-            wanted = named_path(name)
+            path = named_path(name)
         except LookupError as error:
             raise table.error(rows[0], "path", str(error)) from error
         values = numbers[rows]
@@ -221,24 +219,23 @@ def _on_paths(table: UnitTable, numbers: Array, groups: Mapping[str, list[int]])
         if np.any(steps <= 0) or np.ptp(steps) > 0.01 * steps.mean():
             late = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
             raise table.error(rows[late], "t", "samples must be equally spaced in time")
-        if abs(t[0]) > 1.5 * steps.mean() or t[-1] < _WHOLE * wanted.duration - 1.5 * steps.mean():
-            raise table.error(rows[0], "t", f"path {name} takes {wanted.duration:g} s; got {t[0]:g} to {t[-1]:g} s")
-        # While the tip rests after the path its error says something else than on the way: a mean must not count it.
-        on_the_way = t <= wanted.duration + 0.5 * steps.mean()
-        t, values = t[on_the_way], values[on_the_way]
-        off = values[:, 1:] - wanted.at(t).at
-        _refuse_far(table, rows[0], name, off)
-        times[name], errors[name] = t, off
-    return PathsMeasured(times=times, errors=errors)
+        if abs(t[0]) > 1.5 * steps.mean() or t[-1] < _COVERAGE * path.duration - 1.5 * steps.mean():
+            raise table.error(rows[0], "t", f"path {name} takes {path.duration:g} s; got {t[0]:g} to {t[-1]:g} s")
+        # The error of the tip at rest after the path must not enter the mean.
+        during_path = t <= path.duration + 0.5 * steps.mean()
+        times[name] = t[during_path]
+        errors[name] = values[during_path, 1:] - path.evaluate(times[name]).position
+        _refuse_large_errors(table, rows[0], name, errors[name])
+    return PathMeasurement(times=times, errors=errors)
 
 
-def _refuse_far(table: UnitTable, row: int, name: str, off: Array) -> None:
-    """Refuse what no play explains."""
-    worst = float(np.hypot(off[:, 0], off[:, 1]).max())
+def _refuse_large_errors(table: UnitTable, row: int, name: str, errors: Array) -> None:
+    """Refuse errors (s, 2) of the tip that no clearance explains [m]."""
+    worst = float(np.hypot(errors[:, 0], errors[:, 1]).max())
     if worst > _LARGEST:
         raise table.error(
             row,
             name,
-            f"the tip is {worst * 1e3:.4g} mm from where it was told to be; are the units right, and is it in the axes "
-            f"of the ground? More than {_LARGEST * 1e3:g} mm is no play",
+            f"the tip is {worst * 1e3:.4g} mm from its commanded position; are the units right, and is it in the axes "
+            f"of the ground? More than {_LARGEST * 1e3:g} mm is no clearance",
         )

@@ -1,9 +1,9 @@
-"""Whether data contradict a model, and by how much that widens what they say of its parameters.
+"""Whether data contradict a model, and how much that widens the intervals of its parameters.
 
-What is left of a fit, in standard deviations, has a sum of squares that follows chi-square where the model and the
-noise are right. A sum so large that it hardly comes by chance says that no values of the parameters explain the data;
-values that are fitted all the same mean nothing, however sharply they are told. Where it is larger than usual but may
-be chance, intervals grow with it.
+The residuals of a fit, in standard deviations, have a sum of squares that follows chi-square where the model and the
+noise are right. A sum so large that it hardly comes by chance means that no values of the parameters explain the data;
+fitted values then mean nothing, however narrow their intervals. Where it is larger than usual but may be chance,
+intervals grow with it.
 
 Source:
     Particle Data Group, Review of Particle Physics, "Introduction", scale factors of weighted means.
@@ -19,51 +19,51 @@ from scipy.stats import chi2, f
 from armwright.arrays import Array, ArrayLike
 from armwright.errors import ContradictionError
 
-# Data that come by chance in a smaller part of all cases contradict the model.
+# Data contradict the model where chance alone yields such residuals in a smaller part of all cases.
 CONTRADICTION = 1e-4
 _NAMED = 3
 
 
-def chance(square: ArrayLike, freedom: int, known: float = np.inf) -> Array:
-    """Return the probability of what is left being as large or larger where the model holds.
+def p_value(chi_square: ArrayLike, freedom: int, noise_freedom: float = np.inf) -> Array:
+    """Return the probability of residuals as large or larger where the model holds.
 
     Args:
-        square: (...) sums of squares of what is left, in standard deviations.
-        freedom: how many more numbers than parameters there are; with none, nothing can contradict.
-        known: of how many numbers the noise was estimated; infinite where it was given.
+        chi_square: (...) sums of squared residuals, in standard deviations.
+        freedom: number of measured values minus that of parameters; without any, nothing can contradict.
+        noise_freedom: degrees of freedom of the estimated noise; infinite where the noise is known.
     """
-    size = np.asarray(square, dtype=np.float64)
+    size = np.asarray(chi_square, dtype=np.float64)
     if freedom < 1:
         return np.ones_like(size)
-    found = chi2.sf(size, freedom) if np.isinf(known) else f.sf(size / freedom, freedom, known)
-    return np.asarray(found, dtype=np.float64)
+    p = chi2.sf(size, freedom) if np.isinf(noise_freedom) else f.sf(size / freedom, freedom, noise_freedom)
+    return np.asarray(p, dtype=np.float64)
 
 
-def widening(square: ArrayLike, freedom: int) -> Array:
-    """Return (...) by what intervals grow: sqrt(chi2 / freedom), never below 1; see ``chance``."""
-    size = np.asarray(square, dtype=np.float64)
+def widening(chi_square: ArrayLike, freedom: int) -> Array:
+    """Return (...) the factor of intervals: sqrt(chi2 / freedom), never below 1; see ``p_value``."""
+    size = np.asarray(chi_square, dtype=np.float64)
     return np.sqrt(np.maximum(1.0, size / freedom)) if freedom >= 1 else np.ones_like(size)
 
 
-def refuse_contradiction(misfit: float, farthest: Iterable[tuple[str, float]], bounds: Iterable[str]) -> None:
+def refuse_contradiction(misfit: float, residuals: Iterable[tuple[str, float]], bounds: Iterable[str]) -> None:
     """Refuse parameters that were fitted to data which contradict their model.
 
     Args:
-        misfit: see ``chance``.
-        farthest: numbers that were measured and by how many deviations they are off, in any order.
-        bounds: parameters that the fit pushed to a bound, in words.
+        misfit: see ``p_value``.
+        residuals: measured quantities and their residuals in standard deviations, in any order.
+        bounds: parameters at a bound of the fit, in words.
 
     Raises:
         ContradictionError: the misfit is below ``CONTRADICTION``.
     """
     if misfit >= CONTRADICTION:
         return
-    worst = sorted(farthest, key=lambda one: -abs(one[1]))[:_NAMED]
-    off = ", ".join(f"{name} by {deviations:+.3g}" for name, deviations in worst)
+    worst = sorted(residuals, key=lambda residual: -abs(residual[1]))[:_NAMED]
+    listed = ", ".join(f"{name} by {deviations:+.3g}" for name, deviations in worst)
     ends = list(bounds)
     raise ContradictionError(
-        f"the data contradict the model: no clearances explain them, and none are told (data as far off come by chance "
-        f"in {100 * misfit:.2g} % of cases); farthest off, in standard deviations: {off}"
+        f"the data contradict the model: no clearances explain them, and none are reported (chance yields residuals as "
+        f"large in {100 * misfit:.2g} % of cases); largest residuals, in standard deviations: {listed}"
         + (f"; at a bound: {', '.join(ends)}" if ends else "")
         + "; check the payload, the lengths of the links, friction and control of the model, signs, order and units "
         "of the columns, and the noise"

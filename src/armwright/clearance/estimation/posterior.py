@@ -1,7 +1,7 @@
-"""What is known of clearances after a measurement: a distribution, not a number.
+"""The posterior distribution of clearances after a measurement.
 
-The likelihood compares all features together, with the noise of the measurement, the doubt of the surrogate, and what
-impacts leave to chance. Samples come of an ensemble of walkers.
+The likelihood compares all features together, with the noise of the measurement, the uncertainty of the surrogate, and
+the chance in impacts. An ensemble of walkers draws the samples.
 
 Source:
     Spec of the clearance, 4.4; Goodman & Weare (2010) for the walkers.
@@ -17,33 +17,33 @@ import numpy as np
 
 from armwright.arrays import Array, ArrayLike, floats, one_core
 from armwright.clearance.estimation.kriging import Surrogate, solve_features
-from armwright.clearance.estimation.misfit import chance, refuse_contradiction, widening
+from armwright.clearance.estimation.misfit import p_value, refuse_contradiction, widening
 from armwright.errors import InvalidValueError, ShapeError
 
 _WALKERS, _STEPS, _BURN = 60, 300, 100
 _STRETCH = 2.0
-# Parameters are likelier than others when twice the logarithm of the likelihood is larger by so much.
+# Parameters are likelier than others when their deviance is smaller by so much.
 _LIKELIER = 1.0
 # A parameter is at a bound when it is nearer than this part of its range, or than its deviation.
 _NEAR = 1e-3
-# A parameter is told when its standard deviation is at most this part of what was known before.
-_TOLD = 0.3
+# A parameter is identifiable when its standard deviation is at most this part of that of the prior.
+_IDENTIFIABLE = 0.3
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Posterior:
-    """What is known of parameters.
+    """The posterior distribution of parameters.
 
     Attributes:
         names: k parameters.
         samples: (s, k) drawn from the distribution, SI.
-        lower: (k,) of the range that was thought possible.
-        upper: (k,).
-        misfit: probability that features as far off as these are seen where the model holds; small ones say that
-            the model, or the noise it was told, is wrong.
-        best: (k,) the likeliest.
-        farthest: (f,) by how many standard deviations each feature is off there.
-        widening: by what the deviations have grown, since the features are farther off than noise explains.
+        lower: (k,) lower ends of the range of the prior.
+        upper: (k,) its upper ends.
+        misfit: probability of residuals as large where the model holds; a small one means that the model, or its
+            noise, is wrong.
+        best: (k,) the likeliest parameters.
+        residuals: by feature, in standard deviations, at the likeliest parameters.
+        widening: the factor by which residuals above the noise widen the deviations.
     """
 
     names: tuple[str, ...]
@@ -52,14 +52,14 @@ class Posterior:
     upper: Array
     misfit: float
     best: Array
-    farthest: Mapping[str, float]
+    residuals: Mapping[str, float]
     widening: float
 
     @property
     def bounds(self) -> Mapping[str, float]:
-        """Parameters that may lie beyond what was swept, and the end of the range near which they were found.
+        """Parameters that may lie beyond the swept range, with its end near which they are.
 
-        A coefficient of friction that is 0 lies at no end of what was swept but of what there is.
+        A coefficient of friction of 0 is a physical bound and no end of the swept range.
         """
         ends = {}
         for i, name in enumerate(self.names):
@@ -70,18 +70,18 @@ class Posterior:
         return ends
 
     def checked(self) -> Posterior:
-        """Return the same, if features and model do not contradict one another.
+        """Return the posterior itself, if features and model do not contradict each other.
 
         Raises:
             ContradictionError: no parameters explain the features.
         """
         ends = [f"{name.removeprefix('c_')} at {_shown(name, end)}" for name, end in self.bounds.items()]
-        refuse_contradiction(self.misfit, self.farthest.items(), ends)
+        refuse_contradiction(self.misfit, self.residuals.items(), ends)
         return self
 
     @property
     def mean(self) -> Array:
-        """(k,) the mean."""
+        """(k,) means."""
         return np.asarray(self.samples.mean(axis=0), dtype=np.float64)
 
     @property
@@ -96,112 +96,112 @@ class Posterior:
 
     @property
     def identifiable(self) -> Mapping[str, bool]:
-        """Whether the measurement told each parameter: it is known much better than before, and not at a bound.
+        """Whether each parameter is identifiable: it is known much better than by the prior, and not at a bound.
 
-        A bound makes sharp what lies beyond it.
+        A bound narrows the distribution of a parameter beyond it.
         """
-        before = (self.upper - self.lower) / np.sqrt(12)
-        told = self.deviations <= _TOLD * before
-        return {name: bool(one) and name not in self.bounds for name, one in zip(self.names, told, strict=True)}
+        prior = (self.upper - self.lower) / np.sqrt(12)
+        is_narrow = self.deviations <= _IDENTIFIABLE * prior
+        return {name: bool(x) and name not in self.bounds for name, x in zip(self.names, is_narrow, strict=True)}
 
     def interval(self, level: float = 0.9) -> Array:
-        """Return (k, 2) between which each parameter lies with a probability, as much left out on either side."""
+        """Return (k, 2) the central interval in which each parameter lies with the probability ``level``."""
         if not 0 < level < 1:
             raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level:g}")
         ends = np.quantile(self.samples, [0.5 - level / 2, 0.5 + level / 2], axis=0)
         return np.asarray(ends.T, dtype=np.float64)
 
 
-def posterior(surrogate: Surrogate, seen: ArrayLike, noise: ArrayLike, *, seed: int = 0) -> Posterior:
-    """Return what features that were seen say of the parameters.
+def posterior(surrogate: Surrogate, measured: ArrayLike, noise: ArrayLike, *, seed: int = 0) -> Posterior:
+    """Return the posterior distribution of the parameters for measured features.
 
     Args:
         surrogate: of f features.
-        seen: (f,) features.
+        measured: (f,) features.
         noise: (f, f) covariance of the measurement, or (f,) standard deviations.
         seed: of the walkers.
 
     Raises:
         ShapeError: features or noise do not fit.
     """
-    goal, spread = floats(seen, "seen"), floats(noise, "noise")
+    goal, spread = floats(measured, "measured"), floats(noise, "noise")
     count = len(surrogate.features)
     if goal.shape != (count,) or spread.shape not in ((count,), (count, count)):
         raise ShapeError(f"expected {count} features and their noise, got shapes {goal.shape} and {spread.shape}")
-    measured = np.diag(spread**2) if spread.ndim == 1 else spread
+    noise_covariance = np.diag(spread**2) if spread.ndim == 1 else spread
     lower, upper = surrogate.lower, surrogate.upper
 
     freedom = max(1, count - len(lower))
-    fit = _likeliest(surrogate, goal, measured)
+    fit = _likeliest(surrogate, goal, noise_covariance)
 
     def log_density(points: Array) -> Array:
         mean, deviation = surrogate.predict(np.clip(points, lower, upper))
-        covariance = measured + surrogate.correlation * deviation[..., :, None] * deviation[..., None, :]
-        off = mean - goal
-        solved = np.linalg.solve(covariance, off[..., None])[..., 0]
-        density = -0.5 * (off * solved).sum(axis=-1) / wider**2 - 0.5 * np.linalg.slogdet(covariance)[1]
+        covariance = noise_covariance + surrogate.correlation * deviation[..., :, None] * deviation[..., None, :]
+        residual = mean - goal
+        solved = np.linalg.solve(covariance, residual[..., None])[..., 0]
+        density = -0.5 * (residual * solved).sum(axis=-1) / factor**2 - 0.5 * np.linalg.slogdet(covariance)[1]
         inside = np.all((points >= lower) & (points <= upper), axis=-1)
         return np.where(inside, density, -np.inf)
 
     while True:
-        wider = float(widening(fit.square, freedom))
+        factor = float(widening(fit.chi_square, freedom))
         with one_core():
             samples, top = _walk(log_density, fit.point, lower, upper, seed)
-        # Walkers may come to a valley that was missed; the features are then held against that.
-        other = _fit_at(surrogate, goal, measured, top)
-        if not other.unlikely < fit.unlikely - _LIKELIER:  # nor where either is no number
+        # Walkers may reach a likelier optimum than the fit; the fit then moves there.
+        other = _fit_at(surrogate, goal, noise_covariance, top)
+        if not other.deviance < fit.deviance - _LIKELIER:  # nor where either is NaN
             break
         fit = other
-    off = fit.missing / np.sqrt(np.diag(fit.covariance))
+    residuals = fit.residual / np.sqrt(np.diag(fit.covariance))
     return Posterior(
         names=surrogate.parameters,
         samples=samples,
         lower=lower,
         upper=upper,
-        misfit=float(chance(fit.square, freedom)),
+        misfit=float(p_value(fit.chi_square, freedom)),
         best=fit.point,
-        farthest=dict(zip(surrogate.features, off.tolist(), strict=True)),
-        widening=wider,
+        residuals=dict(zip(surrogate.features, residuals.tolist(), strict=True)),
+        widening=factor,
     )
 
 
 class _Fit(NamedTuple):
-    """Parameters (k,), what their features miss (f,), its covariance (f, f), and what that says.
+    """Parameters (k,), the residual of their features (f,), its covariance (f, f), and its probability.
 
     Attributes:
-        square: of what is missing, in deviations.
-        unlikely: twice the negative logarithm of the likelihood, but for a constant.
+        chi_square: of the residual.
+        deviance: twice the negative logarithm of the likelihood, but for a constant.
     """
 
     point: Array
-    missing: Array
+    residual: Array
     covariance: Array
-    square: float
-    unlikely: float
+    chi_square: float
+    deviance: float
 
 
-def _fit_at(surrogate: Surrogate, goal: Array, measured: Array, point: Array) -> _Fit:
-    """Return how well the features at a point (k,) are those seen (f,), measured with a covariance (f, f)."""
+def _fit_at(surrogate: Surrogate, goal: Array, noise: Array, point: Array) -> _Fit:
+    """Return the fit at a point (k,) of features (f,) that were measured with a noise covariance (f, f)."""
     (mean,), (deviation,) = surrogate.predict(point[None])
-    covariance = measured + surrogate.correlation * np.outer(deviation, deviation)
-    missing = goal - mean
-    square = float(missing @ np.linalg.solve(covariance, missing))
-    return _Fit(point, missing, covariance, square, square + float(np.linalg.slogdet(covariance)[1]))
+    covariance = noise + surrogate.correlation * np.outer(deviation, deviation)
+    residual = goal - mean
+    chi_square = float(residual @ np.linalg.solve(covariance, residual))
+    return _Fit(point, residual, covariance, chi_square, chi_square + float(np.linalg.slogdet(covariance)[1]))
 
 
-def _likeliest(surrogate: Surrogate, goal: Array, measured: Array) -> _Fit:
-    """Return the parameters whose features come nearest to those seen by the noise of all of them together."""
-    covariance = _fit_at(surrogate, goal, measured, (surrogate.lower + surrogate.upper) / 2).covariance
-    found: list[_Fit] = []
-    # The doubt of the surface depends on where one is: twice.
+def _likeliest(surrogate: Surrogate, goal: Array, noise: Array) -> _Fit:
+    """Return the parameters whose features come nearest to the measured ones, weighted by their joint covariance."""
+    covariance = _fit_at(surrogate, goal, noise, (surrogate.lower + surrogate.upper) / 2).covariance
+    fits: list[_Fit] = []
+    # The uncertainty of the surrogate depends on the parameters, hence two rounds.
     for _ in range(2):
-        found.append(_fit_at(surrogate, goal, measured, solve_features(surrogate, goal, covariance)))
-        covariance = found[-1].covariance
-    return min(found, key=lambda one: one.unlikely)
+        fits.append(_fit_at(surrogate, goal, noise, solve_features(surrogate, goal, covariance)))
+        covariance = fits[-1].covariance
+    return min(fits, key=lambda fit: fit.deviance)
 
 
 def _shown(name: str, value: float) -> str:
-    """Return a parameter in words: clearances in mm."""
+    """Return a parameter as text: clearances in mm."""
     return f"{value * 1e3:g} mm" if name.startswith("c_") else f"{value:g}"
 
 
@@ -212,23 +212,23 @@ def _walk(
     rng = np.random.default_rng(seed)
     k = len(centre)
     spread = 0.02 * (upper - lower)
-    places = np.clip(centre + spread * rng.standard_normal((_WALKERS, k)), lower + 1e-3 * spread, upper - 1e-3 * spread)
-    density = log_density(places)
+    points = np.clip(centre + spread * rng.standard_normal((_WALKERS, k)), lower + 1e-3 * spread, upper - 1e-3 * spread)
+    density = log_density(points)
     half = _WALKERS // 2
-    kept: list[Array] = []
-    top, highest = places[0].copy(), -np.inf
+    samples: list[Array] = []
+    top, highest = points[0].copy(), -np.inf
     for step in range(_STEPS):
         for own, others in ((slice(0, half), slice(half, None)), (slice(half, None), slice(0, half))):
             z = ((_STRETCH - 1) * rng.random(half) + 1) ** 2 / _STRETCH
-            partner = places[others][rng.integers(half, size=half)]
-            new = partner + z[:, None] * (places[own] - partner)
-            found = log_density(new)
-            taken = np.log(rng.random(half)) < (k - 1) * np.log(z) + found - density[own]
-            places[own] = np.where(taken[:, None], new, places[own])
-            density[own] = np.where(taken, found, density[own])
+            partner = points[others][rng.integers(half, size=half)]
+            new = partner + z[:, None] * (points[own] - partner)
+            new_density = log_density(new)
+            accepted = np.log(rng.random(half)) < (k - 1) * np.log(z) + new_density - density[own]
+            points[own] = np.where(accepted[:, None], new, points[own])
+            density[own] = np.where(accepted, new_density, density[own])
         first = int(np.argmax(density))
         if density[first] > highest:
-            top, highest = places[first].copy(), float(density[first])
+            top, highest = points[first].copy(), float(density[first])
         if step >= _BURN:
-            kept.append(places.copy())
-    return np.concatenate(kept), top
+            samples.append(points.copy())
+    return np.concatenate(samples), top

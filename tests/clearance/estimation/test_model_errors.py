@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import binom
 
 from armwright.arrays import Array
-from armwright.clearance.estimation.blind import POWER, faults, wrong_offsets
-from armwright.clearance.estimation.measurement_file import RestMeasured
+from armwright.clearance.estimation.measurement_file import RestMeasurement
+from armwright.clearance.estimation.model_errors import POWER, model_errors, offsets_of_wrong_model
 from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
 from armwright.errors import ContradictionError
@@ -28,7 +28,7 @@ def is_refused(linkage: Linkage, poses: Array, offsets: Array, noise: float) -> 
     """Whether readings with this noise contradict the model."""
     names = tuple(f"P{i}" for i in range(len(poses)))
     try:
-        RestMeasured(names=names, poses=poses, offsets=offsets, readings=(1,) * len(poses), noise=None).estimate(
+        RestMeasurement(names=names, poses=poses, offsets=offsets, readings=(1,) * len(poses), noise=None).estimate(
             linkage, noise
         )
     except ContradictionError:
@@ -44,12 +44,14 @@ def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -
         c, k = rng.uniform(*RANGE, 3), int(rng.integers(4, 9))
         poses = np.column_stack([rng.uniform(-0.18, 0.18, k), rng.uniform(-0.7, -0.45, k)])
         found = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, c), NOISE)
-        seen = [one for one in faults(five_bar, poses, found) if one.seen < SMALL[one.unit]]
+        seen = [one for one in model_errors(five_bar, poses, found) if one.detectable_from < SMALL[one.unit]]
         # Load and masses, lengths, zeros: none is left out because others are more.
         kind = rng.choice(sorted({one.unit for one in seen}))
         one = rng.choice(np.array([i for i, fault in enumerate(seen) if fault.unit == kind]))
         noise = rng.normal(0.0, NOISE, poses.shape)
-        offsets = [wrong_offsets(five_bar, poses, c, seen[one].name, part * seen[one].seen) for part in (1.0, 0.2)]
+        offsets = [
+            offsets_of_wrong_model(five_bar, poses, c, seen[one].name, part * seen[one].detectable_from) for part in (1.0, 0.2)
+        ]
         count += 1
         refused += is_refused(five_bar, poses, offsets[0] + noise, NOISE)
         little += is_refused(five_bar, poses, offsets[1] + noise, NOISE)
@@ -66,9 +68,9 @@ def test_shifts_of_clearances(five_bar: Linkage) -> None:
     found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
     usual = {"1": 0.05, "m": 5e-5, "rad": 2e-4}
 
-    for one in faults(five_bar, STARTS, found):
+    for one in model_errors(five_bar, STARTS, found):
         by = usual[one.unit]
-        offsets = wrong_offsets(five_bar, STARTS, ARM_A, one.name, by)
+        offsets = offsets_of_wrong_model(five_bar, STARTS, ARM_A, one.name, by)
         shifted = estimate_at_rest(five_bar, STARTS, offsets, NOISE).values - ARM_A
         np.testing.assert_allclose(shifted, by * one.shifts, rtol=0.1, atol=2e-7, err_msg=one.name)
 
@@ -76,11 +78,11 @@ def test_shifts_of_clearances(five_bar: Linkage) -> None:
 def test_play_and_length_look_alike(five_bar: Linkage) -> None:
     """A rod that is longer than in the model looks like play in its pin: it is hardly seen, and shifts J2 as much."""
     found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
-    by_name = {one.name: one for one in faults(five_bar, STARTS, found)}
+    by_name = {one.name: one for one in model_errors(five_bar, STARTS, found)}
 
     rod, crank = by_name["length of link2"], by_name["length of link1"]
     assert 0.9 < abs(rod.shifts[0]) < 1.3
-    assert crank.seen < 0.1 * rod.seen
+    assert crank.detectable_from < 0.1 * rod.detectable_from
     # The cranks are held: their masses press on no pin with play.
     assert not {"mass of link1", "mass of link4"} & set(by_name)
 
@@ -89,8 +91,8 @@ def test_nothing_contradicts(five_bar: Linkage) -> None:
     """Without numbers to spare, or without a known noise, no wrong model is ever seen."""
     for poses, known in ((STARTS[:2], True), (STARTS, False)):
         found = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A), NOISE)
-        told = faults(five_bar, poses, found, noise_is_known=known)
-        assert all(np.isinf(one.seen) for one in told) == (not known or found.spare < 1)
+        told = model_errors(five_bar, poses, found, noise_is_known=known)
+        assert all(np.isinf(one.detectable_from) for one in told) == (not known or found.degrees_of_freedom < 1)
 
 
 def test_told_by_the_command() -> None:

@@ -1,0 +1,244 @@
+"""Which errors of a model readings of a resting tip would contradict, and how the others bias the clearances.
+
+An error of the model shifts the tip, as a little more clearance would. The part of that shift that some clearances
+explain is attributed to them and cannot be detected; only the remainder contradicts the model, once it is large beside
+the noise. So a payload whose weight hardly rotates the forces in the pins is never detected, and with three poses the
+remainder is small for every error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple, TypeAlias
+
+import attrs
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2, f, ncf, ncx2
+
+from armwright.arrays import Array, ArrayLike, floats
+from armwright.clearance.estimation.misfit import CONTRADICTION
+from armwright.clearance.estimation.static import Estimate, closed_at_poses, matrix_at
+from armwright.clearance.ideal import closed
+from armwright.clearance.linkage import Body, Linkage
+from armwright.clearance.rest import at_rest
+from armwright.clearance.settings import contact_stiffness
+from armwright.errors import InvalidValueError, one_of
+
+# The probability with which readings contradict a detected model error.
+POWER = 0.9
+# The change of a model in the difference quotient of the tip: a part of a number, or an angle [rad].
+_STEP = 1e-4
+# A remainder that is a smaller part of its shift is rounding.
+_NEGLIGIBLE = 1e-6
+# The detection limit is iterated until the remainder is this near to what is needed; an error many times as large as
+# its linear estimate is not detected, since it shifts the tip less and less.
+_TOLERANCE, _FAR, _MOST_ROUNDS = 0.01, 10.0, 20
+# A model error whose full size shifts the tip by less has no effect, such as the mass of a locked crank [m].
+_NO_SHIFT = 1e-9
+
+
+class ModelError(NamedTuple):
+    """A possible error of a model.
+
+    Attributes:
+        name: of the quantity.
+        unit: "1" for a part of a force or a mass, "m" for a length, "rad" or "m" for the zero of a drive.
+        detectable_from: size from which readings contradict it in nine of ten cases; infinite where they never do.
+        shifts: (p,) bias of the clearances per unit [m].
+    """
+
+    name: str
+    unit: str
+    detectable_from: float
+    shifts: Array
+
+
+# A wrong model: the linkage, and the errors of the zeros of its drives (d,) [rad, m].
+_WrongModel: TypeAlias = tuple[Linkage, Array]
+
+
+class _Kind(NamedTuple):
+    """A kind of model error: its name, its unit, its size in that unit for a change by 1, and the changed model."""
+
+    name: str
+    unit: str
+    size: float
+    changed: Callable[[float], _WrongModel]
+
+
+def model_errors(
+    linkage: Linkage, poses: ArrayLike, estimate: Estimate, *, noise_is_known: bool = True
+) -> tuple[ModelError, ...]:
+    """Return the possible errors of a model that shift the resting tip, and their detection limits.
+
+    Args:
+        linkage: the nominal model, with p pins.
+        poses: (k, 2) commanded positions of the tip [m].
+        estimate: from the readings there, without leading axes.
+        noise_is_known: otherwise the residuals are taken for noise, and nothing contradicts the model.
+    """
+    q = closed_at_poses(linkage, poses)
+    weights = np.sqrt(np.repeat(estimate.readings, 2))
+    B = weights[:, None] * matrix_at(linkage, q).reshape(-1, len(estimate.names))
+    Q, _ = np.linalg.qr(B)
+    noncentrality = _noncentrality(estimate.degrees_of_freedom, estimate.noise_freedom) if noise_is_known else np.inf
+    least = np.sqrt(noncentrality) * estimate.noise
+    nominal = _tips(linkage, linkage, q, np.zeros(len(linkage.drives)), estimate.values)
+
+    def remainder(shift: Array) -> float:
+        """Return the norm of the part of a weighted shift that no clearances explain."""
+        return float(np.linalg.norm(shift - Q @ (Q.T @ shift)))
+
+    errors = []
+    for name, unit, size, changed in _kinds(linkage):
+
+        def shift(change: float, changed: Callable[[float], _WrongModel] = changed) -> Array:
+            wrong, zeros = changed(change)
+            return weights * (_tips(wrong, linkage, q, zeros, estimate.values) - nominal).ravel()
+
+        slope = (shift(_STEP) - shift(-_STEP)) / (2 * _STEP)
+        full = float(np.linalg.norm(slope))
+        if full < _NO_SHIFT:
+            continue
+        limit = np.inf
+        if np.isfinite(least) and remainder(slope) > _NEGLIGIBLE * full:
+            limit = size * _detection_limit(lambda change: remainder(shift(change)), least / remainder(slope), least)
+        shifts = np.linalg.lstsq(B, slope / size, rcond=None)[0]
+        errors.append(ModelError(name, unit, limit, np.asarray(shifts, dtype=np.float64)))
+    return tuple(errors)
+
+
+def _detection_limit(remainder: Callable[[float], float], linear: float, least: float) -> float:
+    """Return the change from which on, of either sign, a model error leaves the remainder needed to detect it.
+
+    Args:
+        remainder: of the shift by a change, which no clearances explain [m]; a change of -1 removes the quantity.
+        linear: the limit if the remainder is proportional to the change.
+        least: remainder needed [m].
+    """
+    size = linear
+    for _ in range(_MOST_ROUNDS):
+        try:
+            smaller = min(remainder(change) for change in (size, -size) if change > -1)
+        except InvalidValueError:
+            # The wrong linkage cannot be assembled, which nobody overlooks.
+            return size
+        if smaller > (1 - _TOLERANCE) * least:
+            return size
+        size *= least / max(smaller, 0.5 * least)
+        if size > _FAR * linear:
+            break
+    return float(np.inf)
+
+
+def offsets_of_wrong_model(
+    linkage: Linkage, poses: ArrayLike, clearances: ArrayLike, name: str, amount: float
+) -> Array:
+    """Return (k, 2) the offsets of the resting tip of an arm that differs from its model [m].
+
+    Args:
+        linkage: the nominal model, with p pins.
+        poses: (k, 2) positions of its tip by the model, without clearance [m].
+        clearances: (p,) [m].
+        name: of the model error; see ``ModelError``.
+        amount: excess of the arm over its model, in the unit of the model error.
+
+    Raises:
+        UnknownNameError: there is no such model error.
+    """
+    kinds = {kind.name: kind for kind in _kinds(linkage)}
+    kind = kinds[one_of("model error", name, kinds)]
+    wrong, zeros = kind.changed(amount / kind.size)
+    positions = floats(poses, "poses")
+    tips = _tips(wrong, linkage, closed_at_poses(linkage, positions), zeros, floats(clearances, "clearances"))
+    return np.asarray(tips - positions, dtype=np.float64)
+
+
+def _noncentrality(freedom: int, noise_freedom: float) -> float:
+    """Return the noncentrality of chi-square, or of F, at which the model is refused with the probability ``POWER``."""
+    if freedom < 1:
+        return np.inf
+    known = np.isinf(noise_freedom)
+    bound = chi2.isf(CONTRADICTION, freedom) if known else f.isf(CONTRADICTION, freedom, noise_freedom)
+
+    def excess(size: float) -> float:
+        power = ncx2.sf(bound, freedom, size) if known else ncf.sf(bound, freedom, noise_freedom, size)
+        return float(power) - POWER
+
+    upper = 16.0
+    while excess(upper) < 0:
+        upper *= 2
+    return float(brentq(excess, 1e-3, upper))
+
+
+def _tips(wrong: Linkage, nominal: Linkage, q: Array, zeros: Array, clearances: Array) -> Array:
+    """Return (k, 2) the resting positions of the tip of a wrong model, its drives at those of the nominal model.
+
+    Args:
+        wrong: the linkage.
+        nominal: the nominal model.
+        q: (k, n) coordinates of the nominal model without clearance.
+        zeros: (d,) errors of the zeros of the drives [rad, m].
+        clearances: (p,) [m].
+    """
+    start = closed(wrong, q, drives=q[:, list(nominal.driven)] + zeros)
+    c = np.broadcast_to(clearances, (len(q), len(clearances)))
+    return at_rest(wrong, start, c, contact_stiffness(wrong, c)).tip
+
+
+def _kinds(linkage: Linkage) -> Iterator[_Kind]:
+    """Give all kinds of errors that a model may have."""
+    for i, load in enumerate(linkage.loads):
+        if np.any(load.force):
+            yield _Kind(f"load at {load.point}", "1", 1.0, partial(_with_load, linkage, i))
+    for i, body in enumerate(linkage.bodies):
+        yield _Kind(f"mass of {body.name}", "1", 1.0, partial(_with_mass, linkage, i))
+        if _length(body) > 0:
+            yield _Kind(f"length of {body.name}", "m", _length(body), partial(_with_length, linkage, i))
+    if _length(linkage.ground) > 0:
+        yield _Kind("distances on the ground", "m", _length(linkage.ground), partial(_with_ground, linkage))
+    for i, drive in enumerate(linkage.drives):
+        unit = "rad" if linkage.coordinates[linkage.driven[i]].kind == "angle" else "m"
+        yield _Kind(f"zero of {drive.body}", unit, 1.0, partial(_with_zero, linkage, i))
+
+
+def _with_load(linkage: Linkage, number: int, change: float) -> _WrongModel:
+    loads = list(linkage.loads)
+    loads[number] = attrs.evolve(loads[number], force=loads[number].force * (1 + change))
+    return attrs.evolve(linkage, loads=loads), np.zeros(len(linkage.drives))
+
+
+def _with_mass(linkage: Linkage, number: int, change: float) -> _WrongModel:
+    body = linkage.bodies[number]
+    return _with_body(linkage, number, attrs.evolve(body, mass=body.mass * (1 + change)))
+
+
+def _with_length(linkage: Linkage, number: int, change: float) -> _WrongModel:
+    return _with_body(linkage, number, _scaled(linkage.bodies[number], change))
+
+
+def _with_ground(linkage: Linkage, change: float) -> _WrongModel:
+    return attrs.evolve(linkage, ground=_scaled(linkage.ground, change)), np.zeros(len(linkage.drives))
+
+
+def _with_zero(linkage: Linkage, number: int, change: float) -> _WrongModel:
+    return linkage, change * np.eye(len(linkage.drives))[number]
+
+
+def _with_body(linkage: Linkage, number: int, body: Body) -> _WrongModel:
+    """Return the linkage with another body, and drives without an error of their zeros."""
+    bodies = list(linkage.bodies)
+    bodies[number] = body
+    return attrs.evolve(linkage, bodies=bodies), np.zeros(len(linkage.drives))
+
+
+def _scaled(body: Body, change: float) -> Body:
+    return attrs.evolve(body, points={name: point * (1 + change) for name, point in body.points.items()})
+
+
+def _length(body: Body) -> float:
+    """Return the largest distance between two points of a body [m]."""
+    points = np.array(list(body.points.values()))
+    return float(np.linalg.norm(points[:, None] - points, axis=-1).max()) if len(points) > 1 else 0.0
