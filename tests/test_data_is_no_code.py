@@ -10,7 +10,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.clearance.kernel import Layout, emit_simulation
-from armwright.clearance.linkage import Linkage, BodyPoint
+from armwright.clearance.linkage import BodyPoint, Linkage
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.settings import Settings
 from armwright.compiled.arm import compile_arm
@@ -73,7 +73,7 @@ def renamed(linkage: Linkage, name: str) -> Linkage:
 
 
 def source_of(linkage: Linkage) -> str:
-    return emit_simulation(Layout(linkage=linkage, rubbing=Settings().friction, control="effort"), "rk4")
+    return emit_simulation(Layout(linkage=linkage, friction=Settings().friction, control="effort"), "rk4")
 
 
 @pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)

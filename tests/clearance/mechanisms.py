@@ -71,7 +71,7 @@ def pendulum() -> Linkage:
 def still(duration: float, *drives: float) -> Path:
     """The drives stay where they are."""
     pieces = np.array(drives, dtype=np.float64).reshape(1, -1, 1)
-    return Path(name="still", knots=np.array([0.0, duration]), pieces=pieces, of="drives")
+    return Path(name="still", knots=np.array([0.0, duration]), pieces=pieces, follower="drives")
 
 
 def thrown(linkage: Linkage, settings: Settings, duration: float, speeds: ArrayLike) -> Scenario:
@@ -93,8 +93,8 @@ def energies(found: Simulation) -> Array:
     c = np.broadcast_to(found.clearances[..., None, :], (*found.q.shape[:-1], len(linkage.pins)))
     K = contact_stiffness(linkage, c)
     contacts = [Contact(c[..., i], K[..., i], 0.0, 0.0, settings.threshold) for i in range(len(linkage.pins))]
-    touches = [ContactMemory(np.zeros(found.q.shape[:-1]), 1.0) for _ in linkage.pins]
-    state = State(axes(found.q), axes(found.qd), touches)
+    memories = [ContactMemory(np.zeros(found.q.shape[:-1]), 1.0) for _ in linkage.pins]
+    state = State(axes(found.q), axes(found.qd), memories)
     return np.asarray(sum(rates(linkage, FrictionModel(), state, [0.0] * len(linkage.drives), contacts).energy))
 
 

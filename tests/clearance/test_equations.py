@@ -55,14 +55,14 @@ def found(
     qd: np.ndarray,
     drives: Any = None,
     *,
-    rubbing: FrictionModel | None = None,
+    model: FrictionModel | None = None,
     friction: float = 0.1,
     bend: float = 0.0,
 ) -> Rates:
     contacts = [Contact(pin.clearance, 7e10, 0.15, friction, 1e-3) for pin in linkage.pins]
-    touches = [ContactMemory(1.0, 0.3, bend) for _ in linkage.pins]
+    memories = [ContactMemory(1.0, 0.3, bend) for _ in linkage.pins]
     efforts = [0.0] * len(linkage.drives) if drives is None else list(drives)
-    return rates(linkage, rubbing or FrictionModel(), State(list(q), list(qd), touches), efforts, contacts)
+    return rates(linkage, model or FrictionModel(), State(list(q), list(qd), memories), efforts, contacts)
 
 
 def full(linkage: Linkage, q: np.ndarray) -> np.ndarray:
@@ -126,16 +126,16 @@ class TestWhatMotionKeeps:
 
     LAWS = (FrictionModel(), FrictionModel(velocity="centre"), FrictionModel(law="tanh"), FrictionModel(law="lugre"))
 
-    @pytest.mark.parametrize("rubbing", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
+    @pytest.mark.parametrize("model", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
     @pytest.mark.parametrize("seed", range(4))
-    def test_energy(self, seed: int, rubbing: FrictionModel) -> None:
+    def test_energy(self, seed: int, model: FrictionModel) -> None:
         """Kinetic, potential and stored energy grow by what drives give and contacts do not take, watt by watt."""
         rng = np.random.default_rng(seed)
         linkage = tree(rng)
         q, qd = pressed(linkage, rng)
         efforts = rng.uniform(-20.0, 20.0, 3)
 
-        now = found(linkage, q, qd, efforts, rubbing=rubbing, bend=1e-6)
+        now = found(linkage, q, qd, efforts, model=model, bend=1e-6)
         dt, qdd = 1e-7, np.array(now.qdd)
         after, before = (found(linkage, q + s * dt * qd, qd + s * dt * qdd, efforts).energy for s in (1.0, -1.0))
 
@@ -152,13 +152,13 @@ class TestWhatMotionKeeps:
             now = found(linkage, *pressed(linkage, rng))
             assert now.powers[2] > 0
 
-    @pytest.mark.parametrize("rubbing", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
-    def test_momentum_of_free_bodies(self, rng: np.random.Generator, rubbing: FrictionModel) -> None:
+    @pytest.mark.parametrize("model", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
+    def test_momentum_of_free_bodies(self, rng: np.random.Generator, model: FrictionModel) -> None:
         """Two free bodies in a pin with play keep their momentum and their angular momentum, whatever rubs."""
         linkage = pair(rng)
         q, qd = pressed(linkage, rng)
 
-        qdd = np.array(found(linkage, q, qd, rubbing=rubbing, bend=1e-6).qdd)
+        qdd = np.array(found(linkage, q, qd, model=model, bend=1e-6).qdd)
 
         mass = np.array([body.mass for body in linkage.bodies])
         inertia = np.array([body.inertia for body in linkage.bodies])

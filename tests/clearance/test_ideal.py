@@ -373,7 +373,7 @@ class TestRefused:
     def test_tip_of_one_drive(self) -> None:
         """A slider-crank cannot lead its tip through the plane."""
         linkage = load_linkage("slider-crank")
-        with pytest.raises(InvalidValueError, match="it has 1 freedom, and a place of the tip tells 2"):
+        with pytest.raises(InvalidValueError, match="it has 1 freedom, and a position of the tip fixes 2"):
             closed(linkage, assembly_guess(linkage), tip=[0.17, 0.0])
 
     def test_singular(self) -> None:

@@ -107,18 +107,18 @@ class TestWhatItCannotBe:
 
     def test_twins(self, five_bar: Linkage) -> None:
         """Names are given once; a body hangs on one ideal joint and has one drive."""
-        with pytest.raises(InvalidValueError, match="body 'link1' is given twice"):
+        with pytest.raises(InvalidValueError, match="body 'link1' is defined twice"):
             attrs.evolve(five_bar, bodies=[*five_bar.bodies, five_bar.bodies[0]])
-        with pytest.raises(InvalidValueError, match="pin 'J2' is given twice"):
+        with pytest.raises(InvalidValueError, match="pin 'J2' is defined twice"):
             attrs.evolve(five_bar, pins=[*five_bar.pins, five_bar.pins[0]])
-        with pytest.raises(InvalidValueError, match="joint of body 'link1' is given twice"):
+        with pytest.raises(InvalidValueError, match="joint of body 'link1' is defined twice"):
             attrs.evolve(five_bar, joints=[*five_bar.joints, five_bar.joints[0]])
-        with pytest.raises(InvalidValueError, match="drive of body 'link4' is given twice"):
+        with pytest.raises(InvalidValueError, match="drive of body 'link4' is defined twice"):
             attrs.evolve(five_bar, drives=[*five_bar.drives, Drive(body="link4")])
 
     def test_ground_is_no_body(self, five_bar: Linkage) -> None:
         """The ground does not move."""
-        with pytest.raises(InvalidValueError, match="body 'ground' is given twice"):
+        with pytest.raises(InvalidValueError, match="body 'ground' is defined twice"):
             attrs.evolve(five_bar, bodies=[*five_bar.bodies, Body(name="ground", mass=1.0, inertia=1.0)])
 
     def test_without_mass(self, five_bar: Linkage) -> None:

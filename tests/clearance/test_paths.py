@@ -79,7 +79,7 @@ class TestStraight:
 
     def test_three_numbers(self) -> None:
         """The plane has two axes."""
-        with pytest.raises(ShapeError, match=r"start: expected two numbers, got shape \(3,\)"):
+        with pytest.raises(ShapeError, match=r"start: expected a shape ending in \(2,\), got \(3,\)"):
             straight("up", (0, 0, 0), (1, 0))
 
 
@@ -110,7 +110,7 @@ class TestHermite:
 
     def test_places_without_times(self) -> None:
         """There are as many places as times."""
-        with pytest.raises(ShapeError, match=r"expected \(m \+ 1\) times and \(m \+ 1, 2\) places and velocities"):
+        with pytest.raises(ShapeError, match=r"expected \(m \+ 1\) times and \(m \+ 1, 2\) positions and velocities"):
             hermite("x", (0, 1), np.zeros((3, 2)), np.zeros((3, 2)), ())
 
     def test_pick_and_place(self) -> None:

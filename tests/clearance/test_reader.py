@@ -113,7 +113,7 @@ def test_no_file(tmp_path: Path) -> None:
         (
             'bearing = "slider:P"',
             'bearing = "slider.P"',
-            "bearing.*expected a place such as 'link1:J2', got 'slider.P'",
+            "bearing.*expected a point of a body such as 'link1:J2', got 'slider.P'",
         ),
         ('journal = "rod:B"', 'journal = "rod:C"', r"no point of rod 'C'"),
         ('journal = "rod:B"', 'journal = "rot:B"', r"no body 'rot'. Did you mean 'rod'\?"),
@@ -151,5 +151,5 @@ def test_free_body_that_nothing_holds() -> None:
     """A body that no pin joins to the rest cannot be put anywhere."""
     linkage = load_linkage("five-bar")
     adrift = attrs.evolve(linkage, pins=linkage.pins[:1], joints=linkage.joints)
-    with pytest.raises(InvalidValueError, match="five-bar: no pin joins link3 to the rest"):
+    with pytest.raises(InvalidValueError, match="five-bar: no pin joins link3 to the other bodies"):
         assembly_guess(adrift)

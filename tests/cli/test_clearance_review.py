@@ -56,7 +56,7 @@ def test_no_path_for_a_contradiction(estimate: Path) -> None:
     assert wrong.returncode == 3
     assert "the data contradict the model" in wrong.stderr
     assert unknown.returncode == 3
-    assert "the measurement does not tell J3" in unknown.stderr
+    assert "the measurement does not identify J3" in unknown.stderr
 
 
 def test_estimate_refuses_a_contradiction(tmp_path: Path) -> None:
@@ -80,7 +80,7 @@ def test_given_twice(estimate: Path) -> None:
     done = armwright("clearance", "correct", "five-bar", "--estimate", estimate, "--clearance", "J2=0.1")
 
     assert done.returncode == 2
-    assert "given or those of" in done.stderr
+    assert "give either --clearance or --estimate" in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_given_twice(estimate: Path) -> None:
         (["correct", "five-bar", "--rounds", "-1"], 2, "rounds: expected 0 to 100, got -1"),
         (["correct", "five-bar", "--rounds", str(10**30)], 2, "rounds: expected 0 to 100, got 1000"),
         (["correct", "five-bar", "--estimate", "nowhere.json"], 4, "nowhere.json: no such file"),
-        (["correct", "four-bar"], 2, "with its pins closed it has 1 freedom, and a place of the tip tells 2"),
+        (["correct", "four-bar"], 2, "with its pins closed it has 1 freedom, and a position of the tip fixes 2"),
         (["sweep", "five-bar", "--paths", "y1", "--step", "4.6e-5", "-o", "{out}"], 2, "is too long for contacts"),
     ],
 )
@@ -108,7 +108,7 @@ def test_matrix_that_does_not_fit(estimate: Path) -> None:
     done = armwright("clearance", "correct", "five-bar", "--estimate", estimate)
 
     assert done.returncode == 4
-    assert "expected what `armwright clearance estimate --json` prints for five-bar" in done.stderr
+    assert "expected the output of `armwright clearance estimate --json` for five-bar" in done.stderr
 
 
 def test_sweep_of_another_linkage(tmp_path: Path) -> None:

@@ -12,8 +12,8 @@ import pytest
 from armwright.clearance.assessment import ClearanceRun
 from armwright.clearance.five_bar import FiveBar
 from armwright.clearance.ideal import tip_of
-from armwright.clearance.linkage import Pin, BodyPoint
-from armwright.clearance.paths import thesis_path, constant_speed_path
+from armwright.clearance.linkage import BodyPoint, Pin
+from armwright.clearance.paths import constant_speed_path, thesis_path
 from armwright.clearance.reader import load_linkage
 from armwright.clearance.scenario import Scenario, prepare
 from armwright.clearance.settings import Settings

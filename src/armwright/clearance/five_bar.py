@@ -1,7 +1,7 @@
-"""The five-bar without play in closed form: where its links stand for a place of the tip, and the other way round.
+"""The five-bar without clearance in closed form: the angles of its links for a position of its tip, and vice versa.
 
-Two motors turn two cranks; a rod hangs on each, and a pin, the tip, joins the rods. As in the thesis the links are
-numbered from left to right, crank 1, rod 2, rod 3, crank 4, and their angles are measured from the downward vertical,
+Two motors drive two cranks; a rod is attached to each, and a pin, the tip, joins the rods. As in the thesis the links
+are numbered from left to right, crank 1, rod 2, rod 3, crank 4; their angles are measured from the downward vertical,
 counter-clockwise positive: a link points along u = (sin θ, -cos θ).
 
 Source:
@@ -23,10 +23,10 @@ from armwright.clearance.placement import Vec2
 from armwright.errors import InvalidValueError, ShapeError, one_of
 from armwright.tracing.scalar import Scalar, atan2, cos, sin, sqrt
 
-# Where the elbows are, seen with the tip below the motors: both outside, as in the thesis, or both inside, or both to
-# one side. It never changes while no arm is stretched or folded.
+# The sides of the elbows, with the tip below the motors: both outside, as in the thesis, or both inside, or both to one
+# side. It never changes while no arm is stretched or folded.
 Mode: TypeAlias = Literal["out", "left", "right", "in"]
-# Where the tip is, seen from the line that goes from the left elbow to the right one.
+# The side of the tip, relative to the line from the left elbow to the right elbow.
 Assembly: TypeAlias = Literal["below", "above"]
 
 # Signs of sin(θ2 - θ1) and sin(θ3 - θ4).
@@ -38,7 +38,7 @@ MODES: Mapping[Mode, tuple[float, float]] = {
 }
 ASSEMBLIES: Mapping[Assembly, float] = {"below": -1.0, "above": 1.0}
 SIDES = ("left", "right")
-# A place so little out of reach is in reach but for rounding [m]; on the border rounding bends an elbow so little.
+# A position so little out of reach is in reach but for rounding [m]; on the border rounding bends an elbow so little.
 _ROUNDING, _STRAIGHT = 1e-12, 1e-7
 
 
@@ -55,10 +55,10 @@ def _motors(value: ArrayLike) -> Array:
 
 @attrs.frozen(kw_only=True, eq=False)
 class FiveBar:
-    """A five-bar without play.
+    """A five-bar without clearance.
 
     Attributes:
-        motors: (2, 2) where the left and the right motor stand [m].
+        motors: (2, 2) positions of the left and the right motor [m].
         cranks: (2,) lengths of links 1 and 4 [m].
         rods: (2,) lengths of links 2 and 3 [m].
     """
@@ -80,17 +80,17 @@ class FiveBar:
 
     @classmethod
     def of(cls, linkage: Linkage) -> FiveBar:
-        """Return the five-bar that a linkage is when its play is left aside.
+        """Return the five-bar that a linkage is without its clearances.
 
         Args:
-            linkage: four bodies and the ground in one loop of pins, with or without play; the motors turn the two
-                bodies on the ground, and the tip is the pin that joins the other two.
+            linkage: four bodies and the ground in one loop of pins, with or without clearance; the motors drive the
+                two bodies on the ground, and the tip is the pin that joins the other two.
 
         Raises:
             InvalidValueError: it is no five-bar; the text says why.
         """
         parts = parts_of(linkage)
-        lengths = [part.length for part in parts.links]
+        lengths = [link.length for link in parts.links]
         return cls(motors=parts.motors, cranks=[lengths[0], lengths[3]], rods=lengths[1:3])
 
     @property
@@ -100,7 +100,7 @@ class FiveBar:
 
     @property
     def reaches(self) -> Array:
-        """(2, 2) how near to its motor and how far from it each arm brings the tip, left and right [m]."""
+        """(2, 2) the smallest and the largest distance of the tip from its motor, for the left and right arm [m]."""
         return np.stack([np.abs(self.cranks - self.rods), self.cranks + self.rods], axis=-1)
 
 
@@ -120,29 +120,29 @@ def direction(angle: Scalar) -> Vec2:
 
 
 def arm_angles(reach: Vec2, crank: Scalar, rod: Scalar, sign: Scalar) -> ArmAngles:
-    """Return the angles at which an arm of two links spans from its motor to a place.
+    """Return the angles of an arm of two links that reaches from its motor to a point.
 
     Args:
-        reach: from the motor to the place [m].
+        reach: from the motor to the point [m].
         crank: length [m].
         rod: length [m].
-        sign: of sin(rod - crank), 1 or -1: on which side the elbow is.
+        sign: of sin(rod - crank), 1 or -1: the side of the elbow.
     """
     square = reach.dot(reach)
     along = 0.5 * ((crank * crank - rod * rod) / square + 1.0)
     across = -sign * sqrt(crank * crank / square - along * along)
     elbow = reach.times(along).plus(reach.perpendicular().times(across))
-    rest = reach.minus(elbow)
-    return ArmAngles(atan2(elbow.x, -elbow.y), atan2(rest.x, -rest.y))
+    rod_vector = reach.minus(elbow)
+    return ArmAngles(atan2(elbow.x, -elbow.y), atan2(rod_vector.x, -rod_vector.y))
 
 
-def joined_at(elbows: tuple[Vec2, Vec2], rods: tuple[Scalar, Scalar], sign: Scalar) -> Vec2:
-    """Return where two rods meet.
+def rod_intersection(elbows: tuple[Vec2, Vec2], rods: tuple[Scalar, Scalar], sign: Scalar) -> Vec2:
+    """Return the point at which two rods meet.
 
     Args:
-        elbows: where they begin, left and right [m].
+        elbows: left and right starts of the rods [m].
         rods: their lengths [m].
-        sign: -1 for the place on the right of the way from the left elbow to the right one, below it, or 1.
+        sign: -1 for the point below the line from the left elbow to the right elbow, or 1.
     """
     base = elbows[1].minus(elbows[0])
     square = base.dot(base)
@@ -163,13 +163,13 @@ def arm_rates(angles: ArmAngles, crank: Scalar, rod: Scalar, target: Vec2) -> Ar
     Source:
         Thesis eq. (3.11), (3.12): two systems of two equations, with determinant crank · rod · sin(θ2 - θ1).
     """
-    turn = sin(angles.rod - angles.crank)
-    rod_way, crank_way = direction(angles.rod), direction(angles.crank)
-    return ArmAngles(rod_way.dot(target) / (crank * turn), -crank_way.dot(target) / (rod * turn))
+    sine = sin(angles.rod - angles.crank)
+    along_rod, along_crank = direction(angles.rod), direction(angles.crank)
+    return ArmAngles(along_rod.dot(target) / (crank * sine), -along_crank.dot(target) / (rod * sine))
 
 
 def centripetal(angles: ArmAngles, rates: ArmAngles, crank: Scalar, rod: Scalar) -> Vec2:
-    """Return the acceleration that the tip of an arm has at constant rates [m/s²]; arguments as of ``arm_rates``."""
+    """Return the acceleration of the tip of an arm at constant rates [m/s²]; arguments as of ``arm_rates``."""
     parts = (direction(angles.crank).times(crank * rates.crank * rates.crank),
              direction(angles.rod).times(rod * rates.rod * rates.rod))  # fmt: skip
     return parts[0].plus(parts[1]).times(-1.0)
@@ -179,68 +179,70 @@ def centripetal(angles: ArmAngles, rates: ArmAngles, crank: Scalar, rod: Scalar)
 
 
 def inverse(bar: FiveBar, tip: ArrayLike, mode: Mode = "out") -> Array:
-    """Return the angles of the links for places of the tip.
+    """Return the angles of the links for positions of the tip.
 
     Args:
         bar: the five-bar.
-        tip: (..., 2) where its tip is to be [m].
-        mode: where its elbows are.
+        tip: (..., 2) positions of its tip [m].
+        mode: sides of its elbows.
 
     Returns:
         (..., 4) angles θ1 to θ4 from the downward vertical [rad], in (-π, π].
 
     Raises:
-        InvalidValueError: a place is out of reach; the text says by how much and of which arm.
+        InvalidValueError: a position is out of reach; the text names the distance and the arm.
         UnknownNameError: there is no such mode.
 
     Source:
         Thesis eq. (3.8).
     """
     signs = MODES[one_of("assembly mode", mode, MODES)]  # type: ignore[index]
-    places = places_of(tip, "tip")
-    _check_reach(bar, places)
-    found: list[Array] = []
-    for motor, crank, rod, sign in zip(bar.motors, bar.cranks, bar.rods, signs, strict=True):
-        found += arm_angles(_pair(places - motor), float(crank), float(rod), sign)
-    return np.stack([found[0], found[1], found[3], found[2]], axis=-1)
+    points = point_array(tip, "tip")
+    _check_reach(bar, points)
+    return _stacked(
+        [
+            arm_angles(_vector(points - motor), float(crank), float(rod), sign)
+            for motor, crank, rod, sign in zip(bar.motors, bar.cranks, bar.rods, signs, strict=True)
+        ]
+    )
 
 
 def inverse_all(bar: FiveBar, tip: ArrayLike) -> dict[Mode, Array]:
-    """Return the angles for places of the tip in all four modes; arguments and errors as of ``inverse``."""
+    """Return the angles for positions of the tip in all four modes; arguments and errors as of ``inverse``."""
     return {mode: inverse(bar, tip, mode) for mode in MODES}
 
 
 def forward(bar: FiveBar, cranks: ArrayLike, assembly: Assembly = "below") -> tuple[Array, Array]:
-    """Return where the tip is, and the angles of all links, for angles of the cranks.
+    """Return the position of the tip and the angles of all links for angles of the cranks.
 
     Args:
         bar: the five-bar.
         cranks: (..., 2) angles θ1, θ4 [rad].
-        assembly: on which side of the line through the elbows the tip is.
+        assembly: side of the tip, relative to the line through the elbows.
 
     Returns:
-        (..., 2) places of the tip [m], and (..., 4) angles θ1 to θ4 [rad].
+        (..., 2) positions of the tip [m], and (..., 4) angles θ1 to θ4 [rad].
 
     Raises:
-        InvalidValueError: the rods do not meet: the elbows are too far from one another, or too near; or they fall
-            together, and equal rods may stand anywhere.
+        InvalidValueError: the rods do not meet: the elbows are too far from each other, or too near; or they
+            coincide, and equal rods may have any angle.
         UnknownNameError: there is no such assembly.
     """
     sign = ASSEMBLIES[one_of("assembly", assembly, ASSEMBLIES)]  # type: ignore[index]
-    given = places_of(cranks, "cranks")
-    places = elbows(bar, given)
-    _check_meeting(bar, places)
-    left, right = (_pair(places[..., i, :]) for i in range(2))
-    tip = joined_at((left, right), (float(bar.rods[0]), float(bar.rods[1])), sign)
-    rods = [atan2(tip.x - one.x, one.y - tip.y) for one in (left, right)]
-    return np.stack(tip, axis=-1), np.stack([given[..., 0], *rods, given[..., 1]], axis=-1)
+    theta = point_array(cranks, "cranks")
+    points = elbows(bar, theta)
+    _check_meeting(bar, points)
+    ends = (_vector(points[..., 0, :]), _vector(points[..., 1, :]))
+    tip = rod_intersection(ends, (float(bar.rods[0]), float(bar.rods[1])), sign)
+    rods = [atan2(tip.x - elbow.x, elbow.y - tip.y) for elbow in ends]
+    return np.stack(tip, axis=-1), np.stack([theta[..., 0], *rods, theta[..., 1]], axis=-1)
 
 
 def elbows(bar: FiveBar, cranks: ArrayLike) -> Array:
-    """Return (..., 2, 2) where the left and the right elbow are [m] for angles (..., 2) of the cranks [rad]."""
-    given = places_of(cranks, "cranks")
-    ways = np.stack([np.sin(given), -np.cos(given)], axis=-1)
-    return np.asarray(bar.motors + bar.cranks[:, None] * ways, dtype=np.float64)
+    """Return (..., 2, 2) positions of the left and the right elbow [m] for angles (..., 2) of the cranks [rad]."""
+    theta = point_array(cranks, "cranks")
+    directions = np.stack([np.sin(theta), -np.cos(theta)], axis=-1)
+    return np.asarray(bar.motors + bar.cranks[:, None] * directions, dtype=np.float64)
 
 
 def speeds(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike) -> Array:
@@ -257,10 +259,9 @@ def speeds(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike) -> Array:
     Source:
         Thesis eq. (3.11).
     """
-    given, goal = _angles(angles), places_of(velocity, "velocity")
-    _check_bent(given)
-    arms = _arms(bar, given)
-    return _stacked([arm_rates(angle, crank, rod, _pair(goal)) for angle, crank, rod in arms])
+    theta, goal = link_angles(angles), _vector(point_array(velocity, "velocity"))
+    _check_bent(theta)
+    return _stacked([arm_rates(angle, crank, rod, goal) for angle, crank, rod in _arms(bar, theta)])
 
 
 def accelerations(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Array:
@@ -278,13 +279,12 @@ def accelerations(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike, accelera
     Source:
         Thesis eq. (3.12).
     """
-    given, goal = _angles(angles), _pair(places_of(acceleration, "acceleration"))
-    qd = speeds(bar, given, velocity)
-    arms, moving = _arms(bar, given), _arms(bar, qd)
+    theta, goal = link_angles(angles), _vector(point_array(acceleration, "acceleration"))
+    rates = _arms(bar, speeds(bar, theta, velocity))
     return _stacked(
         [
-            arm_rates(angle, crank, rod, goal.minus(centripetal(angle, rates, crank, rod)))
-            for (angle, crank, rod), (rates, _, _) in zip(arms, moving, strict=True)
+            arm_rates(angle, crank, rod, goal.minus(centripetal(angle, rate, crank, rod)))
+            for (angle, crank, rod), (rate, _, _) in zip(_arms(bar, theta), rates, strict=True)
         ]
     )
 
@@ -292,7 +292,7 @@ def accelerations(bar: FiveBar, angles: ArrayLike, velocity: ArrayLike, accelera
 # ---- inside --------------------------------------------------------------------------------------------------------
 
 
-def places_of(value: ArrayLike, what: str) -> Array:
+def point_array(value: ArrayLike, what: str) -> Array:
     """Return (..., 2) numbers.
 
     Raises:
@@ -304,37 +304,43 @@ def places_of(value: ArrayLike, what: str) -> Array:
     return array
 
 
-def _angles(value: ArrayLike) -> Array:
+def link_angles(value: ArrayLike) -> Array:
+    """Return (..., 4) angles θ1 to θ4.
+
+    Raises:
+        ShapeError: the last axis is not 4 long.
+    """
     array = floats(value, "angles", LARGEST)
     if array.ndim == 0 or array.shape[-1] != 4:
         raise ShapeError(f"angles: expected four on the last axis, θ1 to θ4, got shape {array.shape}")
     return array
 
 
-def _pair(places: Array) -> Vec2:
-    """Return (..., 2) numbers as a pair of arrays: also a single place, so that one law fits all."""
-    return Vec2(np.asarray(places[..., 0]), np.asarray(places[..., 1]))
+def _vector(points: Array) -> Vec2:
+    """Return (..., 2) numbers as a vector of arrays, without axes for a single point."""
+    return Vec2(np.asarray(points[..., 0]), np.asarray(points[..., 1]))
 
 
 def _arms(bar: FiveBar, links: Array) -> list[tuple[ArmAngles, float, float]]:
-    """Return of each arm the numbers of crank and rod, and their lengths."""
+    """Return for each arm the angles or rates of crank and rod, and their lengths."""
     pairs = (ArmAngles(*(np.asarray(links[..., i]) for i in order)) for order in ((0, 1), (3, 2)))
-    return [(one, float(a), float(b)) for one, a, b in zip(pairs, bar.cranks, bar.rods, strict=True)]
+    return [(pair, float(crank), float(rod)) for pair, crank, rod in zip(pairs, bar.cranks, bar.rods, strict=True)]
 
 
 def _stacked(arms: list[ArmAngles]) -> Array:
+    """Return (..., 4) the angles or rates of the links of the left and the right arm."""
     left, right = arms
     parts = np.broadcast_arrays(left.crank, left.rod, right.rod, right.crank)
     return np.stack(parts, axis=-1).astype(np.float64)
 
 
-def _check_reach(bar: FiveBar, places: Array) -> None:
-    """Refuse places that an arm does not reach.
+def _check_reach(bar: FiveBar, points: Array) -> None:
+    """Refuse points that an arm does not reach.
 
     Raises:
-        InvalidValueError: there is one; the text says which, by how much and of which arm.
+        InvalidValueError: there is one; the text names the point, the distance and the arm.
     """
-    distances = np.linalg.norm(places[..., None, :] - bar.motors, axis=-1)
+    distances = np.linalg.norm(points[..., None, :] - bar.motors, axis=-1)
     near, far = bar.reaches.T
     out = np.maximum(distances - far, near - distances)
     if np.any(out > _ROUNDING):
@@ -345,15 +351,15 @@ def _check_reach(bar: FiveBar, places: Array) -> None:
             for i in range(2)
             if out[row][i] > _ROUNDING
         ]
-        raise InvalidValueError(f"{_spot(places, row)} is out of reach: {'; and '.join(words)}")
+        raise InvalidValueError(f"{_point_text(points, row)} is out of reach: {'; and '.join(words)}")
     if np.any(distances < _ROUNDING):
         row = tuple(np.argwhere(distances.min(axis=-1) < _ROUNDING)[0])
         side = SIDES[int(distances[row].argmin())]
-        raise InvalidValueError(f"{_spot(places, row)} is on the {side} motor: its folded arm may stand anywhere")
+        raise InvalidValueError(f"{_point_text(points, row)} is on the {side} motor: its folded arm may have any angle")
 
 
-def _spot(places: Array, row: tuple[Any, ...]) -> str:
-    x, y = places[row] * 1e3
+def _point_text(points: Array, row: tuple[Any, ...]) -> str:
+    x, y = points[row] * 1e3
     return f"tip{_index(row)}: ({x:g}, {y:g}) mm"
 
 
@@ -361,13 +367,13 @@ def _index(row: tuple[Any, ...]) -> str:
     return f" {', '.join(str(int(i)) for i in row)}" if row else ""
 
 
-def _check_meeting(bar: FiveBar, places: Array) -> None:
+def _check_meeting(bar: FiveBar, points: Array) -> None:
     """Refuse elbows between which the rods do not meet.
 
     Raises:
         InvalidValueError: there are some.
     """
-    apart = np.linalg.norm(places[..., 1, :] - places[..., 0, :], axis=-1)
+    apart = np.linalg.norm(points[..., 1, :] - points[..., 0, :], axis=-1)
     near, far = abs(float(bar.rods[0] - bar.rods[1])), float(bar.rods.sum())
     out = np.maximum(apart - far, near - apart)
     if np.any(out > _ROUNDING):
@@ -379,7 +385,7 @@ def _check_meeting(bar: FiveBar, places: Array) -> None:
         )
     if np.any(apart < _ROUNDING):
         row = tuple(np.argwhere(apart < _ROUNDING)[0])
-        raise InvalidValueError(f"cranks{_index(row)}: the elbows fall together: the rods may stand anywhere")
+        raise InvalidValueError(f"cranks{_index(row)}: the elbows coincide: the rods may have any angle")
 
 
 def _check_bent(links: Array) -> None:
@@ -388,9 +394,9 @@ def _check_bent(links: Array) -> None:
     Raises:
         InvalidValueError: there is one.
     """
-    turns = np.abs(np.sin(links[..., [1, 2]] - links[..., [0, 3]]))
-    if np.any(turns < _STRAIGHT):
-        *row, side = np.argwhere(turns < _STRAIGHT)[0]
+    sines = np.abs(np.sin(links[..., [1, 2]] - links[..., [0, 3]]))
+    if np.any(sines < _STRAIGHT):
+        *row, side = np.argwhere(sines < _STRAIGHT)[0]
         raise InvalidValueError(
             f"angles{_index(tuple(row))}: the {SIDES[int(side)]} arm is stretched or folded, a serial singularity: "
             f"its tip cannot move along it"

@@ -1,9 +1,8 @@
-"""Which body of a linkage is which link of a five-bar, if it is one."""
+"""The recognition of a five-bar: which body of a linkage is which of its links."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import attrs
@@ -14,8 +13,8 @@ from armwright.clearance.linkage import GROUND, BodyPoint, Guide, Linkage
 from armwright.errors import InvalidValueError, ShapeError
 
 
-class Part(NamedTuple):
-    """A body as a link.
+class Link(NamedTuple):
+    """A body as a link of a five-bar.
 
     Attributes:
         body: its name.
@@ -33,8 +32,8 @@ class Part(NamedTuple):
         return float(np.linalg.norm(self.end - self.start))
 
     @property
-    def turn(self) -> float:
-        """Direction of the link from the axis of its body [rad]."""
+    def angle(self) -> float:
+        """Angle of the link from the axis of its body [rad]."""
         return math.atan2(*(self.end - self.start)[::-1])
 
 
@@ -43,40 +42,39 @@ class Parts:
     """The links of a five-bar.
 
     Attributes:
-        motors: (2, 2) where the left and the right motor stand [m].
+        motors: (2, 2) positions of the left and the right motor [m].
         links: 1 to 4: left crank, left rod, right rod, right crank.
     """
 
     motors: Array
-    links: tuple[Part, ...]
+    links: tuple[Link, ...]
 
 
 def parts_of(linkage: Linkage) -> Parts:
     """Return the links of the five-bar that a linkage is.
 
     Raises:
-        InvalidValueError: it is no five-bar; the text says why.
+        InvalidValueError: it is no five-bar; the text states the reason.
     """
     slides = [joint.body for joint in linkage.joints if isinstance(joint, Guide)]
     if slides:
         raise _no_five_bar(linkage, f"body {slides[0]} slides along a guide")
     if len(linkage.bodies) != 4:
         raise _no_five_bar(linkage, f"it has {len(linkage.bodies)} bodies besides the ground, not 4")
-    way = _loop(linkage)
-    motors = linkage.point(way[0]), linkage.point(way[-1])
+    loop = _loop(linkage)
+    motors = linkage.point(loop[0]), linkage.point(loop[-1])
     if motors[0][0] > motors[1][0]:
-        way, motors = way[::-1], motors[::-1]
-    bodies = [way[i].body for i in (1, 3, 5, 7)]
-    _check_motors(linkage, bodies)
-    joined = (way[4], way[5])
+        loop, motors = loop[::-1], motors[::-1]
+    _check_motors(linkage, (loop[1].body, loop[8].body))
+    joined = loop[4:6]
     if not any(
-        linkage.tip.body == one.body and np.array_equal(linkage.point(linkage.tip), linkage.point(one))
-        for one in joined
+        linkage.tip.body == end.body and np.array_equal(linkage.point(linkage.tip), linkage.point(end))
+        for end in joined
     ):
         raise _no_five_bar(linkage, f"its tip is {linkage.tip}, not {joined[0]}, where the rods are joined")
-    # Each link from the pin nearer to its motor: the right arm is walked the other way.
-    ends = ((way[1], way[2]), (way[3], way[4]), (way[6], way[5]), (way[8], way[7]))
-    links = tuple(Part(start.body, linkage.point(start), linkage.point(end)) for start, end in ends)
+    # Each link starts at the pin nearer to its motor, so that those of the right arm run against the loop.
+    ends = ((loop[1], loop[2]), (loop[3], loop[4]), (loop[6], loop[5]), (loop[8], loop[7]))
+    links = tuple(Link(start.body, linkage.point(start), linkage.point(end)) for start, end in ends)
     for link in links:
         if link.length == 0:
             raise _no_five_bar(linkage, f"both pins of body {link.body} are at one point")
@@ -103,61 +101,57 @@ def configuration(linkage: Linkage, angles: ArrayLike) -> Array:
     lead = theta.shape[:-1]
     values: dict[tuple[str, str], Array] = {}
     for motor, arm in ((parts.motors[0], (0, 1)), (parts.motors[1], (3, 2))):
-        at = np.broadcast_to(motor, (*lead, 2))
+        start = np.broadcast_to(motor, (*lead, 2))
         for number in arm:
             link, along = parts.links[number], theta[..., number] - math.pi / 2
-            axis = along - link.turn
-            centre = at + _turned(linkage.body(link.body).centre - link.start, axis)
+            axis = along - link.angle
+            centre = start + _rotated(linkage.body(link.body).centre - link.start, axis)
             values |= {(link.body, "x"): centre[..., 0], (link.body, "y"): centre[..., 1]}
             values[link.body, "angle"] = axis - linkage.zero
-            at = at + _turned(link.end - link.start, axis)
-    return np.stack([values[one.body, one.kind] for one in linkage.coordinates], axis=-1)
+            start = start + _rotated(link.end - link.start, axis)
+    return np.stack([values[coordinate] for coordinate in linkage.coordinates], axis=-1)
 
 
-def _turned(point: Array, angle: Array) -> Array:
+def _rotated(point: Array, angle: Array) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * point[0] - s * point[1], s * point[0] + c * point[1]], axis=-1)
 
 
 def _loop(linkage: Linkage) -> list[BodyPoint]:
-    """Return the ten places where pins sit, in the order in which one comes to them from the ground to the ground."""
+    """Return the ten ends of the pins, in order along the loop from the ground to the ground."""
     pins = [(BodyPoint(joint.body, joint.point), joint.on) for joint in linkage.joints if not isinstance(joint, Guide)]
     pins += [(pin.bearing, pin.journal) for pin in linkage.pins]
     if len(pins) != 5:
         raise _no_five_bar(linkage, f"it has {len(pins)} pins, not 5")
     for body in (GROUND, *(body.name for body in linkage.bodies)):
-        held = sum(place.body == body for ends in pins for place in ends)
-        if held != 2:
-            raise _no_five_bar(linkage, f"{_called(body)} has {held} pins, not 2")
-    way: list[BodyPoint] = []
-    here, left = GROUND, list(pins)
-    while left:
-        ends = next((ends for ends in left if here in (ends[0].body, ends[1].body)), None)
+        count = sum(end.body == body for ends in pins for end in ends)
+        if count != 2:
+            name = "the ground" if body == GROUND else f"body {body}"
+            raise _no_five_bar(linkage, f"{name} has {count} pins, not 2")
+    loop: list[BodyPoint] = []
+    body, remaining = GROUND, list(pins)
+    while remaining:
+        ends = next((ends for ends in remaining if body in (ends[0].body, ends[1].body)), None)
         if ends is None:
             raise _no_five_bar(linkage, "its bodies are not in one loop")
-        left.remove(ends)
-        way += ends if ends[0].body == here else ends[::-1]
-        here = way[-1].body
-    return way
+        remaining.remove(ends)
+        loop += ends if ends[0].body == body else ends[::-1]
+        body = loop[-1].body
+    return loop
 
 
-def _check_motors(linkage: Linkage, bodies: Sequence[str]) -> None:
-    """Refuse a linkage whose motors do not turn the bodies on the ground."""
-    cranks = (bodies[0], bodies[3])
-    driven = {drive.body for drive in linkage.drives}
-    if driven != set(cranks):
-        names = ", ".join(drive.body for drive in linkage.drives) or "nothing"
+def _check_motors(linkage: Linkage, cranks: tuple[str, str]) -> None:
+    """Refuse a linkage whose motors do not drive the bodies on the ground."""
+    driven = [drive.body for drive in linkage.drives]
+    if set(driven) != set(cranks):
+        names = ", ".join(driven) or "nothing"
         raise _no_five_bar(
-            linkage, f"its drives turn {names}, not {cranks[0]} and {cranks[1]}, which are on the ground"
+            linkage, f"its drives move {names}, not {cranks[0]} and {cranks[1]}, which are on the ground"
         )
     for body in cranks:
         joint = linkage.joint(body)
         if joint is None or joint.on.body != GROUND:
-            raise _no_five_bar(linkage, f"the drive of {body} does not turn it against the ground")
-
-
-def _called(body: str) -> str:
-    return "the ground" if body == GROUND else f"body {body}"
+            raise _no_five_bar(linkage, f"the drive of {body} does not act against the ground")
 
 
 def _no_five_bar(linkage: Linkage, why: str) -> InvalidValueError:

@@ -98,7 +98,7 @@ def _draw_curves(axis: "Axes", bar: FiveBar, mode: Mode) -> None:
     for curve in singular_curves(bar):
         own = "parallel singularity" if curve.modes[0] == mode else "in another mode"
         label = "serial singularity" if curve.kind == "serial" else own
-        axis.plot(*(curve.places * 1e3).T, **styles[label], label=None if label in seen else label)
+        axis.plot(*(curve.points * 1e3).T, **styles[label], label=None if label in seen else label)
         seen.add(label)
 
 

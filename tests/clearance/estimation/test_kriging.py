@@ -167,7 +167,7 @@ class TestFiveBar:
         What impacts do to the amplitude is chance, and the surface says so: nine of ten lie within its 90 %.
         """
         held = rng.uniform(*RANGE, (48, 3))
-        seen = swept.feature_values(held)
+        seen = swept.seen(held)
 
         mean, deviation = swept.surrogate.predict(held)
 
@@ -181,7 +181,7 @@ class TestFiveBar:
     @pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
     def test_all_features(self, swept: Swept, clearances: Array) -> None:
         """All features of the error curves together tell arms A and B to 99.99 % without noise."""
-        found = solve_features(swept.surrogate, swept.feature_values(clearances)[0])
+        found = solve_features(swept.surrogate, swept.seen(clearances)[0])
 
         assert accuracy(found, clearances) > 99.99 > WITHOUT_NOISE
 
@@ -189,7 +189,7 @@ class TestFiveBar:
         """Forty arms that nothing was learnt from are told to 99.99 % on average, the worst to 99.9 %."""
         true = rng.uniform(*RANGE, (40, 3))
 
-        found = [solve_features(swept.surrogate, one) for one in swept.feature_values(true)]
+        found = [solve_features(swept.surrogate, one) for one in swept.seen(true)]
 
         right = accuracy(found, true)
         assert right.mean() > 99.99
@@ -198,7 +198,7 @@ class TestFiveBar:
     def test_more_features_tell_more(self, swept: Swept, rng: np.random.Generator) -> None:
         """The thesis' way, one feature of three paths, tells less than its three features together, and these 99 %."""
         true = rng.uniform(*RANGE, (20, 3))
-        seen = swept.feature_values(true)
+        seen = swept.seen(true)
         names = swept.surrogate.features
 
         def right(chosen: Callable[[str], bool]) -> float:
@@ -243,7 +243,11 @@ def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
     ("change", "error", "said"),
     [
         ({"values": np.zeros((16, 3))}, ShapeError, r"expected \(m, 2\) points and \(m, 2\) values, got \(16, 2\) and"),
-        ({"points": design(8), "values": smooth(design(8))}, InvalidValueError, "expected 12 or more simulations that finished"),
+        (
+            {"points": design(8), "values": smooth(design(8))},
+            InvalidValueError,
+            "expected 12 or more simulations that",
+        ),
         ({"values": np.full((16, 2), np.nan)}, InvalidValueError, "12 or more simulations that finished, got 0"),
         ({"points": design(16) * [1, 0]}, InvalidValueError, "parameter b does not vary: it is 0 in every run"),
         ({"ranges": [(1e-4, 5e-4)]}, ShapeError, r"ranges: expected shape \(2, 2\), got \(1, 2\)"),
@@ -259,7 +263,7 @@ def test_bad_tables(change: dict[str, Any], error: type[Exception], said: str) -
 
 def test_features_that_do_not_fit(known: Surrogate) -> None:
     """There is one number for each feature."""
-    with pytest.raises(ShapeError, match=r"seen: expected 2 features, got shape \(3,\)"):
+    with pytest.raises(ShapeError, match=r"measured: expected 2 features, got shape \(3,\)"):
         solve_features(known, [0.0, 0.0, 0.0])
 
 

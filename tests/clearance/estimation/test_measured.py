@@ -166,8 +166,8 @@ def changed(row: int, old: str, new: str) -> list[str]:
         (changed(2, "150.1", "inf"), ":3: x_mm: every number must be finite and no larger than 1e+100, got inf"),
         (changed(2, "150.1", "-"), ":3: x_mm: expected a number, got '-'"),
         ([*REST, "P1,-140,-700,-140.1,-700.5"], ":2: P1: this pose is commanded at different positions"),
-        ([row.replace("_mm", "_m") for row in REST], "is 509.9 m from where it was told to be"),
-        (changed(2, "150.1", "-150.1"), ":3: P2: the tip is 300.1 mm from where it was told to be; are"),
+        ([row.replace("_mm", "_m") for row in REST], "is 509.9 m from its commanded position"),
+        (changed(2, "150.1", "-150.1"), ":3: P2: the tip is 300.1 mm from its commanded position; are"),
         (changed(1, "P1", ""), ":2: pose: empty; expected a word"),
         ([*REST, "P1," + "7" * 200_000 + ",0,0,0"], "not valid CSV: field larger than field limit"),
     ],
@@ -176,7 +176,7 @@ def test_mistakes_at_rest(rows: list[str], said: str, tmp_path: Path) -> None:
     """Every mistake in a file of readings is told with its line and what is expected."""
     if said.startswith("is 509.9"):
         # Metres by their names, millimetres by their numbers: half a millimetre has become half a metre.
-        said = "the tip is 509.9 mm from where it was told to be; are the units right"
+        said = "the tip is 509.9 mm from its commanded position; are the units right"
     with pytest.raises(FileFormatError) as caught:
         read_measured(written(tmp_path / "rest.csv", rows))
     assert said in str(caught.value)

@@ -6,7 +6,7 @@ import pytest
 
 from armwright.arrays import Array
 from armwright.clearance.estimation.measurement_file import PathMeasurement, RestMeasurement
-from armwright.clearance.estimation.misfit import CONTRADICTION, chance, refuse_contradiction, widening
+from armwright.clearance.estimation.misfit import CONTRADICTION, p_value, refuse_contradiction, widening
 from armwright.clearance.estimation.posterior import posterior
 from armwright.clearance.estimation.static import estimate_at_rest, rest_offsets
 from armwright.clearance.linkage import Linkage
@@ -31,12 +31,12 @@ def at_rest(poses: Array, offsets: Array) -> RestMeasurement:
 
 def test_chance_and_widening() -> None:
     """Of three spare numbers 3 is as expected; 16.27 comes by chance once in a thousand, and widens by 2.33."""
-    assert chance(16.266, 3) == pytest.approx(1e-3, rel=1e-3)
+    assert p_value(16.266, 3) == pytest.approx(1e-3, rel=1e-3)
     assert widening(16.266, 3) == pytest.approx(np.sqrt(16.266 / 3))
     assert widening(1.0, 3) == 1.0
     # Nothing to spare can contradict nothing; a noise of few numbers makes much likely.
-    assert chance(1e9, 0) == 1.0
-    assert chance(16.266, 3, 4) > 0.05
+    assert p_value(1e9, 0) == 1.0
+    assert p_value(16.266, 3, 4) > 0.05
 
 
 def test_refusal_names_what_is_far_off_and_what_is_at_a_bound() -> None:

@@ -50,7 +50,8 @@ def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -
         one = rng.choice(np.array([i for i, fault in enumerate(seen) if fault.unit == kind]))
         noise = rng.normal(0.0, NOISE, poses.shape)
         offsets = [
-            offsets_of_wrong_model(five_bar, poses, c, seen[one].name, part * seen[one].detectable_from) for part in (1.0, 0.2)
+            offsets_of_wrong_model(five_bar, poses, c, seen[one].name, part * seen[one].detectable_from)
+            for part in (1.0, 0.2)
         ]
         count += 1
         refused += is_refused(five_bar, poses, offsets[0] + noise, NOISE)
@@ -98,12 +99,12 @@ def test_nothing_contradicts(five_bar: Linkage) -> None:
 def test_told_by_the_command() -> None:
     """An estimate at rest says what its readings would contradict, as a table and as data."""
     text = armwright("clearance", "estimate", "five-bar", REST, columns=120).stdout
-    told = json.loads(armwright("clearance", "estimate", "five-bar", REST, "--json").stdout)["wrong_models"]
+    told = json.loads(armwright("clearance", "estimate", "five-bar", REST, "--json").stdout)["model_errors"]
 
     lines = {line.split("  ")[0].strip(): line for line in text.splitlines()}
     assert "beyond 100 %" in lines["load at link3:J3"]
     assert "0.1 mm" in lines["length of link2"]
-    assert "Smaller errors pass for clearance: they shift the estimates in proportion" in " ".join(text.split())
-    by_name = {one["what"]: one for one in told}
+    assert "Smaller errors are taken for clearance: they shift the estimates in proportion" in " ".join(text.split())
+    by_name = {error["name"]: error for error in told}
     assert by_name["load at link3:J3"]["unit"] == "1"
     assert set(by_name["zero of link1"]["shifts"]) == {"J2", "J3", "J4"}

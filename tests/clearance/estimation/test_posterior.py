@@ -31,10 +31,10 @@ class Plane:
 
     def predict(self, unit: Array) -> tuple[Array, Array]:
         """Mean and deviation at points."""
-        return unit @ self.slopes, np.full(len(unit), self.random_features)
+        return unit @ self.slopes, np.full(len(unit), self.chance)
 
-    def slope(self, _: Array) -> Array:
-        """How the mean changes: everywhere alike."""
+    def gradient(self, _: Array) -> Array:
+        """The gradient of the mean is the same everywhere."""
         return self.slopes
 
 

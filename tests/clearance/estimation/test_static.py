@@ -169,7 +169,7 @@ def test_told_or_not(five_bar: Linkage) -> None:
 def test_too_few_poses(five_bar: Linkage) -> None:
     """One pose has two numbers for three clearances, and the same pose twice has no more."""
     for poses in (STARTS[:1], STARTS[[0, 0]]):
-        with pytest.raises(TooFewError, match=f"{len(poses)} poses do not tell 3 clearances from one another"):
+        with pytest.raises(TooFewError, match=f"{len(poses)} poses do not determine 3 clearances"):
             estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A))
 
 

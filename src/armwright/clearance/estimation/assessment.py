@@ -93,7 +93,7 @@ class EstimateAssessment:
         ]
         yield ResultTable(title="", heads=heads, rows=rows, numbers=range(1, len(heads)))
         yield ResultTable(
-            title="Errors of the model",
+            title="",
             heads=("error of the model", "detectable from", "shift per", *(f"{pin} µm" for pin in names)),
             rows=[_model_error_cells(error) for error in self.model_errors],
             numbers=range(1, 3 + len(names)),
