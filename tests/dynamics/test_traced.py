@@ -8,7 +8,7 @@ import pytest
 from armwright.arm.load import load_arm
 from armwright.arm.model import Arm
 from armwright.dynamics.articulated_body import articulated_body
-from armwright.dynamics.energy import height_energy, motion_energy
+from armwright.dynamics.energy import link_kinetic_energy, link_potential_energy
 from armwright.dynamics.inertia_matrix import composite_rigid_body
 from armwright.dynamics.lagrange_euler import lagrange_euler
 from armwright.dynamics.newton_euler import newton_euler
@@ -28,7 +28,7 @@ EQUATIONS: dict[str, Equation] = {
     "gravity": lambda arm, q, _qd, _x: gravity_shares(arm, q),
     "speeds": lambda arm, q, qd, _x: speed_shares(arm, q, qd),
     "lagrange_euler": lagrange_euler,
-    "energy": lambda arm, q, qd, _x: [motion_energy(arm, q, qd), height_energy(arm, q)],
+    "energy": lambda arm, q, qd, _x: [link_kinetic_energy(arm, q, qd), link_potential_energy(arm, q)],
 }
 
 

@@ -219,7 +219,7 @@ def _finite(x: float) -> float | None:
 def targets(run: ClearanceRun) -> list[dict[str, Any]]:
     """Return the error at the start and where the path has its goals, at their time and at the nearest approach [m]."""
     scenario, path = run.simulation.scenario, run.simulation.scenario.path
-    found = []
+    rows = []
     for t in sorted({0.0, *path.targets}):
         # A run that diverged has no more; the end of another is there but for rounding.
         if t > run.time[-1] + 0.5 * scenario.h:
@@ -236,8 +236,8 @@ def targets(run: ClearanceRun) -> list[dict[str, Any]]:
                 for i in range(2)
             )
             target["predictable"] = run.predictability.to_the_end or t <= run.predictability.until
-        found.append(target)
-    return found
+        rows.append(target)
+    return rows
 
 
 def settings(run: ClearanceRun) -> dict[str, Any]:

@@ -7,6 +7,7 @@ hold the tip across them.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -248,9 +249,8 @@ def _corners(bar: FiveBar) -> list[Array]:
     """Return the intersections of circles of both arms that both arms reach."""
     points = [
         point
-        for left in bar.reaches[0]
-        for right in bar.reaches[1]
-        for point in _circle_intersections(bar.motors, float(left), float(right))
+        for radii in itertools.product(*bar.reaches.tolist())
+        for point in _circle_intersections(bar.motors, *radii)
     ]
     return [point for point in points if _is_reachable(bar, point)]
 

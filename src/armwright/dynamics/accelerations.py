@@ -1,4 +1,4 @@
-"""Forward dynamics: the joint accelerations that efforts give, by two ways that share nothing but the links."""
+"""Forward dynamics: joint accelerations from efforts, by two algorithms that share only the link transform."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from armwright.errors import UnsupportedArmError
 from armwright.kinematics.forward_kinematics import stack
 from armwright.tracing.scalar import Scalar
 
-# An inertia this small beside its likes is what rounding has left of zero.
+# An inertia this small beside the others of its kind is zero but for rounding.
 NEGLIGIBLE = 1e-12
 
 
@@ -29,7 +29,7 @@ def forward_dynamics(
     wrench: ArrayLike | None = None,
     drives: bool = True,
 ) -> Array:
-    """Return the joint accelerations that efforts give, by the articulated-body algorithm.
+    """Return the joint accelerations that efforts cause, by the articulated-body algorithm.
 
     Args:
         arm: the arm, with n joints.
@@ -39,7 +39,7 @@ def forward_dynamics(
         wrench: (..., 6) force [N] and moment [N m] acting on the tool from outside, at the tool point, along
             base axes; none when left out.
         drives: whether rotor inertia and friction of the drives count. Dry friction of a joint at rest does not:
-            whether it holds depends on all other joints; ``simulate`` finds out.
+            whether it holds depends on all other joints; ``simulate`` determines that.
 
     Returns:
         qdd: (..., n) joint accelerations.
@@ -48,7 +48,7 @@ def forward_dynamics(
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
         InvalidValueError: a number is NaN or infinite.
-        UnsupportedArmError: some joint moves nothing that resists an acceleration.
+        UnsupportedArmError: a joint moves no inertia.
 
     Source:
         Featherstone (2008), section 7.3.
@@ -57,7 +57,7 @@ def forward_dynamics(
     model = arm if drives else _without_drives(arm)
     driving = less_friction(model, qd_, tau_)
     if not lead:
-        # A division by zero must give no error here but an acceleration that the pivots give away.
+        # A division by zero must raise no error here: the check of the pivots reports it.
         q_, qd_, driving = ([np.array(x) for x in scalars] for scalars in (q_, qd_, driving))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         accelerations, pivots = articulated_body(model, q_, qd_, driving, push)
@@ -74,10 +74,10 @@ def toacc(
     wrench: ArrayLike | None = None,
     drives: bool = True,
 ) -> Array:
-    """Return the joint accelerations that efforts give, by n + 1 calls of Newton-Euler and a system of equations.
+    """Return the joint accelerations that efforts cause, by n + 1 calls of Newton-Euler and a system of equations.
 
-    A unit acceleration of each joint in turn gives the columns of the mass matrix; a call without accelerations
-    gives what speeds and gravity take of the efforts.
+    A unit acceleration of one joint at a time yields the columns of the mass matrix; a call without accelerations
+    yields the efforts that speeds and gravity require.
 
     Args:
         arm: the arm, with n joints.
@@ -95,7 +95,7 @@ def toacc(
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
         InvalidValueError: a number is NaN or infinite.
-        UnsupportedArmError: some joint moves nothing that resists an acceleration.
+        UnsupportedArmError: a joint moves no inertia.
 
     Source:
         TR-83-008, appendix V, subroutine TOACC; Walker & Orin (1982), method 1.
@@ -104,9 +104,9 @@ def toacc(
     model = arm if drives else _without_drives(arm)
     D = stack_matrix(unit_accelerations(model, q_), lead)
     bias = newton_euler(model, q_, qd_, [0.0] * arm.n, push)
-    left = stack([a - b for a, b in zip(less_friction(model, qd_, tau_), bias, strict=True)], lead)
+    net = stack([a - b for a, b in zip(less_friction(model, qd_, tau_), bias, strict=True)], lead)
     check_pivots(model, eliminated(model, D))
-    return np.asarray(np.linalg.solve(D, left[..., None])[..., 0], dtype=np.float64)
+    return np.asarray(np.linalg.solve(D, net[..., None])[..., 0], dtype=np.float64)
 
 
 def unit_accelerations(arm: Arm, q: Sequence[Scalar]) -> list[list[Scalar]]:
@@ -115,28 +115,28 @@ def unit_accelerations(arm: Arm, q: Sequence[Scalar]) -> list[list[Scalar]]:
     Source:
         TR-83-008, subroutine TOACC, loop 10.
     """
-    rest = [0.0] * arm.n
+    still = [0.0] * arm.n
     columns = []
     for i, motor in enumerate(arm.motors):
         unit = [1.0 if j == i else 0.0 for j in range(arm.n)]
-        column = newton_euler(arm, q, rest, unit, base_acceleration=arm.gravity.tolist())
+        column = newton_euler(arm, q, still, unit, base_acceleration=arm.gravity.tolist())
         column[i] = column[i] + motor.inertia
         columns.append(column)
     return [list(row) for row in zip(*columns, strict=True)]
 
 
 def eliminated(arm: Arm, M: Array) -> list[Pivot]:
-    """Return the pivots of a mass matrix (..., n, n), eliminated from the hand inward.
+    """Return the pivots of a mass matrix (..., n, n), eliminated from the last joint inward.
 
-    They are the inertias that each joint feels when all joints beyond it are free.
+    They are the inertias about or along each joint while all joints beyond it are free.
     """
     M = M.copy()
     diagonal = np.diagonal(M, axis1=-2, axis2=-1).copy()
-    turns = np.array([joint.revolute for joint in arm.joints])
+    revolute = np.array([joint.revolute for joint in arm.joints])
     pivots: list[Pivot] = []
     for i in reversed(range(arm.n)):
-        # Moments of inertia are measured by moments of inertia, masses by masses.
-        size = diagonal[..., turns == turns[i]].max(axis=-1)
+        # Moments of inertia are compared with moments of inertia, masses with masses.
+        size = diagonal[..., revolute == revolute[i]].max(axis=-1)
         pivots.append(Pivot(inertia=M[..., i, i].copy(), size=size))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             M[..., :i, :i] -= M[..., :i, i, None] * M[..., i, None, :i] / M[..., i, i, None, None]
@@ -144,10 +144,10 @@ def eliminated(arm: Arm, M: Array) -> list[Pivot]:
 
 
 def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
-    """Refuse an arm of which a joint moves nothing that resists.
+    """Refuse an arm of which a joint moves no inertia.
 
     Raises:
-        UnsupportedArmError: a pivot is 0 but for rounding, or no number; the joint nearest to the hand is named.
+        UnsupportedArmError: a pivot is 0 but for rounding, or NaN; the joint nearest to the tool is named.
     """
     for i in reversed(range(arm.n)):
         if not np.all(np.asarray(pivots[i].inertia) > NEGLIGIBLE * np.asarray(pivots[i].size)):
@@ -159,7 +159,7 @@ def check_pivots(arm: Arm, pivots: Sequence[Pivot]) -> None:
 
 
 def less_friction(arm: Arm, qd: Sequence[Scalar], tau: Sequence[Scalar]) -> list[Scalar]:
-    """Return what the friction of the moving drives leaves of the efforts, over abstract scalars."""
+    """Return the efforts less the friction of the moving drives, over abstract scalars."""
     return [
         effort - motor.viscous * speed - dry_friction(motor, speed)
         for motor, speed, effort in zip(arm.motors, qd, tau, strict=True)

@@ -1,4 +1,4 @@
-"""What the functions of this folder take: joint arrays with leading axes that fit together."""
+"""The arguments of the functions of dynamics: joint arrays whose leading axes fit together."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_WRENCH = (0.0,) * 6
 
 
 class Batch(NamedTuple):
-    """Arguments taken apart: of each one scalar per joint, and the leading axes that all of them share."""
+    """Arguments split into scalars, one per joint of each, and the leading axes that all of them share."""
 
     lead: tuple[int, ...]
     scalars: list[list[Scalar]]
@@ -26,14 +26,14 @@ class Batch(NamedTuple):
 
 
 def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> Batch:
-    """Check joint arrays and take them apart into scalars; joint positions are those that are called ``q``.
+    """Check joint arrays and split them into scalars; the array with the name ``q`` has joint positions.
 
-    The public function whose arguments they are calls this itself.
+    Only public functions call this, directly with their arguments: a warning then points to their caller.
 
     Args:
         arm: the arm, with n joints.
         wrench: (..., 6) on the tool, or None.
-        arrays: (..., n) each, by the name that a message calls it.
+        arrays: (..., n) each, by its name in messages.
 
     Returns:
         The scalars, in the order of the arguments.
@@ -42,10 +42,10 @@ def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> 
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
         InvalidValueError: a number is NaN or infinite.
-        UnsupportedArmError: nothing is known of the mass of some link.
+        UnsupportedArmError: the mass of a link is unknown.
 
     Warns:
-        UnitWarning: the positions look like degrees.
+        UnitWarning: the positions seem to be in degrees.
     """
     n = weighed(arm).n
     checked: list[Array] = []
@@ -67,11 +67,11 @@ def batch(arm: Arm, *, wrench: ArrayLike | None = None, **arrays: ArrayLike) -> 
 
 
 def weighed(arm: Arm) -> Arm:
-    """Return ``arm`` if it is one whose masses and inertias are known, or given as none.
+    """Return ``arm`` if its masses and inertias are known, or specified as zero.
 
     Raises:
         KindError: it is no arm.
-        UnsupportedArmError: nothing is known of some link; it is named.
+        UnsupportedArmError: those of a link are unknown; the link is named.
     """
     for i, link in enumerate(known_arm(arm).links, 1):
         if link.unknown:
@@ -84,6 +84,6 @@ def weighed(arm: Arm) -> Arm:
 
 
 def stack_matrix(rows: Sequence[Sequence[Scalar]], lead: tuple[int, ...]) -> Array:
-    """Put a matrix of scalars back together to (..., rows, columns)."""
+    """Return a matrix of scalars as an array (..., rows, columns)."""
     flat = stack([x for row in rows for x in row], lead)
     return flat.reshape(*lead, len(rows), len(rows[0]))

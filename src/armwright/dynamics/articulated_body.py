@@ -1,8 +1,8 @@
-"""Forward dynamics in one sweep out, one in and one out again: the articulated-body algorithm.
+"""The articulated-body algorithm of forward dynamics: passes outward, inward and outward again.
 
-Each link with all beyond it, their joints free to move, answers a force at its own joint like a body whose inertia
-depends on the direction. That inertia, and the force it takes to keep such a body from accelerating, go inward from
-the hand; accelerations come back outward. Accelerations here are those of material points, not spatial ones, so
+Each link with all links beyond it, their joints free to move, reacts to a force at its own joint like a body whose
+inertia depends on the direction. That inertia, and the force without acceleration, are passed inward from the last
+link; accelerations are passed back outward. Accelerations here are those of material points, not spatial ones, so
 linear speeds never appear.
 """
 
@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 from armwright.arm.model import Arm, Joint, Link
 from armwright.dynamics.arguments import NO_WRENCH
 from armwright.dynamics.bodies import body_of
-from armwright.dynamics.newton_euler import felt_acceleration, reaction_at_hand
+from armwright.dynamics.newton_euler import base_frame_acceleration, tool_reaction
 from armwright.kinematics.forward_kinematics import link_transform
 from armwright.tracing.scalar import Scalar, reciprocal
 from armwright.tracing.vectors import (
@@ -30,11 +30,11 @@ from armwright.tracing.vectors import (
     transpose,
 )
 
-_Place: TypeAlias = tuple[Matrix, Vector]
+_Transform: TypeAlias = tuple[Matrix, Vector]
 
 
 class Articulated(NamedTuple):
-    """A link with all beyond it, seen from some frame: the wrench at the origin that accelerates it.
+    """A link with all links beyond it, expressed in a frame: the wrench at the origin that accelerates it.
 
     Moment n = J w_dot + H v_dot + n0 and force f = Hᵀ w_dot + M v_dot + f0; J and M are symmetric.
     """
@@ -47,35 +47,35 @@ class Articulated(NamedTuple):
 
 
 class Pivot(NamedTuple):
-    """The inertia that a joint feels when all joints beyond it are free.
+    """The inertia about or along a joint while all joints beyond it are free.
 
     Attributes:
-        inertia: about or along the joint, rotor included.
-        size: the same about or along all three axes together: what rounding is measured by.
+        inertia: rotor included.
+        size: the sum over all three axes, the reference for rounding.
     """
 
     inertia: Scalar
     size: Scalar
 
 
-class Answer(NamedTuple):
-    """What the way inward finds out about a joint, for the way outward.
+class JointResponse(NamedTuple):
+    """The results of the inward pass for a joint, which the outward pass uses.
 
     Attributes:
-        n: moment that a unit acceleration of the joint takes.
-        f: force that it takes.
-        pivot: part of them along the joint, rotor included.
-        effort: what is left of the effort to accelerate with.
-        swing: acceleration that the speeds give the link where it meets the joint, angular; linear on a slide.
-        whirl: centripetal acceleration of the origin of the link's frame about the joint.
+        n: moment for a unit acceleration of the joint.
+        f: force for it.
+        pivot: their component along the joint, rotor included.
+        effort: the effort that remains for acceleration.
+        coriolis: velocity-product acceleration of the link at the joint; angular, of a slide linear.
+        centripetal: acceleration of the origin of the link's frame about the joint.
     """
 
     n: Vector
     f: Vector
     pivot: Pivot
     effort: Scalar
-    swing: Vector
-    whirl: Vector
+    coriolis: Vector
+    centripetal: Vector
 
 
 def articulated_body(
@@ -85,9 +85,9 @@ def articulated_body(
     tau: Sequence[Scalar],
     wrench: Sequence[Scalar] = NO_WRENCH,
 ) -> tuple[list[Scalar], list[Pivot]]:
-    """Return the accelerations that efforts give, over abstract scalars, in time that grows with n only.
+    """Return the accelerations that efforts cause, over abstract scalars, in time proportional to n.
 
-    Rotor inertia counts; friction does not: take it off ``tau`` before.
+    Rotor inertia counts; friction does not: subtract it from ``tau`` before.
 
     Args:
         arm: the arm, with n joints.
@@ -97,48 +97,50 @@ def articulated_body(
         wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
 
     Returns:
-        n accelerations, and n pivots. Where a pivot is 0 the joint moves nothing that resists, and the
-        accelerations mean nothing.
+        n accelerations, and n pivots. Where a pivot is 0 the joint moves no inertia, and the
+        accelerations are meaningless.
 
     Source:
         Featherstone (2008), section 7.3, with the accelerations of points as in Luh, Walker & Paul (1980).
     """
-    places = [link_transform(joint, position) for joint, position in zip(arm.joints, q, strict=True)]
-    spins = _spins(arm, places, qd)
-    f, n = reaction_at_hand(arm, q, wrench)
+    transforms = [link_transform(joint, position) for joint, position in zip(arm.joints, q, strict=True)]
+    velocities = _angular_velocities(arm, transforms, qd)
+    f, n = tool_reaction(arm, q, wrench)
     body = Articulated(J=_zeros(), H=_zeros(), M=_zeros(), n0=n, f0=f)
-    answers: list[Answer] = []
+    responses: list[JointResponse] = []
     for i in reversed(range(arm.n)):
-        joint, (before, at_joint, behind) = arm.joints[i], spins[i]
-        body = _welded(_of_link(arm.links[i], behind), body)
-        whirl = cross(at_joint, cross(at_joint, places[i][1]))
-        body = _seen_from_before(body, places[i], whirl)
-        swing = scale(1.0 if joint.revolute else 2.0, [before[1] * qd[i], -before[0] * qd[i], 0.0])
-        answer = _answer(body, joint, arm.motors[i].inertia, tau[i], (swing, whirl))
-        body = _let_go(body, joint, answer)
-        answers.append(answer)
-    answers.reverse()
-    return _outward(arm, places, answers), [answer.pivot for answer in answers]
+        joint, (before, at_joint, behind) = arm.joints[i], velocities[i]
+        body = _combined(_link_inertia(arm.links[i], behind), body)
+        centripetal = cross(at_joint, cross(at_joint, transforms[i][1]))
+        body = _in_previous_frame(body, transforms[i], centripetal)
+        coriolis = scale(1.0 if joint.revolute else 2.0, [before[1] * qd[i], -before[0] * qd[i], 0.0])
+        response = _joint_response(body, joint, arm.motors[i].inertia, tau[i], (coriolis, centripetal))
+        body = _through_joint(body, joint, response)
+        responses.append(response)
+    responses.reverse()
+    return _outward(arm, transforms, responses), [response.pivot for response in responses]
 
 
 def _zeros() -> Matrix:
     return [[0.0, 0.0, 0.0] for _ in range(3)]
 
 
-def _spins(arm: Arm, places: Sequence[_Place], qd: Sequence[Scalar]) -> list[tuple[Vector, Vector, Vector]]:
-    """Return of each joint: angular speed before it and behind it, seen from frame i-1, and behind it from frame i."""
+def _angular_velocities(
+    arm: Arm, transforms: Sequence[_Transform], qd: Sequence[Scalar]
+) -> list[tuple[Vector, Vector, Vector]]:
+    """Return for each joint the angular velocity of frame i-1 and frame i in frame i-1, and of frame i in frame i."""
     w: Vector = [0.0, 0.0, 0.0]
-    spins = []
-    for joint, (R, _), speed in zip(arm.joints, places, qd, strict=True):
+    velocities = []
+    for joint, (R, _), speed in zip(arm.joints, transforms, qd, strict=True):
         at_joint = [w[0], w[1], w[2] + speed] if joint.revolute else w
         behind = apply(transpose(R), at_joint)
-        spins.append((w, at_joint, behind))
+        velocities.append((w, at_joint, behind))
         w = behind
-    return spins
+    return velocities
 
 
-def _of_link(link: Link, w: Vector) -> Articulated:
-    """Return a rigid link that turns with w, seen from its frame."""
+def _link_inertia(link: Link, w: Vector) -> Articulated:
+    """Return a rigid link with the angular velocity w, in its frame."""
     mass, (x, y, z), tensor = body_of(link)
     return Articulated(
         J=tensor,
@@ -149,18 +151,18 @@ def _of_link(link: Link, w: Vector) -> Articulated:
     )
 
 
-def _welded(a: Articulated, b: Articulated) -> Articulated:
+def _combined(a: Articulated, b: Articulated) -> Articulated:
     J, H, M = ([add(x, y) for x, y in zip(A, B, strict=True)] for A, B in ((a.J, b.J), (a.H, b.H), (a.M, b.M)))
     return Articulated(J=J, H=H, M=M, n0=add(a.n0, b.n0), f0=add(a.f0, b.f0))
 
 
-def _seen_from_before(body: Articulated, place: _Place, whirl: Vector) -> Articulated:
-    """Return a body of frame i seen from frame i-1, for accelerations of its point at the origin of frame i-1."""
-    R, p = place
+def _in_previous_frame(body: Articulated, transform: _Transform, centripetal: Vector) -> Articulated:
+    """Return a body of frame i in frame i-1, for accelerations of its point at the origin of frame i-1."""
+    R, p = transform
     J, M = congruence(R, body.J), congruence(R, body.M)
     H = product(product(R, body.H), transpose(R))
-    f0 = add(apply(R, body.f0), apply(M, whirl))
-    n0 = add(apply(R, body.n0), apply(H, whirl), cross(p, f0))
+    f0 = add(apply(R, body.f0), apply(M, centripetal))
+    n0 = add(apply(R, body.n0), apply(H, centripetal), cross(p, f0))
     # H and J about the origin of frame i-1: H + [p] M and J - H [p] + [p] (H + [p] M)ᵀ, row by row.
     shifted = [add(row, lever) for row, lever in zip(H, transpose([cross(p, row) for row in M]), strict=True)]
     there, back = [cross(p, row) for row in H], [cross(p, row) for row in shifted]
@@ -169,52 +171,53 @@ def _seen_from_before(body: Articulated, place: _Place, whirl: Vector) -> Articu
     return Articulated(J=J, H=shifted, M=M, n0=n0, f0=f0)
 
 
-def _answer(body: Articulated, joint: Joint, rotor: float, tau: Scalar, rates: tuple[Vector, Vector]) -> Answer:
-    """Ask a body, seen from frame i-1, what a unit acceleration of joint i takes: the joint is the z axis."""
-    swing, whirl = rates
+def _joint_response(
+    body: Articulated, joint: Joint, rotor: float, tau: Scalar, biases: tuple[Vector, Vector]
+) -> JointResponse:
+    """Return the response of a body in frame i-1 to joint i, which is the z axis."""
     if joint.revolute:
-        n, f, own, hold = [row[2] for row in body.J], body.H[2], body.J, body.n0[2]
+        n, f, own, bias = [row[2] for row in body.J], body.H[2], body.J, body.n0[2]
     else:
-        n, f, own, hold = [row[2] for row in body.H], body.M[2], body.M, body.f0[2]
+        n, f, own, bias = [row[2] for row in body.H], body.M[2], body.M, body.f0[2]
     pivot = Pivot(inertia=own[2][2] + rotor, size=own[0][0] + own[1][1] + own[2][2] + rotor)
-    return Answer(n=n, f=f, pivot=pivot, effort=tau - hold, swing=swing, whirl=whirl)
+    return JointResponse(n, f, pivot, tau - bias, *biases)
 
 
-def _let_go(body: Articulated, joint: Joint, answer: Answer) -> Articulated:
-    """Return the body as felt through joint i, which is free to move."""
-    ease = reciprocal(answer.pivot.inertia)
-    n, f = scale(ease, answer.n), scale(ease, answer.f)
-    J = [[body.J[i][j] - n[min(i, j)] * answer.n[max(i, j)] for j in range(3)] for i in range(3)]
-    M = [[body.M[i][j] - f[min(i, j)] * answer.f[max(i, j)] for j in range(3)] for i in range(3)]
-    H = [[body.H[i][j] - n[i] * answer.f[j] for j in range(3)] for i in range(3)]
-    by_swing = (J, transpose(H)) if joint.revolute else (H, M)
+def _through_joint(body: Articulated, joint: Joint, response: JointResponse) -> Articulated:
+    """Return the apparent inertia of the body through joint i, which is free to move."""
+    mobility = reciprocal(response.pivot.inertia)
+    n, f = scale(mobility, response.n), scale(mobility, response.f)
+    J = [[body.J[i][j] - n[min(i, j)] * response.n[max(i, j)] for j in range(3)] for i in range(3)]
+    M = [[body.M[i][j] - f[min(i, j)] * response.f[max(i, j)] for j in range(3)] for i in range(3)]
+    H = [[body.H[i][j] - n[i] * response.f[j] for j in range(3)] for i in range(3)]
+    moment, force = (J, transpose(H)) if joint.revolute else (H, M)
     return Articulated(
         J=J,
         H=H,
         M=M,
-        n0=add(body.n0, apply(by_swing[0], answer.swing), scale(answer.effort, n)),
-        f0=add(body.f0, apply(by_swing[1], answer.swing), scale(answer.effort, f)),
+        n0=add(body.n0, apply(moment, response.coriolis), scale(response.effort, n)),
+        f0=add(body.f0, apply(force, response.coriolis), scale(response.effort, f)),
     )
 
 
-def _outward(arm: Arm, places: Sequence[_Place], answers: Sequence[Answer]) -> list[Scalar]:
+def _outward(arm: Arm, transforms: Sequence[_Transform], responses: Sequence[JointResponse]) -> list[Scalar]:
     w_dot: Vector = [0.0, 0.0, 0.0]
-    v_dot = felt_acceleration(arm)
+    v_dot = base_frame_acceleration(arm)
     accelerations: list[Scalar] = []
-    for joint, (R, p), answer in zip(arm.joints, places, answers, strict=True):
+    for joint, (R, p), response in zip(arm.joints, transforms, responses, strict=True):
         if joint.revolute:
-            w_dot = add(w_dot, answer.swing)
+            w_dot = add(w_dot, response.coriolis)
         else:
-            v_dot = add(v_dot, answer.swing)
-        rest = answer.effort - dot(answer.n, w_dot) - dot(answer.f, v_dot)
-        acceleration = reciprocal(answer.pivot.inertia) * rest
+            v_dot = add(v_dot, response.coriolis)
+        net = response.effort - dot(response.n, w_dot) - dot(response.f, v_dot)
+        acceleration = reciprocal(response.pivot.inertia) * net
         accelerations.append(acceleration)
         along = [0.0, 0.0, acceleration]
         if joint.revolute:
             w_dot = add(w_dot, along)
         else:
             v_dot = add(v_dot, along)
-        v_dot = add(v_dot, cross(w_dot, p), answer.whirl)
+        v_dot = add(v_dot, cross(w_dot, p), response.centripetal)
         Rt = transpose(R)
         w_dot, v_dot = apply(Rt, w_dot), apply(Rt, v_dot)
     return accelerations

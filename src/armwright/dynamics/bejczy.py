@@ -1,7 +1,7 @@
-"""Bejczy's model of the Stanford arm at JPL: each joint feels its own acceleration and gravity, and nothing else.
+"""Bejczy's model of the Stanford arm at JPL: the effort of each joint by its own acceleration and gravity alone.
 
-Report TR-83-008 prints the model in its appendix III with slips. The form here is corrected; ``PRINTED`` has the
-report's numbers, ``fitted`` finds the numbers of an arm.
+Report TR-83-008 prints the model in its appendix III with errors. The form here is corrected; ``PRINTED`` has the
+report's constants, ``fitted`` determines those of an arm.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from armwright.kinematics.forward_kinematics import per_joint, stack
 from armwright.kinematics.jacobians import together
 from armwright.tracing.scalar import Scalar, cos, sin
 
-_KINDS = [True, True, False, True, True, True]  # which joints of a Stanford arm turn
+_KINDS = [True, True, False, True, True, True]  # which joints of a Stanford arm are revolute
 
 
 @attrs.frozen(kw_only=True)
 class Coefficients:
     """The constants of the model.
 
-    The report's b4 stands in three places, which need two numbers: it is split into ``b4`` and ``slide``.
+    The report's b4 occurs in three terms, which need two numbers: it is split into ``b4`` and ``slide``.
 
     Attributes:
         b1: of D11 [kg m²].
@@ -43,12 +43,12 @@ class Coefficients:
         b14: of D44 [kg m²].
         b15: of D44, with the square of sin q5 [kg m²].
         b17: of D55 [kg m²].
-        b18: of D55, by the hand [kg m²].
+        b18: of D55, by the gripper [kg m²].
         b19: of D66, by the rotor [kg m²].
-        b20: of D66, by the hand [kg m²].
+        b20: of D66, by the gripper [kg m²].
         k1: of G2 [kg m].
         k2: of G2 and G3: the mass that the slide carries [kg].
-        k3: of G2, G4 and G5: the first moment of what the wrist carries [kg m].
+        k3: of G2, G4 and G5: the first moment of the bodies on the wrist [kg m].
     """
 
     b1: float
@@ -90,7 +90,7 @@ PRINTED = Coefficients(
 
 
 def bejczy_inertias(c: Coefficients, q: Sequence[Scalar]) -> list[Scalar]:
-    """Return the inertia that each of the six joints feels, over abstract scalars.
+    """Return the inertia of each of the six joints, over abstract scalars.
 
     Source:
         TR-83-008, appendix III; Bejczy (1974). The report lacks the square of sin q2 in D11.
@@ -113,7 +113,7 @@ def bejczy_gravity(c: Coefficients, q: Sequence[Scalar], gravity: float) -> list
     Args:
         c: the constants.
         q: six joint positions.
-        gravity: acceleration of free fall along the base axis, upward [m/s²]: negative for an arm that stands.
+        gravity: acceleration of free fall along the base axis, upward [m/s²]: negative for an upright arm.
 
     Source:
         TR-83-008, appendix III, with gravity as there: g above 0 points up.
@@ -139,7 +139,7 @@ def bejczy_efforts(
         q: (..., 6) joint positions [rad], the third [m].
         qdd: (..., 6) joint accelerations, of the same shape.
         coefficients: constants of the model.
-        gravity: acceleration of free fall along the base axis, upward [m/s²]: negative for an arm that stands.
+        gravity: acceleration of free fall along the base axis, upward [m/s²]: negative for an upright arm.
 
     Returns:
         tau: (..., 6) torques [N m], the third a force [N].
@@ -163,12 +163,12 @@ def bejczy_efforts(
 def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
     """Return the constants with which the model is nearest to an arm, by least squares over configurations.
 
-    The mass that the slide carries, b4 and k2, is what the links weigh; the rest is fitted to the diagonal of the
-    mass matrix and to gravity. D55 gives only the sum of b17 and b18: b18 is the inertia of the hand about the wrist,
-    as the report has it, and so for b19, the rotor, and b20.
+    The mass that the slide carries, b4 and k2, is that of its links; the other constants are fitted to the diagonal
+    of the mass matrix and to gravity. D55 determines only the sum of b17 and b18: b18 is the inertia of the gripper
+    about the wrist, as in the report; likewise b19 is the rotor, and b20 the remainder.
 
     Args:
-        arm: a Stanford arm that stands upright, rotors included.
+        arm: an upright Stanford arm, rotors included.
         q: (m, 6) configurations to fit to.
 
     Raises:
@@ -189,15 +189,15 @@ def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
     carried = sum(link.mass for link in arm.links[2:])
     s2, s4, s5 = np.sin(q[:, (1, 3, 4)]).T
     c2, c4, c5 = np.cos(q[:, (1, 3, 4)]).T
-    q3, one, none = q[:, 2], np.ones(len(q)), np.zeros(len(q))
+    q3, ones, zeros = q[:, 2], np.ones(len(q)), np.zeros(len(q))
     swing = s2 * s2
     b1, b2, b3, b5, b13 = _least_squares(
-        [(one, none), (swing, none), (swing * q3, q3), (swing * q3 * c5, q3 * c5), (none, one)],
+        [(ones, zeros), (swing, zeros), (swing * q3, q3), (swing * q3 * c5, q3 * c5), (zeros, ones)],
         (D[0] - carried * swing * q3**2, D[1] - carried * q3**2),
     )
-    b14, b15 = _least_squares([(one,), (s5 * s5,)], (D[3],))
+    b14, b15 = _least_squares([(ones,), (s5 * s5,)], (D[3],))
     k1, k3 = _least_squares(
-        [(s2, none, none), (s2 * c5 + c2 * s4 * s5, s2 * c4 * s5, s2 * s4 * c5 + c2 * s5)],
+        [(s2, zeros, zeros), (s2 * c5 + c2 * s4 * s5, s2 * c4 * s5, s2 * s4 * c5 + c2 * s5)],
         (G[1] - carried * q3 * s2, G[3], G[4]),
     )
     about_wrist = shifted(body_of(arm.links[5]), [0.0, 0.0, arm.joints[5].d]).tensor[0][0]
@@ -210,6 +210,6 @@ def fitted(arm: Arm, q: ArrayLike) -> Coefficients:
 
 
 def _least_squares(columns: Sequence[Sequence[Array]], values: Sequence[Array]) -> list[float]:
-    """Return the constants of several equations, which stand one below the other."""
+    """Return the constants of several systems of equations, solved together."""
     A = np.stack([np.concatenate(column) for column in columns], axis=1)
     return cast("list[float]", np.linalg.lstsq(A, np.concatenate(values), rcond=None)[0].tolist())

@@ -1,4 +1,4 @@
-"""Rigid bodies over abstract scalars: several as one, seen from any frame."""
+"""Rigid bodies over abstract scalars: their combination, and their change of frames."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from armwright.tracing.vectors import Matrix, Vector, add, apply, congruence, do
 
 
 class Body(NamedTuple):
-    """A rigid body seen from some frame.
+    """A rigid body, expressed in a frame.
 
     Attributes:
         mass: [kg].
@@ -27,13 +27,13 @@ NOTHING = Body(mass=0.0, moment=[0.0, 0.0, 0.0], tensor=[[0.0, 0.0, 0.0] for _ i
 
 
 def body_of(link: Link) -> Body:
-    """Return the body of a link, seen from the frame of the link."""
+    """Return the body of a link, in the frame of the link."""
     about_com = Body(mass=link.mass, moment=[0.0, 0.0, 0.0], tensor=link.inertia.tolist())
     return shifted(about_com, link.com.tolist())
 
 
 def shifted(body: Body, p: Vector) -> Body:
-    """Return a body seen from a parallel frame, in which the origin of the present one lies at p.
+    """Return a body in a parallel frame, in which the origin of the present frame is at p.
 
     Source:
         Huygens and Steiner's theorem, for an origin that need not be the centre of mass.
@@ -47,14 +47,14 @@ def shifted(body: Body, p: Vector) -> Body:
     return Body(mass=body.mass, moment=moment, tensor=tensor)
 
 
-def seen_from_before(body: Body, R: Matrix, p: Vector) -> Body:
-    """Return a body of frame i seen from frame i-1, given rotation and place of frame i in frame i-1."""
-    turned = Body(mass=body.mass, moment=apply(R, body.moment), tensor=congruence(R, body.tensor))
-    return shifted(turned, p)
+def in_previous_frame(body: Body, R: Matrix, p: Vector) -> Body:
+    """Return a body of frame i in frame i-1, by rotation and position of frame i in frame i-1."""
+    rotated = Body(mass=body.mass, moment=apply(R, body.moment), tensor=congruence(R, body.tensor))
+    return shifted(rotated, p)
 
 
-def welded(a: Body, b: Body) -> Body:
-    """Return two bodies that are seen from one frame as one."""
+def combined(a: Body, b: Body) -> Body:
+    """Return two bodies in the same frame as one."""
     tensor = [add(x, y) for x, y in zip(a.tensor, b.tensor, strict=True)]
     return Body(mass=a.mass + b.mass, moment=add(a.moment, b.moment), tensor=tensor)
 
@@ -62,8 +62,8 @@ def welded(a: Body, b: Body) -> Body:
 def as_link(body: Body) -> Link:
     """Return a body of floats as a link: centre of mass, and the tensor about it.
 
-    It is not asked for a tensor that a body can have: moments unknown of a part are unknown of the whole, and of a
-    point mass rounding leaves anything.
+    The tensor is not checked to be possible: unknown moments of a part are unknown of the sum, and that of a point
+    mass is rounding.
     """
     if body.mass == 0:
         return Link(inertia=body.tensor, complete=False)

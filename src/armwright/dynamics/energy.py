@@ -15,11 +15,11 @@ from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Vector, add, apply, cross, dot, transpose
 
 
-def motion_energy(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Scalar:
+def link_kinetic_energy(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Scalar:
     """Return the kinetic energy of the links alone, link by link, over abstract scalars.
 
     Source:
-        König's theorem: that of the mass at its centre, and that of the turning about it.
+        König's theorem: that of the mass at its centre, and that of the rotation about it.
     """
     w: Vector = [0.0, 0.0, 0.0]
     v: Vector = [0.0, 0.0, 0.0]
@@ -37,7 +37,7 @@ def motion_energy(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> Scalar
     return energy
 
 
-def height_energy(arm: Arm, q: Sequence[Scalar]) -> Scalar:
+def link_potential_energy(arm: Arm, q: Sequence[Scalar]) -> Scalar:
     """Return the potential energy of the links, over abstract scalars; that of a mass at the base origin is 0.
 
     Source:
@@ -70,7 +70,7 @@ def kinetic_energy(arm: Arm, q: ArrayLike, qd: ArrayLike, *, drives: bool = True
         TR-83-008 eq. (8).
     """
     lead, (q_, qd_), _ = batch(arm, q=q, qd=qd)
-    energy = motion_energy(arm, q_, qd_)
+    energy = link_kinetic_energy(arm, q_, qd_)
     if drives:
         for motor, speed in zip(arm.motors, qd_, strict=True):
             energy = energy + 0.5 * motor.inertia * speed * speed
@@ -96,4 +96,4 @@ def potential_energy(arm: Arm, q: ArrayLike) -> Array:
         TR-83-008 eq. (10).
     """
     lead, (q_,), _ = batch(arm, q=q)
-    return np.array(np.broadcast_to(height_energy(arm, q_), lead), dtype=np.float64)
+    return np.array(np.broadcast_to(link_potential_energy(arm, q_), lead), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The terms of the efforts: how much each cause asks of each joint."""
+"""The terms of the equation of motion: the effort of each joint by its causes."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Terms:
         coriolis: (..., n, n, n) by the product of the speeds of two joints j < k, both orders together; 0 elsewhere.
         gravity: (..., n) weight of the links.
         viscous: (..., n) friction that grows with speed.
-        dry: (..., n) Coulomb friction of moving joints; 0 at rest, where it depends on what there is to hold.
-        load: (..., n) all that a load in the hand adds: its inertia, its speed and its weight.
-        outside: (..., n) what a wrench on the tool adds.
+        dry: (..., n) Coulomb friction of moving joints; 0 at rest, where it depends on the other efforts.
+        load: (..., n) by a load on the tool: its inertia, its speed and its weight.
+        outside: (..., n) by a wrench on the tool.
 
     Source:
         TR-83-008, the program of appendix IV.
@@ -81,7 +81,7 @@ class Terms:
 def terms(
     arm: Arm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, load: Link = _NO_LOAD, wrench: ArrayLike | None = None
 ) -> Terms:
-    """Return the efforts of one configuration or of a whole motion by their cause.
+    """Return the efforts of one configuration or of many, by their cause.
 
     Args:
         arm: the arm, with n joints.
@@ -93,7 +93,7 @@ def terms(
             base axes; none when left out.
 
     Returns:
-        The terms; their total is what ``inverse_dynamics`` gives for the arm with the load.
+        The terms; their total equals ``inverse_dynamics`` of the arm with the load.
 
     Raises:
         KindError: ``arm`` is no arm, ``load`` no link, or an array something else than real numbers.
@@ -107,8 +107,8 @@ def terms(
         raise KindError(f"load: expected a Link, got {shown(load)}")
     lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
     n = arm.n
-    rest = [0.0] * n
-    # What hangs on the hand is felt through links that weigh nothing.
+    still = [0.0] * n
+    # Loads and wrenches on the tool act through links without mass.
     bare = attrs.evolve(arm, links=[_NO_LOAD] * n)
     derivatives = pose_derivatives(arm, q_)
     D = inertia_coefficients(derivatives)
@@ -127,5 +127,5 @@ def terms(
         viscous=stack([motor.viscous * speed for motor, speed, _ in motors], lead),
         dry=stack([dry_friction(motor, speed) for motor, speed, _ in motors], lead),
         load=stack(newton_euler(payload(bare, load.mass, load.com, load.inertia), q_, qd_, qdd_), lead),
-        outside=stack(newton_euler(bare, q_, rest, rest, push), lead),
+        outside=stack(newton_euler(bare, q_, still, still, push), lead),
     )

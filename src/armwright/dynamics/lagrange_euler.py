@@ -1,6 +1,6 @@
-"""Lagrange-Euler dynamics: energies of the links, derived by the joint positions.
+"""Lagrange-Euler dynamics: derivatives of the energies of the links by the joint positions.
 
-Nothing here shares an equation with Newton-Euler but the link transform, so each is a check on the other. U_ij is
+This shares only the link transform with Newton-Euler, so that each is a check on the other. U_ij is
 the derivative of the pose of link i by q_j, U_ijk that of U_ij by q_k; with the pseudo-inertia J of each link,
 
     D_ij  = sum over m of tr(U_mj J_m U_miᵀ)
@@ -26,7 +26,7 @@ from armwright.kinematics.forward_kinematics import link_transform, per_joint, s
 from armwright.tracing.scalar import Scalar
 from armwright.tracing.vectors import Matrix, add, apply, dot, product
 
-# Three places: the effort, and the two speeds it comes from.
+# Three indices: that of the effort, and those of the two speeds.
 Tensor: TypeAlias = list[list[list[Scalar]]]
 
 _LAST_ROW = [0.0, 0.0, 0.0, 1.0]
@@ -34,7 +34,7 @@ _LAST_ROW = [0.0, 0.0, 0.0, 1.0]
 
 @attrs.frozen(kw_only=True)
 class Derivatives:
-    """Derivatives of the link poses by the joint positions, over abstract scalars, and what is made of them.
+    """Derivatives of the link poses by the joint positions, over abstract scalars, and their products with inertias.
 
     Attributes:
         first: ``first[i][j]`` is U_ij, 4 x 4, for j up to i; the pose of a link depends on no joint beyond it.
@@ -89,7 +89,7 @@ def _homogeneous(joint: Joint, q: Scalar) -> Matrix:
 
 
 def _derived(joint: Joint, T: Matrix) -> Matrix:
-    """Return T Q: as A_i = exp(Q q) times what does not change, this derives it by q.
+    """Return T Q: this is the derivative by q, as A_i = exp(Q q) times a constant.
 
     Source:
         TR-83-008, subroutine MULTQK.
@@ -100,10 +100,10 @@ def _derived(joint: Joint, T: Matrix) -> Matrix:
 
 
 def pseudo_inertia(link: Link) -> Matrix:
-    """Return the 4 x 4 sum of mass times place times placeᵀ over a link, products of inertia included.
+    """Return the 4 x 4 integral of r rᵀ dm over a link, r homogeneous, products of inertia included.
 
     Source:
-        TR-83-008 eq. (9). Its program leaves the products of inertia out.
+        TR-83-008 eq. (9). Its program omits the products of inertia.
     """
     spread = np.eye(3) * link.inertia.trace() / 2 - link.inertia
     s = np.append(link.com, 1.0)
@@ -151,15 +151,15 @@ def gravity_coefficients(arm: Arm, derivatives: Derivatives) -> list[Scalar]:
     """
     n = arm.n
     g = arm.gravity.tolist()
-    places = [[*link.com.tolist(), 1.0] for link in arm.links]
+    centres = [[*link.com.tolist(), 1.0] for link in arm.links]
     return [
-        _sum(-arm.links[m].mass * dot(g, apply(derivatives.first[m][i][:3], places[m])) for m in range(i, n))
+        _sum(-arm.links[m].mass * dot(g, apply(derivatives.first[m][i][:3], centres[m])) for m in range(i, n))
         for i in range(n)
     ]
 
 
 def lagrange_euler(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar], qdd: Sequence[Scalar]) -> list[Scalar]:
-    """Return the efforts that the links alone ask of the joints, over abstract scalars.
+    """Return the efforts that the links alone require, over abstract scalars.
 
     Args:
         arm: the arm, with n joints.
@@ -187,7 +187,7 @@ def _sum(parts: Iterable[Scalar]) -> Scalar:
 
 
 def coriolis_tensor(arm: Arm, q: ArrayLike) -> Array:
-    """Return the tensor that makes centrifugal and Coriolis efforts of speeds.
+    """Return the tensor of the centrifugal and Coriolis efforts.
 
     Its entries are the Christoffel symbols of the mass matrix; they are the same with j and k exchanged.
 
@@ -238,9 +238,9 @@ def coriolis_matrix(arm: Arm, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def pose_derivative_matrices(arm: Arm, q: ArrayLike) -> Array:
-    """Return how the pose of every link changes with every joint: the matrices U_ij of Lagrange-Euler.
+    """Return the derivatives of the link poses by the joint positions: the matrices U_ij of Lagrange-Euler.
 
-    U_ij is the derivative of the homogeneous pose of frame i, seen from the base, by joint position j; 0 for j > i.
+    U_ij is the derivative of the homogeneous pose of frame i in the base frame by joint position j; 0 for j > i.
 
     Args:
         arm: the arm, with n joints.

@@ -1,4 +1,4 @@
-"""Newton-Euler inverse dynamics: the joint efforts that a motion takes."""
+"""Newton-Euler inverse dynamics: the joint efforts that a motion requires."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ def newton_euler(
     *,
     base_acceleration: Sequence[Scalar] = _STILL,
 ) -> list[Scalar]:
-    """Return the efforts that the links alone ask of the joints, over abstract scalars.
+    """Return the efforts that the links alone require, over abstract scalars.
 
-    Arguments and sources are those of ``joint_wrenches``, of which the efforts are the part along or about each joint.
+    Arguments and sources are those of ``joint_wrenches``. The efforts are the components along or about each joint.
     """
     wrenches = joint_wrenches(arm, q, qd, qdd, wrench, base_acceleration=base_acceleration)
     return [
-        dot(one.moment if joint.revolute else one.force, one.axis)
-        for joint, one in zip(arm.joints, wrenches, strict=True)
+        dot(link.moment if joint.revolute else link.force, link.axis)
+        for joint, link in zip(arm.joints, wrenches, strict=True)
     ]
 
 
 class JointWrench(NamedTuple):
-    """What link i-1 does to link i, over abstract scalars, along the axes of frame i.
+    """The wrench of link i-1 on link i, over abstract scalars, along the axes of frame i.
 
     Attributes:
         force: f_i [N].
@@ -58,11 +58,10 @@ def joint_wrenches(
     *,
     base_acceleration: Sequence[Scalar] = _STILL,
 ) -> list[JointWrench]:
-    """Return what each link does to the next, over abstract scalars.
+    """Return the wrench of each link on the next, over abstract scalars.
 
     Outward, from the base: speeds and accelerations of the links, each in its own frame. Gravity enters as an
-    acceleration of the base the other way. Inward, from the hand: forces and moments, and of them the part
-    along or about each joint.
+    opposite acceleration of the base. Inward, from the tool: forces and moments.
 
     Args:
         arm: the arm, with n joints.
@@ -70,17 +69,17 @@ def joint_wrenches(
         qd: n joint speeds.
         qdd: n joint accelerations.
         wrench: force and moment that act on the tool from outside, at the tool point, along base axes.
-        base_acceleration: of the base, along its own axes; the base does not turn. A base that falls freely, with
-            the acceleration ``arm.gravity``, leaves an arm without weight.
+        base_acceleration: of the base, along its own axes; the base does not rotate. On a base that falls freely, with
+            the acceleration ``arm.gravity``, an arm has no weight.
 
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (17)-(25). The report prints the base acceleration with
         gravity pointing up; here gravity is a vector of the arm.
     """
-    v_dot = felt_acceleration(arm, base_acceleration)
+    v_dot = base_frame_acceleration(arm, base_acceleration)
     w: Vector = [0.0, 0.0, 0.0]
     w_dot: Vector = [0.0, 0.0, 0.0]
-    turns: list[Matrix] = []
+    rotations: list[Matrix] = []
     levers: list[Vector] = []
     forces: list[Vector] = []
     moments: list[Vector] = []
@@ -92,29 +91,29 @@ def joint_wrenches(
         com, inertia = link.com.tolist(), link.inertia.tolist()
         com_acceleration = add(v_dot, cross(w_dot, com), cross(w, cross(w, com)))
         force = scale(link.mass, com_acceleration)
-        turns.append(R)
+        rotations.append(R)
         levers.append(lever)
         forces.append(force)
         spin = add(apply(inertia, w_dot), cross(w, apply(inertia, w)))
         moments.append(add(spin, cross(add(lever, com), force)))
-    f, n = reaction_at_hand(arm, q, wrench)
-    found: list[JointWrench] = []
+    f, n = tool_reaction(arm, q, wrench)
+    wrenches: list[JointWrench] = []
     for i in reversed(range(arm.n)):
-        # f and n act from link i on what comes after it, at the origin of frame i, seen from frame i.
+        # f and n act from link i on the next, at the origin of frame i, in frame i.
         n = add(n, cross(levers[i], f), moments[i])
         f = add(f, forces[i])
-        found.append(JointWrench(f, n, turns[i][2]))
-        f, n = apply(turns[i], f), apply(turns[i], n)
-    return found[::-1]
+        wrenches.append(JointWrench(f, n, rotations[i][2]))
+        f, n = apply(rotations[i], f), apply(rotations[i], n)
+    return wrenches[::-1]
 
 
-def felt_acceleration(arm: Arm, base_acceleration: Sequence[Scalar] = _STILL) -> Vector:
-    """Return the acceleration of frame 0 in its own axes, with gravity as an acceleration the other way."""
+def base_frame_acceleration(arm: Arm, base_acceleration: Sequence[Scalar] = _STILL) -> Vector:
+    """Return the acceleration of frame 0 in its own axes, with gravity as an opposite acceleration."""
     return apply(arm.base[:3, :3].T.tolist(), subtract(base_acceleration, arm.gravity.tolist()))
 
 
 def lever_of(joint: Joint, q: Scalar) -> Vector:
-    """Return the vector from the origin of frame i-1 to that of frame i, seen from frame i.
+    """Return the vector from the origin of frame i-1 to that of frame i, in frame i.
 
     It is Rᵀp of the link transform, in which the angle about z cancels.
     """
@@ -144,8 +143,8 @@ def _next_link(
     return w, w_dot, v_dot
 
 
-def reaction_at_hand(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) -> tuple[Vector, Vector]:
-    """Return force and moment that the last link must give to the surroundings, at its origin, in its frame.
+def tool_reaction(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) -> tuple[Vector, Vector]:
+    """Return force and moment of the last link on the surroundings, at its origin, in its frame.
 
     Args:
         arm: the arm, with n joints.
@@ -163,12 +162,12 @@ def reaction_at_hand(arm: Arm, q: Sequence[Scalar], wrench: Sequence[Scalar]) ->
 
 
 def drive_effort(motor: Motor, qd: Scalar, qdd: Scalar) -> Scalar:
-    """Return what the drive itself takes: rotor inertia, viscous and dry friction, over abstract scalars."""
+    """Return the effort of the drive itself: rotor inertia, viscous and dry friction, over abstract scalars."""
     return motor.inertia * qdd + motor.viscous * qd + dry_friction(motor, qd)
 
 
 def dry_friction(motor: Motor, qd: Scalar) -> Scalar:
-    """Return what Coulomb friction takes of a moving joint, 0 of one at rest, over abstract scalars."""
+    """Return the Coulomb friction of a moving joint, 0 at rest, over abstract scalars."""
     return select(qd > 0, motor.coulomb_forward, select(qd < 0, -motor.coulomb_backward, 0.0))
 
 
@@ -217,7 +216,7 @@ def inverse_dynamics(
 
 
 class LinkForces(NamedTuple):
-    """What each link bears of the one before it.
+    """The wrenches of each link on the next.
 
     Attributes:
         force: (..., n, 3) f_i, of link i-1 on link i, along the axes of frame i [N].
@@ -237,10 +236,10 @@ def link_forces(
     wrench: ArrayLike | None = None,
     base_acceleration: ArrayLike = _STILL,
 ) -> LinkForces:
-    """Return the forces and moments between the links of an arm in motion: what bearings carry.
+    """Return the forces and moments between the links of an arm in motion, which its bearings carry.
 
-    The part of them along (a slide) or about (a turn) the axis of the joint is the effort that ``inverse_dynamics``
-    gives without the drives.
+    Their component along or about the axis of a prismatic or revolute joint is the effort of ``inverse_dynamics``
+    without the drives.
 
     Args:
         arm: the arm, with n joints.
@@ -258,14 +257,12 @@ def link_forces(
         KindError: ``arm`` is no arm, or an array is something else than real numbers.
         ShapeError: a last axis is not n (or 6) long, or the leading axes do not fit together.
         InvalidValueError: a number is NaN or infinite.
-        UnsupportedArmError: nothing is known of the mass of some link.
+        UnsupportedArmError: the mass of a link is unknown.
 
     Source:
         Luh, Walker & Paul (1980); TR-83-008 eq. (22)-(24).
     """
     lead, (q_, qd_, qdd_), push = batch(arm, wrench=wrench, q=q, qd=qd, qdd=qdd)
     moved = exact_shape(base_acceleration, (3,), "base_acceleration", LARGEST).tolist()
-    found = joint_wrenches(arm, q_, qd_, qdd_, push, base_acceleration=moved)
-    return LinkForces(
-        stack_matrix([one.force for one in found], lead), stack_matrix([one.moment for one in found], lead)
-    )
+    wrenches = joint_wrenches(arm, q_, qd_, qdd_, push, base_acceleration=moved)
+    return LinkForces(*(stack_matrix(parts, lead) for parts in list(zip(*wrenches, strict=True))[:2]))

@@ -1,4 +1,4 @@
-"""A load in the hand, as part of the last link."""
+"""A load on the tool, as part of the last link."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from armwright.arm.model import Arm, Link
 from armwright.arrays import ArrayLike
 from armwright.dynamics.arguments import weighed
-from armwright.dynamics.bodies import as_link, body_of, seen_from_before, welded
+from armwright.dynamics.bodies import as_link, body_of, combined, in_previous_frame
 
 _NO_TENSOR = np.zeros((3, 3))
 
@@ -35,6 +35,6 @@ def payload(arm: Arm, mass: float, com: ArrayLike = (0.0, 0.0, 0.0), inertia: Ar
     """
     load = Link(mass=mass, com=com, inertia=inertia)
     R, p = weighed(arm).tool[:3, :3].tolist(), arm.tool[:3, 3].tolist()
-    last = welded(body_of(arm.links[-1]), seen_from_before(body_of(load), R, p))
+    last = combined(body_of(arm.links[-1]), in_previous_frame(body_of(load), R, p))
     carried = attrs.evolve(as_link(last), name=arm.links[-1].name)
     return attrs.evolve(arm, links=(*arm.links[:-1], carried))

@@ -1,4 +1,4 @@
-"""Shares of the efforts: what gravity and what the speeds alone ask of the joints."""
+"""Shares of the efforts: those by gravity alone, and those by the speeds alone."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from armwright.tracing.scalar import Scalar
 
 def gravity_shares(arm: Arm, q: Sequence[Scalar]) -> list[Scalar]:
     """Return the efforts that hold an arm at rest against gravity, over abstract scalars."""
-    rest = [0.0] * arm.n
-    return newton_euler(arm, q, rest, rest)
+    still = [0.0] * arm.n
+    return newton_euler(arm, q, still, still)
 
 
 def speed_shares(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Scalar]:
