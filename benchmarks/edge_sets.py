@@ -175,7 +175,7 @@ def _whole_turns(arm: Arm, rng: np.random.Generator) -> EdgeSet:
     turns = np.array([joint.revolute for joint in arm.joints])
     q = q[(np.abs(q[:, turns]) > np.pi).any(axis=-1)]
     q = q[_smallest(arm, q) > REGULAR][:_MANY] if len(q) else q
-    return _of_configurations("asked from a configuration beyond half a turn", arm, q, turns=True)
+    return _of_configurations("near a configuration beyond 180°", arm, q, turns=True)
 
 
 def _beyond_limits(arm: Arm, rng: np.random.Generator) -> EdgeSet:

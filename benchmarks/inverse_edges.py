@@ -189,7 +189,7 @@ def report(name: str) -> list[str]:
     return [
         f"### `{name}`",
         table([*head, "worst residual of a claim", "wrong verdicts"], rows),
-        f"The residuals that armwright reports are off by {misreported['armwright']:.0e} at most.",
+        f"The residuals that armwright reports have errors of {misreported['armwright']:.0e} at most.",
         table(["solved / own configuration, %", "library", *(f"{x:g}" for x in DECADES if x)], decades),
     ]
 
