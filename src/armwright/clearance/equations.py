@@ -104,7 +104,6 @@ class PinContact(NamedTuple):
         depth: δ, how far the journal is in the wall; below 0 where it flies [m].
         rate: δ̇ [m/s].
         normal: force with which they press on one another [N].
-        sliding: speed of the surfaces on one another [m/s].
         memory: of the contact, for the next step.
         deflection_rate: of the bristles of LuGre [m/s]; 0 for other laws.
         forces: generalised forces, by coordinate.
@@ -116,7 +115,6 @@ class PinContact(NamedTuple):
     depth: Scalar
     rate: Scalar
     normal: Scalar
-    sliding: Scalar
     memory: ContactMemory
     deflection_rate: Scalar
     forces: dict[int, Scalar]
@@ -132,7 +130,6 @@ class Rates(NamedTuple):
         efforts: of its drives [N m, N].
         powers: of ``WORKS`` [W].
         pins: the contact in each.
-        tip: position of the tip [m].
         energy: kinetic energy, that of gravity and loads, and that in the contacts [J].
     """
 
@@ -140,7 +137,6 @@ class Rates(NamedTuple):
     efforts: list[Scalar]
     powers: list[Scalar]
     pins: list[PinContact]
-    tip: Vec2
     energy: list[Scalar]
 
 
@@ -173,8 +169,7 @@ def rates(
         for i, weight in drive_weights(linkage, drive.body).items():
             driven = driven + effort * weight * state.qd[i]
     energy = [kinetic_energy(placement), potential_energy(placement), stored]
-    tip = placement.point(linkage.tip).position
-    return Rates(qdd, efforts, [driven, impact_loss, friction_loss], pins, tip, energy)
+    return Rates(qdd, efforts, [driven, impact_loss, friction_loss], pins, energy)
 
 
 # ---- bodies --------------------------------------------------------------------------------------------------------
@@ -360,7 +355,6 @@ def _pin_contact(
         depth=depth,
         rate=rate,
         normal=normal,
-        sliding=surface_slip,
         memory=ContactMemory(select(touching, 1.0, 0.0), speed),
         deflection_rate=deflection_rate,
         forces=forces,

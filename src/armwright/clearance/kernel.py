@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from inspect import isfunction
 from itertools import islice
+from types import ModuleType
 from typing import Literal, TypeAlias
 
 import attrs
@@ -34,26 +36,6 @@ _SIGNATURE = """SIGNATURE = types.void(
 _COMPILED = '@njit(error_model="numpy")'
 # Small parts of the loop, and its equations where they stand in one place, become part of it.
 _INLINED = '@njit(error_model="numpy", forceinline=True)'
-# What the loop calls; it is last itself.
-_EVENTS = (
-    event_location.set_drives,
-    event_location.evaluate,
-    event_location.add_part,
-    event_location.make_part,
-    event_location.crossing_fraction,
-    event_location.find_impacts,
-    event_location.correct,
-    event_location.locate_impacts,
-    event_location.resolve_impacts,
-)
-_PARTS = (
-    simulation_loop.begin_lanes,
-    simulation_loop.begin_stage,
-    simulation_loop.remember,
-    simulation_loop.take_sample,
-    simulation_loop.add_stage,
-    simulation_loop.add_step,
-)
 
 
 @attrs.frozen(kw_only=True)
@@ -150,7 +132,7 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
     """Write the source of a simulation: its sizes, its equations, and the functions of the loop as they stand."""
     sizes = _sizes(layout, integrator)
     body = kernel_body(layout.rates, sizes["INPUTS"])
-    events = [function_source(function, _COMPILED) for function in _EVENTS] if layout.located else []
+    events = _sources(event_location, _COMPILED) if layout.located else []
     equations = textwrap.indent(body.lines, " " * 8)
     return "\n\n".join(
         [
@@ -158,12 +140,18 @@ def emit_simulation(layout: Layout, integrator: Integrator) -> str:
             "\n".join(f"{name} = {value!r}" for name, value in {**sizes, "OUTPUTS": body.outputs}.items()),
             f"{_COMPILED if layout.located else _INLINED}\ndef rates(x, y):\n    for k in range({LANES}):\n{equations}",
             *events,
-            *(function_source(function, _INLINED) for function in _PARTS),
+            *_sources(simulation_loop, _INLINED),
             _SIGNATURE.format(matrix='types.Array(float64, 2, "C", readonly=True)'),
             function_source(simulation_loop.simulate),
             "",
         ]
     )
+
+
+def _sources(module: ModuleType, decorator: str) -> list[str]:
+    """Return the sources of the functions of a module in their order, but for the loop, which calls them."""
+    functions = (x for x in vars(module).values() if isfunction(x) and x.__module__ == module.__name__)
+    return [function_source(x, decorator) for x in functions if x is not simulation_loop.simulate]
 
 
 def _sizes(layout: Layout, integrator: Integrator) -> dict[str, int]:

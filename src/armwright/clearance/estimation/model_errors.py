@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -55,17 +55,22 @@ class ModelError(NamedTuple):
     shifts: Array
 
 
-# A wrong model: the linkage, and the errors of the zeros of its drives (d,) [rad, m].
-_WrongModel: TypeAlias = tuple[Linkage, Array]
-
-
 class _Kind(NamedTuple):
-    """A kind of model error: its name, its unit, its size in that unit for a change by 1, and the changed model."""
+    """A kind of model error.
+
+    Attributes:
+        name: of the quantity.
+        unit: of its size.
+        size: in that unit, for a change by 1.
+        changed: the model after a change.
+        zeros: (d,) errors of the zeros of the drives for a change by 1 [rad, m].
+    """
 
     name: str
     unit: str
     size: float
-    changed: Callable[[float], _WrongModel]
+    changed: Callable[[float], Linkage]
+    zeros: Array
 
 
 def model_errors(
@@ -92,11 +97,11 @@ def model_errors(
         return float(np.linalg.norm(shift - Q @ (Q.T @ shift)))
 
     errors = []
-    for name, unit, size, changed in _kinds(linkage):
+    for kind in _kinds(linkage):
 
-        def shift(change: float, changed: Callable[[float], _WrongModel] = changed) -> Array:
-            wrong, zeros = changed(change)
-            return weights * (_tips(wrong, linkage, q, zeros, estimate.values) - nominal).ravel()
+        def shift(change: float, kind: _Kind = kind) -> Array:
+            tips = _tips(kind.changed(change), linkage, q, change * kind.zeros, estimate.values)
+            return weights * (tips - nominal).ravel()
 
         slope = (shift(_STEP) - shift(-_STEP)) / (2 * _STEP)
         full = float(np.linalg.norm(slope))
@@ -104,9 +109,11 @@ def model_errors(
             continue
         limit = np.inf
         if np.isfinite(least) and remainder(slope) > _NEGLIGIBLE * full:
-            limit = size * _detection_limit(lambda change: remainder(shift(change)), least / remainder(slope), least)
-        shifts = np.linalg.lstsq(B, slope / size, rcond=None)[0]
-        errors.append(ModelError(name, unit, limit, np.asarray(shifts, dtype=np.float64)))
+            limit = kind.size * _detection_limit(
+                lambda change: remainder(shift(change)), least / remainder(slope), least
+            )
+        shifts = np.linalg.lstsq(B, slope / kind.size, rcond=None)[0]
+        errors.append(ModelError(kind.name, kind.unit, limit, np.asarray(shifts, dtype=np.float64)))
     return tuple(errors)
 
 
@@ -150,9 +157,8 @@ def offsets_of_wrong_model(
     """
     kinds = {kind.name: kind for kind in _kinds(linkage)}
     kind = kinds[one_of("model error", name, kinds)]
-    wrong, zeros = kind.changed(amount / kind.size)
-    positions = floats(poses, "poses")
-    tips = _tips(wrong, linkage, closed_at_poses(linkage, positions), zeros, floats(clearances, "clearances"))
+    change, positions, c = amount / kind.size, floats(poses, "poses"), floats(clearances, "clearances")
+    tips = _tips(kind.changed(change), linkage, closed_at_poses(linkage, positions), change * kind.zeros, c)
     return np.asarray(tips - positions, dtype=np.float64)
 
 
@@ -190,48 +196,42 @@ def _tips(wrong: Linkage, nominal: Linkage, q: Array, zeros: Array, clearances: 
 
 def _kinds(linkage: Linkage) -> Iterator[_Kind]:
     """Give all kinds of errors that a model may have."""
+    exact = np.zeros(len(linkage.drives))
     for i, load in enumerate(linkage.loads):
         if np.any(load.force):
-            yield _Kind(f"load at {load.point}", "1", 1.0, partial(_with_load, linkage, i))
+            yield _Kind(f"load at {load.point}", "1", 1.0, partial(_with_load, linkage, i), exact)
     for i, body in enumerate(linkage.bodies):
-        yield _Kind(f"mass of {body.name}", "1", 1.0, partial(_with_mass, linkage, i))
+        yield _Kind(f"mass of {body.name}", "1", 1.0, partial(_with_mass, linkage, i), exact)
         if _length(body) > 0:
-            yield _Kind(f"length of {body.name}", "m", _length(body), partial(_with_length, linkage, i))
-    if _length(linkage.ground) > 0:
-        yield _Kind("distances on the ground", "m", _length(linkage.ground), partial(_with_ground, linkage))
-    for i, drive in enumerate(linkage.drives):
-        unit = "rad" if linkage.coordinates[linkage.driven[i]].kind == "angle" else "m"
-        yield _Kind(f"zero of {drive.body}", unit, 1.0, partial(_with_zero, linkage, i))
+            yield _Kind(f"length of {body.name}", "m", _length(body), partial(_with_length, linkage, i), exact)
+    ground = linkage.ground
+    if _length(ground) > 0:
+        yield _Kind("distances on the ground", "m", _length(ground), partial(_with_ground, linkage), exact)
+    for drive, number, zeros in zip(linkage.drives, linkage.driven, np.eye(len(exact)), strict=True):
+        unit = "rad" if linkage.coordinates[number].kind == "angle" else "m"
+        yield _Kind(f"zero of {drive.body}", unit, 1.0, lambda _: linkage, zeros)
 
 
-def _with_load(linkage: Linkage, number: int, change: float) -> _WrongModel:
+def _with_load(linkage: Linkage, number: int, change: float) -> Linkage:
     loads = list(linkage.loads)
     loads[number] = attrs.evolve(loads[number], force=loads[number].force * (1 + change))
-    return attrs.evolve(linkage, loads=loads), np.zeros(len(linkage.drives))
+    return attrs.evolve(linkage, loads=loads)
 
 
-def _with_mass(linkage: Linkage, number: int, change: float) -> _WrongModel:
-    body = linkage.bodies[number]
-    return _with_body(linkage, number, attrs.evolve(body, mass=body.mass * (1 + change)))
-
-
-def _with_length(linkage: Linkage, number: int, change: float) -> _WrongModel:
-    return _with_body(linkage, number, _scaled(linkage.bodies[number], change))
-
-
-def _with_ground(linkage: Linkage, change: float) -> _WrongModel:
-    return attrs.evolve(linkage, ground=_scaled(linkage.ground, change)), np.zeros(len(linkage.drives))
-
-
-def _with_zero(linkage: Linkage, number: int, change: float) -> _WrongModel:
-    return linkage, change * np.eye(len(linkage.drives))[number]
-
-
-def _with_body(linkage: Linkage, number: int, body: Body) -> _WrongModel:
-    """Return the linkage with another body, and drives without an error of their zeros."""
+def _with_mass(linkage: Linkage, number: int, change: float) -> Linkage:
     bodies = list(linkage.bodies)
-    bodies[number] = body
-    return attrs.evolve(linkage, bodies=bodies), np.zeros(len(linkage.drives))
+    bodies[number] = attrs.evolve(bodies[number], mass=bodies[number].mass * (1 + change))
+    return attrs.evolve(linkage, bodies=bodies)
+
+
+def _with_length(linkage: Linkage, number: int, change: float) -> Linkage:
+    bodies = list(linkage.bodies)
+    bodies[number] = _scaled(bodies[number], change)
+    return attrs.evolve(linkage, bodies=bodies)
+
+
+def _with_ground(linkage: Linkage, change: float) -> Linkage:
+    return attrs.evolve(linkage, ground=_scaled(linkage.ground, change))
 
 
 def _scaled(body: Body, change: float) -> Body:
