@@ -59,7 +59,6 @@ def root(
             metavar="NAME=NUMBER",
             autocompletion=limits,
             callback=lambda texts: _raise_limits(texts or []),
-            show_default=False,
         ),
     ] = None,
     _show: Annotated[
@@ -70,7 +69,6 @@ def root(
             metavar="SHELL",
             callback=_show_completion,
             is_eager=True,
-            show_default=False,
         ),
     ] = None,
     _install: Annotated[
@@ -81,7 +79,6 @@ def root(
             metavar="SHELL",
             callback=_install_completion,
             is_eager=True,
-            show_default=False,
         ),
     ] = None,
     _version: Annotated[

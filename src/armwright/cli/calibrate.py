@@ -18,12 +18,8 @@ from armwright.errors import DoubtfulError
 
 def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    measured: Annotated[
-        Path, typer.Argument(help="CSV of joints and what was measured (docs/calibration.md).", show_default=False)
-    ],
-    units: Annotated[
-        str | None, typer.Option(help="Of a file whose header has none: mm,deg.", show_default=False)
-    ] = None,
+    measured: Annotated[Path, typer.Argument(help="CSV of joints and what was measured (docs/calibration.md).")],
+    units: Annotated[str | None, typer.Option(help="Of a file whose header has none: mm,deg.")] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
@@ -35,10 +31,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = False,
     noise_um: Annotated[
         float | None,
-        typer.Option(
-            help="Standard deviation of a measured coordinate: then it is said if what is left is more.",
-            show_default=False,
-        ),
+        typer.Option(help="Standard deviation of a measured coordinate: then it is said if what is left is more."),
     ] = None,
     output: Annotated[
         Path | None,

@@ -39,16 +39,13 @@ class Format(enum.StrEnum):
 
 def check(  # noqa: PLR0917 - Typer reads one parameter per option
     programs: Annotated[
-        list[Path],
-        typer.Argument(help="The programs, in RLO; of a folder all in it that end in .rlo.", show_default=False),
+        list[Path], typer.Argument(help="The programs, in RLO; of a folder all in it that end in .rlo.")
     ],
     cell: Annotated[
         Path | None,
         typer.Option("--cell", help="The cell they will run in; frames, arms and devices are then checked too."),
     ] = None,
-    emit: Annotated[
-        Emit | None, typer.Option(help="Print this instead; diagnostics go to the error output.", show_default=False)
-    ] = None,
+    emit: Annotated[Emit | None, typer.Option(help="Print this instead; diagnostics go to the error output.")] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     output_format: Annotated[Format, typer.Option("--format", help="How to print diagnostics.")] = Format.TEXT,

@@ -6,12 +6,7 @@ from armwright.cli.clearance_simulate import simulate
 from armwright.cli.clearance_sweep import sweep
 from armwright.cli.commands import App, Group
 
-clearance = App(
-    name="clearance",
-    cls=Group,
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-)
+clearance = App(name="clearance", cls=Group, no_args_is_help=True, rich_markup_mode="markdown")
 clearance.command("simulate")(simulate)
 clearance.command("sweep")(sweep)
 clearance.command("estimate")(estimate)

@@ -18,12 +18,9 @@ if TYPE_CHECKING:
 
 def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
-    measured: Annotated[
-        Path, typer.Argument(help="CSV of the tip at rest, or on paths (docs/clearance.md).", show_default=False)
-    ],
+    measured: Annotated[Path, typer.Argument(help="CSV of the tip at rest, or on paths (docs/clearance.md).")],
     sweep: Annotated[
-        Path | None,
-        typer.Option(help="Folder of `clearance sweep` with the same paths; for measurements on paths."),
+        Path | None, typer.Option(help="Folder of `clearance sweep` with the same paths; for measurements on paths.")
     ] = None,
     noise_um: Annotated[
         float | None,

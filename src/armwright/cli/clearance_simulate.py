@@ -29,24 +29,13 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
     path: Annotated[
         str | None,
-        typer.Option(
-            help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths, show_default=False
-        ),
+        typer.Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
     ] = None,
-    speed_rpm: Annotated[
-        float | None, typer.Option(help="Instead: turn the one drive at so many rev/min.", show_default=False)
-    ] = None,
+    speed_rpm: Annotated[float | None, typer.Option(help="Instead: turn the one drive at so many rev/min.")] = None,
     turns: Annotated[float, typer.Option(help="How many turns of the drive.")] = 3.0,
-    clearance: Annotated[
-        list[str] | None,
-        typer.Option(help="Of one pin in mm: J2=0.5; may be repeated.", show_default=False),
-    ] = None,
-    clearance_mm: Annotated[
-        float | None, typer.Option(help="Of all pins; those of the linkage without it.", show_default=False)
-    ] = None,
-    friction: Annotated[
-        float | None, typer.Option(help="Coefficient; that of the linkage without it.", show_default=False)
-    ] = None,
+    clearance: Annotated[list[str] | None, typer.Option(help="Of one pin in mm: J2=0.5; may be repeated.")] = None,
+    clearance_mm: Annotated[float | None, typer.Option(help="Of all pins; those of the linkage without it.")] = None,
+    friction: Annotated[float | None, typer.Option(help="Coefficient; that of the linkage without it.")] = None,
     friction_law: Annotated[
         str, typer.Option(help="linear, tanh or lugre.", autocompletion=setting("FRICTION_LAWS"))
     ] = "linear",
@@ -66,9 +55,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     locate: Annotated[
         bool, typer.Option("--locate", help="Cut a step in two where a journal comes to its wall.")
     ] = False,
-    sample: Annotated[
-        float | None, typer.Option(help="Time between samples, in s; 1e-4 or less without it.", show_default=False)
-    ] = None,
+    sample: Annotated[float | None, typer.Option(help="Time between samples, in s; 1e-4 or less without it.")] = None,
     control: Annotated[
         str, typer.Option(help="effort: open loop, or pd+ff: with a controller.", autocompletion=setting("CONTROLS"))
     ] = "effort",

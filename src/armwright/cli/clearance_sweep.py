@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of this sweep alone.", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of this sweep alone.")],
     paths: Annotated[str, typer.Option(help="Test paths, with commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
     design: Annotated[
         str,
@@ -34,8 +34,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     levels: Annotated[int, typer.Option(help="Of each clearance, for factorial: 9 are the thesis' 729 runs.")] = 9,
     runs: Annotated[int, typer.Option("-n", "--runs", help="For lhs and sobol (a power of two).")] = 128,
     to_friction: Annotated[
-        float | None,
-        typer.Option(help="Vary the coefficient of friction too, from 0 to this one.", show_default=False),
+        float | None, typer.Option(help="Vary the coefficient of friction too, from 0 to this one.")
     ] = None,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
@@ -44,12 +43,8 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         int, typer.Option(help="Runs beside each that nobody can tell from it, 0 to 15: they tell what is chance.")
     ] = 3,
     seed: Annotated[int, typer.Option(help="Of lhs and sobol.")] = 0,
-    workers: Annotated[
-        int | None, typer.Option(help="Processes; as many as there are cores without it.", show_default=False)
-    ] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(help="Dask scheduler to use instead: tcp://10.0.0.1:8786.", show_default=False)
-    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; as many as there are cores without it.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Dask scheduler to use instead: tcp://10.0.0.1:8786.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     quiet: Quiet = False,
 ) -> None:

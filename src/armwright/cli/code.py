@@ -14,9 +14,7 @@ if TYPE_CHECKING:
 
 
 def code(  # noqa: PLR0917 - Typer reads one parameter per option
-    program: Annotated[
-        Path, typer.Argument(help="A program in RLO, or code that was written before (.rlc).", show_default=False)
-    ],
+    program: Annotated[Path, typer.Argument(help="A program in RLO, or code that was written before (.rlc).")],
     cell: CellFile = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Write the whole code here, to be read back or run (.rlc).")

@@ -16,20 +16,13 @@ if TYPE_CHECKING:
 
 def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="File to write: .urdf, or .toml for an arm file.", show_default=False)
-    ],
-    base: Annotated[
-        str | None, typer.Option(help="Of a URDF file: the link that stands still.", show_default=False)
-    ] = None,
-    tip: Annotated[
-        str | None, typer.Option(help="Of a URDF file: the link that is the tool.", show_default=False)
-    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="File to write: .urdf, or .toml for an arm file.")],
+    base: Annotated[str | None, typer.Option(help="Of a URDF file: the link that stands still.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Of a URDF file: the link that is the tool.")] = None,
     lock: Annotated[
         str | None,
         typer.Option(
-            help="Of a URDF file: joints to hold, as those of a gripper, at 0 or elsewhere: J1,J2=30 (degrees, or mm).",
-            show_default=False,
+            help="Of a URDF file: joints to hold, as those of a gripper, at 0 or elsewhere: J1,J2=30 (degrees, or mm)."
         ),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 def debug(
     program: Annotated[
-        Path | None,
-        typer.Argument(help="The program; without one, editors are served over stdio.", show_default=False),
+        Path | None, typer.Argument(help="The program; without one, editors are served over stdio.")
     ] = None,
     cell: CellFile = None,
     std: Std = Standard.RLO_2,

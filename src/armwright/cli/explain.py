@@ -27,11 +27,7 @@ _BLANK = "\N{NO-BREAK SPACE}"
 def explain(
     code: Annotated[
         str | None,
-        typer.Argument(
-            help="Of a message, such as E206; without one all codes are listed.",
-            autocompletion=codes,
-            show_default=False,
-        ),
+        typer.Argument(help="Of a message, such as E206; without one all codes are listed.", autocompletion=codes),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:

@@ -26,8 +26,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
     diff: Annotated[bool, typer.Option("--diff", help="Write nothing; show what would change.")] = False,
     stdout: Annotated[bool, typer.Option("--stdout", help="Print the programs and leave their files alone.")] = False,
     numbers: Annotated[
-        int | None,
-        typer.Option(min=1, help="Number the lines in steps of this; else they get no numbers.", show_default=False),
+        int | None, typer.Option(min=1, help="Number the lines in steps of this; else they get no numbers.")
     ] = None,
     std: Std = Standard.RLO_2,
     as_json: Annotated[bool, typer.Option("--json", help="Print what became of each program as JSON.")] = False,

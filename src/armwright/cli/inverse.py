@@ -15,17 +15,12 @@ if TYPE_CHECKING:
 
 def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    xyz: Annotated[str | None, typer.Option(help="Place of the tool in mm: 400,100,200.", show_default=False)] = None,
+    xyz: Annotated[str | None, typer.Option(help="Place of the tool in mm: 400,100,200.")] = None,
     rpy: Annotated[
-        str | None,
-        typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees; 0,0,0 when left out.", show_default=False),
+        str | None, typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees; 0,0,0 when left out.")
     ] = None,
-    noap: Annotated[
-        str | None, typer.Option(help="The pose as twelve numbers, columns n, o, a, p in m.", show_default=False)
-    ] = None,
-    near: Annotated[
-        str | None, typer.Option(help="Present joint positions in degrees and mm; nearest first.", show_default=False)
-    ] = None,
+    noap: Annotated[str | None, typer.Option(help="The pose as twelve numbers, columns n, o, a, p in m.")] = None,
+    near: Annotated[str | None, typer.Option(help="Present joint positions in degrees and mm; nearest first.")] = None,
     as_json: Json = False,
 ) -> None:
     """Print every posture that puts the tool at a pose, judged: inside the limits, out of them, out of reach, singular.

@@ -32,13 +32,11 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
         bool, typer.Option("--few", help="Take fewer cycles than the standard asks for, and say so.")
     ] = False,
     band_mm: Annotated[
-        float | None,
-        typer.Option(help="What counts as reached; RP of the same pose without it.", show_default=False),
+        float | None, typer.Option(help="What counts as reached; RP of the same pose without it.")
     ] = None,
     corners_mm: Annotated[float, typer.Option(help="How near to a corner AT and RT are not taken.")] = 0.0,
     limit: Annotated[
-        list[str] | None,
-        typer.Option(help="What a measure should keep: RP=0.05mm; may be repeated.", show_default=False),
+        list[str] | None, typer.Option(help="What a measure should keep: RP=0.05mm; may be repeated.")
     ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,

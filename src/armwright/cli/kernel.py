@@ -16,7 +16,6 @@ def kernel(
         typer.Argument(
             help="Such as forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics.",
             autocompletion=quantities,
-            show_default=False,
         ),
     ],
     count: Annotated[bool, typer.Option("--count", help="Print the operation count only.")] = False,

@@ -13,10 +13,7 @@ if TYPE_CHECKING:
     from armwright.clearance.settings import Settings
 
 LinkageName: TypeAlias = Annotated[
-    str,
-    typer.Argument(
-        help="Name in the catalogue, or a TOML file (docs/clearance.md).", autocompletion=linkages, show_default=False
-    ),
+    str, typer.Argument(help="Name in the catalogue, or a TOML file (docs/clearance.md).", autocompletion=linkages)
 ]
 FrictionVelocity: TypeAlias = Annotated[
     str,

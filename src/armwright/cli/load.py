@@ -12,7 +12,6 @@ Load = Annotated[
     typer.Option(
         "--load",
         help="What the hand holds, in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia.",
-        show_default=False,
     ),
 ]
 

@@ -10,8 +10,7 @@ if TYPE_CHECKING:
     from armwright.arm.model import Arm
 
 MeasuredPoint: TypeAlias = Annotated[
-    str | None,
-    typer.Option("--tool-mm", help="The measured point in the frame of the hand: 0,0,31.", show_default=False),
+    str | None, typer.Option("--tool-mm", help="The measured point in the frame of the hand: 0,0,31.")
 ]
 
 

@@ -58,7 +58,7 @@ class Around(enum.StrEnum):
 def move(  # noqa: PLR0917 - Typer reads one parameter per option
     kind: Annotated[Kind, typer.Argument(help="What goes straight from pose to pose: joints or hand.")],
     arm: ArmName,
-    poses: Annotated[Path, typer.Argument(help="File of poses, TOML or JSON (docs/poses.md).", show_default=False)],
+    poses: Annotated[Path, typer.Argument(help="File of poses, TOML or JSON (docs/poses.md).")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the results; none are kept without it.")
     ] = None,
@@ -70,7 +70,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
         Orientation | None, typer.Option(help="Turn about one axis from pose to pose, or blend ZYZ Euler angles.")
     ] = None,
     deviation_mm: Annotated[
-        float | None, typer.Option(help="Allowed distance of the hand from its planned path; 0.1.", show_default=False)
+        float | None, typer.Option(help="Allowed distance of the hand from its planned path; 0.1.")
     ] = None,
     around: Annotated[
         Around | None,

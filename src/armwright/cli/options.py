@@ -8,19 +8,14 @@ import typer
 from armwright.cli.shell_completion import arms
 
 ArmName: TypeAlias = Annotated[
-    str,
-    typer.Argument(help="Name in the catalogue, or path of an arm file.", autocompletion=arms, show_default=False),
+    str, typer.Argument(help="Name in the catalogue, or path of an arm file.", autocompletion=arms)
 ]
 Configuration: TypeAlias = Annotated[
-    str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
+    str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.")
 ]
 Rows: TypeAlias = Annotated[
     Path | None,
-    typer.Option(
-        "--csv",
-        help="Table of q1 ... qn, in SI units or those of its names, such as motion.csv.",
-        show_default=False,
-    ),
+    typer.Option("--csv", help="Table of q1 ... qn, in SI units or those of its names, such as motion.csv."),
 ]
 Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
 JsonSummary: TypeAlias = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")]

@@ -32,9 +32,7 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     after: Annotated[
         Path | None, typer.Option(help="CSV of what was measured already: the poses that tell most beside it.")
     ] = None,
-    units: Annotated[
-        str | None, typer.Option(help="Of that file, if its header has none: mm,deg.", show_default=False)
-    ] = None,
+    units: Annotated[str | None, typer.Option(help="Of that file, if its header has none: mm,deg.")] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,

@@ -17,12 +17,9 @@ if TYPE_CHECKING:
 # The text form of intermediate code.
 CODE_SUFFIX = ".rlc"
 
-ProgramFile: TypeAlias = Annotated[Path, typer.Argument(help="The program, in RLO.", show_default=False)]
+ProgramFile: TypeAlias = Annotated[Path, typer.Argument(help="The program, in RLO.")]
 CellFile: TypeAlias = Annotated[
-    Path | None,
-    typer.Option(
-        "--cell", help="The cell it runs in, TOML or JSON; else what the program IMPORTs.", show_default=False
-    ),
+    Path | None, typer.Option("--cell", help="The cell it runs in, TOML or JSON; else what the program IMPORTs.")
 ]
 Std: TypeAlias = Annotated[Standard, typer.Option(help="The language: RLO-2, or the RLO-83 of the report alone.")]
 Strict: TypeAlias = Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")]

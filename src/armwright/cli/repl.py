@@ -28,7 +28,7 @@ _ALL_OF_IT = "`:report DIR` keeps all in events.jsonl"
 
 
 def repl(
-    program: Annotated[Path | None, typer.Argument(help="A program to begin with, in RLO.", show_default=False)] = None,
+    program: Annotated[Path | None, typer.Argument(help="A program to begin with, in RLO.")] = None,
     cell: CellFile = None,
     std: Std = Standard.RLO_2,
     as_json: Annotated[

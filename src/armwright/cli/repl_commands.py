@@ -193,10 +193,7 @@ class Commands:
         session, program = self._session, folder / _PROGRAM
         text = self._program(program)
         compiled = compile_program(
-            Source(program.name, text),
-            session.state.cell,
-            std=session.std,
-            read_import=import_reader(folder),
+            Source(program.name, text), session.state.cell, std=session.std, read_import=import_reader(folder)
         )
         recording = run(compiled)
         diagnostics = (*compiled.diagnostics, *warnings(recording))

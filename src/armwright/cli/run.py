@@ -44,18 +44,14 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for the results; none are kept without it.")
     ] = None,
-    servo_ms: Annotated[
-        float | None, typer.Option(help="Servo period in ms; the cell file's, or 1.", show_default=False)
-    ] = None,
+    servo_ms: Annotated[float | None, typer.Option(help="Servo period in ms; the cell file's, or 1.")] = None,
     deviation_mm: Annotated[
-        float | None,
-        typer.Option(help="Allowed deviation from straight lines; the cell file's, or 1.", show_default=False),
+        float | None, typer.Option(help="Allowed deviation from straight lines; the cell file's, or 1.")
     ] = None,
     around: Annotated[
         Around | None,
         typer.Option(
-            help="Go round what stops a straight line: by a pose beside it, or damped rates; the cell file's, or none.",
-            show_default=False,
+            help="Go round what stops a straight line: by a pose beside it, or damped rates; the cell file's, or none."
         ),
     ] = None,
     std: Std = Standard.RLO_2,
@@ -106,12 +102,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
         "strict": strict,
     }
     origin = Origin(
-        program=program,
-        cell=cell,
-        imports=imports,
-        command=command_line(),
-        options=options,
-        motion_rows=most_rows,
+        program=program, cell=cell, imports=imports, command=command_line(), options=options, motion_rows=most_rows
     )
     _finish(recording, code, said, origin, output, error, as_json=as_json, quiet=quiet)
 

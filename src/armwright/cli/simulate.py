@@ -37,9 +37,7 @@ class Method(enum.StrEnum):
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    configuration: Annotated[
-        str, typer.Option("-q", help="Where it starts, degrees and mm: 10,20,30.", show_default=False)
-    ],
+    configuration: Annotated[str, typer.Option("-q", help="Where it starts, degrees and mm: 10,20,30.")],
     speeds: Annotated[str | None, typer.Option("--qd", help="Speeds at the start, degrees/s and mm/s.")] = None,
     duration: Annotated[float, typer.Option(help="How long, in s.")] = 1.0,
     drives: Annotated[Drives, typer.Option(help="Off, or holding the arm's weight.")] = Drives.OFF,

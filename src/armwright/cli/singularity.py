@@ -13,9 +13,7 @@ if TYPE_CHECKING:
 
 def singularity(
     arm: ArmName,
-    configuration: Annotated[
-        str, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
-    ],
+    configuration: Annotated[str, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.")],
     as_json: Json = False,
 ) -> None:
     """Print the factors of the Jacobian's determinant, which are near zero, and what the hand cannot do there.

@@ -18,9 +18,7 @@ def study(
     name: Annotated[
         str,
         typer.Argument(
-            help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.",
-            autocompletion=studies,
-            show_default=False,
+            help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.", autocompletion=studies
         ),
     ],
     output: Annotated[

@@ -11,7 +11,6 @@ ColumnMap: TypeAlias = Annotated[
     typer.Option(
         "--columns",
         help="What columns of the table are: A1=joint_1_deg,X=x_mm, or a TOML file with [columns] (docs/tables.md).",
-        show_default=False,
     ),
 ]
 SkipIncomplete: TypeAlias = Annotated[

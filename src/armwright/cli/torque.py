@@ -20,9 +20,7 @@ _BLOCK = 1000
 
 def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    q: Annotated[
-        str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.", show_default=False)
-    ] = None,
+    q: Annotated[str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.")] = None,
     qd: Annotated[str | None, typer.Option(help="Joint speeds in degrees/s and mm/s; 0 when left out.")] = None,
     qdd: Annotated[str | None, typer.Option(help="Joint accelerations in degrees/s² and mm/s²; likewise.")] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="Table of q, qd and qdd, such as motion.csv.")] = None,
@@ -34,7 +32,6 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
         typer.Option(
             "--wrench",
             help="Force and moment on the tool from outside, along base axes: FX,FY,FZ,MX,MY,MZ in N and N m.",
-            show_default=False,
         ),
     ] = None,
     as_json: Json = False,
