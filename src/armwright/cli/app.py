@@ -1,4 +1,4 @@
-"""The command ``armwright``: its commands, and what becomes of errors."""
+"""The command ``armwright``: its commands, its own options and its entry point."""
 
 import os
 import sys
@@ -16,8 +16,8 @@ from armwright.cli.terminal import bound_widths, prepare_streams
 from armwright.version import __version__
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(requested: bool) -> None:
+    if requested:
         print(f"armwright {__version__}")
         raise typer.Exit
 
@@ -35,18 +35,18 @@ def _install_completion(shell: Shell | None) -> None:
 
 
 def _raise_limits(texts: list[str]) -> list[str]:
-    """Let this command, and the processes that it starts, read more of what a limit bounds."""
+    """Raise limits on the size of inputs for this command and for the processes that it starts."""
     from armwright.errors import ArmwrightError
     from armwright.files.limits import VARIABLE, parsed
 
     try:
-        found = {name: number for text in texts for name, number in parsed(text).items()}
+        raised = {name: number for text in texts for name, number in parsed(text).items()}
     except ArmwrightError as error:
         raise typer.BadParameter(str(error)) from error
-    if found:
+    if raised:
         before = os.environ.get(VARIABLE)
-        told = ",".join(f"{name}={number}" for name, number in found.items())
-        os.environ[VARIABLE] = f"{before},{told}" if before else told
+        settings = ",".join(f"{name}={number}" for name, number in raised.items())
+        os.environ[VARIABLE] = f"{before},{settings}" if before else settings
     return texts
 
 
@@ -55,7 +55,7 @@ def root(
         list[str] | None,
         typer.Option(
             "--raise",
-            help="Read more than is usual, such as table_rows=10000000 (docs/limits.md lists the limits).",
+            help="Raise a limit on the size of inputs, as in table_rows=10000000 (docs/limits.md lists the limits).",
             metavar="NAME=NUMBER",
             autocompletion=limits,
             callback=lambda texts: _raise_limits(texts or []),
@@ -65,7 +65,7 @@ def root(
         Shell | None,
         typer.Option(
             "--show-completion",
-            help="Print what bash, zsh, fish or powershell reads to complete commands, options and names.",
+            help="Print the script with which bash, zsh, fish or powershell completes commands, options and names.",
             metavar="SHELL",
             callback=_show_completion,
             is_eager=True,
@@ -75,7 +75,7 @@ def root(
         Shell | None,
         typer.Option(
             "--install-completion",
-            help="Add that to the start-up files of the shell.",
+            help="Install that script in the start-up files of the shell.",
             metavar="SHELL",
             callback=_install_completion,
             is_eager=True,
@@ -85,7 +85,7 @@ def root(
         bool, typer.Option("--version", help="Print the version and stop.", callback=_version, is_eager=True)
     ] = False,
 ) -> None:
-    """A workbench for robot manipulators: model an arm, move it, program it, look at the result.
+    """A workbench for robot manipulators: model an arm, move it, program it, inspect the result.
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
@@ -95,9 +95,9 @@ def application(words: Collection[str] | None = None) -> App:
     """Return the command line.
 
     Args:
-        words: that will be called with; only the commands among them are made. None: all are.
+        words: arguments of the command line; only the commands among them are imported. None: all are.
     """
-    made = App(
+    app = App(
         name=NAME,
         cls=Commands,
         no_args_is_help=True,
@@ -106,30 +106,30 @@ def application(words: Collection[str] | None = None) -> App:
         rich_markup_mode="markdown",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    register(made, words)
-    made.callback()(root)
-    return made
+    register(app, words)
+    app.callback()(root)
+    return app
 
 
 def __getattr__(name: str) -> App:
-    """Return ``app``, the whole command line, for who looks at all of it."""
+    """Return ``app``, the command line with all commands imported, for tools that document it."""
     if name == "app":
-        made = globals()[name] = application()
-        return made
+        globals()[name] = application()
+        return globals()[name]
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def main() -> None:
-    """Run the command line; an error ends it with one message and the exit status of its kind."""
+    """Run the command line; an error ends it with a message and the exit status of its kind."""
     bound_widths()
     prepare_streams()
     prepare()
     warnings.showwarning = _warn
-    # A shell that asks what may follow is told of all.
+    # Completion by a shell needs all commands.
     run_and_exit(application(None if COMPLETE in os.environ else sys.argv[1:]))
 
 
-def _warn(message: Warning | str, category: type[Warning], *where: object, **_more: object) -> None:
-    """Tell a warning in one line, without the place in our own code that it comes from."""
-    about = "" if issubclass(category, UserWarning) else f"{category.__name__} in {where[0]}:{where[1]}: "
+def _warn(message: Warning | str, category: type[Warning], *location: object, **_more: object) -> None:
+    """Print a warning on one line, without the location in our own code that it comes from."""
+    about = "" if issubclass(category, UserWarning) else f"{category.__name__} in {location[0]}:{location[1]}: "
     print(f"armwright: warning: {about}{message}", file=sys.stderr)

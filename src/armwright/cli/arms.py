@@ -1,4 +1,4 @@
-"""``armwright arms``: the catalogue."""
+"""``armwright arms``: the catalogue of arms."""
 
 from typing import Annotated
 
@@ -14,12 +14,11 @@ def arms(as_json: Annotated[bool, typer.Option("--json", help="Print the list as
     """
     from armwright.arm.load import arm_names, load_arm
 
-    found = [load_arm(name) for name in arm_names()]
+    models = [load_arm(name) for name in arm_names()]
     if as_json:
-        rows = [{"name": arm.name, "joints": arm.n, "title": arm.title, "source": arm.source} for arm in found]
-        print_json(rows)
+        print_json([{"name": m.name, "joints": m.n, "title": m.title, "source": m.source} for m in models])
         return
-    width = max(len(arm.name) for arm in found)
+    width = max(len(arm.name) for arm in models)
     print(f"{'name':<{width}}  joints  title")
-    for arm in found:
+    for arm in models:
         print(f"{arm.name:<{width}}  {arm.n:>6}  {arm.title}")

@@ -1,4 +1,4 @@
-"""``armwright calibrate``: a better arm from measured points."""
+"""``armwright calibrate``: identify the geometric errors of an arm from measured points."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,33 +18,38 @@ from armwright.errors import DoubtfulError
 
 def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    measured: Annotated[Path, typer.Argument(help="CSV of joints and what was measured (docs/calibration.md).")],
-    units: Annotated[str | None, typer.Option(help="Of a file whose header has none: mm,deg.")] = None,
+    measured: Annotated[Path, typer.Argument(help="CSV of joint positions and measured points (docs/calibration.md).")],
+    units: Annotated[str | None, typer.Option(help="Units of a file whose header has none, as in mm,deg.")] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
-    folds: Annotated[int, typer.Option(help="Parts in which postures are held out to see how good it is.")] = 5,
-    seed: Annotated[int, typer.Option(min=0, help="Of the parts.")] = 0,
+    folds: Annotated[int, typer.Option(help="Folds of the cross-validation over joint configurations.")] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the division into folds.")] = 0,
     beyond: Annotated[
         bool,
-        typer.Option("--beyond", help="Also try springs in the joints, gears out of true, and learning what is left."),
+        typer.Option(
+            "--beyond", help="Also try joint compliance, transmission error and a learned model of the residuals."
+        ),
     ] = False,
     noise_um: Annotated[
         float | None,
-        typer.Option(help="Standard deviation of a measured coordinate: then it is said if what is left is more."),
+        typer.Option(help="Standard deviation of a measured coordinate; larger residuals are then reported."),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Folder for the arm (TOML, URDF, tables), errors, report and figures."),
+        typer.Option(
+            "-o", "--output", help="Folder for the corrected arm (TOML, URDF, tables), its errors, report and figures."
+        ),
     ] = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find the errors of an arm from what its tool was measured at, and write the corrected arm.
+    """Identify the geometric errors of an arm from measured points of its tool, and write the corrected arm.
 
-    Points, poses, touched planes and distances, alone or together. Prints which errors were found and how well, which
-    cannot be told and why, and how far held-out readings are off before and after. Readings that contradict the arm
-    end with status 3: those of another arm at once, doubtful ones with the reasons when all is told and written.
+    The measurements may be points, poses, touched planes and distances, alone or together. The command prints the
+    identified errors with their standard errors, which errors are not identifiable and why, and the errors at held-out
+    configurations before and after. Measurements that contradict the arm end the command with status 3: those of
+    another arm at once, doubtful results with the reasons after everything is printed and written.
 
     **Example:** `armwright calibrate puma560-seed examples/puma_points.csv -o out/calibrated`
     """
@@ -67,8 +72,8 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None:
         title = f"{model.name}, {measured.name}"
         write_results(output, calibration_files(assessment, title=title, command=command_line()))
-    against = assessment.contradictions
-    doubtful = DoubtfulError(f"the readings contradict the arm: {'; '.join(against)}") if against else None
+    reasons = assessment.contradictions
+    doubtful = DoubtfulError(f"the measurements contradict the arm: {'; '.join(reasons)}") if reasons else None
     if as_json:
         print_json({**outcome(doubtful), **assessment.as_data()})
     elif not quiet:

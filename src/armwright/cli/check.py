@@ -1,4 +1,4 @@
-"""``armwright check``: what the translator has to say about a program, and what it makes of it."""
+"""``armwright check``: the diagnostics of programs, and the stages of their compilation."""
 
 import enum
 import os
@@ -22,7 +22,7 @@ _SUFFIX = ".rlo"
 
 
 class Emit(enum.StrEnum):
-    """A stage of the translation that can be looked at."""
+    """A stage of the compilation that can be printed."""
 
     CODE = "code"
     TREE = "tree"
@@ -39,13 +39,17 @@ class Format(enum.StrEnum):
 
 def check(  # noqa: PLR0917 - Typer reads one parameter per option
     programs: Annotated[
-        list[Path], typer.Argument(help="The programs, in RLO; of a folder all in it that end in .rlo.")
+        list[Path], typer.Argument(help="Programs in RLO, or folders; all files *.rlo of a folder are checked.")
     ],
     cell: Annotated[
         Path | None,
-        typer.Option("--cell", help="The cell they will run in; frames, arms and devices are then checked too."),
+        typer.Option(
+            "--cell", help="Cell in which the programs will run; frames, arms and devices are then checked too."
+        ),
     ] = None,
-    emit: Annotated[Emit | None, typer.Option(help="Print this instead; diagnostics go to the error output.")] = None,
+    emit: Annotated[
+        Emit | None, typer.Option(help="Stage of the compilation to print; diagnostics then go to the error output.")
+    ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     output_format: Annotated[Format, typer.Option("--format", help="How to print diagnostics.")] = Format.TEXT,
@@ -53,112 +57,112 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Check RLO programs without running them.
 
-    Exit status 0: all can run (there may be warnings); 1: one or more have errors.
+    The exit status is 0 if all programs can run (there may be warnings), and 1 if any has errors.
 
     **Example:** `armwright check examples/stacking.rlo --cell examples/stanford_cell.toml --emit code`
     """
-    from armwright.cli.programs import given_cell
+    from armwright.cli.programs import read_cell_option
     from armwright.program import compile as compile_program
 
-    paths, given = _found(programs), given_cell(cell)
-    compiled = [compile_program(path, given, strict=strict, std=std) for path in paths]
+    paths, option_cell = _program_files(programs), read_cell_option(cell)
+    compilations = [compile_program(path, option_cell, strict=strict, std=std) for path in paths]
     if as_json or output_format is Format.JSON:
-        several = [_as_data(one, emit) for one in compiled]
-        print_json(several[0] if len(several) == 1 else _together(several, paths))
+        results = [_as_data(compilation, emit) for compilation in compilations]
+        print_json(results[0] if len(results) == 1 else _joined_data(results, paths))
     elif output_format is Format.SARIF:
         from armwright.program.diagnostics.sarif import sarif_of
 
-        pairs = zip(compiled, paths, strict=True)
-        print_json(sarif_of([(one.diagnostics, one.source, path.as_posix()) for one, path in pairs]))
+        pairs = zip(compilations, paths, strict=True)
+        print_json(sarif_of([(result.diagnostics, result.source, path.as_posix()) for result, path in pairs]))
     else:
-        for one in compiled:
-            _print(one, emit)
-        if len(compiled) > 1:
-            print(_counted(compiled), file=sys.stderr if emit else sys.stdout)
-    if any(one.code is None for one in compiled):
+        for compilation in compilations:
+            _print(compilation, emit)
+        if len(compilations) > 1:
+            print(_totals(compilations), file=sys.stderr if emit else sys.stdout)
+    if any(compilation.code is None for compilation in compilations):
         raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
 
 
-def _found(given: list[Path]) -> list[Path]:
-    """Return the programs that are asked for, each once: of a folder all in it and in its folders.
+def _program_files(arguments: list[Path]) -> list[Path]:
+    """Return the programs that the arguments name, each once; a folder stands for all programs below it.
 
     Raises:
-        FileFormatError: a folder has none.
+        FileFormatError: a folder has no programs.
     """
     paths: dict[Path, None] = {}
-    for path in given:
-        inside = _inside(path) if path.is_dir() else [path]
-        if not inside:
+    for path in arguments:
+        files = _programs_below(path) if path.is_dir() else [path]
+        if not files:
             raise FileFormatError(str(path), None, "", f"there is no program in this folder; expected files *{_SUFFIX}")
-        paths |= dict.fromkeys(inside)
+        paths |= dict.fromkeys(files)
     return list(paths)
 
 
-def _inside(folder: Path) -> list[Path]:
-    """Return the programs in a folder and in its folders; a pipe that nobody named is none.
+def _programs_below(folder: Path) -> list[Path]:
+    """Return the programs in a folder and its subfolders; pipes and devices are passed over.
 
     Raises:
-        FileFormatError: one of them cannot be read.
+        FileFormatError: a folder cannot be read.
     """
 
     def refuse(error: OSError) -> None:
         raise FileFormatError(str(error.filename), None, "", f"cannot be read: {error.strerror}") from error
 
-    every = (Path(at, name) for at, _, names in os.walk(folder, onerror=refuse) for name in names)
-    return sorted(one for one in every if one.suffix == _SUFFIX and one.is_file())
+    files = (Path(parent, name) for parent, _, names in os.walk(folder, onerror=refuse) for name in names)
+    return sorted(path for path in files if path.suffix == _SUFFIX and path.is_file())
 
 
-def _print(compiled: "Compilation", emit: Emit | None) -> None:
+def _print(compilation: "Compilation", emit: Emit | None) -> None:
     from armwright.cli.programs import print_diagnostics
 
-    for line in _emitted(compiled, emit) if emit else ():
+    for line in _stage_lines(compilation, emit) if emit else ():
         print(line)
-    if not emit or compiled.diagnostics:
-        print_diagnostics(compiled.diagnostics, compiled.source, to_errors=emit is not None)
+    if not emit or compilation.diagnostics:
+        print_diagnostics(compilation.diagnostics, compilation.source, to_errors=emit is not None)
 
 
-def _counted(compiled: "list[Compilation]") -> str:
-    """Return the last line of a report on several programs."""
+def _totals(compilations: "list[Compilation]") -> str:
+    """Return the numbers of errors and warnings of several programs as a line of text."""
     from armwright.program.language.diagnostic import counts_text
 
-    errors = sum(one.is_error for program in compiled for one in program.diagnostics)
-    warnings = sum(len(program.diagnostics) for program in compiled) - errors
-    return f"{len(compiled)} programs: {counts_text(errors, warnings)}"
+    errors = sum(diagnostic.is_error for program in compilations for diagnostic in program.diagnostics)
+    warnings = sum(len(program.diagnostics) for program in compilations) - errors
+    return f"{len(compilations)} programs: {counts_text(errors, warnings)}"
 
 
-def _together(several: list[dict[str, Any]], paths: list[Path]) -> dict[str, Any]:
-    """Return what is wrong with several programs as plain data, each with its path."""
+def _joined_data(results: list[dict[str, Any]], paths: list[Path]) -> dict[str, Any]:
+    """Return the diagnostics of several programs as plain data, each program with its path."""
     return {
-        "exit_status": max(one["exit_status"] for one in several),
-        "errors": sum(one["errors"] for one in several),
-        "warnings": sum(one["warnings"] for one in several),
-        "programs": [{"path": path.as_posix(), **one} for one, path in zip(several, paths, strict=True)],
+        "exit_status": max(result["exit_status"] for result in results),
+        "errors": sum(result["errors"] for result in results),
+        "warnings": sum(result["warnings"] for result in results),
+        "programs": [{"path": path.as_posix(), **result} for result, path in zip(results, paths, strict=True)],
     }
 
 
-def _emitted(compiled: "Compilation", emit: Emit) -> Iterator[str]:
-    """Return a stage of the translation as lines; no lines of code for a program with errors."""
+def _stage_lines(compilation: "Compilation", emit: Emit) -> Iterator[str]:
+    """Return a stage of the compilation as lines; a program with errors has no lines of code."""
     from armwright.program.bytecode.instructions import listing
     from armwright.program.syntax.tree import dump
 
-    source = compiled.source
+    source = compilation.source
     if emit is Emit.CODE:
-        yield from listing(compiled.code).splitlines() if compiled.code else ()
+        yield from listing(compilation.code).splitlines() if compilation.code else ()
     elif emit is Emit.TREE:
-        yield from dump(compiled.tree)
+        yield from dump(compilation.tree)
     else:
-        for token in compiled.tokens:
-            place = f"{source.line(token.start)}:{source.column(token.start)}"
-            yield f"{place:>8}  {token.kind.value:<11}  {token.text}".rstrip()
+        for token in compilation.tokens:
+            location = f"{source.line(token.start)}:{source.column(token.start)}"
+            yield f"{location:>8}  {token.kind.value:<11}  {token.text}".rstrip()
 
 
-def _as_data(compiled: "Compilation", emit: Emit | None) -> dict[str, Any]:
+def _as_data(compilation: "Compilation", emit: Emit | None) -> dict[str, Any]:
     from armwright.cli.programs import diagnostics_data
     from armwright.program.bytecode.instructions import shown_operands
 
-    data = diagnostics_data(compiled)
-    if emit is Emit.CODE and compiled.code:
-        code = compiled.code
+    data = diagnostics_data(compilation)
+    if emit is Emit.CODE and compilation.code:
+        code = compilation.code
         data["constants"] = list(code.constants)
         data["code"] = [
             {
@@ -170,5 +174,5 @@ def _as_data(compiled: "Compilation", emit: Emit | None) -> dict[str, Any]:
             for step in code.instructions
         ]
     elif emit:
-        data[emit.value] = list(_emitted(compiled, emit))
+        data[emit.value] = list(_stage_lines(compilation, emit))
     return data

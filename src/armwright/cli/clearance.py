@@ -1,4 +1,4 @@
-"""``armwright clearance``: linkages whose pins have play."""
+"""``armwright clearance``: linkages with clearance in their joints."""
 
 from armwright.cli.clearance_correct import correct
 from armwright.cli.clearance_estimate import estimate
@@ -15,7 +15,7 @@ clearance.command("correct")(correct)
 
 @clearance.callback()
 def group() -> None:
-    """Linkages with play in their pins: how they rattle, and what that does to the path.
+    """Simulate, estimate and correct linkages with clearance in their revolute joints.
 
     **Example:** `armwright clearance simulate five-bar --path y1 -o out/rattling`
     """

@@ -1,4 +1,4 @@
-"""``armwright clearance simulate``: a linkage with play follows a path, and one sees its journals rattle."""
+"""``armwright clearance simulate``: simulate a linkage with joint clearance along a path."""
 
 import math
 from pathlib import Path
@@ -31,36 +31,52 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None,
         typer.Option(help="Path for the tip: x1 to x10, y1 to y14, or pick-and-place.", autocompletion=paths),
     ] = None,
-    speed_rpm: Annotated[float | None, typer.Option(help="Instead: turn the one drive at so many rev/min.")] = None,
-    turns: Annotated[float, typer.Option(help="How many turns of the drive.")] = 3.0,
-    clearance: Annotated[list[str] | None, typer.Option(help="Of one pin in mm: J2=0.5; may be repeated.")] = None,
-    clearance_mm: Annotated[float | None, typer.Option(help="Of all pins; those of the linkage without it.")] = None,
-    friction: Annotated[float | None, typer.Option(help="Coefficient; that of the linkage without it.")] = None,
+    speed_rpm: Annotated[float | None, typer.Option(help="Speed of a linkage with one drive, in rev/min.")] = None,
+    revolutions: Annotated[float, typer.Option(help="Number of revolutions of the drive.")] = 3.0,
+    clearance: Annotated[
+        list[str] | None, typer.Option(help="Clearance of a pin in mm, as in J2=0.5; may be repeated.")
+    ] = None,
+    clearance_mm: Annotated[
+        float | None, typer.Option(help="Clearance of all pins; the default is that of the linkage.")
+    ] = None,
+    friction: Annotated[
+        float | None, typer.Option(help="Coefficient of friction; the default is that of the linkage.")
+    ] = None,
     friction_law: Annotated[
-        str, typer.Option(help="linear, tanh or lugre.", autocompletion=setting("FRICTION_LAWS"))
+        str, typer.Option(help="Law of friction: linear, tanh or lugre.", autocompletion=setting("FRICTION_LAWS"))
     ] = "linear",
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
     law: Annotated[
         str,
         typer.Option(
-            help="Of impact: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...",
+            help="Contact law: lankarani-nikravesh, flores, hu-guo, carvalho-martins, exact ...",
             autocompletion=setting("IMPACT_LAWS"),
         ),
     ] = "lankarani-nikravesh",
     integrator: Annotated[
-        str, typer.Option(help="rk4 or semi-implicit.", autocompletion=setting("INTEGRATORS"))
+        str, typer.Option(help="Integrator: rk4 or semi-implicit.", autocompletion=setting("INTEGRATORS"))
     ] = "rk4",
-    step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
+    step: Annotated[float, typer.Option(help="Step of the integrator, in s.")] = 1e-5,
     locate: Annotated[
-        bool, typer.Option("--locate", help="Cut a step in two where a journal comes to its wall.")
+        bool, typer.Option("--locate", help="Divide a step at the time at which a journal reaches its bearing.")
     ] = False,
-    sample: Annotated[float | None, typer.Option(help="Time between samples, in s; 1e-4 or less without it.")] = None,
+    sample: Annotated[
+        float | None, typer.Option(help="Time between samples, in s; the default is 1e-4 or less.")
+    ] = None,
     control: Annotated[
-        str, typer.Option(help="effort: open loop, or pd+ff: with a controller.", autocompletion=setting("CONTROLS"))
+        str,
+        typer.Option(
+            help="effort (open loop) or pd+ff (feedback controller with feedforward).",
+            autocompletion=setting("CONTROLS"),
+        ),
     ] = "effort",
     start: Annotated[
-        str, typer.Option(help="At rest on elastic walls, on rigid ones, or centred.", autocompletion=setting("STARTS"))
+        str,
+        typer.Option(
+            help="Initial state: rest on elastic bearings, rest on rigid ones, or centred.",
+            autocompletion=setting("STARTS"),
+        ),
     ] = "rest",
     output: Annotated[
         Path | None,
@@ -69,34 +85,34 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     as_json: JsonSummary = False,
     quiet: Quiet = False,
 ) -> None:
-    """Let a linkage with play follow a path: its drives do what it would need without play.
+    """Simulate a linkage with joint clearance whose drives are commanded as if it had none.
 
-    Prints what became of the path, of every pin and of the energy, and until when all this is a prediction. With -o,
-    report.html shows the linkage moving, its journals in their bearings, and error, forces and energy over
-    time. The first run of a linkage compiles it.
+    The command prints the path error, a row for every pin, the energy balance, and the time until which the run is a
+    prediction. With -o, report.html shows the moving linkage, its journals in their bearings, and error, forces and
+    energy over time. The first run of a linkage compiles its equations.
 
     **Example:** `armwright clearance simulate five-bar --path y1 --clearance J2=0.3 -o out/rattling`
 
-    **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --turns 2 --start centred --step 2e-6`
+    **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --revolutions 2 --start centred --step 2e-6`
     """
     from armwright.clearance.assessment import ClearanceRun
     from armwright.clearance.reader import load_linkage
 
     model = with_clearances(load_linkage(linkage), clearance or [], clearance_mm)
-    way = _path(model, path, speed_rpm, turns)
+    tip_path = _path(model, path, speed_rpm, revolutions)
     settings = settings_of(
         friction_velocity,
         threshold_mm_s,
         law=friction_law,
         step=step,
-        sample=max(step, min(_SAMPLE, way.duration / _SAMPLES)) if sample is None else sample,
+        sample=max(step, min(_SAMPLE, tip_path.duration / _SAMPLES)) if sample is None else sample,
         integrator=integrator,
         control=control,
         impact=law,
         start=start,
         located=locate,
     )
-    run = ClearanceRun.of(*_simulated(model, way, settings, friction, watched=not (quiet or as_json)))
+    run = ClearanceRun.of(*_simulated(model, tip_path, settings, friction, watched=not (quiet or as_json)))
     if output is not None:
         from armwright.report.clearance_run_files import clearance_run_files
 
@@ -105,65 +121,66 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         print_json({"command": command_line(), **run.as_data()})
     elif not quiet:
         data = run.as_data()
-        how = data["settings"]
+        used = data["settings"]
         print(
             f"{data['linkage']}, {data['path']}: {data['status']} after {data['sound_until']:.4g} s; "
-            f"{how['integrator']}, steps of {how['step']:.3g} s, friction {how['friction']:g}"
+            f"{used['integrator']}, steps of {used['step']:.3g} s, friction {used['friction']:g}"
         )
         print_result(run)
         if output is not None:
             print(f"report: {output / 'report.html'}")
 
 
-def _path(model: "Linkage", path: str | None, speed_rpm: float | None, turns: float) -> "TipPath":
-    """Return the path of the tip, or of the one drive."""
+def _path(model: "Linkage", path: str | None, speed_rpm: float | None, revolutions: float) -> "TipPath":
+    """Return the path of the tip, or of the drive of a linkage with a single drive."""
     from armwright.clearance.paths import constant_speed_path, named_path
 
     drives = len(model.drives)
     if (path is None) == (speed_rpm is None):
-        wanted = "--path y1" if drives > 1 else "--speed-rpm 300"
+        option = "--path y1" if drives > 1 else "--speed-rpm 300"
         raise typer.BadParameter(
-            f"expected either --path or --speed-rpm; {model.name} takes {wanted}", param_hint="--path"
+            f"expected either --path or --speed-rpm; {model.name} takes {option}", param_hint="--path"
         )
     if path is not None:
         if drives != 2:
             raise typer.BadParameter(
-                f"a path leads the tip of a linkage with two drives; {model.name} has {drives}{_instead(drives, 1)}",
+                f"expected a linkage with two drives for a path of the tip; {model.name} has {drives}{_instead(drives, 1)}",
                 param_hint="--path",
             )
         return named_path(path)
     if drives != 1:
         raise typer.BadParameter(
-            f"turns one drive; {model.name} has {drives}{_instead(drives, 2)}", param_hint="--speed-rpm"
+            f"expected a linkage with one drive; {model.name} has {drives}{_instead(drives, 2)}",
+            param_hint="--speed-rpm",
         )
-    assert speed_rpm is not None  # noqa: S101 - one of both is given
-    if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < turns < math.inf):
+    assert speed_rpm is not None  # noqa: S101 - either path or speed_rpm is an argument
+    if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < revolutions < math.inf):
         raise typer.BadParameter(
-            f"expected a speed that is not 0 and turns above 0, got {speed_rpm:g} and {turns:g}",
+            f"expected a speed other than 0 and revolutions above 0, got {speed_rpm:g} and {revolutions:g}",
             param_hint="--speed-rpm",
         )
     speed = speed_rpm * 2 * math.pi / 60
-    at = model.assembly.get(model.drives[0].body, 0.0)
-    name = f"{turns:g} turn{'' if turns == 1 else 's'} at {speed_rpm:g} rev/min"
-    return constant_speed_path(name, at, speed, turns * 2 * math.pi / abs(speed))
+    start_angle = model.assembly.get(model.drives[0].body, 0.0)
+    name = f"{revolutions:g} revolution{'' if revolutions == 1 else 's'} at {speed_rpm:g} rev/min"
+    return constant_speed_path(name, start_angle, speed, revolutions * 2 * math.pi / abs(speed))
 
 
-def _instead(drives: int, wanted: int) -> str:
-    """Return what to give instead, if so many drives can be led at all."""
-    if drives != wanted:
+def _instead(drives: int, expected: int) -> str:
+    """Return the option for a linkage with this number of drives, if there is one."""
+    if drives != expected:
         return ""
-    return ": give --path" if wanted == 2 else ": give --speed-rpm"
+    return "; use --path" if expected == 2 else "; use --speed-rpm"
 
 
 def _simulated(
-    model: "Linkage", way: "TipPath", settings: "Settings", friction: float | None, *, watched: bool
+    model: "Linkage", path: "TipPath", settings: "Settings", friction: float | None, *, watched: bool
 ) -> "tuple[Simulation, Predictability]":
-    """Run it, and beside it runs that nobody could tell from it; a word is on the screen while it is compiled."""
+    """Simulate the linkage and indistinguishable copies of it, with a status line while its equations are compiled."""
     import numpy as np
 
     from armwright.clearance.predictability import simulate_with_predictability
     from armwright.clearance.scenario import prepare
 
     with waiting(f"{model.name}: the first run compiles it", quiet=not watched):
-        task: Scenario = prepare(model, way, settings)
+        task: Scenario = prepare(model, path, settings)
         return simulate_with_predictability(task, np.array(list(model.clearances.values())), friction=friction)

@@ -1,4 +1,4 @@
-"""``armwright clearance sweep``: the features of many linkages with other clearances, kept in a folder."""
+"""``armwright clearance sweep``: error-curve features of a linkage at many clearances, stored in a folder."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,39 +21,51 @@ if TYPE_CHECKING:
 
 def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     linkage: LinkageName,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of this sweep alone.")],
-    paths: Annotated[str, typer.Option(help="Test paths, with commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder of the sweep; it must hold nothing else.")],
+    paths: Annotated[str, typer.Option(help="Test paths, separated by commas: x1 to x10, y1 to y14.")] = "y1,y3,y7",
     design: Annotated[
         str,
         typer.Option(
-            help="factorial, lhs (Latin hypercube) or sobol.", autocompletion=one_of("factorial", "lhs", "sobol")
+            help="Design of the experiment: factorial, lhs (Latin hypercube) or sobol.",
+            autocompletion=one_of("factorial", "lhs", "sobol"),
         ),
     ] = "sobol",
     from_mm: Annotated[float, typer.Option(help="Smallest clearance.")] = 0.1,
     to_mm: Annotated[float, typer.Option(help="Largest clearance.")] = 0.5,
-    levels: Annotated[int, typer.Option(help="Of each clearance, for factorial: 9 are the thesis' 729 runs.")] = 9,
-    runs: Annotated[int, typer.Option("-n", "--runs", help="For lhs and sobol (a power of two).")] = 128,
+    levels: Annotated[
+        int, typer.Option(help="Levels of each clearance of a factorial design; 9 levels are the thesis' 729 runs.")
+    ] = 9,
+    runs: Annotated[
+        int, typer.Option("-n", "--runs", help="Number of linkages for lhs and sobol (a power of two).")
+    ] = 128,
     to_friction: Annotated[
-        float | None, typer.Option(help="Vary the coefficient of friction too, from 0 to this one.")
+        float | None, typer.Option(help="Also vary the coefficient of friction, from 0 to this value.")
     ] = None,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
-    step: Annotated[float, typer.Option(help="Of the integrator, in s.")] = 1e-5,
+    step: Annotated[float, typer.Option(help="Step of the integrator, in s.")] = 1e-5,
     replicates: Annotated[
-        int, typer.Option(help="Runs beside each that nobody can tell from it, 0 to 15: they tell what is chance.")
+        int,
+        typer.Option(
+            help="Indistinguishable copies simulated beside each linkage, 0 to 15: their spread measures chaos."
+        ),
     ] = 3,
-    seed: Annotated[int, typer.Option(help="Of lhs and sobol.")] = 0,
-    workers: Annotated[int | None, typer.Option(help="Processes; as many as there are cores without it.")] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Dask scheduler to use instead: tcp://10.0.0.1:8786.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of lhs and sobol.")] = 0,
+    workers: Annotated[
+        int | None, typer.Option(help="Number of processes; the default is the number of cores.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, as in tcp://10.0.0.1:8786.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate a linkage with many clearances on several paths and keep the features of the error curves.
+    """Simulate a linkage with many clearances on several paths and store the features of its error curves.
 
-    Beside each linkage a few are simulated whose clearances differ by a nanometre: features are means over them, with
-    their spread, and it is said until when the runs are predictions. A sweep that was stopped goes on where it was when
-    the same command is given again. `armwright clearance estimate` learns from the folder what an error curve says of
-    the clearances.
+    Beside each linkage a few copies are simulated whose clearances differ by a nanometre: the features are means over
+    them, with their spread, and the command prints until when the runs are predictions. The same command resumes a
+    sweep that was interrupted. `armwright clearance estimate` learns from the folder how the error curves depend on the
+    clearances.
 
     **Example:** `armwright clearance sweep five-bar --design factorial -o out/sweep`
     """
@@ -72,48 +84,48 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
         replicates=replicates,
     )
     plan = _plan(task, design, (from_mm * 1e-3, to_mm * 1e-3), to_friction, levels=levels, runs=runs, seed=seed)
-    # Whatever is wrong with a path is said now, and a step too long for the least play; and the simulation is compiled
-    # once, not by every worker.
+    # A wrong path, or a step too long for the smallest clearance, is reported now; and the simulation is compiled once,
+    # not by every worker.
     if not (output / RESULTS).exists():
         with waiting(f"{task.linkage.name}: the first run compiles it", quiet=quiet or as_json):
             task(plan.points.min(axis=0, keepdims=True))
     with sweep_bar(f"{len(plan.points)} linkages on {len(task.paths)} paths", quiet=quiet or as_json) as progress:
         try:
-            found = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
+            results = run(task, plan, output, workers=workers, scheduler=scheduler, progress=progress)
         except BaseException as error:
-            error.add_note(f"what is finished is kept in '{output}', and the same command goes on from there")
+            error.add_note(f"finished runs are stored in '{output}'; the same command resumes the sweep")
             raise
-    with found:
-        failed = int((found["status"] != 0).sum())
-        chaos = _chaos(task, found)
+    with results:
+        failed = int((results["status"] != 0).sum())
+        chaos = _chaos(task, results)
     if as_json:
         summary = {"runs": len(plan.points), "failed": failed, "paths": list(task.paths), "folder": str(output)}
         print_json({**summary, "chaos": chaos})
     elif not quiet:
-        said = f", {failed} of them came to nothing" if failed else ""
-        print(f"{len(plan.points)} linkages on {', '.join(task.paths)}{said}: {output}")
-        for path, one in chaos.items():
-            left = f"; nothing but chance: {', '.join(one['chance'])}" if one["chance"] else ""
+        failures = f", {failed} of them failed" if failed else ""
+        print(f"{len(plan.points)} linkages on {', '.join(task.paths)}{failures}: {output}")
+        for path, limits in chaos.items():
+            chance = f"; dominated by chance: {', '.join(limits['chance'])}" if limits["chance"] else ""
             print(
-                f"{path}: predictable until t = {one['until']:.4g} s in half of the runs, {one['earliest']:.4g} s in "
-                f"all, of {one['duration']:.4g} s{left}"
+                f"{path}: predictable until t = {limits['until']:.4g} s in half of the runs, "
+                f"{limits['earliest']:.4g} s in all, of {limits['duration']:.4g} s{chance}"
             )
 
 
-def _chaos(task: "FeatureSweep", found: "Dataset") -> dict[str, dict[str, Any]]:
-    """Return by path until when its runs are predictions [s], and which features are left to chance."""
+def _chaos(task: "FeatureSweep", results: "Dataset") -> dict[str, dict[str, Any]]:
+    """Return, by path, until when its runs are predictions [s], and which features chance dominates."""
     import numpy as np
 
     from armwright.clearance.feature_sweep import is_chance
     from armwright.clearance.features import Features
     from armwright.clearance.paths import thesis_path
 
-    done = found["status"].to_numpy() == 0
+    done = results["status"].to_numpy() == 0
     if not task.replicates or not done.any():
         return {}
 
     def numbers(name: str) -> "Array":
-        return np.asarray(found[name].to_numpy()[done])
+        return np.asarray(results[name].to_numpy()[done])
 
     return {
         path: {
@@ -140,7 +152,7 @@ def _plan(
     runs: int,
     seed: int,
 ) -> "Design":
-    """Return which clearances [m] are simulated, and with which coefficients of friction."""
+    """Return the design of the sweep: clearances [m] and, if they are varied, coefficients of friction."""
     import numpy as np
 
     from armwright.arrays import integer

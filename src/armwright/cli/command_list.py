@@ -1,4 +1,4 @@
-"""The commands by name, and what each does, in the words of its own help: a list of them needs none of their modules."""
+"""The commands by name with the first sentence of their help: listing the commands imports none of their modules."""
 
 # ruff: noqa: E501 - a sentence a line
 
@@ -11,58 +11,58 @@ from armwright.cli.commands import App
 COMMANDS = {
     "run": "Run an RLO program in a simulated cell.",
     "check": "Check RLO programs without running them.",
-    "explain": "Explain the code of a message: what it means, what to do, a wrong program and a right one.",
-    "repl": "Try RLO out: each statement is done as it is entered, in a simulated cell, and can be taken back.",
-    "debug": "Run an RLO program step by step, forwards and back.",
-    "fmt": "Lay RLO programs out: one statement a line, indented, words of the language in upper case, comments kept.",
-    "fix": "Cure what is certain in RLO programs: a missing `;` or `=`, a matrix row by row, look-alike characters.",
-    "lsp": "Serve an editor that speaks the Language Server Protocol, over standard input and output.",
-    "code": "Show what a program becomes, or write it out so that it can be changed by hand and run.",
+    "explain": "Explain the code of a diagnostic: what it means, what to do, a wrong program and a correct one.",
+    "repl": "Enter RLO interactively: each statement is executed in a simulated cell, and can be undone.",
+    "debug": "Run an RLO program step by step, forwards and backwards.",
+    "fmt": "Format RLO programs: one statement per line, indented, keywords in upper case, comments preserved.",
+    "fix": "Correct the mistakes in RLO programs that have a certain correction, such as a missing `;` or `=`.",
+    "lsp": "Serve an editor by the Language Server Protocol, over standard input and output.",
+    "code": "Print the intermediate code of a program, or write it to a file that can be edited and run.",
     "arms": "List the arms of the catalogue.",
     "show": "Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.",
-    "convert": "Write an arm as URDF or as an arm file, and say what the file cannot hold.",
+    "convert": "Write an arm as URDF or as an arm file, and report what the format cannot represent.",
     "forward": "Print the tool pose for joint positions.",
-    "inverse": "Print every posture that puts the tool at a pose, judged: inside the limits, out of them, out of reach, singular.",
+    "inverse": "Print all solutions of the inverse kinematics of a pose, and whether each is within the joint limits.",
     "jacobian": "Print the Jacobian of the tool point: three linear rows, then three angular, in SI units and radians.",
-    "torque": "Print the efforts of a motion, in all and by cause, as the report's main program did.",
-    "singularity": "Print the factors of the Jacobian's determinant, which are near zero, and what the hand cannot do there.",
-    "simulate": "Let an arm go and follow it: friction, stops and weight included, with an account of the energy.",
-    "move": "Move an arm through the poses of a file.",
-    "iso9283": "Print the measures of ISO 9283 that measured poses and paths allow, with the cycles of each.",
-    "calibrate": "Find the errors of an arm from what its tool was measured at, and write the corrected arm.",
-    "plan-poses": "Propose poses inside the limits whose measured points tell most of an arm's errors.",
-    "study": "Run one of the sources' experiments and print its numbers beside ours.",
-    "kernel": "Print the kernel that a quantity is compiled to for an arm, and its operation count.",
-    "clearance": "Linkages with play in their pins: how they rattle, and what that does to the path.",
+    "torque": "Print the efforts of a motion, in total and by cause, as the report's main program did.",
+    "singularity": "Print the factors of the Jacobian's determinant, those near zero, and the lost directions of the tool.",
+    "simulate": "Simulate the free response of an arm with friction, stops and gravity, and print its energy balance.",
+    "move": "Plan a motion of an arm through the poses of a file.",
+    "iso9283": "Print the performance characteristics of ISO 9283 from measured poses and paths.",
+    "calibrate": "Identify the geometric errors of an arm from measured points of its tool, and write the corrected arm.",
+    "plan-poses": "Propose measurement configurations at which the errors of an arm are most observable.",
+    "study": "Repeat an experiment of the sources and print its published numbers beside the computed ones.",
+    "kernel": "Print the compiled kernel of a quantity for an arm, and its operation count.",
+    "clearance": "Simulate, estimate and correct linkages with clearance in their revolute joints.",
 }
-# Those whose module has another name than their own.
+# Commands whose module has another name.
 _MODULES = {"jacobian": "forward"}
 
 
 def register(app: App, words: Collection[str] | None) -> None:
-    """Add all commands to a collection.
+    """Add all commands to an application.
 
     Args:
-        app: takes them.
-        words: those of the command line: a command that none of them names is listed, and not imported. None: all are.
+        app: the application.
+        words: arguments of the command line; a command that is not among them is listed only. None: all are imported.
     """
-    for name, does in COMMANDS.items():
+    for name, summary in COMMANDS.items():
         if words is not None and name not in words:
-            app.command(name)(_listed(does))
+            app.command(name)(_placeholder(summary))
             continue
         function = name.replace("-", "_")
-        found: Any = getattr(import_module(f"armwright.cli.{_MODULES.get(name, function)}"), function)
-        if isinstance(found, App):
-            app.add_typer(found)
+        command: Any = getattr(import_module(f"armwright.cli.{_MODULES.get(name, function)}"), function)
+        if isinstance(command, App):
+            app.add_typer(command)
         else:
-            app.command(name)(found)
+            app.command(name)(command)
 
 
-def _listed(does: str) -> Callable[[], None]:
-    """Return what stands for a command that is not called."""
+def _placeholder(summary: str) -> Callable[[], None]:
+    """Return a function that is listed in place of a command whose module is not imported."""
 
     def command() -> None:
-        raise AssertionError(does)
+        raise AssertionError(summary)
 
-    command.__doc__ = does
+    command.__doc__ = summary
     return command

@@ -1,4 +1,4 @@
-"""How commands are declared: flags are shown without a type, and shells complete what may follow."""
+"""Classes of Typer adapted: flags are shown without a type, and files are checked when they are read."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,25 +6,25 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-# Of the program, as people call it; their shell asks it by a variable of its own what may follow.
+# Name of the program, and the environment variable by which a shell asks for completions.
 NAME = "armwright"
 COMPLETE = "_ARMWRIGHT_COMPLETE"
 
 
 def _without_values(parameters: list[Any]) -> list[Any]:
-    """Return parameters of which flags say no type: they take no value."""
-    for one in parameters:
-        if getattr(one, "is_flag", False):
-            one.metavar = ""
+    """Return the parameters, with the name of a value removed from flags, which take none."""
+    for parameter in parameters:
+        if getattr(parameter, "is_flag", False):
+            parameter.metavar = ""
     return parameters
 
 
-def _opened_later(function: Any) -> Any:
-    """Let whoever reads a file find out whether it can be read: one without permission is no wrong call."""
+def _without_permission_checks(function: Any) -> Any:
+    """Return a command whose file arguments are not tested for permission, which is an error of the file, not of usage."""
     for annotation in function.__annotations__.values():
-        for said in getattr(annotation, "__metadata__", ()):
-            if hasattr(said, "readable"):
-                said.readable = False
+        for declaration in getattr(annotation, "__metadata__", ()):
+            if hasattr(declaration, "readable"):
+                declaration.readable = False
     return function
 
 
@@ -37,7 +37,7 @@ class Command(TyperCommand):
 
 
 class Group(TyperGroup):
-    """A command that has commands."""
+    """A group of commands."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Return its own options."""
@@ -45,9 +45,9 @@ class Group(TyperGroup):
 
 
 class App(typer.Typer):
-    """A collection of commands."""
+    """An application or a group of commands."""
 
     def command(self, *arguments: Any, **settings: Any) -> Callable[[Any], Any]:
-        """Take a function as a command."""
-        take = super().command(*arguments, **{"cls": Command, **settings})
-        return lambda function: take(_opened_later(function))
+        """Return a decorator that registers a function as a command."""
+        register = super().command(*arguments, **{"cls": Command, **settings})
+        return lambda function: register(_without_permission_checks(function))

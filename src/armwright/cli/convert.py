@@ -1,4 +1,4 @@
-"""``armwright convert``: an arm from one file format to another."""
+"""``armwright convert``: convert an arm from one file format to another."""
 
 import math
 from pathlib import Path
@@ -17,17 +17,15 @@ if TYPE_CHECKING:
 def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
     output: Annotated[Path, typer.Option("-o", "--output", help="File to write: .urdf, or .toml for an arm file.")],
-    base: Annotated[str | None, typer.Option(help="Of a URDF file: the link that stands still.")] = None,
-    tip: Annotated[str | None, typer.Option(help="Of a URDF file: the link that is the tool.")] = None,
+    base: Annotated[str | None, typer.Option(help="Base link of a URDF file.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Tool link of a URDF file.")] = None,
     lock: Annotated[
         str | None,
-        typer.Option(
-            help="Of a URDF file: joints to hold, as those of a gripper, at 0 or elsewhere: J1,J2=30 (degrees, or mm)."
-        ),
+        typer.Option(help="Joints of a URDF file to lock, at 0 or a position in degrees or mm, as in J1,J2=30."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
 ) -> None:
-    """Write an arm as URDF or as an arm file, and say what the file cannot hold.
+    """Write an arm as URDF or as an arm file, and report what the format cannot represent.
 
     **Example:** `armwright convert puma560 -o puma560.urdf`
     """
@@ -39,46 +37,49 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
     if kind not in {".urdf", ".toml"}:
         raise typer.BadParameter(f"expected a name that ends in .urdf or .toml, got {output}", param_hint="-o")
     if output.exists() and Path(arm).exists() and output.samefile(arm):
-        raise typer.BadParameter("this is the file that is read; it may hold more than an arm", param_hint="-o")
+        raise typer.BadParameter(
+            "expected another file than the input, which may hold more than an arm", param_hint="-o"
+        )
     model, notes = _read(arm, base, tip, lock)
     lost = lost_in_urdf(model) if kind == ".urdf" else []
     write_file(output, urdf_text(model) if kind == ".urdf" else toml_text(model))
     if as_json:
-        said = {"written": str(output), "name": model.name, "joints": model.n, "notes": notes, "lost": lost}
-        print_json(said)
+        print_json({"written": str(output), "name": model.name, "joints": model.n, "notes": notes, "lost": lost})
         return
     print(f"{model.name}: {counted(model.n, 'joint')} written to {output}")
     for sentence in (*notes, *lost):
         print(f"  {sentence}")
 
 
-def _held(path: str, text: str | None) -> "dict[str, float]":
-    """Read where joints of a file are held, in degrees or millimetres, as SI."""
+def _locked_positions(path: str, text: str | None) -> "dict[str, float]":
+    """Read the positions of locked joints, in degrees or millimetres, and return them in SI units."""
     from armwright.arm.urdf.robot import read_robot
 
-    parts = [one.rpartition("=") if "=" in one else (one, "", "0") for one in (text or "").split(",") if one]
+    parts = [item.rpartition("=") if "=" in item else (item, "", "0") for item in (text or "").split(",") if item]
     kinds = {joint.name: joint.kind for joint in read_robot(Path(path)).above.values()} if text else {}
-    held = {}
+    locked = {}
     for name, _, value in parts:
         try:
             position = float(value)
         except ValueError:
             raise typer.BadParameter(f"expected J1,J2=30, got {value!r} for {name}", param_hint="--lock") from None
-        if name in held:
-            raise typer.BadParameter(f"{name} is given twice; expected each joint once", param_hint="--lock")
-        held[name] = position * 1e-3 if kinds.get(name) == "prismatic" else math.radians(position)
-    return held
+        if name in locked:
+            raise typer.BadParameter(f"{name} occurs twice; expected each joint once", param_hint="--lock")
+        locked[name] = position * 1e-3 if kinds.get(name) == "prismatic" else math.radians(position)
+    return locked
 
 
 def _read(name: str, base: str | None, tip: str | None, lock: str | None) -> "tuple[Arm, list[str]]":
-    """Return an arm, and what was not taken as it stands in its file."""
+    """Return an arm, and notes on what its file states otherwise."""
     from armwright.arm.load import load_arm
     from armwright.arm.urdf.reader import read_urdf
 
     if name.lower().endswith(".urdf"):
-        reading = read_urdf(name, base=base, tip=tip, lock=_held(name, lock))
+        reading = read_urdf(name, base=base, tip=tip, lock=_locked_positions(name, lock))
         return reading.arm, list(reading.notes)
     for option, value in (("--base", base), ("--tip", tip), ("--lock", lock)):
         if value:
-            raise typer.BadParameter(f"only URDF files have links and joints to name, not '{name}'", param_hint=option)
+            raise typer.BadParameter(
+                f"expected a URDF file, whose links and joints have names, got '{name}'", param_hint=option
+            )
     return load_arm(name), []

@@ -1,4 +1,4 @@
-"""``armwright debug``: a program step by step, in an editor or on the terminal."""
+"""``armwright debug``: run a program step by step, in an editor or on the terminal."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,23 +16,25 @@ if TYPE_CHECKING:
 
 def debug(
     program: Annotated[
-        Path | None, typer.Argument(help="The program; without one, editors are served over stdio.")
+        Path | None, typer.Argument(help="The program; without it, an editor is served over standard input and output.")
     ] = None,
     cell: CellFile = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
 ) -> None:
-    """Run an RLO program step by step, forwards and back.
+    """Run an RLO program step by step, forwards and backwards.
 
-    With a program it is a debugger on the terminal; `help` lists its commands. Without one it speaks the Debug
-    Adapter Protocol over stdin and stdout, for editors: their launch names program, cell, std,
-    strict, stopOnEntry and output.
+    With a program, the debugger runs on the terminal; `help` lists its commands. Without a program, it serves an editor
+    by the Debug Adapter Protocol over standard input and output; the editor's launch configuration has the keys program,
+    cell, std, strict, stopOnEntry and output.
 
     **Example:** `armwright debug examples/stacking.rlo --cell examples/stanford_cell.toml`
     """
     if program is None:
         if cell is not None:
-            raise typer.BadParameter("an editor names the cell in its launch", param_hint="--cell")
+            raise typer.BadParameter(
+                "expected a program; an editor names the cell in its launch configuration", param_hint="--cell"
+            )
         _serve()
         return
     from armwright.cli.debug_terminal import Terminal
@@ -49,7 +51,7 @@ def debug(
 
 
 def _serve() -> None:
-    """Speak the protocol; whatever else is printed must not get into it."""
+    """Serve an editor by the Debug Adapter Protocol, to which other output must not be added."""
     import os
     import sys
 
@@ -63,13 +65,13 @@ def _serve() -> None:
 
 
 def load(launch: "Launch") -> "Loaded":
-    """Return the program of a session, with its cell.
+    """Return the compiled program of a session with its cell.
 
     Raises:
-        LoadError: it has errors, or no cell to run in.
+        LoadError: the program has errors, or no cell to run in.
         FileFormatError: a file cannot be read.
     """
-    from armwright.cli.programs import given_cell, imported_files
+    from armwright.cli.programs import imported_files, read_cell_option
     from armwright.files.inputs import read_program
     from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
@@ -78,30 +80,31 @@ def load(launch: "Launch") -> "Loaded":
     from armwright.program.language.diagnostic import count_line
     from armwright.program.language_server.cell_lookup import Cells
 
-    given = given_cell(launch.cell)
+    cell = read_cell_option(launch.cell)
     if launch.program.suffix == CODE_SUFFIX:
-        if given is None:
+        if cell is None:
             message = f"{launch.program.name} needs a cell to run in"
             raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
-        return Loaded(code=assemble(read_program(launch.program), str(launch.program)), cell=given, is_listed=True)
-    if given is None:
-        around = Cells().around(launch.program.parent, read_program(launch.program), None).file
-        given = None if around is None else around.cell
-    compiled = compile_program(launch.program, given, strict=launch.strict, std=launch.std)
-    place = compiled.cell
+        return Loaded(code=assemble(read_program(launch.program), str(launch.program)), cell=cell, is_listed=True)
+    if cell is None:
+        nearby = Cells().around(launch.program.parent, read_program(launch.program), None).file
+        cell = None if nearby is None else nearby.cell
+    compiled = compile_program(launch.program, cell, strict=launch.strict, std=launch.std)
     if compiled.code is None:
         raise LoadError(
             count_line(compiled.diagnostics, compiled.source), render(compiled.diagnostics, compiled.source)
         )
-    if place is None:
-        message = f"{launch.program.name} needs a cell to run in: it IMPORTs none, and beside it there is not just one"
+    if compiled.cell is None:
+        message = (
+            f"{launch.program.name} needs a cell to run in: it IMPORTs none, and its folder does not have exactly one"
+        )
         raise LoadError(message, f"{message}\n", ExitStatus.USAGE)
     imports = imported_files(launch.program, compiled)
-    return Loaded(code=compiled.code, cell=place, diagnostics=compiled.diagnostics, imports=imports)
+    return Loaded(code=compiled.code, cell=compiled.cell, diagnostics=compiled.diagnostics, imports=imports)
 
 
 def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
-    """Write what a run leaves, as ``armwright run -o`` does; return a line that says where.
+    """Write the results of a run as ``armwright run -o`` does; return a line with the path of the report.
 
     Raises:
         OutputError: the folder cannot be written.
@@ -110,7 +113,7 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
     from armwright.program.vm.interpreter import warnings
     from armwright.report.files import Origin, result_files, run_record
 
-    assert launch.output is not None  # noqa: S101 - asked for only then
+    assert launch.output is not None  # noqa: S101 - the session calls this only with an output
     origin = Origin(
         program=launch.program,
         cell=launch.cell,
@@ -120,6 +123,6 @@ def save(launch: "Launch", loaded: "Loaded", recording: "Recording") -> str:
     )
     failed = () if recording.failure is None else (recording.failure.diagnostic,)
     diagnostics = (*loaded.diagnostics, *warnings(recording), *failed)
-    made = (recording, loaded.code, diagnostics, origin)
-    write_folder(launch.output, result_files(*made), run_record(*made))
+    results = (recording, loaded.code, diagnostics, origin)
+    write_folder(launch.output, result_files(*results), run_record(*results))
     return f"report{' up to the failure' if failed else ''}: {launch.output / 'report.html'}"

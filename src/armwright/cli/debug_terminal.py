@@ -1,5 +1,6 @@
-"""The debugger on a terminal: a line of command, an answer."""
+"""The debugger on a terminal: reads commands line by line and prints their results."""
 
+import functools
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -16,19 +17,19 @@ if TYPE_CHECKING:
     from armwright.program.debugger.stop_reason import Stop
 
 _HELP = """\
-n         next statement, over procedures         back      back to the statement before
+n         next statement, over procedures         back      back to the previous statement
 s         next statement, into procedures         tback     back by one servo tick
 o         out of the procedure                    rc        back to the last breakpoint
 g         next stage of a MOVE                    c         on to the next breakpoint
 t [N]     on by N servo ticks                     b LINE [if CONDITION]   stop at a line
-d FRAME   stop when it moves or changes           x N       forget breakpoint N
-p EXPR    a value                                 set NAME = EXPR         another value
-frames    the tree of frames                      vars      all variables
+d FRAME   stop when it moves or changes           x N       delete breakpoint N
+p EXPR    print a value                           set NAME = EXPR         assign a value
+frames    the frame tree                          vars      all variables
 where     where all processes are                 list      the program around here
-th N      look at process N                       q         leave
-Whole words do as well: next, step, out, stage, continue, break, print, quit.
+th N      select process N                        q         quit
+Full words are accepted too: next, step, out, stage, continue, break, print, quit.
 An empty line repeats the last step. Ctrl-C stops a program that runs."""
-# What users of other debuggers type.
+# Commands in full, as users of other debuggers type them.
 _WHOLE_WORDS = {
     "next": "n",
     "step": "s",
@@ -40,17 +41,17 @@ _WHOLE_WORDS = {
     "print": "p",
     "delete": "x",
 }
-# Lines shown around the present one.
+# Lines listed before and after the current line.
 _AROUND = 5
 _SLICE = 0.05
 _PROMPT = "(rlo) "
-# No count, and no number of a breakpoint or process, has more.
+# Digits of a count, or of the number of a breakpoint or process, at most.
 _MOST_DIGITS = 15
-_ALL_OF_IT = "`armwright run -o FOLDER` keeps all in events.jsonl"
+_EVENT_LOG_HINT = "`armwright run -o FOLDER` writes all to events.jsonl"
 
 
 class Terminal:
-    """A session on a terminal."""
+    """A session of the debugger on a terminal."""
 
     def __init__(self, loaded: "Loaded") -> None:
         """Load the program."""
@@ -62,12 +63,12 @@ class Terminal:
         self._last, self._script = "", Script()
         self._interrupted = False
         self._commands: dict[str, Callable[[str], None]] = {
-            **{word: self._going(command) for word, command in _STEPS.items()},
+            **{word: functools.partial(self._resume, command) for word, command in _STEPS.items()},
             "t": self._ticks,
             "b": self._break,
             "d": self._watch,
             "x": self._forget,
-            "p": self._print,
+            "p": self._show,
             "set": self._set,
             "frames": lambda _: self._show("frames"),
             "vars": self._variables,
@@ -78,7 +79,7 @@ class Terminal:
         }
 
     def run(self) -> ExitStatus:
-        """Read commands until the user leaves; return how the program has ended, or that it has not."""
+        """Read commands until the user quits; return the exit status of the program, 0 if it has not ended."""
         self._debugger.begin()
         self._finish()
         while True:
@@ -101,27 +102,24 @@ class Terminal:
         return line
 
     def _do(self, line: str) -> None:
-        word, _, rest = line.partition(" ")
+        word, _, argument = line.partition(" ")
         word = _WHOLE_WORDS.get(word, word)
         command = self._commands.get(word)
         if command is None:
             if line:
-                print(f"no command `{word}`; `help` lists them")
+                print(f"unknown command `{word}`; `help` lists the commands")
             return
         self._last = line if word in {*_STEPS, "t"} else ""
         try:
-            command(rest.strip())
+            command(argument.strip())
         except ArmwrightError as error:
             print(error)
 
-    # ---- going on --------------------------------------------------------------------------------------------------
+    # ---- execution -------------------------------------------------------------------------------------------------
 
-    def _going(self, command: "Command") -> Callable[[str], None]:
-        def go(_: str) -> None:
-            self._debugger.resume(command, self._path)
-            self._finish()
-
-        return go
+    def _resume(self, command: "Command", _: str) -> None:
+        self._debugger.resume(command, self._path)
+        self._finish()
 
     def _ticks(self, count: str) -> None:
         for _ in range(_number(count) if count else 1):
@@ -129,11 +127,11 @@ class Terminal:
             stop = self._work()
             if stop.reason != "step":
                 break
-        self._tell()
+        self._print_stop()
 
     def _finish(self) -> None:
         self._work()
-        self._tell()
+        self._print_stop()
 
     def _work(self) -> "Stop":
         from armwright.program.vm.excerpt import ON_A_TERMINAL, listed
@@ -142,8 +140,8 @@ class Terminal:
         with self._interruptible():
             while True:
                 stop = debugger.work(_SLICE)
-                news = [one for one in debugger.news() if one.kind not in {"PLACE", "LOCK"}]
-                for text in listed([f"{one.t1:9.3f} s  {one.text}" for one in news], ON_A_TERMINAL, _ALL_OF_IT):
+                news = [effect for effect in debugger.news() if effect.kind not in {"PLACE", "LOCK"}]
+                for text in listed([f"{e.t1:9.3f} s  {e.text}" for e in news], ON_A_TERMINAL, _EVENT_LOG_HINT):
                     print(text)
                 if self._interrupted and debugger.running:
                     stop = debugger.pause()
@@ -152,7 +150,7 @@ class Terminal:
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
-        """Let Ctrl-C stop the program, not the debugger."""
+        """Stop the program, not the debugger, on Ctrl-C."""
 
         def interrupt(_signal: int, _frame: object) -> None:
             self._interrupted = True
@@ -164,61 +162,57 @@ class Terminal:
         finally:
             signal.signal(signal.SIGINT, before)
 
-    def _tell(self) -> None:
+    def _print_stop(self) -> None:
         from armwright.program.diagnostics.render import render
 
         debugger, stop = self._debugger, self._debugger.stop
-        assert stop is not None  # noqa: S101 - it stands still
+        assert stop is not None  # noqa: S101 - the program is stopped
         source = self._loaded.code.source
         if stop.diagnostic is not None:
             print(render([stop.diagnostic], source), end="")
-        self._path = stop.path if any(one.path == stop.path for one in debugger.processes) else ()
-        reasons = {"step": "", "entry": ""}
-        why = stop.text or reasons.get(stop.reason, stop.reason)
+        self._path = stop.path if any(process.path == stop.path for process in debugger.processes) else ()
+        reason = stop.text or ("" if stop.reason in {"step", "entry"} else stop.reason)
         if stop.over:
-            print(f"{debugger.time:9.3f} s  the program is over; it can still be taken back")
+            print(f"{debugger.time:9.3f} s  the program has ended; `back` still undoes its statements")
             return
         frame = debugger.stack(self._path)[0]
         line = source.line(frame.span.start)
-        print(f"{debugger.time:9.3f} s  {frame.title}, line {line}{': ' + why if why else ''}")
+        print(f"{debugger.time:9.3f} s  {frame.title}, line {line}{': ' + reason if reason else ''}")
         print(f"{line:>5}  {source.line_text(line)}")
 
     # ---- breakpoints -----------------------------------------------------------------------------------------------
 
-    def _break(self, rest: str) -> None:
-        line, _, condition = rest.partition(" if ")
-        found = self._debugger.break_at(_number(line), condition=condition.strip())
-        if found.start is None:
-            print(found.message)
-            self._debugger.forget(found.number)
+    def _break(self, argument: str) -> None:
+        line, _, condition = argument.partition(" if ")
+        breakpoint_ = self._debugger.break_at(_number(line), condition=condition.strip())
+        if breakpoint_.start is None:
+            print(breakpoint_.message)
+            self._debugger.forget(breakpoint_.number)
         else:
-            print(f"breakpoint {found.number} in line {found.start.line}")
+            print(f"breakpoint {breakpoint_.number} in line {breakpoint_.start.line}")
 
     def _watch(self, name: str) -> None:
-        kept = self._debugger.evaluate(name, self._path).kept
-        watch = self._debugger.watch(kept or name)
+        variable = self._debugger.evaluate(name, self._path).kept
+        watch = self._debugger.watch(variable or name)
         print(f"breakpoint {watch.number}: when {name} changes")
 
     def _forget(self, number: str) -> None:
         if not self._debugger.forget(_number(number)):
             print(f"there is no breakpoint {number}")
 
-    # ---- looking ---------------------------------------------------------------------------------------------------
-
-    def _print(self, text: str) -> None:
-        self._show(text)
+    # ---- inspection ------------------------------------------------------------------------------------------------
 
     def _show(self, text: str) -> None:
         shown = self._debugger.evaluate(text, self._path)
         print(f"{shown.value}  {shown.type}".rstrip())
 
-    def _set(self, rest: str) -> None:
-        name, _, text = rest.partition("=")
-        kept = self._debugger.evaluate(name.strip(), self._path).kept
-        if kept is None:
-            print(f"`{name.strip()}` cannot be given a value")
+    def _set(self, argument: str) -> None:
+        name, _, text = argument.partition("=")
+        variable = self._debugger.evaluate(name.strip(), self._path).kept
+        if variable is None:
+            print(f"cannot assign to `{name.strip()}`")
             return
-        print(self._debugger.assign(kept, text.strip(), self._path).value)
+        print(self._debugger.assign(variable, text.strip(), self._path).value)
 
     def _variables(self, _: str) -> None:
         for scope in self._debugger.scopes(self._path):
@@ -242,11 +236,11 @@ class Terminal:
 
     def _thread(self, number: str) -> None:
         processes = self._debugger.processes
-        at = _number(number)
-        if not 1 <= at <= len(processes):
-            print(f"expected 1 to {len(processes)}, the number of a process")
+        index = _number(number)
+        if not 1 <= index <= len(processes):
+            print(f"expected the number of a process, 1 to {len(processes)}, got {index}")
             return
-        self._path = processes[at - 1].path
+        self._path = processes[index - 1].path
         self._where("")
 
 
@@ -269,5 +263,5 @@ class _NumberError(ArmwrightError, ValueError):
 def _number(text: str) -> int:
     number = text.strip()
     if not number.isdecimal() or len(number) > _MOST_DIGITS:
-        raise _NumberError(f"expected a whole number, got `{shortened(number)}`")
+        raise _NumberError(f"expected an integer, got `{shortened(number)}`")
     return int(number)

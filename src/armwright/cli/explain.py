@@ -1,9 +1,9 @@
-"""``armwright explain``: what the code of a message means, with a wrong program and a right one."""
+"""``armwright explain``: what the code of a diagnostic means, with a wrong program and a correct one."""
 
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 
 _WIDTH = 80
 _INDENT = "    "
-# Does not end a line.
+# A blank at which no line is broken.
 _BLANK = "\N{NO-BREAK SPACE}"
 
 
 def explain(
     code: Annotated[
         str | None,
-        typer.Argument(help="Of a message, such as E206; without one all codes are listed.", autocompletion=codes),
+        typer.Argument(help="Code of a diagnostic, as in E206; without it all codes are listed.", autocompletion=codes),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
 ) -> None:
-    """Explain the code of a message: what it means, what to do, a wrong program and a right one.
+    """Explain the code of a diagnostic: what it means, what to do, a wrong program and a correct one.
 
     **Example:** `armwright explain E206`
     """
@@ -45,15 +45,15 @@ def explain(
 
     page = explanation(code)
     source = Source("wrong.rlo", page.wrong)
-    said = answer(source)
+    diagnostics = answer(source)
     if as_json:
-        _print_json(page, said, source)
+        _print_json(page, diagnostics, source)
         return
     console = clean_console()
     if console.is_terminal:
-        _show(console, page, said, source)
+        _show(console, page, diagnostics, source)
     else:
-        print("\n".join(_plain(page, said, source)))
+        print("\n".join(_plain(page, diagnostics, source)))
 
 
 def _list(*, as_json: bool) -> None:
@@ -68,41 +68,40 @@ def _list(*, as_json: bool) -> None:
         ]
         print_json(rows)
         return
-    for number, (name, about) in enumerate(ranges().items()):
-        print(f"{chr(10) if number else ''}{name}")
-        for code in about:
+    for index, (name, codes_of_range) in enumerate(ranges().items()):
+        print(f"{chr(10) if index else ''}{name}")
+        for code in codes_of_range:
             print(f"  {code}  {explanation(code).title}")
 
 
-def _print_json(page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> None:
+def _print_json(page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> None:
     import attrs
 
     from armwright.program.language.diagnostic import to_json
 
-    data: dict[str, Any] = {**attrs.asdict(page), "diagnostics": [to_json(one, source) for one in said]}
-    print_json(data)
+    print_json({**attrs.asdict(page), "diagnostics": [to_json(diagnostic, source) for diagnostic in diagnostics]})
 
 
-def _plain(page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:
+def _plain(page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> Iterator[str]:
     """Return a page as lines of plain text."""
     from armwright.program.diagnostics.render import render
 
     yield f"{page.code}: {page.title}"
     for paragraph in page.text.split("\n\n"):
         yield ""
-        # What stands in backquotes stays on one line.
-        whole = re.sub(r"`[^`]+`", lambda quoted: quoted[0].replace(" ", _BLANK), paragraph)
-        for line in textwrap.wrap(whole, _WIDTH, break_long_words=False, break_on_hyphens=False):
+        # Text in backquotes is not broken.
+        unbroken = re.sub(r"`[^`]+`", lambda quoted: quoted[0].replace(" ", _BLANK), paragraph)
+        for line in textwrap.wrap(unbroken, _WIDTH, break_long_words=False, break_on_hyphens=False):
             yield line.replace(_BLANK, " ")
     yield "\nWrong:\n"
     yield textwrap.indent(page.wrong, _INDENT)
-    yield render(said, source)
+    yield render(diagnostics, source)
     yield "Right:\n"
     yield textwrap.indent(page.right, _INDENT).rstrip()
 
 
-def _show(console: "Console", page: "Page", said: "Sequence[Diagnostic]", source: "Source") -> None:
-    """Print a page for a person who watches."""
+def _show(console: "Console", page: "Page", diagnostics: "Sequence[Diagnostic]", source: "Source") -> None:
+    """Print a page on a terminal, with styles."""
     from rich.markdown import Markdown
     from rich.text import Text
 
@@ -112,13 +111,13 @@ def _show(console: "Console", page: "Page", said: "Sequence[Diagnostic]", source
     console.print(Markdown(page.text), width=min(console.width, _WIDTH))
     console.print(Text("\nWrong\n", "bold"))
     console.print(_coloured(page.wrong), soft_wrap=True)
-    console.print(render_rich(said, source), soft_wrap=True)
+    console.print(render_rich(diagnostics, source), soft_wrap=True)
     console.print(Text("Right\n", "bold"))
     console.print(_coloured(page.right), soft_wrap=True, end="")
 
 
 def _coloured(program: str) -> "Text":
-    """Return a program in colour, indented."""
+    """Return a program with its syntax highlighted, indented."""
     from rich.syntax import Syntax
     from rich.text import Text
 

@@ -1,4 +1,4 @@
-"""How a command ends that could not do what was asked: one message, or one JSON document, and its exit status."""
+"""How a failed command ends: with one message or one JSON document, and an exit status."""
 
 import contextlib
 import errno
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import FrameType
 
-# Set to anything, an error of our own shows where it arose.
+# An environment variable; where it is set, internal errors are printed with a traceback.
 DEBUG = "ARMWRIGHT_DEBUG"
-# What a wrong call raises: a base of all such errors of Typer, whose place depends on its version.
+# The base class of Typer's errors of usage; the module that defines it depends on Typer's version.
 _CallError: type[Exception] = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
 _OUTPUTS = ("-o", "--output")
-# How an output answers that cannot be written; such errors name no file.
+# Errors of a standard output that cannot be written; they name no file.
 _OUTPUT_FAILS = {
     errno.EPIPE,
     errno.ENOSPC,
@@ -40,39 +40,39 @@ _OUTPUT_FAILS = {
     errno.EINVAL,
 }
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-# How long a signal waits that nobody has heard [s].
+# Delay after which a signal that was lost is sent again [s].
 _AGAIN = 0.02
 
 
 class Interrupted(BaseException):
-    """A signal asks the command to end; an exception of our own, since Typer takes KeyboardInterrupt for itself."""
+    """A signal interrupts the command; a class of our own, since Typer handles KeyboardInterrupt itself."""
 
     def __init__(self, number: int) -> None:
-        """Keep the number of the signal."""
+        """Store the number of the signal."""
         self.number = number
         super().__init__(number)
 
 
 class _Raised(BaseException):
-    """Carries past Typer an error that it would end on by itself."""
+    """Wraps an error that Typer would handle itself."""
 
     def __init__(self, error: Exception) -> None:
         self.error = error
 
 
 class Commands(Group):
-    """All commands; what they raise arrives in ``main`` whatever it is."""
+    """All commands; every error that they raise reaches ``run_and_exit``."""
 
     def make_context(self, *arguments: Any, **settings: Any) -> Any:
         """Read the options before the command."""
         try:
-            _refuse_nameless_output(sys.argv[1:])
+            _refuse_empty_output(sys.argv[1:])
             return super().make_context(*arguments, **settings)
         except _CallError as error:
-            raise _harmless(error) from None
+            raise _escaped(error) from None
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write what can be asked for, without Rich, which takes longer than all else."""
+        """Write the help text without Rich, whose import takes longer than everything else."""
         self.format_usage(ctx, formatter)
         for paragraph in (self.help or "").split("\n\n"):
             formatter.write_paragraph()
@@ -81,45 +81,45 @@ class Commands(Group):
         self.format_options(ctx, formatter)
 
     def format_commands(self, _ctx: Any, formatter: Any) -> None:
-        """Write the commands, each with the whole of its first sentence."""
+        """Write the commands, each with the complete first sentence of its help."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, (self.commands[name].help or "").split("\n\n")[0]) for name in self.commands])
 
     def invoke(self, ctx: Any) -> Any:
-        """Call the command that was asked for."""
+        """Call the requested command."""
         try:
             return super().invoke(ctx)
         except _CallError as error:
-            raise _harmless(error) from None
+            raise _escaped(error) from None
         except (EOFError, OSError) as error:
             raise _Raised(error) from error
 
 
-def _refuse_nameless_output(words: list[str]) -> None:
-    """Refuse an output without a name, which a path would take for the current folder: a variable was not set."""
+def _refuse_empty_output(words: list[str]) -> None:
+    """Refuse an empty output path, from a variable that is not set: it would denote the current folder."""
     for word, after in itertools.pairwise([*words, "-"]):
         if (word in _OUTPUTS and not after) or word in {f"{option}=" for option in _OUTPUTS}:
             raise typer.BadParameter("expected a path, got an empty text", param_hint=word.rstrip("="))
 
 
-def _harmless(error: Exception) -> Exception:
-    """Return what is said of a wrong call without what a terminal would obey: Typer shows it in colours by itself."""
+def _escaped(error: Exception) -> Exception:
+    """Return an error of usage with control characters escaped, as Typer prints such errors itself."""
     for name, value in vars(error).items():
         if isinstance(value, str):
             setattr(error, name, cleaned(value))
-        elif isinstance(value, list | tuple) and all(isinstance(one, str) for one in value):
-            setattr(error, name, [cleaned(one) for one in value])
+        elif isinstance(value, list | tuple) and all(isinstance(text, str) for text in value):
+            setattr(error, name, [cleaned(text) for text in value])
     return error
 
 
 def run_and_exit(app: "Callable[..., Any]") -> None:
     """Run the command line and end with its status; an error becomes a message, under ``--json`` a document."""
-    as_json = _read_by_a_program(sys.argv[1:])
+    as_json = _json_requested(sys.argv[1:])
     try:
         status = _status(app, as_json=as_json)
         sys.stdout.flush()
     except BrokenPipeError:
-        # The reader of our output has gone (as in `armwright show ur5 | head`): nothing is left to say.
+        # The reader of our output has ended, as in `armwright show ur5 | head`.
         _forget_output()
         status = ExitStatus.BROKEN_PIPE
     except OSError as error:
@@ -129,34 +129,34 @@ def run_and_exit(app: "Callable[..., Any]") -> None:
     sys.exit(status)
 
 
-def _read_by_a_program(words: list[str]) -> bool:
-    """Whether JSON is asked for."""
+def _json_requested(words: list[str]) -> bool:
+    """Whether the arguments of the command line request JSON."""
     return "--json" in words or "--format=json" in words or ("--format", "json") in itertools.pairwise(words)
 
 
 def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
-    """Run the command line; return its exit status, what is wrong having been told.
+    """Run the command line, print the message of an error, and return the exit status.
 
     Raises:
-        OSError: the output cannot be written; a ``BrokenPipeError``: nobody reads it any more.
+        OSError: the output cannot be written; ``BrokenPipeError``: its reader has ended.
     """
     try:
-        # Typer shows a wrong call itself, with the usage of the command, unless a program reads along.
+        # Typer prints an error of usage itself, with the usage of the command, unless JSON is requested.
         with _interruptible():
             return int(app(standalone_mode=not as_json, prog_name=NAME) or ExitStatus.DONE)
     except SystemExit as end:
         if isinstance(end.__context__, BrokenPipeError):
-            # Rich has met it, and ended with a status of its own.
+            # Rich caught it, and exited with a status of its own.
             raise end.__context__ from None
         return end.code if isinstance(end.code, int) else ExitStatus.DONE
     except _Raised as raised:
         error: BaseException = raised.error
-    except (Exception, Interrupted) as other:  # noqa: BLE001 - all that is not foreseen is our fault, and told as such
+    except (Exception, Interrupted) as other:  # noqa: BLE001 - unforeseen errors are reported as defects
         error = other
     if isinstance(error, OSError) and error.filename is None and error.errno in _OUTPUT_FAILS:
         raise error
-    status, message = _judged(error)
-    # Of a check that failed, and of a doubtful result, the document is printed already: what was found.
+    status, message = _status_and_message(error)
+    # The document of a failed check or a doubtful result has been printed with its result.
     if as_json and not isinstance(error, CheckFailedError | DoubtfulError):
         print_json(failure_data(status, error, message))
     else:
@@ -164,27 +164,27 @@ def _status(app: "Callable[..., Any]", *, as_json: bool) -> int:
     return status
 
 
-def _judged(error: BaseException) -> tuple[int, str]:
-    """Return with which status an error ends a command, and what is said."""
+def _status_and_message(error: BaseException) -> tuple[int, str]:
+    """Return the exit status and the message of an error."""
     match error:
         case ArmwrightError():
             return error.exit_status, str(error)
         case _CallError():
             return ExitStatus.USAGE, error.format_message()  # type: ignore[attr-defined]
         case Interrupted():
-            # A command that leaves something behind says so in a note.
+            # A command that has stored results adds a note to the exception.
             written = ", ".join(f"'{folder}'" for folder in WRITTEN)
-            said = f"the results are written: {written}" if written else "nothing was written"
-            notes = getattr(error, "__notes__", [said])
+            results = f"the results are written: {written}" if written else "nothing was written"
+            notes = getattr(error, "__notes__", [results])
             return 128 + error.number, "; ".join(["interrupted", *notes])
         case OSError():
-            gone = "the current folder" if error.errno == errno.ENOENT else "a file"
-            what = gone if error.filename is None else f"'{error.filename}'"
-            return ExitStatus.FILE, f"cannot read or write {what}: {error.strerror or error}"
+            unnamed = "the current folder" if error.errno == errno.ENOENT else "a file"
+            file = unnamed if error.filename is None else f"'{error.filename}'"
+            return ExitStatus.FILE, f"cannot read or write {file}: {error.strerror or error}"
         case MemoryError():
-            return ExitStatus.INFEASIBLE, "this takes more memory than there is"
+            return ExitStatus.INFEASIBLE, "this needs more memory than is available"
         case _:
-            return ExitStatus.INTERNAL_ERROR, _our_fault(error)
+            return ExitStatus.INTERNAL_ERROR, _defect_message(error)
 
 
 def failure_data(status: int, error: BaseException, message: str) -> dict[str, Any]:
@@ -192,8 +192,8 @@ def failure_data(status: int, error: BaseException, message: str) -> dict[str, A
 
     Args:
         status: the exit status.
-        error: what was raised.
-        message: what is said of it.
+        error: the exception.
+        message: its text.
     """
     details: dict[str, Any] = {"class": type(error).__name__, "message": message}
     if isinstance(error, FileFormatError):
@@ -202,39 +202,39 @@ def failure_data(status: int, error: BaseException, message: str) -> dict[str, A
 
 
 def outcome(error: ArmwrightError | None) -> dict[str, Any]:
-    """Return how a command ends that prints a result as JSON: its status, and what is wrong with the result."""
+    """Return the exit status, and the error if there is one, for the JSON document of a result."""
     if error is None:
         return {"exit_status": int(ExitStatus.DONE)}
     return failure_data(error.exit_status, error, str(error))
 
 
-def _our_fault(error: BaseException) -> str:
-    """Say where a defect of armwright showed, and what its user can do; with the traceback where it is asked for."""
+def _defect_message(error: BaseException) -> str:
+    """Return a message that locates a defect of armwright and asks for a report; print a traceback where it is set."""
     if os.environ.get(DEBUG):
         traceback.print_exception(error)
     last = traceback.extract_tb(error.__traceback__)[-1]
     text = " ".join(str(error).split())
-    said = f"{type(error).__name__}: {text}" if text else type(error).__name__
+    description = f"{type(error).__name__}: {text}" if text else type(error).__name__
     return (
-        f"a defect of armwright, not of what was given: {said} (in {last.name}, {Path(last.filename).name}:"
-        f"{last.lineno}); please report it with the command and its files; {DEBUG}=1 shows more"
+        f"a defect of armwright, not of its inputs: {description} (in {last.name}, {Path(last.filename).name}:"
+        f"{last.lineno}); please report it with the command and its files; {DEBUG}=1 prints a traceback"
     )
 
 
 @contextlib.contextmanager
 def _interruptible() -> "Iterator[None]":
-    """Let signals interrupt a command; before and after it there is nothing to clear up, and they end the process."""
+    """Turn signals into exceptions during a command; before and after it they end the process."""
     before = {number: signal.getsignal(number) for number in _SIGNALS}
-    # What `nohup` made deaf stays so.
-    heard = [number for number in _SIGNALS if number is not signal.SIGHUP or before[number] is not signal.SIG_IGN]
-    for number in heard:
+    # A hang-up that `nohup` ignores stays ignored.
+    handled = [number for number in _SIGNALS if number is not signal.SIGHUP or before[number] is not signal.SIG_IGN]
+    for number in handled:
         signal.signal(number, _interrupt)
     unraisable, sys.unraisablehook = sys.unraisablehook, _interrupt_again
     try:
         yield
     finally:
         sys.unraisablehook = unraisable
-        for number in heard:
+        for number in handled:
             signal.signal(number, before[number] or signal.SIG_DFL)
 
 
@@ -243,7 +243,7 @@ def _interrupt(number: int, _frame: "FrameType | None") -> None:
 
 
 def _interrupt_again(lost: "sys.UnraisableHookArgs") -> None:
-    """Send a signal once more that came while an object was cleared away, where exceptions go nowhere."""
+    """Send a signal again that arrived in a destructor, where exceptions are lost."""
     if isinstance(lost.exc_value, Interrupted):
         threading.Timer(_AGAIN, os.kill, (os.getpid(), lost.exc_value.number)).start()
     else:
@@ -251,5 +251,5 @@ def _interrupt_again(lost: "sys.UnraisableHookArgs") -> None:
 
 
 def _forget_output() -> None:
-    """Keep the interpreter from writing at its end what cannot be written."""
+    """Redirect the output to the null device, so that the interpreter does not flush it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

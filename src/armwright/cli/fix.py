@@ -1,4 +1,4 @@
-"""``armwright fix``: slips that have one certain cure, cured in place."""
+"""``armwright fix``: correct mistakes in programs that have a single certain correction."""
 
 import sys
 from pathlib import Path
@@ -23,34 +23,36 @@ def fix(
         list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
     ],
     cell: Annotated[
-        Path | None, typer.Option("--cell", help="The cell they will run in; what is left is then checked against it.")
+        Path | None,
+        typer.Option("--cell", help="Cell in which the programs will run; remaining errors are checked against it."),
     ] = None,
     diff: Annotated[
-        bool, typer.Option("--diff", "--dry-run", help="Write nothing; show what would change and what would be left.")
+        bool, typer.Option("--diff", "--dry-run", help="Write nothing; print the changes and the remaining errors.")
     ] = False,
     std: Std = Standard.RLO_2,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was done and what is left as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print corrections and remaining errors as JSON.")] = False,
 ) -> None:
-    """Cure what is certain in RLO programs: a missing `;` or `=`, a matrix row by row, look-alike characters.
+    """Correct the mistakes in RLO programs that have a certain correction, such as a missing `;` or `=`.
 
-    A program from the standard input or a pipe is printed as it becomes; what was done is told on the error output.
+    Matrices written row by row and look-alike characters are corrected too. A program from the standard input or a pipe
+    is printed corrected, and the list of corrections goes to the error output.
 
-    Exit status 0: no program has errors any more; 1: something is left to do by hand.
+    The exit status is 0 if no program has errors any more, and 1 if errors remain.
 
     **Example:** `armwright fix examples/bench.rlo --diff`
     """
-    from armwright.cli.programs import given_cell
+    from armwright.cli.programs import read_cell_option
     from armwright.cli.source_files import is_stream, print_difference, read_source, write_back
     from armwright.cli.terminal import print_verbatim
     from armwright.program.diagnostics.fixes import fixed
 
-    acted_on = given_cell(cell)
+    option_cell = read_cell_option(cell)
     rows: list[dict[str, Any]] = []
     for path in programs:
         printed = is_stream(path)
         try:
             source = read_source(path)
-            result = fixed(source, _translator(path.parent, acted_on, std))
+            result = fixed(source, _compiler(path.parent, option_cell, std))
             if result.cures and not (diff or printed):
                 write_back(source, path, result.text)
         except ArmwrightError as error:
@@ -65,28 +67,29 @@ def fix(
             print_difference(source, result.text)
         elif printed and not diff:
             print_verbatim(result.text)
-        _print(result, done="could be cured" if diff else "cured", to_errors=printed and not diff)
+        _print(result, done="could be corrected" if diff else "corrected", to_errors=printed and not diff)
     if as_json:
         print_json(rows)
     if any(row["exit_status"] for row in rows):
         raise typer.Exit(max(row["exit_status"] for row in rows))
 
 
-def _translator(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":
-    """Return what finds out what is wrong with a program: in a cell, or in the one it IMPORTs."""
-    from armwright.program import compile as translate, known_cell
+def _compiler(folder: Path, cell: "Cell | None", std: Standard) -> "Translate":
+    """Return a function that compiles a program for a cell, or for the cell that the program IMPORTs."""
+    from armwright.program import compile as compile_program, known_cell
     from armwright.program.api import import_reader
 
-    def find(source: "Source") -> "Compilation":
+    def compile_source(source: "Source") -> "Compilation":
         read = import_reader(folder)
         known = known_cell(cell) if cell else None
-        found = translate(source, known, std=std, read_import=read)
-        own = next((one.cell for one in found.imports if one.cell and one.cell.arms), None)
+        compilation = compile_program(source, known, std=std, read_import=read)
+        imports = compilation.imports
+        own = next((imported.cell for imported in imports if imported.cell and imported.cell.arms), None)
         if known is None and own is not None:
-            found = translate(source, known_cell(own), std=std, read_import=read)
-        return found
+            return compile_program(source, known_cell(own), std=std, read_import=read)
+        return compilation
 
-    return find
+    return compile_source
 
 
 def _print(result: "Fixed", *, done: str, to_errors: bool) -> None:
@@ -95,11 +98,11 @@ def _print(result: "Fixed", *, done: str, to_errors: bool) -> None:
     out = sys.stderr if to_errors else sys.stdout
     for cure in result.cures:
         source, start = cure.source, cure.diagnostic.span.start
-        place = f"{source.name}:{source.line(start)}:{source.column(start)}"
-        print(f"{place}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.what}", file=out)
+        location = f"{source.name}:{source.line(start)}:{source.column(start)}"
+        print(f"{location}: {cure.diagnostic.message} ({cure.diagnostic.code}): {cure.what}", file=out)
     count = len(result.cures)
-    slips = f"{counted(count, 'slip')} {done}" if count else "nothing to cure"
-    print(f"{result.compilation.source.name}: {slips}", file=out)
+    mistakes = f"{counted(count, 'mistake')} {done}" if count else "nothing to correct"
+    print(f"{result.compilation.source.name}: {mistakes}", file=out)
     if result.compilation.diagnostics:
         print_diagnostics(result.compilation.diagnostics, result.compilation.source, to_errors=to_errors)
 
@@ -109,6 +112,6 @@ def _as_data(result: "Fixed") -> dict[str, Any]:
     from armwright.program.language.diagnostic import to_json
 
     cures = [{**to_json(cure.diagnostic, cure.source), "done": cure.what} for cure in result.cures]
-    found = diagnostics_data(result.compilation)
-    status = ExitStatus.PROGRAM_ERRORS if found["errors"] else ExitStatus.DONE
-    return {**found, "exit_status": status, "cures": cures}
+    data = diagnostics_data(result.compilation)
+    status = ExitStatus.PROGRAM_ERRORS if data["errors"] else ExitStatus.DONE
+    return {**data, "exit_status": status, "cures": cures}

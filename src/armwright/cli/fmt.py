@@ -1,4 +1,4 @@
-"""``armwright fmt``: programs laid out, in place."""
+"""``armwright fmt``: format programs in place."""
 
 import sys
 from pathlib import Path
@@ -21,20 +21,22 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
         list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
     ],
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; end with exit status 5 if something would change.")
+        bool, typer.Option("--check", help="Write nothing; end with exit status 5 if a program would change.")
     ] = False,
-    diff: Annotated[bool, typer.Option("--diff", help="Write nothing; show what would change.")] = False,
-    stdout: Annotated[bool, typer.Option("--stdout", help="Print the programs and leave their files alone.")] = False,
+    diff: Annotated[bool, typer.Option("--diff", help="Write nothing; print the changes.")] = False,
+    stdout: Annotated[
+        bool, typer.Option("--stdout", help="Print the formatted programs and leave their files unchanged.")
+    ] = False,
     numbers: Annotated[
-        int | None, typer.Option(min=1, help="Number the lines in steps of this; else they get no numbers.")
+        int | None, typer.Option(min=1, help="Step of the line numbers; without it lines are not numbered.")
     ] = None,
     std: Std = Standard.RLO_2,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what became of each program as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result for each program as JSON.")] = False,
 ) -> None:
-    """Lay RLO programs out: one statement a line, indented, words of the language in upper case, comments kept.
+    """Format RLO programs: one statement per line, indented, keywords in upper case, comments preserved.
 
-    A program with a slip of syntax is left alone and told of, for behind a slip nobody knows where a block was meant to
-    end; the others are written all the same. In an editor the language server lays out what stands around the slips.
+    A program with syntax errors is reported and not changed, as the ends of its blocks are not known; the other programs
+    are written. In an editor the language server formats the statements around the errors.
 
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """
@@ -68,14 +70,14 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
         elif stdout or (streamed and not check):
             print_verbatim(after)
         else:
-            print(_said(source, changed=row["changed"], check=check))
+            print(_outcome(source, changed=row["changed"], check=check))
     if as_json:
         print_json(rows)
     if any(row["exit_status"] for row in rows):
         raise typer.Exit(max(row["exit_status"] for row in rows))
 
 
-def _said(source: "Source", *, changed: bool, check: bool) -> str:
+def _outcome(source: "Source", *, changed: bool, check: bool) -> str:
     if not changed:
-        return f"as it should be: {source.name}"
-    return f"would change: {source.name}" if check else f"laid out: {source.name}"
+        return f"unchanged: {source.name}"
+    return f"would change: {source.name}" if check else f"formatted: {source.name}"

@@ -1,4 +1,4 @@
-"""``armwright forward`` and ``armwright jacobian``: where the hand is, and how it moves."""
+"""``armwright forward`` and ``armwright jacobian``: the pose of the tool and its velocity per joint velocity."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -38,9 +38,9 @@ def forward(  # noqa: PLR0917 - Typer reads one parameter per option
             print(json.dumps({"q": q.tolist(), "pose": X.tolist(), "noap": to_noap(X).tolist()}))
             continue
         print("  ".join(f"{name:>10}" for name in ("n", "o", "a")), f"  {'p mm':>12}")
-        for *turn, place in X[:3].tolist():
-            numbers = "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in turn)
-            print(numbers, f"  {round(place * 1e3, 3) + 0.0:12.3f}")
+        for *rotation, position in X[:3].tolist():
+            numbers = "  ".join(f"{round(x, 6) + 0.0:10.6f}" for x in rotation)
+            print(numbers, f"  {round(position * 1e3, 3) + 0.0:12.3f}")
 
 
 def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -50,7 +50,7 @@ def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     frame: Annotated[
-        str, typer.Option(help="Whose axes: base or tool.", autocompletion=one_of("base", "tool"))
+        str, typer.Option(help="Frame of the rows: base or tool.", autocompletion=one_of("base", "tool"))
     ] = "base",
     as_json: Json = False,
 ) -> None:
@@ -77,17 +77,17 @@ def jacobian(  # noqa: PLR0917 - Typer reads one parameter per option
 
 
 def _per_rate(model: "Arm") -> list[str]:
-    """Return what one unit of speed is, joint by joint, for the head of a Jacobian."""
+    """Return the headings of the columns of a Jacobian: the joint with the unit of its velocity."""
     return [f"j{i} {'rad/s' if joint.revolute else 'm/s'}" for i, joint in enumerate(model.joints, 1)]
 
 
 def configurations(model: "Arm", configuration: str | None, file: TableFile | None) -> "list[Array]":
-    """Return the joint positions asked for: from the option, or one per row of a file."""
+    """Return the joint configurations of the option or of the rows of a file."""
     from armwright.cli.joints import joint_values, rows
 
     if (configuration is None) == (file is None):
-        raise typer.BadParameter("give the joint positions, either here or as --csv FILE", param_hint="-q")
+        raise typer.BadParameter("expected joint positions, either here or as --csv FILE", param_hint="-q")
     if file is not None:
         return list(rows(model, file, ("q",))[0])
-    assert configuration is not None  # noqa: S101 - one of the two is given
+    assert configuration is not None  # noqa: S101 - without a file there is the option
     return [joint_values(model, configuration, "-q")]

@@ -1,4 +1,4 @@
-"""``armwright inverse``: every posture that puts the hand at a pose."""
+"""``armwright inverse``: all solutions of the inverse kinematics of a pose."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,17 +15,19 @@ if TYPE_CHECKING:
 
 def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    xyz: Annotated[str | None, typer.Option(help="Place of the tool in mm: 400,100,200.")] = None,
+    xyz: Annotated[str | None, typer.Option(help="Position of the tool in mm, as in 400,100,200.")] = None,
     rpy: Annotated[
-        str | None, typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees; 0,0,0 when left out.")
+        str | None, typer.Option(help="Roll, pitch, yaw about fixed x, y, z in degrees; the default is 0,0,0.")
     ] = None,
-    noap: Annotated[str | None, typer.Option(help="The pose as twelve numbers, columns n, o, a, p in m.")] = None,
-    near: Annotated[str | None, typer.Option(help="Present joint positions in degrees and mm; nearest first.")] = None,
+    noap: Annotated[str | None, typer.Option(help="Pose as twelve numbers, columns n, o, a, p, in m.")] = None,
+    near: Annotated[
+        str | None, typer.Option(help="Joint positions in degrees and mm; the nearest solution is printed first.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Print every posture that puts the tool at a pose, judged: inside the limits, out of them, out of reach, singular.
+    """Print all solutions of the inverse kinematics of a pose, and whether each is within the joint limits.
 
-    Exit status 3 when no posture is inside the limits.
+    A pose out of reach and a singular solution are reported. The exit status is 3 if no solution is within the limits.
 
     **Example:** `armwright inverse puma560 --xyz 500,100,300 --rpy 0,90,0`
     """
@@ -50,12 +52,12 @@ def inverse(  # noqa: PLR0917 - Typer reads one parameter per option
             for branch in solution
         ]
         status = ExitStatus.DONE if solution.allowed else ExitStatus.INFEASIBLE
-        said = {"exit_status": status, "answer": solution.outcome, "distance": solution.distance}
-        print_json({**said, "branches": branches})
+        outcome = {"exit_status": status, "answer": solution.outcome, "distance": solution.distance}
+        print_json({**outcome, "branches": branches})
     else:
         _print(model, solution)
         if solution.outcome == "out of reach":
-            _ask_for_the_unit(model, X, metres=noap is not None)
+            _suggest_unit(model, X, metres=noap is not None)
     if not solution.allowed:
         raise typer.Exit(ExitStatus.INFEASIBLE)
 
@@ -68,19 +70,19 @@ def _pose(xyz: str | None, rpy: str | None, noap: str | None) -> "Array":
     from armwright.spatial.rotations import rotation_from_vector
 
     if (xyz is None) == (noap is None):
-        raise typer.BadParameter("give the pose, either as --xyz and --rpy or as --noap", param_hint="--xyz")
+        raise typer.BadParameter("expected the pose, either as --xyz and --rpy or as --noap", param_hint="--xyz")
     if noap is not None:
         if rpy is not None:
-            raise typer.BadParameter("the twelve numbers have the turn already", param_hint="--rpy")
+            raise typer.BadParameter("the twelve numbers of --noap include the orientation", param_hint="--rpy")
         return from_noap(numbers(noap, 12, "--noap"))
-    assert xyz is not None  # noqa: S101 - one of the two is given
+    assert xyz is not None  # noqa: S101 - without --noap there is --xyz
     roll, pitch, yaw = np.radians(numbers("0,0,0" if rpy is None else rpy, 3, "--rpy"))
-    turns = [rotation_from_vector(np.array(w)) for w in ((0, 0, yaw), (0, pitch, 0), (roll, 0, 0))]
-    return homogeneous(turns[0] @ turns[1] @ turns[2], np.array(numbers(xyz, 3, "--xyz")) * 1e-3)
+    R_z, R_y, R_x = (rotation_from_vector(np.array(w)) for w in ((0, 0, yaw), (0, pitch, 0), (roll, 0, 0)))
+    return homogeneous(R_z @ R_y @ R_x, np.array(numbers(xyz, 3, "--xyz")) * 1e-3)
 
 
-def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
-    """Say that a place out of reach would be in reach in the other unit, if it would."""
+def _suggest_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
+    """Print a note where a position out of reach would be within reach in the other unit of length."""
     from armwright.kinematics.inverse_kinematics.solution import Outcome
     from armwright.kinematics.inverse_kinematics.solve import inverse as solutions
 
@@ -88,7 +90,7 @@ def _ask_for_the_unit(model: "Arm", X: "Array", *, metres: bool) -> None:
     other[:3, 3] *= 1e-3 if metres else 1e3
     if solutions(model, other).outcome is not Outcome.OUT_OF_REACH:
         option, unit, typed = ("--noap", "m", "mm") if metres else ("--xyz", "mm", "m")
-        print(f"note: {option} is in {unit}; in {typed} the pose would be in reach")
+        print(f"note: {option} is in {unit}; in {typed} the pose would be within reach")
 
 
 def _print(model: "Arm", solution) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001

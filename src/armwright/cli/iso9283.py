@@ -1,4 +1,4 @@
-"""``armwright iso9283``: what measured poses and paths say of a robot, by the definitions of ISO 9283."""
+"""``armwright iso9283``: the performance characteristics of ISO 9283 from measured poses and paths."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,50 +23,53 @@ if TYPE_CHECKING:
 
 def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     files: Annotated[
-        list[Path], typer.Argument(help="Measurements, CSV (docs/iso9283.md); several may belong together.")
+        list[Path], typer.Argument(help="Measurements as CSV (docs/iso9283.md), in one or several files.")
     ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for report.html, measures.json and the figures (SVG).")
     ] = None,
     few: Annotated[
-        bool, typer.Option("--few", help="Take fewer cycles than the standard asks for, and say so.")
+        bool, typer.Option("--few", help="Accept fewer cycles than the standard requires, and state it.")
     ] = False,
     band_mm: Annotated[
-        float | None, typer.Option(help="What counts as reached; RP of the same pose without it.")
+        float | None,
+        typer.Option(help="Radius within which a pose counts as attained; the default is RP of the same pose."),
     ] = None,
-    corners_mm: Annotated[float, typer.Option(help="How near to a corner AT and RT are not taken.")] = 0.0,
+    corners_mm: Annotated[
+        float, typer.Option(help="Distance from a corner within which AT and RT are not evaluated.")
+    ] = 0.0,
     limit: Annotated[
-        list[str] | None, typer.Option(help="What a measure should keep: RP=0.05mm; may be repeated.")
+        list[str] | None, typer.Option(help="Limit of a characteristic, as in RP=0.05mm; may be repeated.")
     ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Print the measures of ISO 9283 that measured poses and paths allow, with the cycles of each.
+    """Print the performance characteristics of ISO 9283 from measured poses and paths.
 
-    Accuracy and repeatability of poses (AP, RP, vAP), of distances (AD, RD) and of paths (AT, RT, AV, RV, FV), coming
-    to rest (t, OV, TP), corners (CR, CO), drift, exchangeability, compliance and weaving. A test with fewer cycles than
-    the standard asks for is refused unless --few is given. A measure that exceeds its --limit ends the command with
-    exit status 5, after everything is printed and written.
+    Accuracy and repeatability of poses (AP, RP, vAP), of distances (AD, RD) and of paths (AT, RT, AV, RV, FV),
+    stabilization and overshoot (t, OV, TP), corners (CR, CO), drift, exchangeability, compliance and weaving, each with
+    its number of cycles. A test with fewer cycles than the standard requires is refused without --few. A characteristic
+    that exceeds its --limit ends the command with exit status 5 after everything is printed and written.
 
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
     from armwright.accuracy.measurement_file import read_measurements
 
-    _refuse_no_lengths(band_mm, corners_mm)
+    _check_lengths(band_mm, corners_mm)
     bounds = _bounds(limit or [])
     for path in files:
         warn_of_stray(path)
     tests = read_measurements(files, columns=columns_of(columns), skip_incomplete=skip_incomplete)
-    found = _assessed(tests, bounds, few=few, band_mm=band_mm, corners_mm=corners_mm)
+    assessment = _assessed(tests, bounds, few=few, band_mm=band_mm, corners_mm=corners_mm)
     if output is not None:
-        write_results(output, _files(found, files))
-    exceeded = CheckFailedError(_exceeded(found.exceeded)) if found.exceeded else None
+        write_results(output, _files(assessment, files))
+    exceeded = CheckFailedError(_exceeded(assessment.exceeded)) if assessment.exceeded else None
     if as_json:
-        print_json({**outcome(exceeded), **found.as_data()})
+        print_json({**outcome(exceeded), **assessment.as_data()})
     elif not quiet:
-        print_result(found)
+        print_result(assessment)
         if output is not None:
             print(f"report: {output / 'report.html'}")
     if exceeded is not None:
@@ -74,7 +77,7 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
 
 
 def _exceeded(measures: "Sequence[Characteristic]") -> str:
-    """Say which measures exceed their limits, and by how much."""
+    """Return a message with the characteristics that exceed their limits, and by how much."""
     exceeded = []
     for measure in measures:
         unit, condition = measure.displayed_unit, f", {measure.condition}" if measure.condition else ""
@@ -85,8 +88,8 @@ def _exceeded(measures: "Sequence[Characteristic]") -> str:
     return f"limit exceeded: {'; '.join(exceeded)}"
 
 
-def _refuse_no_lengths(band_mm: float | None, corners_mm: float) -> None:
-    """Refuse a band or a distance from corners that is none."""
+def _check_lengths(band_mm: float | None, corners_mm: float) -> None:
+    """Refuse a radius or a distance from corners that is not positive and finite."""
     for name, value, valid in (
         ("--band-mm", band_mm, band_mm is None or 0 < band_mm < float("inf")),
         ("--corners-mm", corners_mm, 0 <= corners_mm < float("inf")),
@@ -98,12 +101,12 @@ def _refuse_no_lengths(band_mm: float | None, corners_mm: float) -> None:
 def _assessed(
     tests: "Sequence[AnyTest]", bounds: "Mapping[str, Named]", *, few: bool, band_mm: float | None, corners_mm: float
 ) -> "Assessment":
-    """Work out all measures and compare them with their limits."""
+    """Compute all characteristics and compare them with their limits."""
     from armwright.accuracy.assessment import assess
 
     try:
-        found = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)
-        return found.within({symbol: _in_si(found, *bound) for symbol, bound in bounds.items()})
+        assessment = assess(tests, few=few, band=None if band_mm is None else band_mm * 1e-3, corners=corners_mm * 1e-3)
+        return assessment.within({symbol: _in_si(assessment, *bound) for symbol, bound in bounds.items()})
     except TooFewError as error:
         raise TooFewError(str(error).replace("few=True takes", "--few takes")) from error
 
@@ -118,11 +121,11 @@ def _bounds(texts: list[str]) -> dict[str, Named]:
     return bounds
 
 
-def _in_si(found: "Assessment", symbol: str, value: float, unit: str) -> float:
-    """Return a limit in SI units."""
+def _in_si(assessment: "Assessment", symbol: str, value: float, unit: str) -> float:
+    """Return a limit in SI units; the unit must be that in which the characteristic is printed."""
     from armwright.errors import one_of
 
-    measures = {measure.symbol: measure for measure in found.measures}
+    measures = {measure.symbol: measure for measure in assessment.measures}
     measure = measures[one_of("measure", symbol, measures)]
     shown = measure.displayed_unit
     if unit != shown:
@@ -132,15 +135,15 @@ def _in_si(found: "Assessment", symbol: str, value: float, unit: str) -> float:
     return value / measure.scale
 
 
-def _files(found: "Assessment", files: list[Path]) -> dict[str, str]:
+def _files(assessment: "Assessment", files: list[Path]) -> dict[str, str]:
     """Return the files of an assessment by name."""
     from armwright.report.accuracy_figures import drawings
     from armwright.report.accuracy_page import accuracy_page
 
-    drawn = drawings(found)
+    figures = drawings(assessment)
     title = f"ISO 9283: {', '.join(path.name for path in files)}"
     return {
-        "measures.json": json_text(found.as_data()) + "\n",
-        "report.html": accuracy_page(found, drawn, title=title, command=command_line()),
-        **{f"{one.name}.svg": one.svg for one in drawn},
+        "measures.json": json_text(assessment.as_data()) + "\n",
+        "report.html": accuracy_page(assessment, figures, title=title, command=command_line()),
+        **{f"{figure.name}.svg": figure.svg for figure in figures},
     }

@@ -1,4 +1,4 @@
-"""Joint values on the command line: degrees and millimetres in, rows of SI files too."""
+"""Joint values from the command line, in degrees and millimetres, and from tables, in SI units."""
 
 import math
 import sys
@@ -29,41 +29,41 @@ def units(arm: "Arm") -> "Array":
 
 
 def unit_names(arm: "Arm") -> list[str]:
-    """Return, per joint, what ``units`` counts in, for the head of a table: ``j1 deg``, ``j3 mm``."""
+    """Return the headings of a table with joint values in ``units``: ``j1 deg``, ``j3 mm``."""
     return [f"j{i} {'deg' if joint.revolute else 'mm'}" for i, joint in enumerate(arm.joints, 1)]
 
 
 def rows(arm: "Arm", file: "TableFile", quantities: tuple[str, ...]) -> list["Array"]:
-    """Read columns such as q1 … qn, qd1 … qdn of a CSV file, such as motion.csv, in SI; others are passed over.
+    """Read columns such as q1 … qn, qd1 … qdn of a CSV file, such as motion.csv, in SI; other columns are ignored.
 
     Args:
         arm: the arm.
-        file: what to read, and how.
-        quantities: what to read, of q, qd and qdd; the first are the joint positions.
+        file: the table, and how to read it.
+        quantities: those to read of q, qd and qdd; the first is q.
 
     Returns:
         One array (rows, n) per quantity.
 
     Raises:
-        FileFormatError: the file, a column or all rows are missing, or a value is no finite number.
+        FileFormatError: the file, a column or all rows are missing, or a value is not a finite number.
     """
     from armwright.cli.results import warn_of_stray
     from armwright.errors import shown
     from armwright.files.unit_table import read_header
 
     warn_of_stray(file.path)
-    wanted = [f"{quantity}{i + 1}" for quantity in quantities for i in range(arm.n)]
+    columns = [f"{quantity}{i + 1}" for quantity in quantities for i in range(arm.n)]
     header = read_header(file.path, _columns(arm, quantities), columns=file.columns)
-    header.require(wanted, f"{arm.name} has {arm.n} joints")
-    table = header.rows(filled=wanted, skip_incomplete=file.skip_incomplete)
+    header.require(columns, f"{arm.name} has {arm.n} joints")
+    table = header.rows(filled=columns, skip_incomplete=file.skip_incomplete)
     arms = table.words("arm")
     other = next((i for i, name in enumerate(arms) if name != arms[0]), None)
     if other is not None:
-        said = f"rows of several arms, {shown(arms[0])} and {shown(arms[other])}; leave those of one"
-        raise table.error(other, "arm", said)
-    numbers = [table.numbers(wanted[k : k + arm.n]) for k in range(0, len(wanted), arm.n)]
-    if any(table.headings[name].unit == "rad" for name in wanted[: arm.n]):
-        _ask_for_degrees(arm, file.path, numbers[0])
+        text = f"expected rows of a single arm, got {shown(arms[0])} and {shown(arms[other])}"
+        raise table.error(other, "arm", text)
+    numbers = [table.numbers(columns[k : k + arm.n]) for k in range(0, len(columns), arm.n)]
+    if any(table.headings[name].unit == "rad" for name in columns[: arm.n]):
+        _warn_of_degrees(arm, file.path, numbers[0])
     return numbers
 
 
@@ -86,10 +86,9 @@ def _columns(arm: "Arm", quantities: tuple[str, ...]) -> "Schema":
     return names.Schema(columns=columns, passes_over=True)
 
 
-def _ask_for_degrees(arm: "Arm", path: Path, q: "Array") -> None:
-    """Say on the error output that the positions (rows, n) of a file look like degrees, if they do."""
+def _warn_of_degrees(arm: "Arm", path: Path, q: "Array") -> None:
+    """Print a warning where the positions (rows, n) of a file are probably in degrees."""
     from armwright.arm.positions import degrees_by_mistake
 
-    found = degrees_by_mistake(arm, q)
-    if found:
-        print(f"armwright: warning: {path}: {found}; columns without a unit are in SI units", file=sys.stderr)
+    if suspicion := degrees_by_mistake(arm, q):
+        print(f"armwright: warning: {path}: {suspicion}; columns without a unit are in SI units", file=sys.stderr)

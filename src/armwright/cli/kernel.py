@@ -1,4 +1,4 @@
-"""``armwright kernel``: what an equation becomes for one arm."""
+"""``armwright kernel``: the compiled form of an equation for an arm."""
 
 from typing import Annotated
 
@@ -14,15 +14,17 @@ def kernel(
     quantity: Annotated[
         str,
         typer.Argument(
-            help="Such as forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics.",
+            help="Quantity: forward, jacobian, inverse_branches, inverse_dynamics, forward_dynamics ...",
             autocompletion=quantities,
         ),
     ],
     count: Annotated[bool, typer.Option("--count", help="Print the operation count only.")] = False,
-    one: Annotated[bool, typer.Option("--one", help="Print the function of one configuration, not of many.")] = False,
+    single: Annotated[
+        bool, typer.Option("--single", help="Print the function of a single configuration, not of many.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print source and operation count as JSON.")] = False,
 ) -> None:
-    """Print the kernel that a quantity is compiled to for an arm, and its operation count.
+    """Print the compiled kernel of a quantity for an arm, and its operation count.
 
     **Example:** `armwright kernel stanford-jpl inverse_dynamics --count`
     """
@@ -31,13 +33,15 @@ def kernel(
 
     emitted = emit_quantity(load_arm(arm), quantity)
     total = sum(emitted.operations.values())
-    source = emitted.one if one else emitted.rows
+    source = emitted.one if single else emitted.rows
     if as_json:
         counts = {"operations": emitted.operations, "total": total, "joined": emitted.joined}
         print_json({**counts, "source": source})
         return
     if not count:
         print(source)
-    print(f"{emitted.title}: {total} operations per configuration; {emitted.joined} additions take in a multiplication")
+    print(
+        f"{emitted.title}: {total} operations per configuration; {emitted.joined} additions are fused with a multiplication"
+    )
     for name, number in emitted.operations.items():
         print(f"  {name:<12}{number:>5}")

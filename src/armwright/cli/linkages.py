@@ -1,4 +1,4 @@
-"""What the commands for linkages with play share: options, clearances, settings of a simulation."""
+"""Options, clearances and simulation settings that the commands for linkages share."""
 
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -13,12 +13,13 @@ if TYPE_CHECKING:
     from armwright.clearance.settings import Settings
 
 LinkageName: TypeAlias = Annotated[
-    str, typer.Argument(help="Name in the catalogue, or a TOML file (docs/clearance.md).", autocompletion=linkages)
+    str,
+    typer.Argument(help="Name in the catalogue, or path of a TOML file (docs/clearance.md).", autocompletion=linkages),
 ]
 FrictionVelocity: TypeAlias = Annotated[
     str,
     typer.Option(
-        help="Which speed slides: of the surface, or of the centre as the thesis has it.",
+        help="Sliding velocity: of the surface, or of the journal's centre as in the thesis.",
         autocompletion=setting("SLIP_SPEEDS"),
     ),
 ]
@@ -26,42 +27,45 @@ Threshold: TypeAlias = Annotated[float, typer.Option(help="Sliding speed below w
 
 
 def with_clearances(model: "Linkage", clearances: list[str], clearance_mm: float | None = None) -> "Linkage":
-    """Return the linkage with the clearances that are asked for.
+    """Return a linkage with other clearances.
 
     Args:
         model: the linkage.
-        clearances: of one pin each, such as ``J2=0.5`` [mm].
-        clearance_mm: of all pins that are not named; those of the linkage when left out.
+        clearances: of a pin each, such as ``J2=0.5`` [mm].
+        clearance_mm: of all other pins; the default is that of the linkage.
 
     Raises:
-        BadParameter: a text is something else.
+        BadParameter: a text is not a pin with its clearance.
         InvalidValueError: a clearance is larger than the radius of its journal.
     """
-    found = {} if clearance_mm is None else dict.fromkeys(model.clearances, clearance_mm * 1e-3)
-    given = named_numbers(clearances, ("", "mm"), "a pin and its clearance in mm, J2=0.5", "--clearance")
-    found |= {name: one.value * 1e-3 for name, one in given.items()}
-    playing = model.with_clearances(found)
-    for pin in playing.pins:
-        c, most = playing.clearances[pin.name], pin.journal_radius
-        if pin.name in found and c > most:
+    requested = {} if clearance_mm is None else dict.fromkeys(model.clearances, clearance_mm * 1e-3)
+    named = named_numbers(clearances, ("", "mm"), "a pin and its clearance in mm, J2=0.5", "--clearance")
+    requested |= {name: number.value * 1e-3 for name, number in named.items()}
+    linkage = model.with_clearances(requested)
+    for pin in linkage.pins:
+        c, most = linkage.clearances[pin.name], pin.journal_radius
+        if pin.name in requested and c > most:
             raise InvalidValueError(
                 f"clearance {pin.name}: expected at most the radius of the journal, {most * 1e3:g} mm, got {c * 1e3:g} "
                 f"mm; if micrometres are meant, {c * 1e3:g} µm are {c:g} mm"
             )
-    return playing
+    return linkage
 
 
 def settings_of(velocity: str, threshold_mm_s: float, *, law: str = "linear", **others: Any) -> "Settings":
-    """Return the settings of a simulation; what stands for nothing is answered with the nearest name.
+    """Return the settings of a simulation.
 
     Args:
-        velocity: which speed slides.
+        velocity: name of the sliding velocity.
         threshold_mm_s: sliding speed below which friction fades.
-        law: of friction.
-        others: settings by their names, SI.
+        law: name of the law of friction.
+        others: further settings by name, in SI units.
+
+    Raises:
+        UnknownNameError: a name is unknown; the message has the nearest valid name.
     """
     from armwright.clearance.equations import FrictionModel
     from armwright.clearance.settings import Settings
 
-    rubbing = FrictionModel(law=law, velocity=velocity)  # type: ignore[arg-type]
-    return Settings(threshold=threshold_mm_s * 1e-3, friction=rubbing, **others)
+    friction = FrictionModel(law=law, velocity=velocity)  # type: ignore[arg-type]
+    return Settings(threshold=threshold_mm_s * 1e-3, friction=friction, **others)

@@ -1,4 +1,4 @@
-"""A load in the hand, on the command line: a point mass in kilograms and millimetres, or a file with its inertia."""
+"""The payload as an option: a point mass in kilograms and millimetres, or a file with its inertia."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,17 +11,17 @@ Load = Annotated[
     str | None,
     typer.Option(
         "--load",
-        help="What the hand holds, in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia.",
+        help="Payload in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia.",
     ),
 ]
 
 
-def load_in_hand(text: str) -> "Link":
-    """Return the body that is in the hand.
+def read_payload(text: str) -> "Link":
+    """Return the body that the gripper holds.
 
     Raises:
-        BadParameter: it is neither a file nor a mass, 0 or more, and a place.
-        FileFormatError: the file is missing, broken, or says what cannot be.
+        BadParameter: the text is neither a file nor a mass, 0 or more, with a position.
+        FileFormatError: the file is missing or invalid.
     """
     from armwright.arm.load import is_path, read_load
     from armwright.arm.model import Link
@@ -30,9 +30,9 @@ def load_in_hand(text: str) -> "Link":
     if is_path(text):
         return read_load(text)
     try:
-        mass, *place = numbers(text, 4, "--load")
+        mass, *position = numbers(text, 4, "--load")
     except typer.BadParameter as error:
-        raise typer.BadParameter(f"{error.message}; or give a file that ends in .toml", param_hint="--load") from error
+        raise typer.BadParameter(f"{error.message}, or a file that ends in .toml", param_hint="--load") from error
     if mass < 0:
         raise typer.BadParameter(f"expected a mass of 0 kg or more, got {mass:g}", param_hint="--load")
-    return Link(mass=mass, com=[x * 1e-3 for x in place])
+    return Link(mass=mass, com=[x * 1e-3 for x in position])

@@ -1,4 +1,4 @@
-"""``armwright lsp``: the language server, for editors."""
+"""``armwright lsp``: the language server for editors."""
 
 from typing import Annotated
 
@@ -7,14 +7,18 @@ import typer
 
 def lsp(
     _stdio: Annotated[
-        bool, typer.Option("--stdio", help="Talk over standard input and output. There is no other way.", hidden=True)
+        bool,
+        typer.Option(
+            "--stdio", help="Communicate over standard input and output, which is the only transport.", hidden=True
+        ),
     ] = True,
 ) -> None:
-    """Serve an editor that speaks the Language Server Protocol, over standard input and output.
+    """Serve an editor by the Language Server Protocol, over standard input and output.
 
-    Messages while one types, hovers with the poses of the cell, definition, references, rename, completion, fixes,
-    colours by meaning, the stages behind each MOVE, outline, formatting. Settings of the editor, all under
-    `armwright`: `cell` (a file; else the program's IMPORT, or the only cell beside it), `std` (`2` or `83`), `strict`.
+    The server has diagnostics at every change, hover texts with the poses of the cell, definition, references, rename,
+    completion, fixes, semantic highlighting, the stages behind each MOVE, outline and formatting. Settings of the
+    editor, all under `armwright`: `cell` (a file; the default is the program's IMPORT, or the only cell in its folder),
+    `std` (`2` or `83`) and `strict`.
 
     **Example**, in a configuration of Neovim:
     `vim.lsp.config("rlo", { cmd = { "armwright", "lsp" }, filetypes = { "rlo" } })`
@@ -33,5 +37,5 @@ def lsp(
         raise MissingExtraError(text) from error
     status = serve()
     sys.stderr.flush()
-    # A program may still be looked at, and the input be read from, which would keep the process alive.
+    # Threads that still analyse a program or read the input would keep the process alive.
     os._exit(status)

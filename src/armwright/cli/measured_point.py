@@ -1,4 +1,4 @@
-"""The point of the hand that is measured, where it is not the tool of the arm file."""
+"""The measured point as an option, where it is not the tool of the arm file."""
 
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from armwright.arm.model import Arm
 
 MeasuredPoint: TypeAlias = Annotated[
-    str | None, typer.Option("--tool-mm", help="The measured point in the frame of the hand: 0,0,31.")
+    str | None, typer.Option("--tool-mm", help="Measured point in the frame of the last link, in mm, as in 0,0,31.")
 ]
 
 
 def with_tool(model: "Arm", text: str | None) -> "Arm":
-    """Return an arm whose tool is a point of its hand; the same arm where none is told."""
+    """Return an arm whose tool is a point of its last link; the same arm without a text."""
     import attrs
     import numpy as np
 
