@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from typing import Literal, NamedTuple, TypeAlias
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from armwright.calibration.chain import Chain, chain_of
 from armwright.calibration.cross_validation import FOLDS
 from armwright.calibration.identifiability import is_overdetermined, preferred_parameters, select_identifiable
 from armwright.errors import InvalidValueError, one_of
+from armwright.files.result_table import ResultTable
 
 Index: TypeAlias = Literal["O1", "O2", "O3", "O4", "O5"]
 INDICES: tuple[Index, ...] = ("O1", "O2", "O3", "O4", "O5")
@@ -66,6 +67,26 @@ class MeasurementPlan(NamedTuple):
     observability: Observability
     random: Observability
     names: tuple[str, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The identifiable errors, in a sentence."""
+        return (f"{len(self.q)} poses make {len(self.names)} errors identifiable: {', '.join(self.names)}",)
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the plan as plain data in SI units."""
+        return {
+            "q": self.q.tolist(),
+            "identifiable": list(self.names),
+            "observability": self.observability._asdict(),
+            "random": self.random._asdict(),
+        }
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Yield the table of the observability indices, beside those of random poses."""
+        rows = zip(Observability._fields, self.observability, self.random, strict=True)
+        shown = ((name, f"{planned:.4g}", f"{random:.4g}") for name, planned, random in rows)
+        yield ResultTable(title="", heads=("index", "planned poses", "random poses"), rows=shown, numbers=(1, 2))
 
 
 def observability(chain: Chain, q: Array, fitted: list[int], *, rotations: bool = False) -> Observability:

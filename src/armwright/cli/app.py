@@ -114,8 +114,8 @@ def application(words: Collection[str] | None = None) -> App:
 def __getattr__(name: str) -> App:
     """Return ``app``, the command line with all commands imported, for tools that document it."""
     if name == "app":
-        globals()[name] = application()
-        return globals()[name]
+        app = globals()[name] = application()
+        return app
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

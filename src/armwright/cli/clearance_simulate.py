@@ -12,6 +12,7 @@ from armwright.cli.output import command_line, print_json, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
 from armwright.cli.shell_completion import paths, setting
+from armwright.errors import counted
 
 if TYPE_CHECKING:
     from armwright.clearance.linkage import Linkage
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 # Samples of a run, and the time between two of them at most [s].
 _SAMPLES, _SAMPLE = 2500, 1e-4
+# Drives of the linkages to which an option applies.
+_DRIVES = {"--speed-rpm": 1, "--path": 2}
 
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
@@ -93,7 +96,7 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     **Example:** `armwright clearance simulate five-bar --path y1 --clearance J2=0.3 -o out/rattling`
 
-    **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --revolutions 2 --start centred --step 2e-6`
+    **Example:** `armwright clearance simulate slider-crank --speed-rpm 5000 --revolutions 2 --step 2e-6`
     """
     from armwright.clearance.assessment import ClearanceRun
     from armwright.clearance.reader import load_linkage
@@ -136,23 +139,17 @@ def _path(model: "Linkage", path: str | None, speed_rpm: float | None, revolutio
     from armwright.clearance.paths import constant_speed_path, named_path
 
     drives = len(model.drives)
+    option = "--path" if path is not None else "--speed-rpm"
     if (path is None) == (speed_rpm is None):
-        option = "--path y1" if drives > 1 else "--speed-rpm 300"
-        raise typer.BadParameter(
-            f"expected either --path or --speed-rpm; {model.name} takes {option}", param_hint="--path"
-        )
+        example = "--path y1" if drives > 1 else "--speed-rpm 300"
+        text = f"expected either --path or --speed-rpm; {model.name} takes {example}"
+        raise typer.BadParameter(text, param_hint="--path")
+    if drives != _DRIVES[option]:
+        other = next((f"; use {name}" for name, number in _DRIVES.items() if number == drives), "")
+        text = f"expected a linkage with {counted(_DRIVES[option], 'drive')}; {model.name} has {drives}{other}"
+        raise typer.BadParameter(text, param_hint=option)
     if path is not None:
-        if drives != 2:
-            raise typer.BadParameter(
-                f"expected a linkage with two drives for a path of the tip; {model.name} has {drives}{_instead(drives, 1)}",
-                param_hint="--path",
-            )
         return named_path(path)
-    if drives != 1:
-        raise typer.BadParameter(
-            f"expected a linkage with one drive; {model.name} has {drives}{_instead(drives, 2)}",
-            param_hint="--speed-rpm",
-        )
     assert speed_rpm is not None  # noqa: S101 - either path or speed_rpm is an argument
     if not (math.isfinite(speed_rpm) and speed_rpm != 0 and 0 < revolutions < math.inf):
         raise typer.BadParameter(
@@ -163,13 +160,6 @@ def _path(model: "Linkage", path: str | None, speed_rpm: float | None, revolutio
     start_angle = model.assembly.get(model.drives[0].body, 0.0)
     name = f"{revolutions:g} revolution{'' if revolutions == 1 else 's'} at {speed_rpm:g} rev/min"
     return constant_speed_path(name, start_angle, speed, revolutions * 2 * math.pi / abs(speed))
-
-
-def _instead(drives: int, expected: int) -> str:
-    """Return the option for a linkage with this number of drives, if there is one."""
-    if drives != expected:
-        return ""
-    return "; use --path" if expected == 2 else "; use --speed-rpm"
 
 
 def _simulated(

@@ -20,7 +20,7 @@ def _without_values(parameters: list[Any]) -> list[Any]:
 
 
 def _without_permission_checks(function: Any) -> Any:
-    """Return a command whose file arguments are not tested for permission, which is an error of the file, not of usage."""
+    """Return a command whose file arguments are not tested for permission: that is no error of usage."""
     for annotation in function.__annotations__.values():
         for declaration in getattr(annotation, "__metadata__", ()):
             if hasattr(declaration, "readable"):

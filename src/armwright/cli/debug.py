@@ -25,8 +25,8 @@ def debug(
     """Run an RLO program step by step, forwards and backwards.
 
     With a program, the debugger runs on the terminal; `help` lists its commands. Without a program, it serves an editor
-    by the Debug Adapter Protocol over standard input and output; the editor's launch configuration has the keys program,
-    cell, std, strict, stopOnEntry and output.
+    by the Debug Adapter Protocol over standard input and output; the editor's launch configuration has the keys
+    program, cell, std, strict, stopOnEntry and output.
 
     **Example:** `armwright debug examples/stacking.rlo --cell examples/stanford_cell.toml`
     """

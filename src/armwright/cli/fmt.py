@@ -35,8 +35,8 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
 ) -> None:
     """Format RLO programs: one statement per line, indented, keywords in upper case, comments preserved.
 
-    A program with syntax errors is reported and not changed, as the ends of its blocks are not known; the other programs
-    are written. In an editor the language server formats the statements around the errors.
+    A program with syntax errors is reported and not changed, as the ends of its blocks are not known; the other
+    programs are written. In an editor the language server formats the statements around the errors.
 
     **Example:** `armwright fmt examples/peg.rlo --diff`
     """

@@ -40,8 +40,6 @@ def kernel(
         return
     if not count:
         print(source)
-    print(
-        f"{emitted.title}: {total} operations per configuration; {emitted.joined} additions are fused with a multiplication"
-    )
+    print(f"{emitted.title}: {total} operations per configuration; {emitted.joined} additions are fused with a product")
     for name, number in emitted.operations.items():
         print(f"  {name:<12}{number:>5}")

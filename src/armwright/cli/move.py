@@ -1,4 +1,4 @@
-"""``armwright move``: an arm goes through poses, joint by joint or along straight ways of its hand."""
+"""``armwright move``: plan a motion through poses, straight in joint space or straight paths of the tool."""
 
 import enum
 import sys
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
 # Bounds of the options [ms], [mm].
 _PERIOD_MS, _DEVIATION_MM = (0.01, 1000.0), (1e-4, 100.0)
-# A limit passed by this part of it is rounding.
+# Relative excess over a limit that is rounding.
 _ROUNDING = 1e-9
 
 
 class Kind(enum.StrEnum):
-    """What goes straight from pose to pose."""
+    """The space in which the path between poses is straight."""
 
     JOINT = "joint"
     CARTESIAN = "cartesian"
 
 
 class Orientation(enum.StrEnum):
-    """How the hand turns from pose to pose."""
+    """How the orientation of the tool is interpolated from pose to pose."""
 
     GEODESIC = "geodesic"
     ZYZ = "zyz"
@@ -49,47 +49,54 @@ class Ends(enum.StrEnum):
 
 
 class Around(enum.StrEnum):
-    """How to go round what stops a straight way."""
+    """The kind of detour where the arm cannot follow a straight path."""
 
     VIA = "via"
     DAMPED = "damped"
 
 
 def move(  # noqa: PLR0917 - Typer reads one parameter per option
-    kind: Annotated[Kind, typer.Argument(help="What goes straight from pose to pose: joints or hand.")],
+    kind: Annotated[
+        Kind, typer.Argument(help="Space in which the path between poses is straight: joint or cartesian.")
+    ],
     arm: ArmName,
     poses: Annotated[Path, typer.Argument(help="File of poses, TOML or JSON (docs/poses.md).")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the results; none are kept without it.")
+        Path | None, typer.Option("-o", "--output", help="Folder for the results; without it none are written.")
     ] = None,
     near: Annotated[
-        str | None, typer.Option(help="Present posture, degrees and mm: 10,20,30. It decides the branch.")
+        str | None,
+        typer.Option(help="Initial joint positions in degrees and mm, as in 10,20,30; they select the branch."),
     ] = None,
-    ends: Annotated[Ends, typer.Option(help="Start and stop, or begin and end at full speed.")] = Ends.REST,
+    ends: Annotated[Ends, typer.Option(help="Start and end at rest, or at full speed.")] = Ends.REST,
     orientation: Annotated[
-        Orientation | None, typer.Option(help="Turn about one axis from pose to pose, or blend ZYZ Euler angles.")
+        Orientation | None,
+        typer.Option(help="Interpolation of the orientation: about a fixed axis, or of ZYZ Euler angles."),
     ] = None,
     deviation_mm: Annotated[
-        float | None, typer.Option(help="Allowed distance of the hand from its planned path; 0.1.")
+        float | None, typer.Option(help="Allowed path deviation of the tool; the default is 0.1.")
     ] = None,
     around: Annotated[
         Around | None,
-        typer.Option(help="Stop at every pose and go round what stops a line: by a pose beside it, or damped rates."),
+        typer.Option(
+            help="Stop at every pose; detour where a line is blocked: by a via pose, or damped least squares."
+        ),
     ] = None,
     keep_limits: Annotated[
-        bool, typer.Option("--keep-limits", help="Run slower where the file's times ask too much.")
+        bool, typer.Option("--keep-limits", help="Slow the motion down where the times of the file exceed limits.")
     ] = False,
     servo_ms: Annotated[float, typer.Option(help="Servo period of motion.csv.")] = 2.0,
     film: Annotated[bool, typer.Option(help="Draw move.gif, and move.mp4 where ffmpeg is installed.")] = True,
     as_json: Json = False,
     quiet: QuietButWarnings = False,
 ) -> None:
-    """Move an arm through the poses of a file.
+    """Plan a motion of an arm through the poses of a file.
 
-    A joint move takes every joint straight from posture to posture; a Cartesian one takes the hand straight from pose
-    to pose, on one branch of postures from start to end, and says how near it keeps to that. Poses without times are
-    passed as fast as the limits of speed, acceleration and effort allow. Writes motion.csv (every servo tick, SI),
-    move.json, figures, report.html (a page that opens from the disk and shows the arm moving), and a film.
+    The path of a joint move is straight in joint space; the tool of a Cartesian move follows a straight path from pose
+    to pose, on a single branch of the inverse kinematics, with a certified bound of its path deviation. Poses without
+    times are passed as fast as the limits of speed, acceleration and effort allow. With -o the command writes
+    motion.csv (every servo tick, SI), move.json, figures, report.html (a page that opens from the disk and shows the
+    arm moving), and a film.
 
     **Example:** `armwright move joint puma560 examples/puma_poses.toml -o out/joint`
     """
@@ -101,17 +108,17 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
         kind, arm, poses, near=near, ends=ends, orientation=orientation, deviation_mm=deviation_mm, around=around
     )
     notes = list(file.notes)
-    factor, because = slowing_for_limits(planned.arm, planned.trajectory)
-    if because is not None and factor > 1 + _ROUNDING:
-        what = slower(planned.arm, factor, because)
-        notes.append(f"run {what}" if keep_limits else f"the limits would hold {what}: --keep-limits does that")
+    factor, reason = slowing_for_limits(planned.arm, planned.trajectory)
+    if reason is not None and factor > 1 + _ROUNDING:
+        slowing = slower(planned.arm, factor, reason)
+        notes.append(f"run {slowing}" if keep_limits else f"the limits would hold {slowing}: --keep-limits does that")
         planned = planned.slowed(factor) if keep_limits else planned
     for note in notes:
         print(f"armwright: {poses}: {note}", file=sys.stderr)
     uses = limit_use(planned.arm, planned.trajectory)
     if output is not None:
         write_results(
-            output, _files(_moved(planned, file, poses, servo_ms * 1e-3, notes), uses, film=film, quiet=quiet)
+            output, _files(_report_data(planned, file, poses, servo_ms * 1e-3, notes), uses, film=film, quiet=quiet)
         )
     if as_json:
         print_json(_summary(planned, file, uses))
@@ -125,16 +132,16 @@ def _check_options(
     kind: Kind, *, orientation: Orientation | None, deviation_mm: float | None, around: Around | None, servo_ms: float
 ) -> None:
     """Refuse options out of range, and those that do not belong to the kind of move."""
-    for name, given in (("--orientation", orientation), ("--deviation-mm", deviation_mm), ("--around", around)):
-        if kind is Kind.JOINT and given is not None:
-            raise typer.BadParameter("only a cartesian move has one", param_hint=name)
+    for name, value in (("--orientation", orientation), ("--deviation-mm", deviation_mm), ("--around", around)):
+        if kind is Kind.JOINT and value is not None:
+            raise typer.BadParameter("expected a cartesian move for this option", param_hint=name)
     if orientation is not None and around is not None:
-        raise typer.BadParameter("lines with stops turn about one axis; leave it out", param_hint="--orientation")
-    for name, value, bounds in (
-        ("--servo-ms", servo_ms, _PERIOD_MS),
-        ("--deviation-mm", _DEVIATION_MM[0] if deviation_mm is None else deviation_mm, _DEVIATION_MM),
-    ):
-        within(value, bounds, name)
+        raise typer.BadParameter(
+            "lines with stops (--around) rotate about a fixed axis; omit this option", param_hint="--orientation"
+        )
+    within(servo_ms, _PERIOD_MS, "--servo-ms")
+    if deviation_mm is not None:
+        within(deviation_mm, _DEVIATION_MM, "--deviation-mm")
 
 
 def _planned(
@@ -168,18 +175,18 @@ def _planned(
             return stopping_move(arm, file.poses, by=around.value, near=start, deviation=deviation), file
         except PathError as error:
             other = Around.VIA if around is Around.DAMPED else Around.DAMPED
-            hint = "" if error.cause == "reach" else f"; `--around {other}` looks for another way round"
+            hint = "" if error.cause == "reach" else f"; `--around {other}` searches for another detour"
             raise ArmwrightError(f"{poses}: {error}{hint}") from error
     timed["orientation"] = (orientation or Orientation.GEODESIC).value
     try:
         return cartesian_move(arm, file.poses, **timed, deviation=deviation), file
     except PathError as error:
-        # Which of them finds one is known when it is looked for, and that takes its time.
-        hint = "" if error.cause == "reach" else "; `--around damped` and `--around via` look for a way round"
+        # Whether either finds a detour is known only after a search, which takes time.
+        hint = "" if error.cause == "reach" else "; `--around damped` and `--around via` search for a detour"
         raise ArmwrightError(f"{poses}: {error}{hint}") from error
 
 
-def _moved(planned: "Move", file: "PosesFile", poses: Path, period: float, notes: "Iterable[str]") -> "Moved":
+def _report_data(planned: "Move", file: "PosesFile", poses: Path, period: float, notes: "Iterable[str]") -> "Moved":
     from armwright.dynamics.newton_euler import inverse_dynamics
     from armwright.report.move_page import Moved
     from armwright.report.page import Message
@@ -207,46 +214,46 @@ def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: b
 
     planned, samples = moved.move, moved.samples
     X = forward(planned.arm, samples.q)
-    moments = dict(zip(moved.file.names, planned.times.tolist(), strict=True))
-    places = {name: pose[:3, 3] for name, pose in zip(moved.file.names, planned.poses, strict=True)}
+    pose_times = dict(zip(moved.file.names, planned.times.tolist(), strict=True))
+    positions = {name: pose[:3, 3] for name, pose in zip(moved.file.names, planned.poses, strict=True)}
     title = moved.file.title or f"{planned.arm.name} through {moved.name}"
     joints = move_figures.joint_panels(samples, [joint.revolute for joint in planned.arm.joints])
-    hand = move_figures.hand_panels(samples.times, X)
+    tool = move_figures.hand_panels(samples.times, X)
     files: dict[str, Any] = {
         "motion.csv": motion_csv(samples.times, samples.q, samples.qd, samples.qdd, moved.tau),
         "move.json": json_text(_summary(planned, moved.file, uses)) + "\n",
-        "joints.svg": move_figures.panels(f"{title}: joints", samples.times, joints, marks=moments),
-        "hand.svg": move_figures.panels(f"{title}: hand", samples.times, hand, marks=moments, columns=2),
-        "path.svg": move_figures.path_in_space(f"{title}: path of the hand, approach vectors", X, places),
+        "joints.svg": move_figures.panels(f"{title}: joints", samples.times, joints, marks=pose_times),
+        "hand.svg": move_figures.panels(f"{title}: tool", samples.times, tool, marks=pose_times, columns=2),
+        "path.svg": move_figures.path_in_space(f"{title}: path of the tool, approach vectors", X, positions),
         "report.html": run_page(move_page(moved)),
     }
     if not film:
         return files
-    with counting("drawing the film", quiet=quiet) as told:
-        return {**files, **films(planned, told)}
+    with counting("drawing the film", quiet=quiet) as progress:
+        return {**files, **films(planned, progress)}
 
 
 def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> dict[str, Any]:
-    """Return a move in short, as plain data in SI units."""
-    passed = zip(
+    """Return a summary of a move as plain data in SI units."""
+    passages = zip(
         file.names, planned.times.tolist(), planned.configurations.tolist(), planned.misses.tolist(), strict=True
     )
     return {
         "arm": planned.arm.name,
         "duration": planned.trajectory.duration,
         "branch": planned.label,
-        "poses": [{"name": name, "time": t, "q": q, "missed_by": miss} for name, t, q, miss in passed],
+        "poses": [{"name": name, "time": t, "q": q, "deviation": deviation} for name, t, q, deviation in passages],
         "certificate": None if planned.certificate is None else planned.certificate.as_data(),
         "of_limits": {name: use.tolist() for name, use in uses.items()},
-        "ways": [
+        "segments": [
             {
-                "by": way.by,
-                "stopped_by": None if way.obstacle is None else str(way.obstacle),
-                "off_the_line": way.price.distance,
-                "turned_off": way.price.turn,
-                "longer_by": way.price.time,
+                "method": detour.by,
+                "obstacle": None if detour.obstacle is None else str(detour.obstacle),
+                "position_deviation": detour.price.distance,
+                "rotation_deviation": detour.price.turn,
+                "extra_time": detour.price.time,
             }
-            for way in planned.detours
+            for detour in planned.detours
         ],
     }
 
@@ -257,21 +264,22 @@ def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> 
     from armwright.cli.joints import unit_names, units
 
     console = plain_console()
-    shown = table(("pose", "s", *unit_names(planned.arm), *(["missed mm"] if planned.hand else [])))
+    shown = table(("pose", "s", *unit_names(planned.arm), *(["deviation mm"] if planned.hand else [])))
     scale = units(planned.arm)
     for i, pose in enumerate(file.names):
         configurations = [f"{q:z.1f}" for q in planned.configurations[i] / scale]
-        missed = [f"{planned.misses[i] * 1e3:.1f}"] if planned.hand else []
-        shown.add_row(pose, f"{planned.times[i]:.3f}", *configurations, *missed, end_section=i == len(file.names) - 1)
+        deviation = [f"{planned.misses[i] * 1e3:.1f}"] if planned.hand else []
+        shown.add_row(
+            pose, f"{planned.times[i]:.3f}", *configurations, *deviation, end_section=i == len(file.names) - 1
+        )
     for limit, use in uses.items():
         parts = [Text(f"{part:.0%}", style="bold red" if part > 1 + _ROUNDING else "") for part in use]
         shown.add_row(limit, "", *parts)
     print_table(console, shown)
-    console.print("speed, acceleration and effort in parts of their limits")
+    console.print("speed, acceleration and effort in percent of their limits")
     console.print(f"{planned.arm.name}: {planned.trajectory.duration:.3f} s, {planned.label}")
     if planned.certificate:
         console.print(f"certificate {planned.certificate}")
-    for i, way in enumerate(planned.detours):
-        leg = f"{file.names[i]} to {file.names[i + 1]}"
-        how = "a line" if way.by == "line" else f"no line, {way.obstacle}; round it by {way.by}"
-        console.print(f"{leg}: {how}: {way.price}")
+    for i, detour in enumerate(planned.detours):
+        method = "a line" if detour.by == "line" else f"no line, {detour.obstacle}; detour by {detour.by}"
+        console.print(f"{file.names[i]} to {file.names[i + 1]}: {method}: {detour.price}")

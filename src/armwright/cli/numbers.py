@@ -1,4 +1,4 @@
-"""Numbers on the command line: lists of them, numbers with a name, bounds."""
+"""Numbers as arguments: lists of numbers, named numbers, and bounds."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -6,16 +6,16 @@ from typing import NamedTuple
 
 import typer
 
-# Digits are given back to nothing else: a text that is no number is refused in the time of its length.
+# Possessive quantifiers: a text that is not a number is refused in time linear in its length.
 _NUMBER = r"[+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
 _NAMED = re.compile(rf"(?P<name>[^=]+)=(?P<number>{_NUMBER})(?P<unit>[a-zA-Z%/]*)")
 
 
 def numbers(text: str, count: int, option: str) -> list[float]:
-    """Read numbers apart by commas or blanks.
+    """Read numbers that are separated by commas or blanks.
 
     Raises:
-        BadParameter: it is not ``count`` finite numbers, or one is larger than any of a robot.
+        BadParameter: the text is not ``count`` finite numbers, or a number is larger than any of a robot.
     """
     from armwright.arrays import LARGEST
 
@@ -28,7 +28,7 @@ def numbers(text: str, count: int, option: str) -> list[float]:
     if len(values) != count:
         raise typer.BadParameter(f"expected {count} finite numbers, got {len(values)}: {text}", param_hint=option)
     for value, word in zip(values, words, strict=True):
-        if not abs(value) <= LARGEST:  # what is NaN compares with nothing
+        if not abs(value) <= LARGEST:  # not fulfilled by NaN
             raise typer.BadParameter(
                 f"every number must be finite and no larger than {LARGEST:g}, got {word}", param_hint=option
             )
@@ -36,10 +36,10 @@ def numbers(text: str, count: int, option: str) -> list[float]:
 
 
 def units_of(text: str | None) -> tuple[str, str] | None:
-    """Read a unit of lengths and one of angles, apart by a comma; None where none are given.
+    """Read a unit of lengths and a unit of angles that are separated by a comma; None without a text.
 
     Raises:
-        BadParameter: they are not two.
+        BadParameter: the text is not two units.
     """
     if text is None:
         return None
@@ -62,33 +62,33 @@ def named_numbers(texts: Iterable[str], units: Sequence[str] | None, expected: s
 
     Args:
         texts: such as ``J2=0.3`` or ``J2=1e-3mm``.
-        units: what may stand behind a number; anything without them.
-        expected: what should have been given, in words.
-        option: whose values they are.
+        units: valid units; None allows any.
+        expected: description of a valid text, for the message.
+        option: option of the texts, for the message.
 
     Returns:
-        By name, in the order in which they were given.
+        The numbers by name, in the order of the texts.
 
     Raises:
-        BadParameter: one is something else, or a name is given twice.
+        BadParameter: a text is not a named number, or a name occurs twice.
     """
-    found: dict[str, Named] = {}
+    named: dict[str, Named] = {}
     for text in texts:
         match = _NAMED.fullmatch(text.replace(" ", ""))
         if match is None or (units is not None and match["unit"] not in units):
             raise typer.BadParameter(f"expected {expected}, got {text}", param_hint=option)
-        one = Named(match["name"], float(match["number"]), match["unit"])
-        if one.name in found:
-            raise typer.BadParameter(f"{one.name} is given twice; expected each name once", param_hint=option)
-        found[one.name] = one
-    return found
+        name = match["name"]
+        if name in named:
+            raise typer.BadParameter(f"{name} occurs twice; expected each name once", param_hint=option)
+        named[name] = Named(name, float(match["number"]), match["unit"])
+    return named
 
 
 def within(value: float, bounds: tuple[float, float], option: str) -> float:
     """Return a number that is within its bounds.
 
     Raises:
-        BadParameter: it is not.
+        BadParameter: the number is outside them.
     """
     lower, upper = bounds
     if not lower <= value <= upper:

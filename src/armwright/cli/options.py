@@ -11,11 +11,11 @@ ArmName: TypeAlias = Annotated[
     str, typer.Argument(help="Name in the catalogue, or path of an arm file.", autocompletion=arms)
 ]
 Configuration: TypeAlias = Annotated[
-    str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.")
+    str | None, typer.Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")
 ]
 Rows: TypeAlias = Annotated[
     Path | None,
-    typer.Option("--csv", help="Table of q1 ... qn, in SI units or those of its names, such as motion.csv."),
+    typer.Option("--csv", help="Table of q1 ... qn, such as motion.csv, in SI units or the units in its headings."),
 ]
 Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
 JsonSummary: TypeAlias = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")]

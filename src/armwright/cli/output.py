@@ -1,4 +1,4 @@
-"""What commands print: JSON, tables, and the command line that was given."""
+"""Output of the commands: JSON, tables, and the command line for the record."""
 
 import json
 import sys
@@ -14,30 +14,30 @@ if TYPE_CHECKING:
 
     from armwright.files.result_table import Result, ResultTable
 
-# Of a table that is measured: more than any has [columns].
+# Width at which tables are measured [columns]; none is wider.
 _WIDEST = 10_000
 
 
 def command_line() -> str:
-    """Return the command as it was given, for the record."""
+    """Return the command line of this process as text, for the record."""
     import shlex
 
     return shlex.join(["armwright", *sys.argv[1:]])
 
 
 def json_text(data: Any) -> str:
-    """Return data as people read JSON, without an end of line."""
+    """Return data as indented JSON, without a final line break."""
     return json.dumps(data, indent=2, ensure_ascii=False)
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON; where the output knows no other letters, in ASCII."""
-    every_letter = (sys.stdout.encoding or "").lower().startswith("utf")
-    print(json_text(data) if every_letter else json.dumps(data, indent=2))
+    """Print data as JSON, in ASCII where the encoding of the output is not a Unicode encoding."""
+    is_unicode = (sys.stdout.encoding or "").lower().startswith("utf")
+    print(json.dumps(data, indent=2, ensure_ascii=not is_unicode))
 
 
 def plain_console() -> "Console":
-    """Return a console that takes every text as it is."""
+    """Return a console that does not highlight."""
     return console(highlight=False)
 
 
@@ -50,7 +50,7 @@ def print_result(result: "Result") -> None:
 
 
 def print_result_tables(console: "Console", tables: "Iterable[ResultTable]") -> None:
-    """Print tables of results, those without rows left out."""
+    """Print tables of results, without empty ones."""
     for result in tables:
         if result.rows:
             words = [i for i in range(len(result.heads)) if i not in result.numbers]
@@ -63,9 +63,9 @@ def print_result_tables(console: "Console", tables: "Iterable[ResultTable]") -> 
 
 
 def print_table(console: "Console", shown: "Table") -> None:
-    """Print a table, its cells folded between words where the terminal is narrow, but never within a number.
+    """Print a table; on a narrow terminal its cells are folded between words, but never within a number.
 
-    A table that is wider all the same runs over the edge, where a terminal breaks the line and a file does not.
+    A wider table exceeds the width of the terminal, which then breaks the lines; in a file they stay unbroken.
     """
     room = console.options.update(max_width=_WIDEST)
     for column in shown.columns:
@@ -84,17 +84,17 @@ def table(
     """Return a table for a terminal, to be printed by ``print_table``.
 
     Args:
-        columns: their names.
+        columns: names of the columns.
         rows: texts of each row.
-        title: above it, at the left.
-        words: columns of words, from 0; the others hold numbers and end at the right.
+        title: title above the table.
+        words: indices of columns with words; the others hold numbers and are aligned right.
     """
     from rich import box
     from rich.table import Table
 
-    found = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    for place, name in enumerate(columns):
-        found.add_column(name, justify="left" if place in words else "right", overflow="fold")
+    made = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, name in enumerate(columns):
+        made.add_column(name, justify="left" if index in words else "right", overflow="fold")
     for row in rows:
-        found.add_row(*row)
-    return found
+        made.add_row(*row)
+    return made

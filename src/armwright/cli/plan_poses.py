@@ -1,14 +1,14 @@
-"""``armwright plan-poses``: the poses at which an arm should be measured."""
+"""``armwright plan-poses``: propose configurations at which an arm should be measured."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json
-from armwright.cli.output import plain_console, print_json, print_table, table
+from armwright.cli.output import print_json, print_result
 from armwright.cli.shell_completion import one_of
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
@@ -19,31 +19,35 @@ if TYPE_CHECKING:
 
 def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    count: Annotated[int, typer.Option("-n", "--count", help="How many poses.")] = 30,
+    count: Annotated[int, typer.Option("-n", "--count", help="Number of poses.")] = 30,
     index: Annotated[
         str,
         typer.Option(
-            help="What is to be large: O1 to O5 (docs/calibration.md).",
+            help="Observability index to maximize: O1 to O5 (docs/calibration.md).",
             autocompletion=one_of("O1", "O2", "O3", "O4", "O5"),
         ),
     ] = "O1",
-    seed: Annotated[int, typer.Option(min=0, help="Of the candidates.")] = 0,
-    turns: Annotated[bool, typer.Option("--turns", help="Turns are measured too, not places alone.")] = False,
-    after: Annotated[
-        Path | None, typer.Option(help="CSV of what was measured already: the poses that tell most beside it.")
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the candidates.")] = 0,
+    orientations: Annotated[
+        bool, typer.Option("--orientations", help="Orientations are measured too, not positions alone.")
+    ] = False,
+    after: Annotated[Path | None, typer.Option(help="CSV of measurements to which the poses are added.")] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Units of that file where its header has none, as in mm,deg.")
     ] = None,
-    units: Annotated[str | None, typer.Option(help="Of that file, if its header has none: mm,deg.")] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
     tool_mm: MeasuredPoint = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="CSV of the poses, to be measured and given to calibrate.")
+        Path | None,
+        typer.Option("-o", "--output", help="CSV of the poses, to be completed by measurements for calibrate."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Propose poses inside the limits whose measured points tell most of an arm's errors.
+    """Propose measurement configurations at which the errors of an arm are most observable.
 
-    The CSV has a column for every joint; add `x_mm, y_mm, z_mm`, where the tool was measured, and calibrate.
+    The configurations are within the limits. The CSV has a column for every joint; add the measured positions of the
+    tool as `x_mm, y_mm, z_mm` and calibrate.
 
     **Example:** `armwright plan-poses puma560 -n 30 -o out/poses.csv`
     """
@@ -60,28 +64,19 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
         measured = read_measurements(
             after, model, units=units_of(units), columns=columns_of(columns), skip_incomplete=skip_incomplete
         ).q
-    plan = planned(model, count, index=index, seed=seed, rotations=turns, measured=measured)  # type: ignore[arg-type]
+    plan = planned(model, count, index=index, seed=seed, rotations=orientations, measured=measured)  # type: ignore[arg-type]
     if output is not None:
         write_file(output, _csv(model, plan))
     if as_json:
-        print_json(_as_data(plan))
+        print_json(plan.as_data())
     else:
-        _print(model, plan)
+        print_result(plan)
         if output is not None:
             print(f"poses: {output}")
 
 
-def _as_data(plan: "MeasurementPlan") -> dict[str, Any]:
-    return {
-        "q": plan.q.tolist(),
-        "tells": list(plan.names),
-        "observability": plan.observability._asdict(),
-        "by chance": plan.random._asdict(),
-    }
-
-
 def _columns(model: "Arm") -> list[tuple[str, float]]:
-    """Return the names of the columns and how many of their units are one in SI."""
+    """Return the names of the columns, each with the factor from SI to its unit."""
     import math
 
     return [
@@ -94,12 +89,3 @@ def _csv(model: "Arm", plan: "MeasurementPlan") -> str:
     columns = _columns(model)
     rows = [",".join(f"{x * scale:z.4f}" for x, (_, scale) in zip(q, columns, strict=True)) for q in plan.q]
     return "\n".join([",".join(name for name, _ in columns), *rows]) + "\n"
-
-
-def _print(model: "Arm", plan: "MeasurementPlan") -> None:
-    console = plain_console()
-    console.print(f"{len(plan.q)} poses of {model.name} tell {len(plan.names)} errors:")
-    console.print(", ".join(plan.names))
-    rows = zip(plan.observability._fields, plan.observability, plan.random, strict=True)
-    shown = ((name, f"{ours:.4g}", f"{chance:.4g}") for name, ours, chance in rows)
-    print_table(console, table(("index", "these poses", "by chance"), shown))

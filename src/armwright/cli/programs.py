@@ -1,4 +1,4 @@
-"""What the commands for programs share: reading and translating them, their cells, and showing diagnostics."""
+"""Options, cells and diagnostics that the commands for programs share."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,22 +14,27 @@ if TYPE_CHECKING:
     from armwright.program import Compilation, Source
     from armwright.program.language.diagnostic import Diagnostic
 
-# The text form of intermediate code.
+# Suffix of a file of intermediate code.
 CODE_SUFFIX = ".rlc"
 
-ProgramFile: TypeAlias = Annotated[Path, typer.Argument(help="The program, in RLO.")]
+ProgramFile: TypeAlias = Annotated[Path, typer.Argument(help="Program in RLO.")]
 CellFile: TypeAlias = Annotated[
-    Path | None, typer.Option("--cell", help="The cell it runs in, TOML or JSON; else what the program IMPORTs.")
+    Path | None,
+    typer.Option(
+        "--cell", help="Cell in which the program runs, TOML or JSON; the default is what the program IMPORTs."
+    ),
 ]
-Std: TypeAlias = Annotated[Standard, typer.Option(help="The language: RLO-2, or the RLO-83 of the report alone.")]
+Std: TypeAlias = Annotated[
+    Standard, typer.Option(help="Version of the language: RLO-2, or only the RLO-83 of the report.")
+]
 Strict: TypeAlias = Annotated[bool, typer.Option("--strict", help="Treat an implied AFFIX (W201) as an error.")]
 
 
-def given_cell(path: Path | None) -> "Cell | None":
-    """Return the cell of the option ``--cell``, if it is given.
+def read_cell_option(path: Path | None) -> "Cell | None":
+    """Return the cell of the option ``--cell``; None without the option.
 
     Raises:
-        FileFormatError: it cannot be read, or says what cannot be.
+        FileFormatError: the file cannot be read, or is invalid.
     """
     from armwright.cell.reader import read_cell
 
@@ -45,7 +50,7 @@ def imported_files(program: Path, compiled: "Compilation") -> tuple[Path, ...]:
 
 
 def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, to_errors: bool = False) -> None:
-    """Print diagnostics with the lines they are about, in colour when a person watches."""
+    """Print diagnostics with the lines of their locations, in colour on a terminal."""
     import sys
 
     from armwright.cli.terminal import console
@@ -59,8 +64,8 @@ def print_diagnostics(diagnostics: "Iterable[Diagnostic]", source: "Source", *, 
 
 
 def error_data(diagnostics: "Iterable[Diagnostic]", source: "Source") -> dict[str, Any]:
-    """Return the first error of a program, with its exit status, as errors are told under ``--json``."""
-    first = next((one for one in diagnostics if one.is_error), None)
+    """Return the first error of a program, with its exit status, in the form of ``--json``."""
+    first = next((diagnostic for diagnostic in diagnostics if diagnostic.is_error), None)
     if first is None:
         return {"exit_status": int(ExitStatus.DONE)}
     error = {
@@ -74,14 +79,14 @@ def error_data(diagnostics: "Iterable[Diagnostic]", source: "Source") -> dict[st
 
 
 def diagnostics_data(compiled: "Compilation") -> dict[str, Any]:
-    """Return what is wrong with a program as plain data."""
+    """Return the diagnostics of a program as plain data."""
     from armwright.program.language.diagnostic import to_json
 
-    errors = sum(one.is_error for one in compiled.diagnostics)
+    errors = sum(diagnostic.is_error for diagnostic in compiled.diagnostics)
     return {
         **error_data(compiled.diagnostics, compiled.source),
         "program": compiled.source.name,
         "errors": errors,
         "warnings": len(compiled.diagnostics) - errors,
-        "diagnostics": [to_json(one, compiled.source) for one in compiled.diagnostics],
+        "diagnostics": [to_json(diagnostic, compiled.source) for diagnostic in compiled.diagnostics],
     }

@@ -1,4 +1,4 @@
-"""What a person sees who waits: bars and words on the error output, where it is a terminal."""
+"""Progress bars and status lines on the error output, where it is a terminal."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,23 +12,23 @@ if TYPE_CHECKING:
 
 
 def watched_console(*, quiet: bool = False) -> "Console | None":
-    """Return the console of the error output; None where nobody watches, or wants to."""
+    """Return the console of the error output; None where it is not a terminal, or with ``quiet``."""
     from armwright.cli.terminal import console
 
-    found = console(stderr=True)
-    return None if quiet or not found.is_terminal else found
+    stderr = console(stderr=True)
+    return None if quiet or not stderr.is_terminal else stderr
 
 
 @contextmanager
 def waiting(text: str, *, quiet: bool = False) -> "Iterator[Callable[[str], None] | None]":
-    """Say what is going on.
+    """Show a status line.
 
     Args:
-        text: in a few words.
-        quiet: say nothing.
+        text: text of the line.
+        quiet: show nothing.
 
     Yields:
-        told: takes other words; None where nobody watches.
+        update: replaces the text; None where nothing is shown.
     """
     console = watched_console(quiet=quiet)
     if console is None:
@@ -40,14 +40,14 @@ def waiting(text: str, *, quiet: bool = False) -> "Iterator[Callable[[str], None
 
 @contextmanager
 def counting(title: str, *, quiet: bool = False) -> "Iterator[Callable[..., None] | None]":
-    """Show how many of how many pieces are done.
+    """Show a progress bar with the number of finished items.
 
     Args:
-        title: what is being done.
+        title: name of the work.
         quiet: show nothing.
 
     Yields:
-        told: takes how many are done, of how many, and more words; None where nobody watches.
+        progress: takes the number of finished items, the number of all, and further text; None where nothing is shown.
     """
     from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bar, TextColumn
 
@@ -63,10 +63,10 @@ def counting(title: str, *, quiet: bool = False) -> "Iterator[Callable[..., None
 
 @contextmanager
 def parts() -> "Iterator[Callable[[str, float], None] | None]":
-    """Show a bar for each of several pieces of work.
+    """Show a progress bar for each of several tasks.
 
     Yields:
-        told: takes the name of one and how much of it is done, 0 to 1; None where nobody watches.
+        update: takes the name of a task and the finished part of it, 0 to 1; None where nothing is shown.
     """
     from rich.progress import Progress as Bar
 
@@ -77,31 +77,31 @@ def parts() -> "Iterator[Callable[[str, float], None] | None]":
     with Bar(console=console, transient=True) as bar:
         lines: dict[str, TaskID] = {}
 
-        def told(what: str, part: float) -> None:
-            if what not in lines:
-                lines[what] = bar.add_task(what, total=1.0)
-            bar.update(lines[what], completed=part)
+        def update(task: str, part: float) -> None:
+            if task not in lines:
+                lines[task] = bar.add_task(task, total=1.0)
+            bar.update(lines[task], completed=part)
 
-        yield told
+        yield update
 
 
 @contextmanager
 def sweep_bar(title: str, *, quiet: bool = False) -> "Iterator[Callable[[Progress], None] | None]":
-    """Show how far a sweep is: runs, rate, time left, failures.
+    """Show the progress of a sweep: runs, rate, remaining time, failures.
 
     Args:
-        title: what is running.
+        title: name of the sweep.
         quiet: show nothing.
 
     Yields:
-        progress: what ``run`` takes of this name; None where nobody watches.
+        progress: the argument of this name of ``sweep.run``; None where nothing is shown.
     """
-    with counting(title, quiet=quiet) as told:
-        yield None if told is None else lambda now: told(now.done, now.runs, progress_text(now))
+    with counting(title, quiet=quiet) as update:
+        yield None if update is None else lambda now: update(now.done, now.runs, progress_text(now))
 
 
 def progress_text(now: "Progress") -> str:
-    """Write rate, time left and what went wrong in a few words."""
+    """Return rate, remaining time and number of failures as text."""
     words = []
     if now.rate > 0:
         words.append(f"{now.rate:.3g} runs/s")

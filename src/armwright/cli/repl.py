@@ -1,4 +1,4 @@
-"""``armwright repl``: statements done as they are typed, in a simulated cell."""
+"""``armwright repl``: enter statements interactively in a simulated cell."""
 
 import contextlib
 import io
@@ -24,54 +24,54 @@ if TYPE_CHECKING:
     from armwright.program.vm.recording import Effect
 
 _DIM = "dim"
-_ALL_OF_IT = "`:report DIR` keeps all in events.jsonl"
+_EVENT_LOG_HINT = "`:report DIR` writes all to events.jsonl"
 
 
 def repl(
-    program: Annotated[Path | None, typer.Argument(help="A program to begin with, in RLO.")] = None,
+    program: Annotated[Path | None, typer.Argument(help="Program in RLO to load first.")] = None,
     cell: CellFile = None,
     std: Std = Standard.RLO_2,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print one line of JSON for each input, without prompts.")
     ] = False,
 ) -> None:
-    """Try RLO out: each statement is done as it is entered, in a simulated cell, and can be taken back.
+    """Enter RLO interactively: each statement is executed in a simulated cell, and can be undone.
 
-    An expression shows its value, :frames the frame tree, :undo goes back, :save writes the session as a program,
-    :help tells the rest. Names and words are completed with the tab key. Without a terminal the lines of the
-    standard input are taken, and the exit status is the highest of what went wrong: 1 for a statement with errors,
-    3 for one that could not be done, 4 for a file.
+    An expression prints its value, :frames the frame tree; :undo undoes a statement, :save writes the session as a
+    program, and :help lists all commands. The tab key completes names and keywords. Without a terminal the session
+    reads the lines of the standard input, and the exit status is the highest of all errors: 1 for a statement with
+    errors, 3 for one that cannot be executed, 4 for a file.
 
     **Example:** `armwright repl --cell examples/stanford_cell.toml`
     """
-    from armwright.cli.programs import given_cell
+    from armwright.cli.programs import read_cell_option
     from armwright.cli.repl_commands import COMMANDS, Commands
     from armwright.cli.repl_lines import Script, Terminal, editing
     from armwright.program.api import import_reader
     from armwright.program.repl.session import Session
 
-    session = Session(given_cell(cell), std, import_reader(Path()))
+    session = Session(read_cell_option(cell), std, import_reader(Path()))
     commands = Commands(session, cell)
-    watched = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
-    talk = _Json(session) if as_json else _Talk()
+    interactive = sys.stdin.isatty() and sys.stdout.isatty() and not as_json
+    printer = _JsonPrinter(session) if as_json else _Printer()
     if isinstance(sys.stdout, io.TextIOWrapper):
-        # Whoever feeds a pipe waits for answers.
+        # A program at the other end of a pipe waits for the results.
         sys.stdout.reconfigure(line_buffering=True)
     if program is not None:
-        talk.answer(commands.load_file(program))
-    if not watched:
-        _converse(session, commands, Script(), talk)
-        if talk.status:
-            raise typer.Exit(talk.status)
+        printer.answer(commands.load_file(program))
+    if not interactive:
+        _converse(session, commands, Script(), printer)
+        if printer.status:
+            raise typer.Exit(printer.status)
         return
     _greet(session)
     with _interruptible(), editing(session, COMMANDS):
-        _converse(session, commands, Terminal(colour=_colour()), talk)
+        _converse(session, commands, Terminal(colour=_colour()), printer)
 
 
 @contextlib.contextmanager
 def _interruptible() -> Iterator[None]:
-    """Let Ctrl-C abandon a line or a statement, and not the session."""
+    """Let Ctrl-C end a line or a statement instead of the session."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
@@ -87,15 +87,15 @@ def _greet(session: "Session") -> None:
     from armwright.version import __version__
 
     cell, language = session.state.cell, "RLO-83" if session.std is Standard.RLO_83 else "RLO-2"
-    where = f"in '{cell.name}' with {', '.join(sorted(cell.arms))}" if cell.arms else "without arms (see --cell)"
-    print(f"armwright {__version__}: {language} {where}. :help tells more, Ctrl-D ends.")
+    setting = f"in '{cell.name}' with {', '.join(sorted(cell.arms))}" if cell.arms else "without arms (see --cell)"
+    print(f"armwright {__version__}: {language} {setting}. :help lists the commands, Ctrl-D ends the session.")
 
 
 # ---- the conversation ----------------------------------------------------------------------------------------------
 
 
-def _converse(session: "Session", commands: "Commands", lines: "Lines", talk: "_Talk") -> None:
-    """Take lines until there are no more."""
+def _converse(session: "Session", commands: "Commands", lines: "Lines", printer: "_Printer") -> None:
+    """Read and execute lines until the input ends."""
     from armwright.cli.repl_commands import EndOfSessionError
 
     begun = ""
@@ -105,42 +105,42 @@ def _converse(session: "Session", commands: "Commands", lines: "Lines", talk: "_
             line = lines.line(f"... {number}> " if begun else f"rlo {number}> ")
         except KeyboardInterrupt:
             print()
-            # Lines that were seen keep their numbers.
+            # Abandoned lines keep their numbers.
             session.pass_over(begun)
             begun = ""
             continue
         if line is None:
             break
         try:
-            begun = _one(session, commands, begun, line, talk)
+            begun = _execute_line(session, commands, begun, line, printer)
         except EndOfSessionError:
             return
         except KeyboardInterrupt:
             begun = ""
-            talk.interrupted()
+            printer.interrupted()
     if begun:
-        talk.answer(session.enter(begun, whole=True))
+        printer.answer(session.enter(begun, whole=True))
 
 
-def _one(session: "Session", commands: "Commands", begun: str, line: str, talk: "_Talk") -> str:
-    """Take one line; return what has to be gone on with."""
+def _execute_line(session: "Session", commands: "Commands", begun: str, line: str, printer: "_Printer") -> str:
+    """Execute a line; return the text of a statement that is not complete yet."""
     if not begun and line.lstrip().startswith(":"):
         session.pass_over(line)
-        talk.command(commands, line)
+        printer.command(commands, line)
         return ""
     text = f"{begun}{line}\n"
     answer = session.enter(text)
     if not answer.complete:
         return text
-    talk.answer(answer)
+    printer.answer(answer)
     return ""
 
 
-class _Talk:
-    """Shows people what came of their inputs.
+class _Printer:
+    """Prints the results of inputs for people.
 
     Attributes:
-        status: the highest of all that went wrong so far.
+        status: the highest exit status so far.
     """
 
     def __init__(self) -> None:
@@ -150,14 +150,15 @@ class _Talk:
         self._console = console(highlight=False, soft_wrap=True)
 
     def answer(self, answer: "Answer") -> None:
-        """Show what was done, in order, and then what is wrong."""
+        """Print the effects of an input in order, and then its diagnostics."""
         from armwright.cli.programs import print_diagnostics
         from armwright.program.repl.undo_report import SILENT
         from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
 
         self.status = max(self.status, answer.status)
-        found = excerpt([one for one in answer.effects if one.kind not in SILENT], ON_A_TERMINAL).mapped(_shown)
-        for text, style in found.joined((more(found.left_out, _ALL_OF_IT), _DIM)):
+        effects = [effect for effect in answer.effects if effect.kind not in SILENT]
+        shown = excerpt(effects, ON_A_TERMINAL).mapped(_shown)
+        for text, style in shown.joined((more(shown.left_out, _EVENT_LOG_HINT), _DIM)):
             self._console.print(text, style=style)
         if answer.diagnostics:
             print_diagnostics(answer.diagnostics, answer.source)
@@ -165,7 +166,7 @@ class _Talk:
             self._console.print(remark, style="yellow")
 
     def command(self, commands: "Commands", line: str) -> None:
-        """Do a command and show what it says."""
+        """Run a command and print its reply."""
         try:
             reply = commands.run(line)
         except ArmwrightError as error:
@@ -178,46 +179,46 @@ class _Talk:
             self.answer(reply.answer)
 
     def interrupted(self) -> None:
-        """Say what became of a statement that was interrupted."""
-        self._console.print("interrupted; the statement under way was taken back", style="yellow")
+        """Print that a statement was interrupted."""
+        self._console.print("interrupted; the current statement was undone", style="yellow")
 
 
 def _shown(effect: "Effect") -> tuple[str, str]:
-    """Return what is shown of an effect, and how it looks."""
+    """Return the text and the style of an effect."""
     from armwright.program.vm.excerpt import one_line
 
     if effect.kind == "PRINT":
-        return one_line(effect.data["printed"], _ALL_OF_IT), ""
-    return f"{effect.t1:9.3f}  {one_line(effect.text, _ALL_OF_IT)}", _DIM
+        return one_line(effect.data["printed"], _EVENT_LOG_HINT), ""
+    return f"{effect.t1:9.3f}  {one_line(effect.text, _EVENT_LOG_HINT)}", _DIM
 
 
-class _Json(_Talk):
-    """Gives programs one line of JSON for each input."""
+class _JsonPrinter(_Printer):
+    """Prints a line of JSON for each input, for programs."""
 
     def __init__(self, session: "Session") -> None:
         super().__init__()
         self._session = session
 
     def answer(self, answer: "Answer") -> None:
-        """Give an answer as plain data."""
+        """Print the result of an input as plain data."""
         self.status = max(self.status, answer.status)
-        self._give(_as_data(answer))
+        self._print(_as_data(answer))
 
     def command(self, commands: "Commands", line: str) -> None:
-        """Give what a command says, line by line, and what it entered, if it did."""
+        """Print the reply of a command, and the result of the statements that it entered."""
         data: dict[str, Any] = {"command": line.strip()}
         try:
             reply = commands.run(line)
         except ArmwrightError as error:
             self.status = max(self.status, error.exit_status)
-            self._give({**data, "ok": False, **failure_data(error.exit_status, error, str(error))})
+            self._print({**data, "ok": False, **failure_data(error.exit_status, error, str(error))})
             return
         entered = {} if reply.answer is None else _as_data(reply.answer)
         if reply.answer is not None:
             self.status = max(self.status, reply.answer.status)
-        self._give({**data, "ok": True, "exit_status": ExitStatus.DONE, "lines": list(reply.lines), **entered})
+        self._print({**data, "ok": True, "exit_status": ExitStatus.DONE, "lines": list(reply.lines), **entered})
 
-    def _give(self, data: dict[str, Any]) -> None:
+    def _print(self, data: dict[str, Any]) -> None:
         print(json.dumps({**data, "time": self._session.state.machine.now}, ensure_ascii=False))
 
 
@@ -231,9 +232,16 @@ def _as_data(answer: "Answer") -> dict[str, Any]:
         "exit_status": answer.status,
         "printed": list(answer.printed),
         "effects": [
-            {"t0": one.t0, "t1": one.t1, "kind": one.kind, "arm": one.arm, "text": one.text, **one.data}
-            for one in answer.effects
+            {
+                "t0": effect.t0,
+                "t1": effect.t1,
+                "kind": effect.kind,
+                "arm": effect.arm,
+                "text": effect.text,
+                **effect.data,
+            }
+            for effect in answer.effects
         ],
-        "diagnostics": [to_json(one, answer.source) for one in answer.diagnostics],
+        "diagnostics": [to_json(diagnostic, answer.source) for diagnostic in answer.diagnostics],
         "remarks": list(answer.remarks),
     }

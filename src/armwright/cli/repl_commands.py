@@ -1,4 +1,4 @@
-"""The commands of a session, which begin with a colon: looking round, going back, files."""
+"""The commands of a session, which begin with a colon: inspection, undo, files."""
 
 import contextlib
 import os
@@ -18,16 +18,16 @@ _PROGRAM = "session.rlo"
 
 
 class EndOfSessionError(Exception):
-    """The session shall end."""
+    """The user has ended the session."""
 
 
 @attrs.frozen(kw_only=True)
 class Reply:
-    """What a command has to say.
+    """The result of a command.
 
     Attributes:
-        lines: for people.
-        answer: of a file that was entered, if one was.
+        lines: text for people.
+        answer: the result of the statements of a file, if the command has loaded one.
     """
 
     lines: tuple[str, ...] = ()
@@ -41,17 +41,17 @@ class Commands:
         """Serve a session.
 
         Args:
-            session: to be looked at and changed.
-            cell: the file of its cell, if one was given.
+            session: the session.
+            cell: the file of its cell; None without a file.
         """
         self._session, self._cell = session, cell
 
     def run(self, line: str) -> Reply:
-        """Do what a line says that begins with a colon.
+        """Run the command of a line that begins with a colon.
 
         Raises:
-            ArmwrightError: it cannot be done.
-            EndOfSessionError: it asks for the end.
+            ArmwrightError: the command is unknown, or fails.
+            EndOfSessionError: the command ends the session.
         """
         word, _, argument = line.strip()[1:].partition(" ")
         argument = argument.strip()
@@ -59,21 +59,21 @@ class Commands:
             raise UnknownNameError("command", f":{word}", [f":{name}" for name in _COMMANDS])
         if command.takes.startswith("[") or not command.takes:
             if argument and not command.takes:
-                raise InvalidValueError(f":{word} stands alone, got '{argument}'")
+                raise InvalidValueError(f":{word} takes no argument, got '{argument}'")
         elif not argument:
             raise InvalidValueError(f":{word} needs {command.takes}, such as `:{word} {command.example}`")
         return command.run(self, argument)
 
-    # ---- looking round ---------------------------------------------------------------------------------------------
+    # ---- inspection ------------------------------------------------------------------------------------------------
 
     def frames(self, _: str) -> Reply:
-        """Show the frame tree: places in the unit of the program, turns about z, y, x in degrees."""
+        """Show the frame tree: positions in the unit of the program, rotations about z, y, x in degrees."""
         from armwright.program.repl.frame_view import frames
 
         return Reply(lines=tuple(frames(self._session)))
 
     def arms(self, _: str) -> Reply:
-        """Show the joints of the arms and what their hands hold."""
+        """Show the joints of the arms and the objects that they grasp."""
         from armwright.program.repl.frame_view import arms
 
         return Reply(lines=tuple(arms(self._session)))
@@ -87,14 +87,14 @@ class Commands:
         return Reply(lines=tuple(self._session.program().splitlines()))
 
     def help(self, _: str) -> Reply:
-        """Show this."""
-        rows = [(f":{name} {command.takes}".rstrip(), command.does) for name, command in _COMMANDS.items()]
+        """List the commands."""
+        rows = [(f":{name} {command.takes}".rstrip(), command.summary) for name, command in _COMMANDS.items()]
         width = max(len(usage) for usage, _ in rows)
         return Reply(
             lines=(
                 "Enter statements, declarations (VAR, PROCEDURE, UNITS, IMPORT), or an expression to see its value.",
-                "What is not complete goes on in the next line. Ctrl-C abandons a line, Ctrl-D ends the session.",
-                *(f"  {usage:<{width}}  {does}" for usage, does in rows),
+                "An incomplete statement continues on the next line. Ctrl-C abandons a line, Ctrl-D ends the session.",
+                *(f"  {usage:<{width}}  {summary}" for usage, summary in rows),
             )
         )
 
@@ -102,48 +102,48 @@ class Commands:
         """End the session."""
         raise EndOfSessionError
 
-    # ---- back and forth --------------------------------------------------------------------------------------------
+    # ---- undo and redo ---------------------------------------------------------------------------------------------
 
     def undo(self, argument: str) -> Reply:
-        """Take back the last statements: frames, arms, clock, camera and devices too."""
-        taken = self._session.undo(_count(argument))
-        if not taken:
-            raise InvalidValueError("nothing is left to be taken back")
-        return Reply(lines=tuple(f"taken back: {text}" for text in taken))
+        """Undo the last statements, with frames, arms, clock, camera and devices."""
+        undone = self._session.undo(_count(argument))
+        if not undone:
+            raise InvalidValueError("there is nothing to undo")
+        return Reply(lines=tuple(f"undone: {text}" for text in undone))
 
     def redo(self, argument: str) -> Reply:
-        """Do again what was taken back last."""
-        again = self._session.redo(_count(argument))
-        if not again:
-            raise InvalidValueError("nothing was taken back that could be done again")
-        return Reply(lines=tuple(f"done again: {text}" for text in again))
+        """Redo the statements that were undone last."""
+        redone = self._session.redo(_count(argument))
+        if not redone:
+            raise InvalidValueError("there is nothing to redo")
+        return Reply(lines=tuple(f"redone: {text}" for text in redone))
 
     # ---- files -----------------------------------------------------------------------------------------------------
 
     def load(self, argument: str) -> Reply:
-        """Enter what a file holds, such as a whole program."""
+        """Enter the statements of a file, such as a program."""
         return Reply(answer=self.load_file(_path(argument)))
 
     def load_file(self, path: Path) -> "Answer":
-        """Enter what a file holds.
+        """Enter the statements of a file.
 
         Raises:
-            FileFormatError: it cannot be read.
+            FileFormatError: the file cannot be read.
         """
         from armwright.files.inputs import read_program
         from armwright.program.language.source import Source
 
-        # What a file imports it names as seen from its own folder.
+        # The imports of a file are relative to its folder.
         return self._session.load(
             Source(path.name, read_program(path)), lambda name: os.path.normpath(path.parent / name)
         )
 
     def save(self, argument: str) -> Reply:
-        """Write the session as a program that runs to the same end."""
+        """Write the session as a program with the same final state."""
         return self._save(_target(argument), overwrite=False)
 
     def overwrite(self, argument: str) -> Reply:
-        """Write it over a file that is there already."""
+        """Write the session over an existing file."""
         return self._save(_target(argument), overwrite=True)
 
     def _save(self, path: Path, *, overwrite: bool) -> Reply:
@@ -152,24 +152,24 @@ class Commands:
         if path.is_dir():
             raise OutputError(f"cannot write '{path}': it is a folder")
         if path.exists() and not overwrite:
-            raise OutputError(f"'{path}' is there already; `:save! {path}` overwrites it")
+            raise OutputError(f"'{path}' exists already; `:save! {path}` overwrites it")
         write_file(path, self._program(path), back=overwrite)
         return Reply(lines=(f"saved: {path}",))
 
     def _program(self, path: Path) -> str:
-        """Return the session as a program that can lie there."""
-        cell = [] if self._cell is None else ["--cell", _seen_from(path.parent, str(self._cell))]
+        """Return the session as a program at a path: relative paths start from its folder."""
+        cell = [] if self._cell is None else ["--cell", _relative_to(path.parent, str(self._cell))]
         remark = shlex.join(["armwright", "run", path.name, *cell])
-        return self._session.program(remark, lambda name: _seen_from(path.parent, name))
+        return self._session.program(remark, lambda name: _relative_to(path.parent, name))
 
     def report(self, argument: str) -> Reply:
-        """Write the program and what it did: motion, events, frames, and a page that shows the arms moving."""
+        """Write the program and its results: motion, events, frames, and a page that shows the arms moving."""
         from armwright.files.output import reason
 
         folder = _target(argument)
-        missing = [one for one in (folder, *folder.parents) if not one.exists()]
+        missing = [path for path in (folder, *folder.parents) if not path.exists()]
         try:
-            # What the program imports is looked for from there.
+            # The imports of the program are relative to this folder.
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f"cannot write to '{folder}': {reason(error, folder)}; nothing was written") from error
@@ -177,8 +177,8 @@ class Commands:
             self._report(folder)
         except BaseException:
             with contextlib.suppress(OSError):
-                for one in missing:
-                    one.rmdir()
+                for path in missing:
+                    path.rmdir()
             raise
         return Reply(lines=(f"report: {folder / 'report.html'}",))
 
@@ -207,8 +207,8 @@ class Commands:
             text=text,
         )
         assert compiled.code is not None  # noqa: S101 - it has run
-        made = (recording, compiled.code, diagnostics, origin)
-        write_folder(folder, {_PROGRAM: text, **result_files(*made)}, run_record(*made))
+        results = (recording, compiled.code, diagnostics, origin)
+        write_folder(folder, {_PROGRAM: text, **result_files(*results)}, run_record(*results))
 
 
 @attrs.frozen(kw_only=True)
@@ -216,9 +216,9 @@ class _Command:
     """A command.
 
     Attributes:
-        run: what it does.
-        takes: its argument for people, in brackets where it can be left out; empty without one.
-        example: of the argument.
+        run: the method that runs it.
+        takes: name of its argument for people, in brackets where it is optional; empty without an argument.
+        example: example of the argument.
     """
 
     run: Callable[[Commands, str], Reply]
@@ -226,8 +226,8 @@ class _Command:
     example: str = ""
 
     @property
-    def does(self) -> str:
-        """What it does, for people."""
+    def summary(self) -> str:
+        """The description of the command, for people."""
         return (self.run.__doc__ or "").rstrip(".")
 
 
@@ -253,7 +253,7 @@ def _count(argument: str) -> int:
         return 1
     if argument.isascii() and argument.isdigit() and int(argument[:9]) > 0:
         return int(argument[:9])
-    raise InvalidValueError(f"expected a whole number from 1, got '{argument}'")
+    raise InvalidValueError(f"expected an integer from 1, got '{argument}'")
 
 
 def _path(argument: str) -> Path:
@@ -261,15 +261,15 @@ def _path(argument: str) -> Path:
     path = Path(argument[1:-1] if quoted else argument)
     try:
         return path.expanduser()
-    except RuntimeError:  # nobody is called so
+    except RuntimeError:  # there is no such user
         return path
 
 
 def _target(argument: str) -> Path:
-    """Return a path to be written to.
+    """Return the path of an output.
 
     Raises:
-        OutputError: there can be no such path, or what is there cannot be looked at.
+        OutputError: the path is invalid or not accessible.
     """
     path = _path(argument)
     try:
@@ -282,6 +282,6 @@ def _target(argument: str) -> Path:
     return path
 
 
-def _seen_from(folder: Path, name: str) -> str:
-    """Return how a program in a folder names a file that is named from here."""
+def _relative_to(folder: Path, name: str) -> str:
+    """Return the path of a file relative to a folder."""
     return name if Path(name).is_absolute() else Path(os.path.relpath(name, folder)).as_posix()

@@ -1,4 +1,4 @@
-"""Where the lines of a session come from: a terminal with history and completion, or a file or pipe."""
+"""The input lines of a session: from a terminal with history and completion, or from a file or pipe."""
 
 import contextlib
 import sys
@@ -12,9 +12,9 @@ from armwright.files.limits import MEGABYTE, beyond, limit
 if TYPE_CHECKING:
     from armwright.program.repl.session import Session
 
-# Lines of earlier sessions that the arrow keys come back to.
+# Lines of earlier sessions that the arrow keys recall.
 _LONGEST_HISTORY = 2000
-# What ends a word; a colon begins a command, and a slash parts the folders of a path.
+# Characters that end a word; a colon begins a command, and a slash separates the folders of a path.
 _DELIMITERS = ' \t\n()[],;:=<>*/+"'
 _PROMPT = "\001\033[1;34m\002{}\001\033[0m\002"
 # The commands whose argument is a file or folder.
@@ -22,24 +22,24 @@ WITH_PATH = ("load", "save", "save!", "report")
 
 
 class Lines(Protocol):
-    """Gives the lines of a session, one after the other."""
+    """A source of the lines of a session."""
 
     def line(self, prompt: str) -> str | None:
-        """Return the next line without its end; None behind the last."""
+        """Return the next line without its line break; None at the end of the input."""
 
 
 class Script:
-    """Lines of the standard input that nobody types: no prompts, no history."""
+    """Lines of a standard input that is not a terminal: no prompts, no history."""
 
     def __init__(self) -> None:
-        """Begin with the first line, before which a mark of byte order may stand."""
+        """Begin with the first line, which may have a byte order mark."""
         self._encoding = "utf-8-sig"
 
-    def line(self, prompt: str) -> str | None:  # noqa: ARG002 - nobody would read it
-        """Return the next line; characters that are not UTF-8 become the one that stands for them.
+    def line(self, prompt: str) -> str | None:  # noqa: ARG002 - a script has no prompts
+        """Return the next line; bytes that are not UTF-8 become replacement characters.
 
         Raises:
-            FileFormatError: it is longer than a program may be.
+            FileFormatError: the line is longer than a program may be.
         """
         most = limit("program_mb") * MEGABYTE
         line = sys.stdin.buffer.readline(most + 1)
@@ -50,14 +50,14 @@ class Script:
 
 
 class Terminal:
-    """Lines that somebody types."""
+    """Lines that are typed on a terminal."""
 
     def __init__(self, *, colour: bool) -> None:
-        """Write prompts, in colour if wanted."""
+        """Set whether prompts are printed in colour."""
         self._colour = colour
 
     def line(self, prompt: str) -> str | None:
-        """Return what is typed behind a prompt.
+        """Return the line that is typed after a prompt.
 
         Raises:
             KeyboardInterrupt: the line was abandoned.
@@ -71,16 +71,16 @@ class Terminal:
 
 @contextlib.contextmanager
 def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
-    """Let the arrow keys bring back earlier lines, also of earlier sessions, and the tab key complete words."""
+    """Let the arrow keys recall lines of this and earlier sessions, and the tab key complete words."""
     from armwright.files.store import make_private
 
     try:
         import readline
-    except ImportError:  # a Python without it: lines can be typed all the same
+    except ImportError:  # a Python without it still reads lines
         yield
         return
     history = history_file()
-    # A history that cannot be read or kept is no reason to do without a session.
+    # A session works without a history that can be read or stored.
     if history:
         with contextlib.suppress(OSError):
             readline.read_history_file(history)
@@ -92,8 +92,8 @@ def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
         return choices[number] if number < len(choices) else None
 
     readline.set_completer(complete)
-    by_editline = "libedit" in (readline.__doc__ or "")
-    readline.parse_and_bind("bind ^I rl_complete" if by_editline else "tab: complete")
+    is_editline = "libedit" in (readline.__doc__ or "")
+    readline.parse_and_bind("bind ^I rl_complete" if is_editline else "tab: complete")
     try:
         yield
     finally:
@@ -105,7 +105,7 @@ def editing(session: "Session", commands: tuple[str, ...]) -> Iterator[None]:
 
 
 def history_file() -> Path | None:
-    """Return where the lines of sessions are kept: in the user's cache folder, if there is one and it is private."""
+    """Return the file of the lines of sessions, in the user's cache folder if there is one and it is private."""
     from armwright.files.store import cache_folder, distrust
 
     folder = cache_folder()
@@ -113,13 +113,13 @@ def history_file() -> Path | None:
 
 
 def completions(session: "Session", commands: tuple[str, ...], before: str, word: str) -> list[str]:
-    """Return what a word may become.
+    """Return the completions of a word.
 
     Args:
-        session: whose names can be used.
-        commands: those that begin with a colon, without it.
-        before: the line in front of the word.
-        word: its beginning; it may be empty.
+        session: the session, whose names are completed.
+        commands: names of the commands, without the colon.
+        before: the line before the word.
+        word: beginning of the word; it may be empty.
     """
     from armwright.program.language.words import SENSORS, VOCABULARIES, Standard
     from armwright.program.repl.frame_view import names
@@ -136,18 +136,18 @@ def completions(session: "Session", commands: tuple[str, ...], before: str, word
         words |= FUNCTIONS.keys()
     own = names(session)
     known = {name.upper() for name in own}
-    # Words of the language as the line writes them; names as they are spelled.
+    # Keywords in the case of the word; names as they are spelled.
     shown = (str.lower if word.islower() else str.upper)(" ".join(words - known)).split()
-    return sorted({one for one in (*own, *shown) if one.upper().startswith(word.upper())})
+    return sorted({choice for choice in (*own, *shown) if choice.upper().startswith(word.upper())})
 
 
 def _paths(before: str, word: str) -> list[str]:
-    """Return the ends of paths that begin so; folders end with a slash."""
+    """Return the completions of a path; folders end with a slash."""
     folder, slash, name = before.rpartition("/")
     begun = name + word
     try:
         entries = sorted(Path(folder + slash).expanduser().iterdir())
-    except (OSError, RuntimeError, ValueError):  # no such folder, nobody called so, a zero byte
+    except (OSError, RuntimeError, ValueError):  # no such folder, no such user, a zero byte
         return []
-    fitting = (one for one in entries if one.name.startswith(begun) and (begun or not one.name.startswith(".")))
-    return [one.name[len(name) :] + ("/" if one.is_dir() else "") for one in fitting]
+    matches = (path for path in entries if path.name.startswith(begun) and (begun or not path.name.startswith(".")))
+    return [path.name[len(name) :] + ("/" if path.is_dir() else "") for path in matches]

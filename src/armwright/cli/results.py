@@ -1,4 +1,4 @@
-"""Folders of results, as the commands write and read them."""
+"""Writing folders of results, and warnings about files in them."""
 
 import sys
 from collections.abc import Mapping
@@ -10,15 +10,15 @@ if TYPE_CHECKING:
 
 
 def write_results(folder: Path, files: "Mapping[str, Content]", record: Mapping[str, Any] | None = None) -> None:
-    """Write the results of a command into a folder, all of them or none.
+    """Write the results of a command into a folder, either all of them or none.
 
     Args:
-        folder: made where it is missing.
-        files: by name.
-        record: what ``run.json`` says; the command and the version without it.
+        folder: the folder; it is created where it is missing.
+        files: contents by name of file.
+        record: content of ``run.json``; the default is the command and the version.
 
     Raises:
-        OutputError: the folder or a file cannot be written; the text says which and why.
+        OutputError: the folder or a file cannot be written; the message names it with the reason.
     """
     from armwright.cli.output import command_line
     from armwright.files.output import write_folder
@@ -29,12 +29,12 @@ def write_results(folder: Path, files: "Mapping[str, Content]", record: Mapping[
 
 
 def warn_of_stray(path: Path) -> None:
-    """Say where a file that is read is not what the run of its folder has written."""
+    """Print a warning where an input is in a folder of results whose record does not match it."""
     from armwright.files.output import RECORD, is_stray
 
     if is_stray(path):
         print(
-            f"armwright: {path}: not what the run has written of which {path.parent / RECORD} speaks: it was changed, "
+            f"armwright: {path}: differs from the file that is recorded in {path.parent / RECORD}: it was changed, "
             "or belongs to another run",
             file=sys.stderr,
         )

@@ -1,4 +1,4 @@
-"""``armwright run``: a program moves an arm, and the user sees what happened."""
+"""``armwright run``: run a program in a simulated cell and report its results."""
 
 import enum
 import sys
@@ -10,7 +10,7 @@ import typer
 from armwright.cli.numbers import within
 from armwright.cli.options import JsonSummary, QuietButWarnings
 from armwright.cli.output import command_line, plain_console, print_json, print_table, table
-from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, given_cell
+from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, read_cell_option
 from armwright.cli.progress import waiting
 from armwright.errors import ExitStatus, counted
 from armwright.program.language.words import Standard
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class Around(enum.StrEnum):
-    """How to go round what stops a straight line."""
+    """The kind of detour where the arm cannot follow a straight line."""
 
     VIA = "via"
     DAMPED = "damped"
@@ -42,38 +42,39 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     program: ProgramFile,
     cell: CellFile = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the results; none are kept without it.")
+        Path | None, typer.Option("-o", "--output", help="Folder for the results; without it none are written.")
     ] = None,
-    servo_ms: Annotated[float | None, typer.Option(help="Servo period in ms; the cell file's, or 1.")] = None,
+    servo_ms: Annotated[
+        float | None, typer.Option(help="Servo period in ms; the default is that of the cell file, or 1.")
+    ] = None,
     deviation_mm: Annotated[
-        float | None, typer.Option(help="Allowed deviation from straight lines; the cell file's, or 1.")
+        float | None,
+        typer.Option(help="Allowed deviation from straight lines; the default is that of the cell file, or 1."),
     ] = None,
     around: Annotated[
         Around | None,
-        typer.Option(
-            help="Go round what stops a straight line: by a pose beside it, or damped rates; the cell file's, or none."
-        ),
+        typer.Option(help="Detour where a straight line is blocked: by a via pose, or damped least squares."),
     ] = None,
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     max_steps: Annotated[
-        int, typer.Option(min=1, help="End a program that does so many steps without any time going by.")
+        int, typer.Option(min=1, help="Limit of the steps that a program executes without advancing the clock.")
     ] = 1_000_000,
     max_time: Annotated[
-        float, typer.Option(min=0.0, max=1e9, help="End a program that runs so long on the cell's clock, in s.")
+        float, typer.Option(min=0.0, max=1e9, help="Limit of the duration on the clock of the cell, in s.")
     ] = 3600.0,
     most_rows: Annotated[
-        int, typer.Option("--motion-rows", min=2, help="Rows that motion.csv may have; what is left out is said.")
+        int, typer.Option("--motion-rows", min=2, help="Limit of the rows of motion.csv; omitted rows are reported.")
     ] = 1_000_000,
     as_json: JsonSummary = False,
     quiet: QuietButWarnings = False,
 ) -> None:
     """Run an RLO program in a simulated cell.
 
-    Writes motion.csv (every servo tick, SI), events.jsonl (every effect with its source line), frames.json (the
-    final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the disk and
-    shows the arm moving. With --around, a straight line that meets a singularity or a limit is left and met again; a
-    warning says where, why and at what price in mm, mrad and s.
+    With -o the command writes motion.csv (every servo tick, SI), events.jsonl (every effect with its source line),
+    frames.json (the final frame tree), run.json (inputs, versions, summary) and report.html, a page that opens from the
+    disk and shows the arm moving. With --around, the tool detours where a straight line meets a singularity or a limit;
+    a warning has the location, the cause, and the cost in mm, mrad and s.
 
     **Example:** `armwright run examples/stacking.rlo --cell examples/stanford_cell.toml -o out`
     """
@@ -82,35 +83,35 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     from armwright.report.files import Origin
 
     warn_of_stray(program)
-    given = given_cell(cell)
-    code, place, said, imports = _translated(program, given, strict=strict, std=std, as_json=as_json)
-    place = _adjusted(place, servo_ms, deviation_mm, around)
+    option_cell = read_cell_option(cell)
+    code, used_cell, diagnostics, imports = _compiled(program, option_cell, strict=strict, std=std, as_json=as_json)
+    used_cell = _adjusted(used_cell, servo_ms, deviation_mm, around)
     limits = Limits(steps=max_steps, time=max_time)
     error: RunError | None = None
     try:
-        recording = _interpret(code, place, limits, watched=not (quiet or as_json))
+        recording = _interpret(code, used_cell, limits, watched=not (quiet or as_json))
     except RunError as stopped:
         if stopped.recording is None:
             raise
         error, recording = stopped, stopped.recording()
     options = {
-        "servo_ms": place.period * 1e3,
-        "deviation_mm": place.deviation * 1e3,
-        "corner_mm": place.corner_room * 1e3,
-        "around": place.around or Around.NONE.value,
+        "servo_ms": used_cell.period * 1e3,
+        "deviation_mm": used_cell.deviation * 1e3,
+        "corner_mm": used_cell.corner_room * 1e3,
+        "around": used_cell.around or Around.NONE.value,
         "std": std.value,
         "strict": strict,
     }
     origin = Origin(
         program=program, cell=cell, imports=imports, command=command_line(), options=options, motion_rows=most_rows
     )
-    _finish(recording, code, said, origin, output, error, as_json=as_json, quiet=quiet)
+    _finish(recording, code, diagnostics, origin, output, error, as_json=as_json, quiet=quiet)
 
 
-def _finish(  # noqa: PLR0917 - what there is to say, and how
+def _finish(  # noqa: PLR0917 - the run, and how it is reported
     recording: "Recording",
     code: "Code",
-    said: "Sequence[Diagnostic]",
+    compiler_diagnostics: "Sequence[Diagnostic]",
     origin: "Origin",
     output: Path | None,
     error: "RunError | None",
@@ -118,7 +119,7 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Write what a run has left, also one that failed, and say how it went."""
+    """Write and print the results of a run, also of one that failed."""
     from armwright.cli.programs import print_diagnostics
     from armwright.cli.results import write_results
     from armwright.program.vm.excerpt import KEPT, NOT_KEPT
@@ -126,16 +127,16 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
     from armwright.report.files import ending, left_out, result_files, run_record, summary
 
     failed = () if error is None else (error.diagnostic,)
-    diagnostics = (*said, *warnings(recording), *failed)
+    diagnostics = (*compiler_diagnostics, *warnings(recording), *failed)
     notes = left_out(recording, origin.motion_rows) if output is not None else ()
     if output is not None:
-        made = (recording, code, diagnostics, origin)
-        write_results(output, result_files(*made), run_record(*made))
+        results = (recording, code, diagnostics, origin)
+        write_results(output, result_files(*results), run_record(*results))
     if as_json:
-        told = summary(recording, code, diagnostics, KEPT if output else NOT_KEPT)
+        data = summary(recording, code, diagnostics, KEPT if output else NOT_KEPT)
         folder = {"output": str(output)} if output else {}
-        frames = {"time": error.time, "frames": _places(error)} if error else {}
-        print_json({**ending(recording, code), **told, **folder, "left_out": notes, **frames})
+        frames = {"time": error.time, "frames": _frame_positions(error)} if error else {}
+        print_json({**ending(recording, code), **data, **folder, "left_out": notes, **frames})
     else:
         if diagnostics:
             print_diagnostics(diagnostics, code.source)
@@ -144,105 +145,105 @@ def _finish(  # noqa: PLR0917 - what there is to say, and how
         if error is not None:
             if not quiet:
                 print_table(plain_console(), _trace_table(recording, code, KEPT if output else NOT_KEPT))
-            _print_moment(error, code)
+            _print_frames(error, code)
         elif not quiet:
             _print_summary(recording, code, KEPT if output else NOT_KEPT)
         if output is not None and (error is not None or not quiet):
-            # On a line of its own and never wrapped, so that it can be clicked or copied.
+            # On a line of its own and not wrapped, so that it can be clicked or copied.
             print(f"report{' up to the failure' if error else ''}: {output / 'report.html'}")
     if error is not None:
         raise typer.Exit(error.exit_status)
 
 
-def _translated(
-    program: Path, given: "Cell | None", *, strict: bool, std: Standard, as_json: bool
+def _compiled(
+    program: Path, cell: "Cell | None", *, strict: bool, std: Standard, as_json: bool
 ) -> "tuple[Code, Cell, tuple[Diagnostic, ...], tuple[Path, ...]]":
-    """Return the code of a program, its cell, what was said of it, and the files that it imports."""
+    """Return the code of a program, its cell, its diagnostics, and the files that it imports."""
     from armwright.cli.programs import imported_files
     from armwright.files.inputs import read_program
     from armwright.program import compile as compile_program
     from armwright.program.bytecode.assembler import assemble
 
     if program.suffix == CODE_SUFFIX:
-        if given is None:
-            _no_cell(program)
-        return assemble(read_program(program), str(program)), given, (), ()
-    compiled = compile_program(program, given, strict=strict, std=std)
+        if cell is None:
+            _refuse_without_cell(program)
+        return assemble(read_program(program), str(program)), cell, (), ()
+    compiled = compile_program(program, cell, strict=strict, std=std)
     if compiled.code is None:
         _refuse(compiled.source, compiled.diagnostics, as_json=as_json)
     if compiled.cell is None:
-        _no_cell(program)
+        _refuse_without_cell(program)
     return compiled.code, compiled.cell, compiled.diagnostics, imported_files(program, compiled)
 
 
-def _no_cell(program: Path) -> NoReturn:
-    what = f"{program} needs a cell to run in, and IMPORTs none"
-    raise typer.BadParameter(f"missing: {what}; try examples/stanford_cell.toml", param_hint="--cell")
+def _refuse_without_cell(program: Path) -> NoReturn:
+    text = f"missing: {program} needs a cell to run in, and IMPORTs none; try examples/stanford_cell.toml"
+    raise typer.BadParameter(text, param_hint="--cell")
 
 
-def _adjusted(place: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
+def _adjusted(cell: "Cell", servo_ms: float | None, deviation_mm: float | None, around: Around | None) -> "Cell":
     import attrs
 
     from armwright.cell.reader import DEVIATION_MM, SERVO_MS, WAYS_ROUND
 
-    period = place.period if servo_ms is None else within(servo_ms, SERVO_MS, "--servo-ms") * 1e-3
-    deviation = place.deviation
+    period = cell.period if servo_ms is None else within(servo_ms, SERVO_MS, "--servo-ms") * 1e-3
+    deviation = cell.deviation
     if deviation_mm is not None:
         deviation = within(deviation_mm, DEVIATION_MM, "--deviation-mm") * 1e-3
-    way_round = place.around if around is None else WAYS_ROUND[around.value]
-    return attrs.evolve(place, period=period, deviation=deviation, around=way_round)
+    detour = cell.around if around is None else WAYS_ROUND[around.value]
+    return attrs.evolve(cell, period=period, deviation=deviation, around=detour)
 
 
-def _interpret(code: "Code", place: "Cell", limits: "Limits", *, watched: bool) -> "Recording":
-    """Run in the simulator, with the present statement on the screen when a person watches."""
+def _interpret(code: "Code", cell: "Cell", limits: "Limits", *, watched: bool) -> "Recording":
+    """Run a program in the simulator, with a status line of the current statement on a terminal."""
     from armwright.cell.simulator import Simulator
     from armwright.program.vm.interpreter import interpret
 
-    simulator = Simulator(place)
-    with waiting("", quiet=not watched) as told:
-        if told is None:
-            return interpret(code, place, simulator, limits=limits)
+    simulator = Simulator(cell)
+    with waiting("", quiet=not watched) as update:
+        if update is None:
+            return interpret(code, cell, simulator, limits=limits)
 
         def show(now: float, line: int) -> None:
-            # Source lines may hold what looks like markup.
-            words = code.source.line_text(line).strip()[:60].replace("[", "\\[")
-            told(f"{now:9.3f} s  line {line:<5} {words}")
+            # Brackets in source lines are not markup.
+            text = code.source.line_text(line).strip()[:60].replace("[", "\\[")
+            update(f"{now:9.3f} s  line {line:<5} {text}")
 
-        return interpret(code, place, simulator, show, limits=limits)
+        return interpret(code, cell, simulator, show, limits=limits)
 
 
 def _refuse(source: "Source", diagnostics: "Sequence[Diagnostic]", *, as_json: bool) -> NoReturn:
-    """Say why a program cannot run, and stop."""
+    """Print the diagnostics of a program with errors, and end the command."""
     from armwright.cli.programs import error_data, print_diagnostics
     from armwright.program.language.diagnostic import to_json
 
     if as_json:
-        said = {"program": source.name, "diagnostics": [to_json(one, source) for one in diagnostics]}
-        print_json({**error_data(diagnostics, source), **said})
+        rows = [to_json(diagnostic, source) for diagnostic in diagnostics]
+        print_json({**error_data(diagnostics, source), "program": source.name, "diagnostics": rows})
     else:
         print_diagnostics(diagnostics, source)
     raise typer.Exit(ExitStatus.PROGRAM_ERRORS)
 
 
-def _places(error: "RunError") -> dict[str, list[float] | None]:
-    """Return where every frame was when a program could not go on, in the world in m; None without a value."""
+def _frame_positions(error: "RunError") -> dict[str, list[float] | None]:
+    """Return the positions of all frames in the world [m] when a program failed; None for a frame without a value."""
     tree = error.tree
     return {name: tree.world(name)[:3, 3].tolist() if tree.has_value(name) else None for name in tree}
 
 
-def _print_summary(recording: "Recording", code: "Code", where: str) -> None:
+def _print_summary(recording: "Recording", code: "Code", hint: str) -> None:
     from armwright.program.vm.excerpt import ON_A_TERMINAL, listed
 
     console = plain_console()
-    print_table(console, _trace_table(recording, code, where))
+    print_table(console, _trace_table(recording, code, hint))
     if recording.stages:
-        print_table(console, _stage_table(recording, code, where))
+        print_table(console, _stage_table(recording, code, hint))
     slowed = [
-        f"line {code.source.line(one.span.start)}: {one.stage.kind} to {one.to[-1]} runs {one.stage.slowed}"
-        for one in recording.stages
-        if one.stage.slowed
+        f"line {code.source.line(run.span.start)}: {run.stage.kind} to {run.to[-1]} runs {run.stage.slowed}"
+        for run in recording.stages
+        if run.stage.slowed
     ]
-    for text in listed(slowed, ON_A_TERMINAL, where):
+    for text in listed(slowed, ON_A_TERMINAL, hint):
         console.print(text)
     moves = sum(effect.kind == "MOVE" for effect in recording.effects)
     console.print(
@@ -250,43 +251,44 @@ def _print_summary(recording: "Recording", code: "Code", where: str) -> None:
         f"{counted(len(recording.stages), 'stage')}, "
         f"{counted(len(recording.streams[0].t) if recording.streams else 0, 'servo tick')}"
     )
-    console.print("Collisions are not looked for.")
+    console.print("Collisions are not checked.")
 
 
-def _trace_table(recording: "Recording", code: "Code", where: str) -> "Table":
+def _trace_table(recording: "Recording", code: "Code", hint: str) -> "Table":
     from rich.text import Text
 
     from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more, one_line
 
     several = len(recording.processes) > 1
 
-    def row(one: "Effect") -> "tuple[str | Text, ...]":
-        line, end = Text(str(code.source.line(one.span.start)), style="dim"), f"{one.t1:.3f}" if one.t1 > one.t0 else ""
-        return (line, f"{one.t0:.3f}", end, *((one.process,) if several else ()), one_line(one.text, where))
+    def row(effect: "Effect") -> "tuple[str | Text, ...]":
+        line = Text(str(code.source.line(effect.span.start)), style="dim")
+        end = f"{effect.t1:.3f}" if effect.t1 > effect.t0 else ""
+        return (line, f"{effect.t0:.3f}", end, *((effect.process,) if several else ()), one_line(effect.text, hint))
 
-    found = excerpt([one for one in recording.effects if one.kind != "PLACE"], ON_A_TERMINAL)
-    names = ("line", "from s", "to s", *(("process",) if several else ()), "what happened")
-    rest = (*[""] * (len(names) - 1), more(found.left_out, where))
-    return table(names, found.mapped(row).joined(rest), words=range(3, len(names)))
+    effects = excerpt([effect for effect in recording.effects if effect.kind != "PLACE"], ON_A_TERMINAL)
+    names = ("line", "from s", "to s", *(("process",) if several else ()), "effect")
+    omitted = (*[""] * (len(names) - 1), more(effects.left_out, hint))
+    return table(names, effects.mapped(row).joined(omitted), words=range(3, len(names)))
 
 
-def _stage_table(recording: "Recording", code: "Code", where: str) -> "Table":
+def _stage_table(recording: "Recording", code: "Code", hint: str) -> "Table":
     from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
 
     def row(stage: "RunStage") -> "tuple[str | Text, ...]":
-        off = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
+        deviation = "" if stage.stage.deviation is None else f"{stage.stage.deviation * 1e3:.3f}"
         line = str(code.source.line(stage.span.start))
-        what = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}{', stopped' if stage.stopped else ''}"
+        title = f"{stage.arm} {stage.stage.kind} {' '.join(stage.to)}{', stopped' if stage.stopped else ''}"
         start, duration, length = f"{stage.t0:.3f}", f"{stage.duration:.3f}", f"{stage.length * 1e3:.0f}"
-        return (line, what, start, duration, length, off, *_peaks(stage, recording))
+        return (line, title, start, duration, length, deviation, *_peaks(stage, recording))
 
-    found = excerpt(recording.stages, ON_A_TERMINAL).mapped(row)
-    names = ("line", "stage", "from s", "s", "mm", "off mm", "peak speed", "peak effort")
-    return table(names, found.joined(("", more(found.left_out, where), *[""] * 6)), words=(1,))
+    stages = excerpt(recording.stages, ON_A_TERMINAL).mapped(row)
+    names = ("line", "stage", "from s", "s", "mm", "deviation mm", "peak speed", "peak effort")
+    return table(names, stages.joined(("", more(stages.left_out, hint), *[""] * 6)), words=(1,))
 
 
 def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
-    """Say the largest share of a limit and whose it is."""
+    """Return the largest shares of the limits of speed and effort, with the joints that have them."""
     from rich.text import Text
 
     arm = recording.cell.arms[stage.arm].arm
@@ -299,21 +301,21 @@ def _peaks(stage: "RunStage", recording: "Recording") -> "list[Text]":
     return texts
 
 
-def _print_moment(error: "RunError", code: "Code") -> None:
-    """Show where every frame was when a program could not go on."""
+def _print_frames(error: "RunError", code: "Code") -> None:
+    """Print the positions of all frames when a program failed."""
     from armwright.cell.frames import WORLD
     from armwright.cli.terminal import console
     from armwright.program.vm.excerpt import ON_A_TERMINAL, excerpt, more
 
     def row(name: str) -> tuple[str, ...]:
         parent = (error.tree.parent(name) or WORLD).removesuffix(".BASE")
-        place = "no value yet"
+        position = "no value yet"
         if error.tree.has_value(name):
-            place = ", ".join(f"{x * 1e3:z.1f}" for x in error.tree.world(name)[:3, 3])
-        return code.spelled(name), "its base" if parent == name else code.spelled(parent), place
+            position = ", ".join(f"{x * 1e3:z.1f}" for x in error.tree.world(name)[:3, 3])
+        return code.spelled(name), "its base" if parent == name else code.spelled(parent), position
 
-    found = excerpt([name for name in error.tree if name != WORLD and not name.endswith(".BASE")], ON_A_TERMINAL)
-    rest = (more(found.left_out, "all in frames.json of `-o FOLDER`"), "", "")
-    columns = ("frame", "hangs on", "x, y, z in the world, mm")
-    shown = table(columns, found.mapped(row).joined(rest), title=f"frames at {error.time:.3f} s", words=(0, 1))
+    frames = excerpt([name for name in error.tree if name != WORLD and not name.endswith(".BASE")], ON_A_TERMINAL)
+    omitted = (more(frames.left_out, "all in frames.json of `-o FOLDER`"), "", "")
+    columns = ("frame", "parent", "x, y, z in the world, mm")
+    shown = table(columns, frames.mapped(row).joined(omitted), title=f"frames at {error.time:.3f} s", words=(0, 1))
     console(stderr=True).print(shown)

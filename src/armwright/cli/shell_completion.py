@@ -1,4 +1,4 @@
-"""What a shell asks while somebody types: what a word may become, and the script that makes a shell ask."""
+"""Completion by the shell: the completions of arguments, and the script that a shell needs for them."""
 
 import contextlib
 import enum
@@ -12,7 +12,7 @@ Complete = Callable[[str], list[str]]
 
 
 class Shell(enum.StrEnum):
-    """A shell that can be told what may follow."""
+    """A shell for which there is a completion script."""
 
     BASH = "bash"
     ZSH = "zsh"
@@ -21,7 +21,7 @@ class Shell(enum.StrEnum):
 
 
 def prepare() -> None:
-    """Let the shells ask, if one does."""
+    """Set up Typer's completion if a shell asks for completions."""
     if COMPLETE in os.environ:
         from typer.completion import completion_init  # type: ignore[attr-defined]
 
@@ -29,14 +29,14 @@ def prepare() -> None:
 
 
 def script(shell: Shell) -> str:
-    """Return what a shell has to read."""
+    """Return the completion script of a shell."""
     from typer.completion import get_completion_script  # type: ignore[attr-defined]
 
     return get_completion_script(prog_name=NAME, complete_var=COMPLETE, shell=shell.value)
 
 
 def install(shell: Shell) -> Path:
-    """Write the script where a shell reads it whenever it starts; return its file.
+    """Install the script in the start-up files of a shell; return its path.
 
     Raises:
         OutputError: the start-up files of the shell cannot be read or written.
@@ -50,12 +50,12 @@ def install(shell: Shell) -> Path:
         for name in (".bashrc", ".zshrc"):
             regular(Path.home() / name)
         return install_script(shell=shell.value, prog_name=NAME, complete_var=COMPLETE)[1]
-    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: nobody knows the home folder
+    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: the home folder is unknown
         text = f"cannot install the completion for {shell}: {error}; --show-completion {shell} prints its script"
         raise OutputError(text) from error
 
 
-# ---- what a word may become ----------------------------------------------------------------------------------------
+# ---- completions ---------------------------------------------------------------------------------------------------
 
 
 def arms(incomplete: str) -> list[str]:
@@ -108,7 +108,7 @@ def limits(incomplete: str) -> list[str]:
 
 
 def one_of(*words: str) -> Complete:
-    """Return what completes one of some words."""
+    """Return a function that completes a word of a list."""
 
     def complete(incomplete: str) -> list[str]:
         return _beginning(words, incomplete)
@@ -117,7 +117,7 @@ def one_of(*words: str) -> Complete:
 
 
 def setting(name: str) -> Complete:
-    """Return what completes a setting of a simulation of play: ``name`` is that of the constant that lists them."""
+    """Return a function that completes a word of a constant of ``clearance.settings`` with this name."""
 
     def complete(incomplete: str) -> list[str]:
         from armwright.clearance import settings
@@ -132,9 +132,10 @@ def _beginning(words: Iterable[str], incomplete: str) -> list[str]:
 
 
 def _or_files(names: Iterable[str], incomplete: str) -> list[str]:
-    """Complete a name, or a file beside; nothing where no name fits, and the shell completes paths by itself."""
-    found = _beginning(names, incomplete)
-    if found and incomplete:
+    """Complete a name, or a path if a name matches too; without a match the shell itself completes paths."""
+    choices = _beginning(names, incomplete)
+    if choices and incomplete:
         with contextlib.suppress(OSError):
-            found += sorted(f"{one.name}/" if one.is_dir() else one.name for one in Path().glob(f"{incomplete}*"))
-    return found
+            paths = Path().glob(f"{incomplete}*")
+            choices += sorted(f"{path.name}/" if path.is_dir() else path.name for path in paths)
+    return choices

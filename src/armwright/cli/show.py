@@ -1,4 +1,4 @@
-"""``armwright show``: the tables of one arm."""
+"""``armwright show``: the tables of an arm."""
 
 import math
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,16 +15,16 @@ if TYPE_CHECKING:
 
     from armwright.arm.model import Arm, Joint
 
-# Room for the widest table there can be, in characters.
+# Width at which tables are measured [characters]; none is wider.
 _WIDEST = 200
-# Who says which way gravity points.
+# The origin of the gravity vector, in words.
 _GRAVITY_FROM = {
-    "standard": "as nothing else is stated; in a cell, that of the cell",
+    "standard": "the default; in a cell, that of the cell",
     "stated": "stated by the arm; in a cell, that of the cell",
     "root": "down in the root link of the file; in a cell, that of the cell",
     "world": "that of the cell",
 }
-# What a drive has that can be felt.
+# Parameters of a drive that affect the motion of the joint.
 _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
 
 
@@ -34,7 +34,7 @@ def show(
 ) -> None:
     """Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.
 
-    Degrees and millimetres for people; --json gives SI units and radians.
+    The tables are in degrees and millimetres; --json prints SI units and radians.
 
     **Example:** `armwright show puma560`
     """
@@ -53,20 +53,20 @@ def show(
         console.print()
         console.print(title, style="bold")
         if table:
-            # A narrow screen wraps the line; it must not cut numbers off.
-            whole = console.measure(table, options=console.options.update(max_width=_WIDEST)).maximum
-            clean_console(highlight=False, width=max(whole, console.width)).print(table)
+            # A narrow terminal wraps lines; it must not truncate numbers.
+            width = console.measure(table, options=console.options.update(max_width=_WIDEST)).maximum
+            clean_console(highlight=False, width=max(width, console.width)).print(table)
     console.print()
     console.print(_facts(model))
 
 
 def _tables(model: "Arm") -> "Iterator[tuple[str, Table | None]]":
-    """Name every table, or say that there is nothing to put into it."""
+    """Yield every table with its title; a title alone states that there are no data."""
     if any(joint.name or link.name for joint, link in zip(model.joints, model.links, strict=True)):
         yield "Names", _names(model)
     yield "Denavit-Hartenberg, standard", _geometry(model)
     if any(joint.fixed is not None for joint in model.joints):
-        yield "Fixed transforms, behind theta and d and before a and alpha", _fixed(model)
+        yield "Fixed transforms, after theta and d and before a and alpha", _fixed(model)
     yield "Limits", _limits(model)
     unknown = [f"link {i}: {link.unknown}" for i, link in enumerate(model.links, 1) if link.unknown]
     if unknown:
@@ -75,11 +75,11 @@ def _tables(model: "Arm") -> "Iterator[tuple[str, Table | None]]":
         yield "Links: mass, and centre of mass in the frame of the link", _links(model)
         yield "Inertia about the centre of mass, kg m²", _inertia(model)
     else:
-        yield "Links: no masses or inertias are given", None
+        yield "Links: no masses or inertias are known", None
     if any(any(getattr(motor, name) for name in _DRIVE) for motor in model.motors):
-        yield "Drives, as felt at the joint", _motors(model)
+        yield "Drives, reflected to the joint", _motors(model)
     else:
-        yield "Drives: no inertia or friction is given", None
+        yield "Drives: no inertia or friction is known", None
 
 
 def _table(columns: "Sequence[str]", rows: "Iterable[Sequence[str]]") -> "Table":
@@ -100,9 +100,9 @@ def _fixed(model: "Arm") -> "Table":
     rows = []
     for i, joint in enumerate(model.joints, 1):
         if joint.fixed is not None:
-            place = (f"{x * 1e3:z.6g}" for x in joint.fixed[:3, 3])
-            turn = (f"{math.degrees(x):z.6g}°" for x in to_rpy(joint.fixed[:3, :3]))
-            rows.append((str(i), *place, *turn))
+            position = (f"{x * 1e3:z.6g}" for x in joint.fixed[:3, 3])
+            rotation = (f"{math.degrees(x):z.6g}°" for x in to_rpy(joint.fixed[:3, :3]))
+            rows.append((str(i), *position, *rotation))
     return _table(("joint", "x mm", "y mm", "z mm", "roll", "pitch", "yaw"), rows)
 
 
@@ -156,9 +156,9 @@ def _motors(model: "Arm") -> "Table":
         inertia, viscous, dry = ("kg m²", "N m s", "N m") if joint.revolute else ("kg", "N s/m", "N")
         forward, backward = motor.coulomb_forward, motor.coulomb_backward
         coulomb = f"{forward:g} {dry}" if forward == backward else f"+{forward:g} / -{backward:g} {dry}"
-        felt = f"{motor.inertia:g} {inertia}", f"{motor.viscous:g} {viscous}", coulomb
-        rows.append((str(i), *felt, f"{motor.gear_ratio:g}"))
-    return _table(("joint", "inertia", "viscous", "dry friction", "gear ratio"), rows)
+        friction = f"{motor.viscous:g} {viscous}", coulomb
+        rows.append((str(i), f"{motor.inertia:g} {inertia}", *friction, f"{motor.gear_ratio:g}"))
+    return _table(("joint", "inertia", "viscous", "Coulomb friction", "gear ratio"), rows)
 
 
 def _facts(model: "Arm") -> "Table":
@@ -170,15 +170,15 @@ def _facts(model: "Arm") -> "Table":
     def noap(X: "Any") -> str:
         numbers = to_noap(X) + 0.0
         columns = ["  ".join(f"{x:z.6g}" for x in numbers[k : k + 3].round(12)) for k in (0, 3, 6)]
-        place = "  ".join(f"{x * 1e3:z.6g}" for x in numbers[9:].round(12))
-        return f"n ({columns[0]})  o ({columns[1]})  a ({columns[2]})  p ({place}) mm"
+        position = "  ".join(f"{x * 1e3:z.6g}" for x in numbers[9:].round(12))
+        return f"n ({columns[0]})  o ({columns[1]})  a ({columns[2]})  p ({position}) mm"
 
     facts = [("base", noap(model.base)), ("tool", noap(model.tool))]
     facts.append(("gravity", f"{vector_text(model.gravity)}, {_GRAVITY_FROM[model.gravity_from]}"))
     if math.isfinite(model.reach):
         facts.append(("reach", _length(model.reach)))
     if math.isfinite(model.tool_speed):
-        facts.append(("hand", f"{_length(model.tool_speed)}/s at full reach"))
+        facts.append(("tool speed", f"{_length(model.tool_speed)}/s at full reach"))
     grid = Table.grid(padding=(0, 2))
     for fact in facts:
         grid.add_row(*fact)

@@ -1,35 +1,27 @@
-"""``armwright simulate``: what an arm does when its drives do this."""
+"""``armwright simulate``: simulate the motion of an arm with its drives off or holding its weight."""
 
 import enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from armwright.cli.load import Load
 from armwright.cli.numbers import within
 from armwright.cli.options import ArmName, Json
-from armwright.cli.output import print_json
+from armwright.cli.output import print_json, print_result
 from armwright.cli.results import write_results
-
-if TYPE_CHECKING:
-    from armwright.arm.model import Arm
-    from armwright.simulation.result import JointState, Simulation
-
-
-# More changes of joints than this are counted, not listed.
-_EVENTS = 20
 
 
 class Drives(enum.StrEnum):
-    """What the drives do."""
+    """The control of the drives."""
 
     OFF = "off"
     GRAVITY = "gravity"
 
 
 class Method(enum.StrEnum):
-    """How the motion is integrated."""
+    """The method of integration."""
 
     GILL = "gill"
     ADAPTIVE = "adaptive"
@@ -37,23 +29,25 @@ class Method(enum.StrEnum):
 
 def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    configuration: Annotated[str, typer.Option("-q", help="Where it starts, degrees and mm: 10,20,30.")],
-    speeds: Annotated[str | None, typer.Option("--qd", help="Speeds at the start, degrees/s and mm/s.")] = None,
-    duration: Annotated[float, typer.Option(help="How long, in s.")] = 1.0,
-    drives: Annotated[Drives, typer.Option(help="Off, or holding the arm's weight.")] = Drives.OFF,
+    configuration: Annotated[
+        str, typer.Option("-q", help="Initial joint positions in degrees and mm, as in 10,20,30.")
+    ],
+    speeds: Annotated[str | None, typer.Option("--qd", help="Initial joint velocities in degrees/s and mm/s.")] = None,
+    duration: Annotated[float, typer.Option(help="Duration in s.")] = 1.0,
+    drives: Annotated[Drives, typer.Option(help="Drives off, or holding the weight of the arm.")] = Drives.OFF,
     method: Annotated[Method, typer.Option(help="Runge-Kutta-Gill in fixed steps, or adaptive.")] = Method.ADAPTIVE,
-    step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and time between rows.")] = 1.0,
+    step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and period of the rows.")] = 1.0,
     load: Load = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for motion.csv.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Let an arm go and follow it: friction, stops and weight included, with an account of the energy.
+    """Simulate the free response of an arm with friction, stops and gravity, and print its energy balance.
 
     **Example:** `armwright simulate puma560 -q 0,0,90,0,0,0 --duration 2`
     """
     from armwright.arm.load import load_arm
     from armwright.cli.joints import joint_values
-    from armwright.cli.load import load_in_hand
+    from armwright.cli.load import read_payload
     from armwright.dynamics.payloads import payload
     from armwright.report.motion_table import motion_csv
     from armwright.simulation.controllers import gravity_compensation, no_effort
@@ -62,10 +56,10 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
 
     model = load_arm(arm)
     if load is not None:
-        held = load_in_hand(load)
-        model = payload(model, held.mass, held.com, held.inertia)
+        body = read_payload(load)
+        model = payload(model, body.mass, body.com, body.inertia)
     within(step_ms, (0.001, 1000), "--step-ms")
-    found = run(
+    simulation = run(
         model,
         joint_values(model, configuration, "-q"),
         None if speeds is None else joint_values(model, speeds, "--qd"),
@@ -75,41 +69,11 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         period=step_ms * 1e-3,
     )
     if output is not None:
-        write_results(output, {"motion.csv": motion_csv(found.t, found.q, found.qd, found.qdd, found.tau)})
+        write_results(
+            output,
+            {"motion.csv": motion_csv(simulation.t, simulation.q, simulation.qd, simulation.qdd, simulation.tau)},
+        )
     if as_json:
-        print_json({"status": found.status.name.lower(), "t": float(found.t[-1]), **_account(found)})
+        print_json(simulation.as_data())
     else:
-        _print(model, found)
-
-
-def _account(found: "Simulation") -> dict[str, float]:
-    return {
-        "kinetic": float(found.kinetic[-1]),
-        "potential_change": float(found.potential[-1] - found.potential[0]),
-        "work_of_drives": float(found.work[-1].sum()),
-        "heat_of_friction": float(found.heat[-1].sum()),
-        "lost_at_stops": float(found.impact[-1]),
-        "imbalance": float(abs(found.imbalance).max()),
-    }
-
-
-def _print(model: "Arm", found: "Simulation") -> None:
-    from armwright.cli.joints import units
-
-    print(f"{found.status.name.lower()} after {found.t[-1]:.3f} s")
-    per_unit = units(model)
-    for i, joint in enumerate(model.joints):
-        unit = "deg" if joint.revolute else "mm"
-        start, end, speed = (values[i] / per_unit[i] for values in (found.q[0], found.q[-1], found.qd[-1]))
-        print(f"  {model.called(i)}: from {start:z9.3f} to {end:z9.3f} {unit}, at {speed:z9.3f} {unit}/s")
-    for name, value in _account(found).items():
-        print(f"  {name.replace('_', ' '):<18}{value:z12.6g} J")
-    shown = found.events[:_EVENTS]
-    for event in shown:
-        print(f"  {event.t:.4f} s: {model.called(event.joint)} {_word(event.before)}, then {_word(event.after)}")
-    if len(found.events) > len(shown):
-        print(f"  ... and {len(found.events) - len(shown)} changes more")
-
-
-def _word(state: "JointState") -> str:
-    return state.name.lower().replace("_", " ")
+        print_result(simulation)

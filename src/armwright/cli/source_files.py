@@ -1,4 +1,4 @@
-"""What the commands that change programs share: reading them, showing the difference, writing them back."""
+"""Reading programs, printing differences and writing programs back, for the commands that change them."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from armwright.program.language.source import Source
 
-# The program that stands for what is typed or piped in.
+# The path that denotes the standard input.
 INPUT = Path("-")
 
 
@@ -14,7 +14,7 @@ def read_source(path: Path) -> "Source":
     """Read a program, from the standard input for ``-``.
 
     Raises:
-        FileFormatError: it cannot be read, is larger than the limit, or is not UTF-8 text.
+        FileFormatError: the program cannot be read, is larger than the limit, or is not UTF-8 text.
     """
     import sys
 
@@ -27,14 +27,14 @@ def read_source(path: Path) -> "Source":
 
 
 def is_stream(path: Path) -> bool:
-    """Whether a program comes from the standard input, a pipe or a device, and what becomes of it is printed."""
+    """Whether a program comes from the standard input, a pipe or a device, so that its new text is printed."""
     from armwright.files.output import descriptor
 
     return path == INPUT or descriptor(path) is not None or (path.exists() and not path.is_file())
 
 
 def print_difference(source: "Source", after: str) -> None:
-    """Print how a program would change, as ``diff -u`` does, in colour when a person watches."""
+    """Print the changes of a program as ``diff -u`` does, in colour on a terminal."""
     import difflib
 
     from rich.text import Text
@@ -52,18 +52,18 @@ def print_difference(source: "Source", after: str) -> None:
 
 
 def write_back(source: "Source", path: Path, text: str) -> None:
-    """Write a program where it was read: all of it or nothing; a link stays one, and who may read it may go on.
+    """Replace the text of a program in its file, completely or not at all; links and permissions are preserved.
 
-    Lines end as most of them did, and a mark of byte order stays.
+    The most frequent line ending of the file is used, and a byte order mark is preserved.
 
     Args:
-        source: as it was read.
-        path: from there.
-        text: what it is from now on.
+        source: the program as it was read.
+        path: its file.
+        text: its new text.
 
     Raises:
-        FileFormatError: it cannot be read any more.
-        OutputError: it cannot be written, or somebody has changed it meanwhile; the text says why.
+        FileFormatError: the file cannot be read any more.
+        OutputError: the file cannot be written, or has changed since; the message has the reason.
     """
     from codecs import BOM_UTF8
 

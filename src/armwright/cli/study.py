@@ -1,4 +1,4 @@
-"""``armwright study``: the experiments of the sources, printed numbers beside computed ones."""
+"""``armwright study``: repeat experiments of the sources, published numbers beside computed ones."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,7 @@ from armwright.cli.progress import parts, waiting
 from armwright.cli.results import write_results
 from armwright.cli.shell_completion import studies
 
-# Those that show bars.
+# Studies that show progress bars.
 _WITH_BARS = {"five-bar-clearance"}
 
 
@@ -18,7 +18,8 @@ def study(
     name: Annotated[
         str,
         typer.Argument(
-            help="stanford-torque, puma-moves, five-bar-clearance or dh-calibration.", autocompletion=studies
+            help="Name of the study: stanford-torque, puma-moves, five-bar-clearance or dh-calibration.",
+            autocompletion=studies,
         ),
     ],
     output: Annotated[
@@ -27,20 +28,20 @@ def study(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON.")] = False,
 ) -> None:
-    """Run one of the sources' experiments and print its numbers beside ours.
+    """Repeat an experiment of the sources and print its published numbers beside the computed ones.
 
-    stanford-torque: the efforts of the Stanford arm over the report's motion by Newton-Euler, by Bejczy's model and
-    with the largest load (figures 3 to 11), and every printed constant with a verdict.
+    stanford-torque: the efforts of the Stanford arm during the report's motion by Newton-Euler, by Bejczy's model and
+    with the largest payload (figures 3 to 11), and a verdict on every published constant.
 
     puma-moves: a joint move and a Cartesian move of the PUMA through three poses (figures 5 to 7, 10, 16 to 19, 22, 23,
-    and 25 as a film), what each asks of the joints, and what becomes of the second one at the wrist's singularity.
+    and 25 as a film), the joint speeds and efforts of both, and the Cartesian move at the singularity of the wrist.
 
-    five-bar-clearance: a parallel arm with play in three pins: error curves, their features over 729 linkages, the
-    clearances told from them, two arms compared, a path corrected (tables 5.3 to 5.12, figures 4.6 to 5.13). Takes a
-    minute.
+    five-bar-clearance: a parallel arm with clearance in three joints: error curves, their features over 729 linkages,
+    the clearances estimated from them, two arms compared, a path corrected (tables 5.3 to 5.12, figures 4.6 to 5.13).
+    This study takes a minute.
 
-    dh-calibration: a three-joint arm touches a board of 33 points in three attitudes; the thesis' fit of its table, and
-    a complete model, held against six points (table 2.4).
+    dh-calibration: a three-joint arm touches a board of 33 points in three orientations; the thesis' calibration of its
+    Denavit-Hartenberg table and a complete model, both validated at six points (table 2.4).
 
     **Example:** `armwright study puma-moves -o out/puma-moves`
     """

@@ -1,4 +1,4 @@
-"""Options of the commands that read tables: which columns are which, and what becomes of rows with empty cells."""
+"""Options of the commands that read tables: the map of columns, and the treatment of rows with empty cells."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,21 +10,21 @@ ColumnMap: TypeAlias = Annotated[
     str | None,
     typer.Option(
         "--columns",
-        help="What columns of the table are: A1=joint_1_deg,X=x_mm, or a TOML file with [columns] (docs/tables.md).",
+        help="Map of column names, as in A1=joint_1_deg,X=x_mm, or a TOML file with [columns] (docs/tables.md).",
     ),
 ]
 SkipIncomplete: TypeAlias = Annotated[
-    bool, typer.Option("--skip-incomplete", help="Leave out rows with empty cells, and say how many.")
+    bool, typer.Option("--skip-incomplete", help="Omit rows with empty cells, and report their number.")
 ]
 
 
 class TableFile(NamedTuple):
-    """A table to be read, and how.
+    """A file with a table, and how to read it.
 
     Attributes:
-        path: of the file.
-        columns: names of columns, with unit, by those in the file.
-        skip_incomplete: leave out rows with cells that should not be empty.
+        path: path of the file.
+        columns: names of columns with unit, by their names in the file.
+        skip_incomplete: whether rows with empty cells in required columns are omitted.
     """
 
     path: Path
@@ -33,10 +33,10 @@ class TableFile(NamedTuple):
 
 
 def columns_of(text: str | None) -> dict[str, str] | None:
-    """Read a column map; None where there is none.
+    """Read a column map; None without a text.
 
     Raises:
-        BadParameter: it is neither pairs of names nor a file.
+        BadParameter: the text is neither pairs of names nor a file.
         FileFormatError: the file is missing or broken.
     """
     if text is None:
@@ -51,14 +51,14 @@ def columns_of(text: str | None) -> dict[str, str] | None:
 
 
 def table_file(path: Path | None, columns: str | None, *, skip_incomplete: bool) -> TableFile | None:
-    """Return what is read of ``--csv``; None where no file is given.
+    """Return the table of ``--csv``; None without a path.
 
     Raises:
-        BadParameter: the other options are given without it.
+        BadParameter: options of a table are present without the table.
     """
     if path is not None:
         return TableFile(path, columns_of(columns), skip_incomplete)
     for option, value in (("--columns", columns), ("--skip-incomplete", skip_incomplete)):
         if value:
-            raise typer.BadParameter("there is no table to read: give --csv FILE", param_hint=option)
+            raise typer.BadParameter("expected a table, --csv FILE, with this option", param_hint=option)
     return None

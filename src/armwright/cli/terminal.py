@@ -1,7 +1,7 @@
-r"""What reaches a terminal: letters, never the commands that a name, a text of a program or a file may hide among them.
+r"""Output streams that escape control characters, which names, programs or files may contain, for the terminal.
 
-Control characters, marks that turn the direction of writing and letters that cannot be seen are printed as escapes such
-as ``\u001b``. These are JSON's own, so that JSON stays JSON and says the same.
+Control characters, marks of writing direction and invisible characters are printed as escapes of JSON, such as
+``\u001b``, so that a JSON document keeps its meaning.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rich.segment import Segment
 
 # C0 without tab and line feed, DEL, C1; soft hyphen; fillers and joiners without width; marks of direction; separators
-# of lines and paragraphs; tags and what selects variants.
+# of lines and paragraphs; tags and variation selectors.
 _HIDDEN = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180f\u200b-\u200f\u2028-\u202e"
     "\u2060-\u206f\u3164\ufe00-\ufe0f\ufeff\uffa0\ufff0-\ufffb\U0001bca0-\U0001bca3\U0001d173-\U0001d17a"
@@ -27,12 +27,12 @@ _HIDDEN = re.compile(
 )
 
 
-# No terminal has more columns, or lines.
+# Largest plausible number of columns or lines of a terminal.
 _MOST_COLUMNS = 10_000
 
 
 def cleaned(text: str) -> str:
-    """Return a text without anything that a terminal obeys or hides, as escapes of JSON; lines and tabs stay."""
+    """Return a text with control and invisible characters, except line breaks and tabs, as escapes of JSON."""
     return _HIDDEN.sub(_escaped, text)
 
 
@@ -42,7 +42,7 @@ def _escaped(match: re.Match[str]) -> str:
 
 
 class CleanStream(io.TextIOWrapper):
-    """The output of a command: whatever is printed to it is cleaned, by whomever."""
+    """The output of a command; all text that is written to it is cleaned."""
 
     def write(self, text: str) -> int:
         """Write a text, cleaned."""
@@ -55,15 +55,15 @@ class CleanStream(io.TextIOWrapper):
 
     @property
     def rich_proxied_file(self) -> "_Verbatim":
-        """Where Rich writes, which adds colours to what ``console`` has cleaned."""
+        """The stream for Rich, which adds colours to text that ``console`` has cleaned."""
         return _Verbatim(self)
 
 
 class CleanProxy:
-    """Another's stream that takes the place of the output, as one that captures it does: cleaned, and left whole."""
+    """A wrapper that cleans the text written to a stream which replaces the output, such as one that captures it."""
 
     def __init__(self, stream: Any) -> None:
-        """Clean what is written to a stream."""
+        """Wrap a stream."""
         self._stream = stream
 
     def write(self, text: str) -> int:
@@ -78,7 +78,7 @@ class CleanProxy:
 
     @property
     def rich_proxied_file(self) -> "_Verbatim":
-        """Where Rich writes, which adds colours to what ``console`` has cleaned."""
+        """The stream for Rich, which adds colours to text that ``console`` has cleaned."""
         return _Verbatim(self)
 
     def __getattr__(self, name: str) -> Any:
@@ -86,7 +86,7 @@ class CleanProxy:
 
 
 class _Verbatim:
-    """A clean stream as Rich sees it."""
+    """A clean stream with its method ``verbatim`` as ``write``, for Rich."""
 
     def __init__(self, stream: CleanStream | CleanProxy) -> None:
         self._stream = stream
@@ -99,15 +99,15 @@ class _Verbatim:
 
 
 def bound_widths() -> None:
-    """Take what the environment says of the size of a terminal only where it is the size of one."""
+    """Remove implausible sizes of the terminal from the environment."""
     for name in ("COLUMNS", "LINES", "TERMINAL_WIDTH"):
-        told = os.environ.get(name, "")
-        if told and not (told.isascii() and told.isdigit() and len(told) < 10 and 0 < int(told) <= _MOST_COLUMNS):
+        size = os.environ.get(name, "")
+        if size and not (size.isascii() and size.isdigit() and len(size) < 10 and 0 < int(size) <= _MOST_COLUMNS):
             del os.environ[name]
 
 
 class ErrorStream(CleanStream):
-    """The error output of a command: what it cannot take is lost, and changes neither status nor results."""
+    """The error output of a command; failures to write it are ignored, so that they change no status or results."""
 
     def write(self, text: str) -> int:
         """Write a text, cleaned."""
@@ -120,38 +120,36 @@ class ErrorStream(CleanStream):
         return len(text)
 
     def flush(self) -> None:
-        """Write what has been kept so far."""
+        """Flush the buffer."""
         with contextlib.suppress(OSError):
             super().flush()
 
 
 def prepare_streams() -> None:
-    """Let nothing reach standard and error output uncleaned from now on; what is said to a closed one is lost.
+    """Replace standard and error output by clean streams; output to a closed stream is discarded.
 
-    A closed standard input is an empty one.
+    A closed standard input is treated as empty.
     """
     if sys.stdin is None:
-        sys.stdin = Path(os.devnull).open(encoding="utf-8")  # noqa: SIM115 - it stays as long as the process
+        sys.stdin = Path(os.devnull).open(encoding="utf-8")  # noqa: SIM115 - open until the process ends
     sys.stdout, sys.stderr = _clean(sys.stdout, CleanStream), _clean(sys.stderr, ErrorStream)
 
 
 def _clean(stream: Any, kind: type[CleanStream]) -> Any:
     if stream is None:
-        # Otherwise errors would be printed to the other of the two, among the results.
-        stream = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - it stays as long as the process
+        # Otherwise errors would be printed among the results.
+        stream = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
     if isinstance(stream, CleanStream | CleanProxy):
         return stream
     if stream not in (sys.__stdout__, sys.__stderr__) or not isinstance(stream, io.TextIOWrapper):
         return CleanProxy(stream)
-    encoding, by_lines, at_once = stream.encoding, stream.line_buffering, stream.write_through
-    # A terminal that knows no degree sign gets an escape, not a traceback.
-    return kind(
-        stream.detach(), encoding=encoding, errors="backslashreplace", line_buffering=by_lines, write_through=at_once
-    )
+    settings = {name: getattr(stream, name) for name in ("encoding", "line_buffering", "write_through")}
+    # A terminal whose encoding has no degree sign gets an escape, not a traceback.
+    return kind(stream.detach(), errors="backslashreplace", **settings)
 
 
 def print_verbatim(text: str) -> None:
-    """Print a text for another program to read, such as a formatted one; where a person watches it is cleaned."""
+    """Print a text for other programs, such as a formatted program, unchanged; on a terminal it is cleaned."""
     if isinstance(sys.stdout, CleanStream | CleanProxy) and not sys.stdout.isatty():
         sys.stdout.verbatim(text)
     else:
@@ -159,17 +157,17 @@ def print_verbatim(text: str) -> None:
 
 
 def console(*, stderr: bool = False, **settings: Any) -> "Console":
-    """Return a console of Rich's that cleans what it shows; texts are no markup unless ``markup`` says so.
+    """Return a console of Rich that cleans its texts and does not interpret markup, unless ``markup`` is true.
 
     Args:
         stderr: whether it writes to the error output.
-        settings: of Rich's Console.
+        settings: further arguments of Rich's Console.
     """
     from rich.console import Console
     from rich.segment import Segment
 
     class CleanConsole(Console):
-        """A console whose texts are cleaned; colours are added later, and what moves the cursor is no text."""
+        """A console whose texts are cleaned; styles and control codes of Rich itself are not."""
 
         def render(self, renderable: "RenderableType", options: Any = None) -> "Iterable[Segment]":
             for segment in super().render(renderable, options):

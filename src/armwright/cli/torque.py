@@ -1,4 +1,4 @@
-"""``armwright torque``: what a motion takes, and why."""
+"""``armwright torque``: the efforts of a motion, by cause."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,15 +14,17 @@ if TYPE_CHECKING:
     from armwright.arrays import Array
     from armwright.dynamics.equation_of_motion import Terms
 
-# Rows of a file that are worked out at once: many, as that takes no longer than one, but not all of a long file.
+# Rows of a table that are computed together: many for speed, but not all of a long table.
 _BLOCK = 1000
 
 
 def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     arm: ArmName,
-    q: Annotated[str | None, typer.Option("-q", help="Joint positions in degrees and mm: 10,20,30.")] = None,
-    qd: Annotated[str | None, typer.Option(help="Joint speeds in degrees/s and mm/s; 0 when left out.")] = None,
-    qdd: Annotated[str | None, typer.Option(help="Joint accelerations in degrees/s² and mm/s²; likewise.")] = None,
+    q: Annotated[str | None, typer.Option("-q", help="Joint positions in degrees and mm, as in 10,20,30.")] = None,
+    qd: Annotated[str | None, typer.Option(help="Joint velocities in degrees/s and mm/s; the default is 0.")] = None,
+    qdd: Annotated[
+        str | None, typer.Option(help="Joint accelerations in degrees/s² and mm/s²; the default is 0.")
+    ] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="Table of q, qd and qdd, such as motion.csv.")] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
@@ -31,14 +33,14 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None,
         typer.Option(
             "--wrench",
-            help="Force and moment on the tool from outside, along base axes: FX,FY,FZ,MX,MY,MZ in N and N m.",
+            help="External wrench on the tool along base axes: FX,FY,FZ,MX,MY,MZ in N and N m.",
         ),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Print the efforts of a motion, in all and by cause, as the report's main program did.
+    """Print the efforts of a motion, in total and by cause, as the report's main program did.
 
-    Torques in N m, forces of slides in N, positive in the direction of the joint.
+    Efforts are torques in N m, or forces in N for prismatic joints, positive in the direction of the joint.
 
     **Example:** `armwright torque stanford-jpl -q 0,90,500,0,45,0 --qdd 60,0,0,0,0,0 --load 1.8,0,0,50`
     """
@@ -46,18 +48,18 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
 
     from armwright.arm.load import load_arm
     from armwright.arm.model import Link
-    from armwright.cli.load import load_in_hand
+    from armwright.cli.load import read_payload
     from armwright.cli.numbers import numbers
     from armwright.dynamics.equation_of_motion import terms
 
     model = load_arm(arm)
-    held = Link() if load is None else load_in_hand(load)
-    push = None if wrench is None else numbers(wrench, 6, "--wrench")
+    body = Link() if load is None else read_payload(load)
+    tool_wrench = None if wrench is None else numbers(wrench, 6, "--wrench")
     motion = _motion(model, (q, qd, qdd), table_file(csv, columns, skip_incomplete=skip_incomplete))
     for first in range(0, len(motion[0]), _BLOCK):
-        found = terms(model, *(values[first : first + _BLOCK] for values in motion), load=held, wrench=push)
-        causes = _causes(found)
-        for row in range(len(found.total)):
+        block = terms(model, *(values[first : first + _BLOCK] for values in motion), load=body, wrench=tool_wrench)
+        causes = _causes(block)
+        for row in range(len(block.total)):
             efforts = {name: values[row].tolist() for name, values in causes.items()}
             if as_json:
                 print(json.dumps({"total": efforts.pop("total"), **efforts}))
@@ -70,30 +72,33 @@ def _motion(model: "Arm", values: tuple[str | None, str | None, str | None], fil
 
     q, qd, qdd = values
     if (q is None) == (file is None):
-        raise typer.BadParameter("give the motion, either as -q, --qd and --qdd or as --csv FILE", param_hint="-q")
+        raise typer.BadParameter("expected the motion, either as -q, --qd and --qdd or as --csv FILE", param_hint="-q")
     if file is not None:
         if qd is not None or qdd is not None:
-            raise typer.BadParameter("a file has its own speeds and accelerations", param_hint="--csv")
+            raise typer.BadParameter(
+                "expected no --qd and --qdd with a table, which has its own velocities and accelerations",
+                param_hint="--csv",
+            )
         return rows(model, file, ("q", "qd", "qdd"))
     still = ",".join(["0"] * model.n)
     texts = (("-q", q), ("--qd", qd), ("--qdd", qdd))
     return [joint_values(model, still if text is None else text, option)[None] for option, text in texts]
 
 
-def _causes(found: "Terms") -> "dict[str, Array]":
-    """Return the terms joint by joint, (rows, n) each, sums over the other joints taken."""
+def _causes(terms: "Terms") -> "dict[str, Array]":
+    """Return the terms of each joint, (rows, n), as sums over the other joints."""
     return {
-        "own inertia": found.own,
-        "coupling": found.coupling.sum(axis=-1),
-        "motor inertia": found.motor,
-        "centrifugal": found.centrifugal.sum(axis=-1),
-        "Coriolis": found.coriolis.sum(axis=(-2, -1)),
-        "gravity": found.gravity,
-        "viscous friction": found.viscous,
-        "dry friction": found.dry,
-        "load": found.load,
-        "wrench": found.outside,
-        "total": found.total,
+        "own inertia": terms.own,
+        "coupling": terms.coupling.sum(axis=-1),
+        "motor inertia": terms.motor,
+        "centrifugal": terms.centrifugal.sum(axis=-1),
+        "Coriolis": terms.coriolis.sum(axis=(-2, -1)),
+        "gravity": terms.gravity,
+        "viscous friction": terms.viscous,
+        "Coulomb friction": terms.dry,
+        "load": terms.load,
+        "wrench": terms.outside,
+        "total": terms.total,
     }
 
 

@@ -1,8 +1,9 @@
-"""What a simulated motion is: its course, its energies, what happened to its joints."""
+"""The result of a simulation: the motion, its energies and the events of its joints."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from enum import Enum, IntEnum
 from numbers import Integral
 from typing import NamedTuple
@@ -11,18 +12,28 @@ import attrs
 import numpy as np
 import numpy.typing as npt
 
+from armwright.arm.model import Arm
 from armwright.arrays import Array, number, read_only, reduce_by_fields
 from armwright.errors import InvalidValueError, KindError, shown
+from armwright.files.result_table import ResultTable
+
+# Changes of joint states that a table lists at most.
+_LISTED_EVENTS = 20
 
 
 class JointState(IntEnum):
-    """What a joint is doing."""
+    """The state of a joint."""
 
     MOVES = 0
     STICKS = 1
     LOWER_STOP = 2
     UPPER_STOP = 3
     BRAKED = 4
+
+    @property
+    def words(self) -> str:
+        """The state in words, as in ``lower stop``."""
+        return self.name.lower().replace("_", " ")
 
 
 class Status(Enum):
@@ -86,6 +97,7 @@ class Simulation:
     At every moment M qdd + coriolis + gravity = tau + friction + hold.
 
     Attributes:
+        arm: the simulated arm.
         status: how it ended.
         t: (m,) times [s]; up to the asked end when it finished.
         q: (m, n) joint positions [rad] or [m].
@@ -103,6 +115,7 @@ class Simulation:
         events: what happened to joints, in order.
     """
 
+    arm: Arm
     status: Status
     t: Array = attrs.field(converter=read_only)
     q: Array = attrs.field(converter=read_only)
@@ -134,3 +147,44 @@ class Simulation:
     def at_rest(self, index: int = -1) -> bool:
         """Whether no joint moves at one of the moments, the last one when left out."""
         return not self.qd[index].any() and not self.qdd[index].any()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How and when the simulation ended."""
+        return (f"{self.status.name.lower()} after {self.t[-1]:.3f} s",)
+
+    def _energies(self) -> dict[str, float]:
+        """Return the energy balance from start to end [J]."""
+        return {
+            "kinetic": float(self.kinetic[-1]),
+            "potential_change": float(self.potential[-1] - self.potential[0]),
+            "work_of_drives": float(self.work[-1].sum()),
+            "heat_of_friction": float(self.heat[-1].sum()),
+            "lost_at_stops": float(self.impact[-1]),
+            "imbalance": float(abs(self.imbalance).max()),
+        }
+
+    def as_data(self) -> dict[str, str | float]:
+        """Return the status, the end and the energy balance as plain data in SI units."""
+        return {"status": self.status.name.lower(), "t": float(self.t[-1]), **self._energies()}
+
+    def tables(self) -> Iterator[ResultTable]:
+        """Yield the tables of the joints [deg, mm], of the energy balance, and of the first events."""
+        rows = []
+        for i, joint in enumerate(self.arm.joints):
+            unit, scale = ("deg", 180 / math.pi) if joint.revolute else ("mm", 1e3)
+            values = (self.q[0, i], self.q[-1, i], self.qd[-1, i])
+            rows.append((self.arm.called(i), unit, *(f"{x * scale:z.3f}" for x in values)))
+        heads = ("joint", "unit", "start", "end", "speed at the end, per s")
+        yield ResultTable(title="", heads=heads, rows=rows, numbers=(2, 3, 4))
+        energies = ((name.replace("_", " "), f"{value:z.6g}") for name, value in self._energies().items())
+        yield ResultTable(title="", heads=("energy", "J"), rows=energies, numbers=(1,))
+        events = self.events[:_LISTED_EVENTS]
+        more = len(self.events) - len(events)
+        yield ResultTable(
+            title="",
+            heads=("s", "joint", "before", "after"),
+            rows=((f"{e.t:.4f}", self.arm.called(e.joint), e.before.words, e.after.words) for e in events),
+            numbers=(0,),
+            remark=f"... and {more} more changes" if more else "",
+        )

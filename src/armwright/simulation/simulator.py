@@ -274,6 +274,7 @@ class _Run:
         moments = [self._plant.moment(s.t, s.y[:n], s.y[n : 2 * n], s.phase) for s in self._samples]
         efforts = {name: np.array([getattr(moment, name) for moment in moments]) for name in Moment._fields}
         return Simulation(
+            arm=arm,
             status=status,
             t=np.array([sample.t for sample in self._samples]),
             q=q,
