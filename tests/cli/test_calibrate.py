@@ -20,7 +20,7 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("plan") / "poses.csv"
     done = armwright("plan-poses", ARM, "-n", "40", "-o", path)
     assert done.returncode == 0, done.stderr
-    assert "40 poses of puma560 tell 21 errors" in done.stdout
+    assert "40 poses make 21 errors identifiable" in done.stdout
     return path
 
 
@@ -139,7 +139,7 @@ def test_coupled_joints_are_doubtful(tmp_path: Path) -> None:
     data = armwright("calibrate", "ur5", path, "-o", tmp_path / "out", "--json", "--folds", "3", columns=200)
 
     assert data.returncode == 3
-    assert "armwright: the readings contradict the arm: " in data.stderr
+    assert "armwright: the measurements contradict the arm: " in data.stderr
     assert "coupled to another (q3 = a2 q2 + q3" in data.stderr
     assert (tmp_path / "out" / "errors.json").exists()
     told = json.loads(data.stdout)
@@ -173,7 +173,7 @@ def test_stated_noise(measured: Path) -> None:
 def test_next_poses(measured: Path, tmp_path: Path) -> None:
     """Poses are planned beside those that were measured; with turns, fewer will do."""
     done = armwright("plan-poses", ARM, "-n", "2", "--after", measured, "-o", tmp_path / "more.csv")
-    few = armwright("plan-poses", ARM, "-n", "8", "--turns")
+    few = armwright("plan-poses", ARM, "-n", "8", "--orientations")
 
     assert done.returncode == 0, done.stderr
     assert len((tmp_path / "more.csv").read_text(encoding="utf-8").splitlines()) == 3

@@ -121,7 +121,7 @@ def test_interrupted_sweep(tmp_path: Path) -> None:
         _, said = running.communicate(timeout=300)
 
     assert running.returncode == 130
-    kept = "what is finished is kept in 'out', and the same command goes on from there"
+    kept = "finished runs are stored in 'out'; the same command resumes the sweep"
     assert said == f"armwright: interrupted; {kept}\n"
     assert list(tmp_path.glob("out/blocks/???????.npy"))
 

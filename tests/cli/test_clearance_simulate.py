@@ -63,11 +63,20 @@ def test_options_reach_the_run() -> None:
 def test_turning_drive() -> None:
     """A slider-crank takes a speed and turns; at 600 rev/min two turns take 0.2 s."""
     done = armwright(
-        "clearance", "simulate", "slider-crank", "--speed-rpm", "600", "--turns", "2", "--start", "centred", "--json"
+        "clearance",
+        "simulate",
+        "slider-crank",
+        "--speed-rpm",
+        "600",
+        "--revolutions",
+        "2",
+        "--start",
+        "centred",
+        "--json",
     )
 
     told = json.loads(done.stdout)
-    assert told["path"] == "2 turns at 600 rev/min"
+    assert told["path"] == "2 revolutions at 600 rev/min"
     assert told["duration"] == pytest.approx(0.2)
     assert told["status"] == "finished"
     assert list(told["pins"]) == ["B"]
@@ -109,8 +118,8 @@ def test_slips(arguments: list[str], said: str) -> None:
     [
         (["five-bar"], "five-bar takes --path y1"),
         (["five-bar", "--path", "y1", "--speed-rpm", "60"], "either --path or --speed-rpm"),
-        (["slider-crank", "--path", "y1"], "slider-crank has 1: give --speed-rpm"),
-        (["four-bar", "--speed-rpm", "0"], "a speed that is not 0"),
+        (["slider-crank", "--path", "y1"], "slider-crank has 1; use --speed-rpm"),
+        (["four-bar", "--speed-rpm", "0"], "a speed other than 0"),
         (["five-bar", "--path", "y1", "--clearance", "J2"], "J2=0.5, got J2"),
         (["five-bar", "--path", "y1", "--clearance", "J2=thick"], "J2=0.5, got J2=thick"),
     ],

@@ -111,8 +111,8 @@ def test_other_commands_read_urdf() -> None:
     [
         (("puma560",), 2, "Missing option '-o'"),
         (("puma560", "-o", "puma.xml"), 2, "expected a name that ends in .urdf or .toml, got puma.xml"),
-        (("puma560", "-o", "puma.toml", "--tip", "hand"), 2, "only URDF files have links and joints to name"),
-        (("puma560", "-o", "puma.toml", "--lock", "j1"), 2, "only URDF files have links and joints to name"),
+        (("puma560", "-o", "puma.toml", "--tip", "hand"), 2, "expected a URDF file, whose links and joints have names"),
+        (("puma560", "-o", "puma.toml", "--lock", "j1"), 2, "expected a URDF file, whose links and joints have names"),
         (("pumma560", "-o", "puma.toml"), 2, "Did you mean 'puma560'?"),
         ((EXAMPLE, "-o", "seven.toml", "--tip", "tool_pont"), 2, "no link 'tool_pont'. Did you mean 'tool_point'?"),
         ((EXAMPLE, "-o", "seven.toml", "--lock", "waist=x"), 2, "--lock: expected J1,J2=30, got 'x' for waist"),
@@ -140,7 +140,7 @@ def test_the_file_that_is_read_is_not_replaced(tmp_path: Path) -> None:
     done = armwright("convert", "seven.urdf", "-o", tmp_path / "seven.urdf", cwd=tmp_path)
 
     assert done.returncode == 2
-    assert "this is the file that is read" in " ".join(done.stderr.replace("│", " ").split())
+    assert "expected another file than the input" in " ".join(done.stderr.replace("│", " ").split())
     assert (tmp_path / "seven.urdf").read_bytes() == EXAMPLE.read_bytes()
 
 

@@ -68,7 +68,7 @@ def test_stages_ticks_and_the_end() -> None:
     assert "    0.005 s  program, line 11" in said
     assert any(line.endswith("line 14: apf1 begins to move with ARM_1") for line in said)
     assert any(line.startswith("      apf1  (") for line in said), "apf1 hangs on obj1, which hangs on the arm"
-    assert any(line.endswith("the program is over; it can still be taken back") for line in said)
+    assert any(line.endswith("the program has ended; `back` still undoes its statements") for line in said)
     assert said[-1] == "   15  end."
 
 
@@ -77,12 +77,12 @@ def test_slips_of_the_user() -> None:
     status, said = debug("jump", "b soon", "b 99", "p nobody", "x 7", "set 1 = 2", "th 3", "help", "q")
 
     assert status == 0
-    assert "no command `jump`; `help` lists them" in said
-    assert "expected a whole number, got `soon`" in said
+    assert "unknown command `jump`; `help` lists the commands" in said
+    assert "expected an integer, got `soon`" in said
     assert "no statement begins here or further down" in said
     assert any(line.startswith("`nobody` is not declared") for line in said)
     assert "there is no breakpoint 7" in said
-    assert "`1` cannot be given a value" in said
+    assert "cannot assign to `1`" in said
     assert "expected 1 to 1, the number of a process" in said
     assert any(line.startswith("n         next statement") for line in said)
 
@@ -120,7 +120,7 @@ def test_many_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     said = done.output.splitlines()
     left_out = [int(one.split()[2].replace(",", "")) for one in said if one.startswith("... and ")]
     assert done.exit_code == 0
-    assert "more; `armwright run -o FOLDER` keeps all in events.jsonl" in done.output
+    assert "more; `armwright run -o FOLDER` writes all to events.jsonl" in done.output
     # The end of the program is a line, too, and may be among those left out.
     assert 0 <= sum('PRINT "again"' in one for one in said) + sum(left_out) - 20_000 <= 1
 
@@ -141,5 +141,5 @@ def test_numbers_of_any_length() -> None:
     status, said = debug(f"\ufefft {digits}", f"b {digits}", f"x {digits}", f"th {digits}", "p 6 * 7", "q")
 
     assert status == 0
-    assert [line[:26] for line in said[-5:-1]] == ["expected a whole number, g"] * 4
+    assert [line[:26] for line in said[-5:-1]] == ["expected an integer, got `"] * 4
     assert said[-1].startswith("42")

@@ -96,7 +96,7 @@ def test_our_fault() -> None:
     done = _fails("KeyError('q')")
 
     assert (done.returncode, done.stdout) == (ExitStatus.INTERNAL_ERROR, "")
-    assert done.stderr.startswith("armwright: a defect of armwright, not of what was given: KeyError: 'q' (in broken,")
+    assert done.stderr.startswith("armwright: a defect of armwright, not of its inputs: KeyError: 'q' (in broken,")
     assert "please report it" in done.stderr
     assert len(done.stderr.splitlines()) == 1
 
@@ -105,7 +105,7 @@ def test_our_fault() -> None:
     ("error", "status", "message"),
     [
         ("EOFError('cut off')", 70, "EOFError: cut off"),
-        ("MemoryError()", 3, "this takes more memory than there is"),
+        ("MemoryError()", 3, "this needs more memory than is available"),
         ("OSError(28, 'No space left on device')", 4, "cannot write the output: No space left on device"),
         ("PermissionError(13, 'Permission denied', 'a')", 4, "cannot read or write 'a': Permission denied"),
     ],
@@ -227,7 +227,7 @@ def test_changed_results_are_told(tmp_path: Path) -> None:
     for name, commands in calls.items():
         for command in commands:
             done = armwright(*command, tmp_path / "out" / name)
-            assert "not what the run has written" in done.stderr, (command, done)
+            assert "differs from the file that is recorded" in done.stderr, (command, done)
 
 
 @pytest.mark.parametrize(

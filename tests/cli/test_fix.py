@@ -37,7 +37,7 @@ def test_cures_and_what_is_left(wrong: Path) -> None:
         f"{wrong}:5:8: `ARM - 1` is not the name of an arm (E106): wrote `ARM_1` for `ARM - 1`\n"
         f"{wrong}:7:4: the program does not end with `.` (E110): put in `.`\n"
         f"{wrong}:5:13: missing `;` between two statements (E104): put in `;`\n"
-        f"{wrong}: 4 slips cured\n"
+        f"{wrong}: 4 mistakes corrected\n"
         "error[E105]: unknown statement `MVOE`\n"
         f"  --> {wrong}:4:3\n"
         "   |\n"
@@ -56,7 +56,7 @@ def test_nothing_left(wrong: Path) -> None:
 
     assert (first.returncode, second.returncode) == (0, 0)
     assert wrong.read_text() == CURED.replace("MVOE", "MOVE")
-    assert second.stdout.startswith(f"{wrong}: nothing to cure\n")
+    assert second.stdout.startswith(f"{wrong}: nothing to correct\n")
 
 
 @pytest.mark.parametrize("option", ["--diff", "--dry-run"])
@@ -73,7 +73,7 @@ def test_diff(wrong: Path, option: str) -> None:
         "-VAR f : FRAME",
         "+VAR f : FRAME;",
     ]
-    assert f"{wrong}: 4 slips could be cured" in lines
+    assert f"{wrong}: 4 mistakes could be corrected" in lines
     assert result.returncode == 1
 
 
@@ -97,7 +97,7 @@ def test_cell(tmp_path: Path) -> None:
     result = fix(path, "--cell", EXAMPLES / "stanford_cell.toml")
     assert result.returncode == 1
     assert path.read_text() == "BEGIN OPEN ARM_7 END."
-    assert "ARM_7" in result.stdout.partition("1 slip cured")[2]
+    assert "ARM_7" in result.stdout.partition("1 mistake corrected")[2]
 
 
 def test_json(wrong: Path) -> None:

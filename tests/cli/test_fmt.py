@@ -44,8 +44,8 @@ def test_in_place(written: Path) -> None:
     first, second = fmt(written), fmt(written)
 
     assert written.read_text() == LAID_OUT
-    assert (first.returncode, first.stdout.decode()) == (0, f"laid out: {written}\n")
-    assert (second.returncode, second.stdout.decode()) == (0, f"as it should be: {written}\n")
+    assert (first.returncode, first.stdout.decode()) == (0, f"formatted: {written}\n")
+    assert (second.returncode, second.stdout.decode()) == (0, f"unchanged: {written}\n")
     assert [path.name for path in written.parent.iterdir()] == ["arm.rlo"]
 
 

@@ -102,11 +102,15 @@ def test_what_are_no_six_numbers(call: Call, option: str, text: str, said: str) 
         (
             ("inverse", "puma560", "--noap", "1 0 0 0 1 0 0 0 1 .4 .1 .2", "--rpy", "0,0,90"),
             2,
-            "--rpy: the twelve numbers have the turn already",
+            "--rpy: the twelve numbers of --noap include the orientation",
         ),
-        (("torque", "puma560"), 2, "-q: give the motion"),
-        (("torque", "puma560", "--qd", Q), 2, "-q: give the motion"),
-        (("torque", "puma560", "--csv", "x.csv", "--qd", Q), 2, "--csv: a file has its own speeds and accelerations"),
+        (("torque", "puma560"), 2, "-q: expected the motion"),
+        (("torque", "puma560", "--qd", Q), 2, "-q: expected the motion"),
+        (
+            ("torque", "puma560", "--csv", "x.csv", "--qd", Q),
+            2,
+            "--csv: expected no --qd and --qdd with a table, which has its own velocities and accelerations",
+        ),
         (("simulate", "puma560", "-q", Q, "--duration", "-1"), 2, "duration: expected more than 0 s, got -1.0"),
         (("simulate", "puma560", "-q", Q, "--duration", "nan"), 2, "duration: expected more than 0 s, got nan"),
         (("simulate", "puma560", "-q", Q, "--duration", "1e9"), 2, "would be 1e+12 moments; expected at most 1e+07"),
@@ -211,7 +215,7 @@ def test_table_options_without_a_table(call: Call, option: tuple[str, ...]) -> N
     got, _, error = call("forward", "puma560", "-q", Q, *option)
 
     assert got == 2
-    assert f"{option[0]}: there is no table to read: give --csv FILE" in error
+    assert f"{option[0]}: expected a table, --csv FILE, with this option" in error
 
 
 def test_velocities_by_joint_names(call: Call, tmp_path: Path) -> None:
@@ -320,8 +324,8 @@ def test_simulation_with_a_load(call: Call) -> None:
 @pytest.mark.parametrize(
     ("load", "status", "said"),
     [
-        ("1", 2, "--load: expected 4 finite numbers, got 1: 1; or give a file that ends in .toml"),
-        ("heavy", 2, "--load: expected 4 numbers, got 'heavy'; or give a file that ends in .toml"),
+        ("1", 2, "--load: expected 4 finite numbers, got 1: 1, or a file that ends in .toml"),
+        ("heavy", 2, "--load: expected 4 numbers, got 'heavy', or a file that ends in .toml"),
         ("-1,0,0,0", 2, "--load: expected a mass of 0 kg or more, got -1"),
         ("nan,0,0,0", 2, "--load: every number must be finite"),
         ("missing.toml", 4, "missing.toml: no such file"),

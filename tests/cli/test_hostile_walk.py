@@ -49,7 +49,7 @@ CALLS: dict[str, list[str]] = {
     "calibrate": ["puma560-seed", "points.csv", "--folds", "2", "--json"],
     "plan-poses": ["ur5", "-n", "16", "--json"],
     "clearance": [],
-    "clearance simulate": ["slider-crank", "--speed-rpm", "300", "--turns", "0.05", "--json"],
+    "clearance simulate": ["slider-crank", "--speed-rpm", "300", "--revolutions", "0.05", "--json"],
     "clearance sweep": ["five-bar", "-o", "out", "--paths", "x1", "-n", "2", "--workers", "1", "--json"],
     "clearance estimate": ["five-bar", "rest.csv", "--json"],
     "clearance correct": ["five-bar", "--path", "x1", "--rounds", "1", "--knots", "2", "--json"],

@@ -88,8 +88,8 @@ def test_inverse_out_of_reach() -> None:
 @pytest.mark.parametrize(
     ("place", "said"),
     [
-        (("--xyz", "0.5,0.1,0.3"), "note: --xyz is in mm; in m the pose would be in reach"),
-        (("--noap", "1,0,0,0,1,0,0,0,1,500,100,300"), "note: --noap is in m; in mm the pose would be in reach"),
+        (("--xyz", "0.5,0.1,0.3"), "note: --xyz is in mm; in m the pose would be within reach"),
+        (("--noap", "1,0,0,0,1,0,0,0,1,500,100,300"), "note: --noap is in m; in mm the pose would be within reach"),
     ],
 )
 def test_inverse_in_the_other_unit(place: tuple[str, str], said: str) -> None:
@@ -167,13 +167,13 @@ def test_bad_files(tmp_path: Path, text: str, said: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("forward", "puma560"), "give the joint positions"),
+        (("forward", "puma560"), "expected joint positions"),
         (("forward", "puma560", "-q", "1,2,3"), "expected 6 finite numbers, got 3"),
         (("forward", "puma560", "-q", "1,2,3,4,5,x"), "got 'x'"),
         (("forward", "puma560", "-q", "1,2,3,4,5,inf"), "finite"),
         (("jacobian", "puma560", "-q", Q_DEG, "--frame", "world"), "expected base or tool, got world"),
-        (("inverse", "puma560"), "give the pose"),
-        (("torque", "puma560"), "give the motion"),
+        (("inverse", "puma560"), "expected the pose"),
+        (("torque", "puma560"), "expected the motion"),
     ],
 )
 def test_usage(arguments: tuple[str, ...], said: str) -> None:
@@ -190,7 +190,7 @@ def test_kernel() -> None:
     assert data["total"] == sum(data["operations"].values())
     assert "def rows(" in data["source"]
     compile(data["source"], "kernel", "exec")
-    assert "def one(" in armwright("kernel", "stanford-jpl", "forward", "--one").stdout
+    assert "def one(" in armwright("kernel", "stanford-jpl", "forward", "--single").stdout
     assert "operations per configuration" in armwright("kernel", "ur5", "jacobian", "--count").stdout
     wrong = armwright("kernel", "ur5", "jacobain")
     assert (wrong.returncode, "Did you mean 'jacobian'?" in wrong.stderr) == (2, True)
@@ -207,5 +207,5 @@ def test_rows_of_several_arms(command: str, tmp_path: Path) -> None:
     path.write_text("\n".join([f"arm,{names}", *rows[:2]]) + "\n")
 
     assert refused.returncode == 4
-    assert "motion.csv:4: arm: rows of several arms, 'ARM_1' and 'ARM_2'; leave" in refused.stderr
+    assert "motion.csv:4: arm: expected rows of a single arm, got 'ARM_1' and 'ARM_2'" in refused.stderr
     assert armwright(command, "puma560-seed", "--csv", path).returncode == 0

@@ -80,7 +80,7 @@ def test_no_branch(tmp_path: Path) -> None:
     assert done.stdout == ""
     assert "no branch carries the hand to its last pose. left, down, no-flip: at 0." in done.stderr
     assert "between poses 2 and 3" in done.stderr
-    assert done.stderr.endswith("`--around damped` and `--around via` look for a way round\n")
+    assert done.stderr.endswith("`--around damped` and `--around via` search for a detour\n")
     assert not (tmp_path / "out").exists()
 
 
@@ -90,7 +90,7 @@ def test_the_other_way_round_is_named() -> None:
 
     assert done.returncode == 3
     assert "from pose 2 to pose 3: on the line near (" in done.stderr
-    assert done.stderr.endswith("`--around damped` looks for another way round\n")
+    assert done.stderr.endswith("`--around damped` searches for another detour\n")
 
 
 def test_way_round() -> None:
@@ -101,7 +101,7 @@ def test_way_round() -> None:
     assert "A to B: a line: " in done.stdout
     said = " ".join(done.stdout.split())
     assert "B to C: no line, on the line near (" in said
-    assert "round it by damped: " in said
+    assert "detour by damped: " in said
     assert " mm off the line, " in said
 
 
@@ -119,11 +119,15 @@ def test_a_servo_slower_than_the_move(tmp_path: Path) -> None:
         (("joint", "puma56", POSES), 2, "no arm 'puma56'. Did you mean 'puma560'?"),
         (("joint", "puma560-seed", EXAMPLES / "puma_pose.toml"), 4, "no such file; did you mean "),
         (("slide", "puma560-seed", POSES), 2, "'slide' is not one of 'joint', 'cartesian'"),
-        (("joint", "puma560-seed", POSES, "--orientation", "zyz"), 2, "only a cartesian move has one"),
+        (("joint", "puma560-seed", POSES, "--orientation", "zyz"), 2, "expected a cartesian move for this option"),
         (("joint", "puma560-seed", POSES, "--near", "1,2"), 2, "expected 6 finite numbers, got 2"),
         (("joint", "puma560-seed", POSES, "--servo-ms", "0"), 2, "expected 0.01 to 1000, got 0"),
         (("cartesian", "puma560-seed", POST, "--deviation-mm", "-1"), 2, "expected 0.0001 to 100, got -1"),
-        (("cartesian", "puma560-seed", POST, "--around", "via", "--orientation", "zyz"), 2, "turn about one axis"),
+        (
+            ("cartesian", "puma560-seed", POST, "--around", "via", "--orientation", "zyz"),
+            2,
+            "rotate about a fixed axis",
+        ),
     ],
 )
 def test_mistakes(arguments: tuple[Any, ...], status: int, said: str) -> None:

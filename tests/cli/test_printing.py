@@ -87,7 +87,7 @@ def test_many_digits_that_are_no_number() -> None:
 
 def test_a_name_that_is_given_twice() -> None:
     """Of two numbers of one name none is dropped without a word."""
-    with pytest.raises(typer.BadParameter, match="J2 is given twice"):
+    with pytest.raises(typer.BadParameter, match="J2 occurs twice"):
         named_numbers(["J2=0.3", "J3=0.3", "J2=0.4"], ("", "mm"), "a pin", "--clearance")
 
 

@@ -68,13 +68,13 @@ def test_what_goes_wrong_counts() -> None:
     ("line", "text"),
     [
         (":frame", "error: no command ':frame'. Did you mean ':frames'?"),
-        (":undo", "error: nothing is left to be taken back"),
-        (":undo x", "error: expected a whole number from 1, got 'x'"),
-        (":undo 0", "error: expected a whole number from 1, got '0'"),
-        (":redo", "error: nothing was taken back that could be done again"),
+        (":undo", "error: there is nothing to undo"),
+        (":undo x", "error: expected an integer from 1, got 'x'"),
+        (":undo 0", "error: expected an integer from 1, got '0'"),
+        (":redo", "error: there is nothing to redo"),
         (":load", "error: :load needs FILE, such as `:load stacking.rlo`"),
         (":load nowhere.rlo", "error: nowhere.rlo: no such file"),
-        (":time now", "error: :time stands alone, got 'now'"),
+        (":time now", "error: :time takes no argument, got 'now'"),
         (":save /", "error: cannot write '/': it is a folder"),
         (":save /proc/no/where", "error: cannot make '/proc/no'"),
         (":", "error: no command ':'"),
@@ -126,7 +126,7 @@ def test_a_program_to_begin_with() -> None:
 
     assert status == 0
     assert "ARM_1 [OBJ1] MOVE: PTP OBJ2 @100" in said
-    taken = re.search(r"^taken back: (.*)$", said, re.MULTILINE)
+    taken = re.search(r"^undone: (.*)$", said, re.MULTILINE)
     assert taken is not None
     assert taken[1] not in said.partition("taken back")[2].partition("\n")[2]
 
@@ -165,7 +165,7 @@ def test_saving(tmp_path: Path) -> None:
     run = armwright("run", tmp_path / "new" / "try it.rlo", "--cell", CELL, "--json")
 
     assert status == 4
-    assert "is there already; `:save! " in said
+    assert "exists already; `:save! " in said
     assert run.returncode == 0
     clock = re.search(r"^(\d+\.\d{3}) s$", said, re.MULTILINE)
     assert clock is not None
@@ -218,7 +218,7 @@ def test_many_lines() -> None:
 
     lines = said.splitlines()
     assert status == 0
-    assert lines[499:502] == ["500", "... and 19,000 more; `:report DIR` keeps all in events.jsonl", "19501"]
+    assert lines[499:502] == ["500", "... and 19,000 more; `:report DIR` writes all to events.jsonl", "19501"]
     assert len(lines) == 1002
     assert "... and 4,000 more; " in lines[-1]
 
@@ -236,7 +236,7 @@ def test_json() -> None:
     assert rows[2]["printed"] == ["2"]
     assert rows[3]["diagnostics"][0]["code"] == "E202"
     assert rows[4]["effects"][0]["kind"] == "PRINT"
-    assert rows[5]["lines"] == ["taken back: IF n = 2 THEN PRINT(1)"]
+    assert rows[5]["lines"] == ["undone: IF n = 2 THEN PRINT(1)"]
     assert (rows[3]["error"]["code"], rows[3]["error"]["line"]) == ("E202", 4)
     assert rows[6]["error"]["class"] == "UnknownNameError"
     assert rows[6]["error"]["message"].startswith("no command ':oh'")
@@ -374,7 +374,7 @@ def test_ctrl_c(tmp_path: Path) -> None:
         screen.until("rlo 3> ")
         screen.type("WHILE 1 = 1 DO n = n + 1\n")
         screen.interrupt()
-        assert "interrupted; the statement under way was taken back" in screen.until("rlo 4> ")
+        assert "interrupted; the current statement was undone" in screen.until("rlo 4> ")
         screen.type("n\n")
         assert "\n1\r\n" in screen.until("rlo 5> ")
         assert screen.process.poll() is None

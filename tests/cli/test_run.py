@@ -199,7 +199,7 @@ def test_collisions_are_not_looked_for(stacked: Path, tmp_path: Path) -> None:
     (tmp_path / "far.rlo").write_text("BEGIN\n  MOVE ARM_1 TO WORLD * XYZ(9, 0, 0) ;\nEND.\n")
     failed = armwright("run", "far.rlo", "--cell", STANFORD, "-o", "out", "--json", cwd=tmp_path)
 
-    assert armwright(*program).stdout.rstrip().endswith("Collisions are not looked for.")
+    assert armwright(*program).stdout.rstrip().endswith("Collisions are not checked.")
     assert json.loads(armwright(*program, "--json").stdout)["collisions"] == "not looked for"
     assert (failed.returncode, json.loads(failed.stdout)["collisions"]) == (3, "not looked for")
     for folder in (stacked, tmp_path / "out"):
@@ -619,11 +619,11 @@ def test_a_terminal_of_many_lines(tmp_path: Path) -> None:
     told = json.loads(armwright(*call, "--json").stdout)
 
     assert "... and 19,001 more; all in events.jsonl\n" in kept.stdout.replace(" \n", "\n")
-    assert "... and 19,001 more; `-o FOLDER` keeps all in events.jsonl" in shown.stdout
+    assert "... and 19,001 more; `-o FOLDER` writes all to events.jsonl" in shown.stdout
     assert 'PRINT "500"' in shown.stdout
     assert 'PRINT "501"' not in shown.stdout
     assert len(shown.stdout.splitlines()) < 1020
-    assert told["trace"][2000] == "... and 16,000 more; `-o FOLDER` keeps all in events.jsonl"
+    assert told["trace"][2000] == "... and 16,000 more; `-o FOLDER` writes all to events.jsonl"
 
 
 def test_a_page_of_many_frames_and_changes(tmp_path: Path) -> None:

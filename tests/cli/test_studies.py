@@ -92,7 +92,7 @@ def test_holding_its_weight() -> None:
     """With its weight held, a PUMA at rest stays where it is."""
     said = armwright("simulate", "puma560", "-q", "0,0,90,0,0,0", "--duration", "0.2", "--drives", "gravity").stdout
 
-    assert "joint 2: from     0.000 to     0.000 deg" in said
+    assert "joint 2   deg     0.000    0.000" in said
 
 
 def test_starting_outside_the_stops() -> None:
