@@ -16,10 +16,10 @@ PATHS = ("y1", "y3", "y7")
 STARTS = np.array(((-0.15, -0.7), (-0.05, -0.7), (0.15, -0.7)))
 
 
-def accuracy(found: ArrayLike, true: ArrayLike) -> Array:
+def accuracy(estimated: ArrayLike, true: ArrayLike) -> Array:
     """Mean accuracy of clearances (..., 3) as the thesis counts it [%]."""
-    found, true = np.asarray(found), np.asarray(true)
-    return np.asarray(100 * (1 - np.abs(found / true - 1)).mean(axis=-1))
+    estimated, true = np.asarray(estimated), np.asarray(true)
+    return np.asarray(100 * (1 - np.abs(estimated / true - 1)).mean(axis=-1))
 
 
 def beginning(path: Path, end: float) -> Path:

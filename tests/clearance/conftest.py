@@ -28,7 +28,7 @@ class Swept(NamedTuple):
     values: Mapping[str, Array]
     surrogate: Surrogate
 
-    def seen(self, clearances: Array) -> Array:
+    def features(self, clearances: Array) -> Array:
         """All features (..., f) of other five-bars, without noise."""
         return feature_vector(self.task(np.atleast_2d(clearances)), PATHS, FEATURES)
 

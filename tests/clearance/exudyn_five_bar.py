@@ -34,9 +34,9 @@ def simulated(
         # The hollow one is the second.
         markers = [
             mbs.AddMarker(
-                itemInterface.MarkerBodyRigid(bodyNumber=bodies[place.body], localPosition=_local(linkage, place))
+                itemInterface.MarkerBodyRigid(bodyNumber=bodies[point.body], localPosition=_local(linkage, point))
             )
-            for place in (pin.journal, pin.bearing)
+            for point in (pin.journal, pin.bearing)
         ]
         data = mbs.AddNode(itemInterface.NodeGenericData(initialCoordinates=[0.1, 0, 0, 0], numberOfDataCoordinates=4))
         mbs.AddObject(
@@ -88,28 +88,28 @@ def _torque(torques: Callable[[float], np.ndarray], number: int) -> Any:
     return lambda _mbs, t, _load: float(torques(t)[number])
 
 
-def _local(linkage: Linkage, place: Any) -> list[float]:
+def _local(linkage: Linkage, body_point: Any) -> list[float]:
     """A place from the centre of a free body, or from the pin of a crank."""
-    origin = linkage.body(place.body).centre if linkage.joint(place.body) is None else 0.0
-    return [*(linkage.point(place) - origin), 0.0]
+    origin = linkage.body(body_point.body).centre if linkage.joint(body_point.body) is None else 0.0
+    return [*(linkage.point(body_point) - origin), 0.0]
 
 
 def _body(mbs: Any, body: Any, linkage: Linkage, q: np.ndarray) -> int:
-    numbers = {one.kind: i for i, one in enumerate(linkage.coordinates) if one.body == body.name}
+    numbers = {coordinate.kind: i for i, coordinate in enumerate(linkage.coordinates) if coordinate.body == body.name}
     joint = linkage.joint(body.name)
     angle = float(q[numbers["angle"]]) + linkage.zero
     weights = [np.array((0.0, -body.mass * G, 0.0))]
-    places = [list(body.centre)]
+    positions = [list(body.centre)]
     if joint is None:
         node = mbs.AddNode(
             itemInterface.NodeRigidBody2D(referenceCoordinates=[*map(float, q[[numbers["x"], numbers["y"]]]), angle])
         )
-        found = mbs.AddObject(itemInterface.ObjectRigidBody2D(mass=body.mass, inertia=body.inertia, nodeNumber=node))
-        places = [[0.0, 0.0]]
+        item = mbs.AddObject(itemInterface.ObjectRigidBody2D(mass=body.mass, inertia=body.inertia, nodeNumber=node))
+        positions = [[0.0, 0.0]]
     else:
         # Of a crank the inertia about its pin counts.
         node = mbs.AddNode(itemInterface.Node1D(referenceCoordinates=[0.0], initialCoordinates=[angle]))
-        found = mbs.AddObject(
+        item = mbs.AddObject(
             itemInterface.ObjectRotationalMass1D(
                 inertia=body.inertia + body.mass * float(body.centre @ body.centre),
                 nodeNumber=node,
@@ -118,11 +118,11 @@ def _body(mbs: Any, body: Any, linkage: Linkage, q: np.ndarray) -> int:
         )
     for load in linkage.loads:
         if load.point.body == body.name:
-            places.append(_local(linkage, load.point)[:2])
+            positions.append(_local(linkage, load.point)[:2])
             weights.append(np.array((*load.force, 0.0)))
-    for place, weight in zip(places, weights, strict=True):
+    for position, weight in zip(positions, weights, strict=True):
         marker = mbs.AddMarker(
-            itemInterface.MarkerBodyPosition(bodyNumber=found, localPosition=[*map(float, place), 0.0])
+            itemInterface.MarkerBodyPosition(bodyNumber=item, localPosition=[*map(float, position), 0.0])
         )
         mbs.AddLoad(itemInterface.Force(markerNumber=marker, loadVector=list(map(float, weight))))
-    return int(found)
+    return int(item)

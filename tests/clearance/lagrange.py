@@ -32,7 +32,7 @@ def along(theta: np.ndarray | float) -> np.ndarray:
     return np.array((np.sin(theta), -np.cos(theta)))
 
 
-def place(q: np.ndarray, body: int, s: float) -> np.ndarray:
+def position(q: np.ndarray, body: int, s: float) -> np.ndarray:
     """A point of a link, ``s`` of its length from its centre."""
     return q[3 * body : 3 * body + 2] + s * LENGTH[body] * along(q[3 * body + 2])
 
@@ -52,16 +52,16 @@ def forces(q: np.ndarray, v: np.ndarray, torques: np.ndarray, wall: Wall) -> np.
     Q[1::3] -= MASS * G
     Q[2] += torques[0]
     Q[11] += torques[1]
-    push(Q, q, 2, place(q, 2, 0.5), np.array((0.0, -LOAD)))
-    for bearing, at, journal, on in PINS:
-        e = place(q, journal, on) - place(q, bearing, at)
+    push(Q, q, 2, position(q, 2, 0.5), np.array((0.0, -LOAD)))
+    for bearing, end, journal, on in PINS:
+        e = position(q, journal, on) - position(q, bearing, end)
         size = np.linalg.norm(e)
         depth = size - wall.clearance
         if depth <= 0:
             continue
         n = e / size
         t = np.array((-n[1], n[0]))
-        point = place(q, bearing, at) + (wall.clearance + RADIUS) * n
+        point = position(q, bearing, end) + (wall.clearance + RADIUS) * n
         slip = (skin(q, v, journal, point) - skin(q, v, bearing, point)) @ t
         normal = wall.stiffness * depth**1.5
         force = normal * (n + wall.friction * np.clip(slip / wall.threshold, -1, 1) * t)
@@ -95,7 +95,7 @@ def motion(
         for k, (body, base) in enumerate(BASES.items()):
             theta, spin, half = q[3 * body + 2], v[3 * body + 2], LENGTH[body] / 2
             rows = slice(2 * k, 2 * k + 2)
-            phi[rows], dphi[rows] = place(q, body, -0.5) - base, speed(q, v, body, -0.5)
+            phi[rows], dphi[rows] = position(q, body, -0.5) - base, speed(q, v, body, -0.5)
             J[2 * k, 3 * body] = J[2 * k + 1, 3 * body + 1] = 1.0
             J[rows, 3 * body + 2] = -half * np.array((np.cos(theta), np.sin(theta)))
             gamma[rows] = half * spin**2 * np.array((-np.sin(theta), np.cos(theta)))

@@ -87,23 +87,23 @@ def left_alone(task: Scenario) -> Scenario:
     return attrs.evolve(task, table=np.zeros_like(task.table))
 
 
-def energies(found: Simulation) -> Array:
+def energies(run: Simulation) -> Array:
     """(..., s) kinetic energy, that of gravity and loads, and that of indentations, all together [J]."""
-    linkage, settings = found.scenario.linkage, found.scenario.settings
-    c = np.broadcast_to(found.clearances[..., None, :], (*found.q.shape[:-1], len(linkage.pins)))
+    linkage, settings = run.scenario.linkage, run.scenario.settings
+    c = np.broadcast_to(run.clearances[..., None, :], (*run.q.shape[:-1], len(linkage.pins)))
     K = contact_stiffness(linkage, c)
     contacts = [Contact(c[..., i], K[..., i], 0.0, 0.0, settings.threshold) for i in range(len(linkage.pins))]
-    memories = [ContactMemory(np.zeros(found.q.shape[:-1]), 1.0) for _ in linkage.pins]
-    state = State(axes(found.q), axes(found.qd), memories)
+    memories = [ContactMemory(np.zeros(run.q.shape[:-1]), 1.0) for _ in linkage.pins]
+    state = State(axes(run.q), axes(run.qd), memories)
     return np.asarray(sum(rates(linkage, FrictionModel(), state, [0.0] * len(linkage.drives), contacts).energy))
 
 
-def imbalance(found: Simulation) -> Array:
+def imbalance(run: Simulation) -> Array:
     """(..., s) energy that has come from nowhere since the start [J]."""
-    energy = energies(found)
-    works = found.works
-    given = works["driven"] - works["impact loss"] - works["friction loss"]
-    return np.asarray(energy - energy[..., :1] - given)
+    energy = energies(run)
+    works = run.works
+    work = works["driven"] - works["impact loss"] - works["friction loss"]
+    return np.asarray(energy - energy[..., :1] - work)
 
 
 def axes(values: Array) -> list[Any]:

@@ -101,7 +101,8 @@ def squeezer(gamma: float) -> Linkage:
             for i, (name, centre, points) in zip(numbers, bodies, strict=True)
         ],
         joints=[
-            Pin(body=name, point=place.split(":")[1], on=BodyPoint(*place.split(":"))) for name, place in hung.items()
+            Pin(body=name, point=joint_point.split(":")[1], on=BodyPoint(*joint_point.split(":")))
+            for name, joint_point in hung.items()
         ],
         pins=[
             ClearancePin(

@@ -51,7 +51,7 @@ def y1(clearance: float = 0.5e-3, friction: float = 0.05) -> Simulation:
     return simulate(prepare(linkage(), named_path("y1"), CENTRE), np.full(3, clearance), frictions=friction)
 
 
-def missed(path: Path, clearances: Array, settings: Settings = CENTRE) -> Array:
+def distances_from_goals(path: Path, clearances: Array, settings: Settings = CENTRE) -> Array:
     """How far the tip is from the three targets [m]."""
     run = simulate(prepare(linkage(), path, settings), clearances)
     return np.asarray(np.linalg.norm(tip_errors(run, PickAndPlace().nodes), axis=-1))
@@ -59,22 +59,22 @@ def missed(path: Path, clearances: Array, settings: Settings = CENTRE) -> Array:
 
 def test_known_clearances() -> None:
     """With known clearances two rounds bring the mean error at the targets from 0.56 mm below a micrometre."""
-    told: list[float] = []
-    found = correct_nodes(linkage(), PickAndPlace(), ARM_A, CENTRE, rounds=2, progress=told.append)
+    reported: list[float] = []
+    correction = correct_nodes(linkage(), PickAndPlace(), ARM_A, CENTRE, rounds=2, progress=reported.append)
 
-    assert found.before.mean() == pytest.approx(0.5593e-3, rel=0.01)
-    assert found.after.mean() < KNOWN
+    assert correction.before.mean() == pytest.approx(0.5593e-3, rel=0.01)
+    assert correction.after.mean() < KNOWN
     # Each round makes it a hundred times smaller: a fixed point, not a search.
-    assert np.all(np.diff(np.log10(found.history)) < -2)
-    assert told == list(found.history)
-    np.testing.assert_array_equal(found.path.evaluate(found.path.targets).position, found.nodes)
+    assert np.all(np.diff(np.log10(correction.history)) < -2)
+    assert reported == list(correction.history)
+    np.testing.assert_array_equal(correction.path.evaluate(correction.path.targets).position, correction.nodes)
 
 
 def test_estimated_clearances() -> None:
     """With the clearances that the thesis estimated arm A comes to 0.005 mm from its targets (thesis: 0.031 mm)."""
-    found = correct_nodes(linkage(), PickAndPlace(), THESIS_ESTIMATE, CENTRE, rounds=2)
+    correction = correct_nodes(linkage(), PickAndPlace(), THESIS_ESTIMATE, CENTRE, rounds=2)
 
-    errors = missed(found.path, ARM_A)
+    errors = distances_from_goals(correction.path, ARM_A)
     assert errors.mean() < ESTIMATED
     # (0.005, 0.0037, 0.0056) mm in the spec of the clearance, 4.5.
     np.testing.assert_allclose(errors, (5.0e-6, 3.7e-6, 5.6e-6), rtol=0, atol=0.3e-6)
@@ -92,24 +92,24 @@ def test_robust(rng: np.random.Generator) -> None:
     pointed = correct_nodes(linkage(), PickAndPlace(), unlucky, COARSE, rounds=1)
 
     assert robust.after.shape == (16, 3)
-    by_robust, by_point = robust.after.mean(), missed(pointed.path, samples, COARSE).mean()
+    by_robust, by_point = robust.after.mean(), distances_from_goals(pointed.path, samples, COARSE).mean()
     assert by_robust < 0.7 * by_point
     assert by_robust < robust.before.mean() / 20
 
 
 def test_whole_path() -> None:
     """A whole path can be moved: along y1 the mean error falls from 0.45 mm to a tenth and less."""
-    found = correct_path(linkage(), named_path("y1"), ARM_A, CENTRE, rounds=2)
+    correction = correct_path(linkage(), named_path("y1"), ARM_A, CENTRE, rounds=2)
 
-    assert found.history[0] == pytest.approx(0.45e-3, rel=0.05)
-    assert found.history[-1] < 0.1 * found.history[0]
+    assert correction.history[0] == pytest.approx(0.45e-3, rel=0.05)
+    assert correction.history[-1] < 0.1 * correction.history[0]
     # Up to where the acceleration turns round and throws the journals across, all of it.
-    told = simulate(prepare(linkage(), found.path, CENTRE), ARM_A)
-    before = told.time < 0.195
-    wanted = named_path("y1").evaluate(told.time).position
-    off = np.linalg.norm(told.tip - wanted, axis=-1)[before]
-    assert np.sqrt(np.mean(off**2)) < 0.02e-3
-    assert found.path.duration == named_path("y1").duration
+    run = simulate(prepare(linkage(), correction.path, CENTRE), ARM_A)
+    before = run.time < 0.195
+    goal = named_path("y1").evaluate(run.time).position
+    distance = np.linalg.norm(run.tip - goal, axis=-1)[before]
+    assert np.sqrt(np.mean(distance**2)) < 0.02e-3
+    assert correction.path.duration == named_path("y1").duration
 
 
 class TestShifted:
@@ -149,8 +149,8 @@ class TestShifted:
         path, same = named_path("y1"), shifted(named_path("y1"), self.TIMES, np.zeros((9, 2)))
         times = np.linspace(0.001, 0.249, 117)
 
-        for wanted, found in zip(path.evaluate(times), same.evaluate(times), strict=True):
-            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11)
+        for expected, result in zip(path.evaluate(times), same.evaluate(times), strict=True):
+            np.testing.assert_allclose(result, expected, rtol=0, atol=1e-11)
 
     def test_even_shift(self) -> None:
         """A path moved as a whole is the path elsewhere."""
@@ -164,15 +164,15 @@ class TestShifted:
 
 def test_contacts_that_are_lost() -> None:
     """Up to where y1 brakes no contact is lost; there the force turns about, and all three journals fly."""
-    said = lost_contacts(linkage(), named_path("y1"))
+    intervals = lost_contacts(linkage(), named_path("y1"))
     run = y1()
 
     braking = run.time > 0.199
     # Where the push ends, at 0.05 s, the dents spring back, and a journal hops a little.
     assert run.depths[~braking].min() > -HOP
     for i, name in enumerate(linkage().clearances):
-        assert len(said[name]) == 1
-        start, end = said[name][0]
+        assert len(intervals[name]) == 1
+        start, end = intervals[name][0]
         assert (start, end) == (pytest.approx(0.2, abs=2e-4), pytest.approx(0.2, abs=2e-4))
         flying = run.time[braking & (run.depths[:, i] < 0)]
         # A journal needs some steps to leave the dent that it has made.
@@ -207,21 +207,21 @@ def test_leaning_tip() -> None:
     """
     path, play = straight("slow", (-0.15, -0.7), (-0.15, -0.697), speed=0.02, ramp=0.1), np.full(3, 0.5e-3)
     run = simulate(prepare(linkage(), path, COARSE), play, frictions=0.0)
-    _, said = leaning_error(linkage(), path, play, samples=len(run.time))
+    _, predicted = leaning_error(linkage(), path, play, samples=len(run.time))
 
     assert run.depths.min() > -1e-6
     early = run.time <= 0.1
-    assert np.linalg.norm(said - run.error, axis=-1)[early].max() < 10e-6
+    assert np.linalg.norm(predicted - run.error, axis=-1)[early].max() < 10e-6
     assert np.linalg.norm(run.error, axis=-1).min() > 0.9e-3
 
 
 def test_leaning_grows_with_play() -> None:
     """Twice the play is twice the leaning, and the errors of the pins add up."""
     clearances = np.array([ARM_A, 2 * ARM_A, *(ARM_A * np.eye(3))])
-    _, said = leaning_error(linkage(), named_path("x2"), clearances, samples=31)
+    _, predicted = leaning_error(linkage(), named_path("x2"), clearances, samples=31)
 
-    np.testing.assert_allclose(said[1], 2 * said[0], rtol=1e-12)
-    np.testing.assert_allclose(said[2:].sum(axis=0), said[0], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(predicted[1], 2 * predicted[0], rtol=1e-12)
+    np.testing.assert_allclose(predicted[2:].sum(axis=0), predicted[0], rtol=1e-9, atol=1e-15)
 
 
 def test_between_samples() -> None:
@@ -230,9 +230,9 @@ def test_between_samples() -> None:
     way = np.stack([np.sin(9 * run.time), np.cos(7 * run.time)], axis=-1)
     times = np.array([0.0, 0.033_333, 0.12345, run.time[-1]])
 
-    found = tip_at(attrs.evolve(run, tip=way), times)
+    tips = tip_at(attrs.evolve(run, tip=way), times)
 
-    np.testing.assert_allclose(found, np.stack([np.sin(9 * times), np.cos(7 * times)], axis=-1), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(tips, np.stack([np.sin(9 * times), np.cos(7 * times)], axis=-1), rtol=0, atol=1e-9)
 
 
 def test_bad_input() -> None:
@@ -266,13 +266,13 @@ def test_diverging() -> None:
 
 def test_best_round_is_kept() -> None:
     """Where a round makes the path worse, as on y2 with its late impacts, the best is returned and not the last."""
-    found = correct_path(linkage(), named_path("y2"), (0.3e-3, 0.2e-3, 0.25e-3), rounds=3)
+    correction = correct_path(linkage(), named_path("y2"), (0.3e-3, 0.2e-3, 0.25e-3), rounds=3)
 
-    assert found.best == int(np.argmin(found.history))
-    assert found.after.mean() == min(found.history)
-    run = simulate(prepare(linkage(), found.path), perturbed(np.array((0.3e-3, 0.2e-3, 0.25e-3))))
-    goals = named_path("y2").evaluate(np.array(found.path.targets)).position
-    assert np.linalg.norm(tip_errors(run, goals), axis=-1).mean() == min(found.history)
+    assert correction.best == int(np.argmin(correction.history))
+    assert correction.after.mean() == min(correction.history)
+    run = simulate(prepare(linkage(), correction.path), perturbed(np.array((0.3e-3, 0.2e-3, 0.25e-3))))
+    goals = named_path("y2").evaluate(np.array(correction.path.targets)).position
+    assert np.linalg.norm(tip_errors(run, goals), axis=-1).mean() == min(correction.history)
 
 
 def test_mean_over_runs_that_nobody_can_tell_apart() -> None:
@@ -281,18 +281,18 @@ def test_mean_over_runs_that_nobody_can_tell_apart() -> None:
     Other runs a nanometre away come to the goals as far off as is said.
     """
     path = named_path("x4")
-    found = correct_path(linkage(), path, ARM_A, CENTRE, knots=12, rounds=2)
+    correction = correct_path(linkage(), path, ARM_A, CENTRE, knots=12, rounds=2)
 
-    assert found.before.shape == found.after.shape == (16, 12)
+    assert correction.before.shape == correction.after.shape == (16, 12)
     others = ARM_A + np.random.default_rng(3).uniform(-1e-9, 1e-9, (64, 3))
-    run = simulate(prepare(linkage(), found.path, CENTRE), others)
-    away = np.linalg.norm(tip_errors(run, path.evaluate(np.array(found.path.targets)).position), axis=-1)
+    run = simulate(prepare(linkage(), correction.path, CENTRE), others)
+    away = np.linalg.norm(tip_errors(run, path.evaluate(np.array(correction.path.targets)).position), axis=-1)
     late = slice(6, None)
-    assert found.after.std(axis=0, ddof=1)[late].max() > 1e-6
-    expected = np.sqrt(np.mean(found.after.var(axis=0, ddof=1)[late] * (1 / 16 + 1 / 64)))
-    off = away.mean(axis=0) - found.after.mean(axis=0)
-    assert np.sqrt(np.mean(off[late] ** 2)) < 3 * expected
-    assert found.history[found.best] < 0.3 * found.history[0]
+    assert correction.after.std(axis=0, ddof=1)[late].max() > 1e-6
+    expected = np.sqrt(np.mean(correction.after.var(axis=0, ddof=1)[late] * (1 / 16 + 1 / 64)))
+    deviation = away.mean(axis=0) - correction.after.mean(axis=0)
+    assert np.sqrt(np.mean(deviation[late] ** 2)) < 3 * expected
+    assert correction.history[correction.best] < 0.3 * correction.history[0]
 
 
 def test_no_round_that_makes_it_worse(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -302,8 +302,8 @@ def test_no_round_that_makes_it_worse(monkeypatch: pytest.MonkeyPatch) -> None:
         "armwright.clearance.correction.tip_errors", lambda _run, goals: np.full((16, *goals.shape), next(errors))
     )
 
-    found = correct_nodes(linkage(), PickAndPlace(), ARM_A, COARSE, rounds=3)
+    correction = correct_nodes(linkage(), PickAndPlace(), ARM_A, COARSE, rounds=3)
 
-    assert found.best == 0
-    np.testing.assert_array_equal(found.nodes, PickAndPlace().nodes)
-    np.testing.assert_array_equal(found.after, found.before)
+    assert correction.best == 0
+    np.testing.assert_array_equal(correction.nodes, PickAndPlace().nodes)
+    np.testing.assert_array_equal(correction.after, correction.before)

@@ -42,14 +42,14 @@ def pressed(linkage: Linkage, rng: np.random.Generator, depth: float = DEPTH) ->
     pin, way = linkage.pins[0], rng.uniform(-np.pi, np.pi)
     placed = Placement(linkage, list(q), list(qd))
     hole, shaft = placed.point(pin.bearing), placed.point(pin.journal)
-    wanted = hole.position.plus(type(hole.position)(math.cos(way), math.sin(way)).times(pin.clearance + depth))
-    q[-3:-1] += np.array(wanted.minus(shaft.position))
+    centre = hole.position.plus(type(hole.position)(math.cos(way), math.sin(way)).times(pin.clearance + depth))
+    q[-3:-1] += np.array(centre.minus(shaft.position))
     # The wall is not left in haste: their speeds differ by some centimetres a second.
     qd[-3:-1] += np.array(hole.velocity.minus(shaft.velocity)) + rng.uniform(-0.03, 0.03, 2)
     return q, qd
 
 
-def found(
+def rates_of(
     linkage: Linkage,
     q: np.ndarray,
     qd: np.ndarray,
@@ -117,7 +117,7 @@ class TestBesidePinocchio:
 
         other = pinocchio.aba(model, model.createData(), T @ q + shift, T @ qd, tau)
 
-        ours = np.array(found(linkage, q, qd, efforts).qdd)
+        ours = np.array(rates_of(linkage, q, qd, efforts).qdd)
         np.testing.assert_allclose(T @ ours, other, rtol=ROUNDING, atol=ROUNDING)
 
 
@@ -126,7 +126,7 @@ class TestWhatMotionKeeps:
 
     LAWS = (FrictionModel(), FrictionModel(velocity="centre"), FrictionModel(law="tanh"), FrictionModel(law="lugre"))
 
-    @pytest.mark.parametrize("model", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
+    @pytest.mark.parametrize("model", LAWS, ids=lambda model: f"{model.law}-{model.velocity}")
     @pytest.mark.parametrize("seed", range(4))
     def test_energy(self, seed: int, model: FrictionModel) -> None:
         """Kinetic, potential and stored energy grow by what drives give and contacts do not take, watt by watt."""
@@ -135,9 +135,9 @@ class TestWhatMotionKeeps:
         q, qd = pressed(linkage, rng)
         efforts = rng.uniform(-20.0, 20.0, 3)
 
-        now = found(linkage, q, qd, efforts, model=model, bend=1e-6)
+        now = rates_of(linkage, q, qd, efforts, model=model, bend=1e-6)
         dt, qdd = 1e-7, np.array(now.qdd)
-        after, before = (found(linkage, q + s * dt * qd, qd + s * dt * qdd, efforts).energy for s in (1.0, -1.0))
+        after, before = (rates_of(linkage, q + s * dt * qd, qd + s * dt * qdd, efforts).energy for s in (1.0, -1.0))
 
         assert now.pins[0].normal > 50.0
         assert abs(now.powers[2]) > 1e-3
@@ -149,23 +149,23 @@ class TestWhatMotionKeeps:
         """Surfaces that slide on one another never gain by it."""
         for _ in range(20):
             linkage = tree(rng)
-            now = found(linkage, *pressed(linkage, rng))
+            now = rates_of(linkage, *pressed(linkage, rng))
             assert now.powers[2] > 0
 
-    @pytest.mark.parametrize("model", LAWS, ids=lambda one: f"{one.law}-{one.velocity}")
+    @pytest.mark.parametrize("model", LAWS, ids=lambda model: f"{model.law}-{model.velocity}")
     def test_momentum_of_free_bodies(self, rng: np.random.Generator, model: FrictionModel) -> None:
         """Two free bodies in a pin with play keep their momentum and their angular momentum, whatever rubs."""
         linkage = pair(rng)
         q, qd = pressed(linkage, rng)
 
-        qdd = np.array(found(linkage, q, qd, model=model, bend=1e-6).qdd)
+        qdd = np.array(rates_of(linkage, q, qd, model=model, bend=1e-6).qdd)
 
         mass = np.array([body.mass for body in linkage.bodies])
         inertia = np.array([body.inertia for body in linkage.bodies])
-        at, pull, turn = q.reshape(2, 3)[:, :2], qdd.reshape(2, 3)[:, :2], qdd.reshape(2, 3)[:, 2]
+        centre, pull, turn = q.reshape(2, 3)[:, :2], qdd.reshape(2, 3)[:, :2], qdd.reshape(2, 3)[:, 2]
         assert np.abs(mass[:, None] * pull).max() > 10.0
         np.testing.assert_allclose(mass @ pull, 0.0, atol=ROUNDING)
-        moment = mass * (at[:, 0] * pull[:, 1] - at[:, 1] * pull[:, 0]) + inertia * turn
+        moment = mass * (centre[:, 0] * pull[:, 1] - centre[:, 1] * pull[:, 0]) + inertia * turn
         assert moment.sum() == pytest.approx(0.0, abs=ROUNDING)
 
     def test_moment_about_the_contact(self, rng: np.random.Generator) -> None:
@@ -173,14 +173,14 @@ class TestWhatMotionKeeps:
         linkage = pair(rng)
         q, qd = pressed(linkage, rng)
 
-        now = found(linkage, q, qd)
+        now = rates_of(linkage, q, qd)
         qdd = np.array(now.qdd).reshape(2, 3)
         pin = linkage.pins[0]
         hole = Placement(linkage, list(q), list(qd)).point(pin.bearing).position
         gap = np.array(now.pins[0].gap)
         touch = np.array(hole) + gap / np.linalg.norm(gap) * (pin.clearance + pin.journal_radius)
-        for body, (x, y, turn), at in zip(linkage.bodies, qdd, q.reshape(2, 3), strict=True):
-            lever = at[:2] - touch
+        for body, (x, y, turn), pose in zip(linkage.bodies, qdd, q.reshape(2, 3), strict=True):
+            lever = pose[:2] - touch
             assert abs(turn) > 1.0
             moment = body.mass * (lever[0] * y - lever[1] * x) + body.inertia * turn
             assert moment == pytest.approx(0.0, abs=ROUNDING)
@@ -217,14 +217,14 @@ class TestGivenMotions:
         linkage = tree(rng)
         forced = attrs.evolve(linkage, drives=[Drive(body=d.body, kind="motion") for d in linkage.drives])
         q, qd = pressed(linkage, rng)
-        wanted = rng.uniform(-5.0, 5.0, 3)
+        accelerations = rng.uniform(-5.0, 5.0, 3)
 
-        asked = found(forced, q, qd, wanted)
-        again = found(linkage, q, qd, asked.efforts)
+        prescribed = rates_of(forced, q, qd, accelerations)
+        again = rates_of(linkage, q, qd, prescribed.efforts)
 
-        np.testing.assert_allclose(np.array(asked.qdd)[list(linkage.driven)], wanted, rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(again.qdd, asked.qdd, rtol=1e-9, atol=1e-9)
-        assert again.powers[0] == pytest.approx(asked.powers[0], rel=1e-9)
+        np.testing.assert_allclose(np.array(prescribed.qdd)[list(linkage.driven)], accelerations, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(again.qdd, prescribed.qdd, rtol=1e-9, atol=1e-9)
+        assert again.powers[0] == pytest.approx(prescribed.powers[0], rel=1e-9)
 
     def test_mixed(self, rng: np.random.Generator) -> None:
         """A lever with an effort on a sledge whose motion is given: the sledge's drive carries the lever's too."""
@@ -235,11 +235,11 @@ class TestGivenMotions:
         )
         q, qd = pressed(linkage, rng)
 
-        asked = found(mixed, q, qd, (1.0, -2.0, 7.0))
-        again = found(linkage, q, qd, asked.efforts)
+        prescribed = rates_of(mixed, q, qd, (1.0, -2.0, 7.0))
+        again = rates_of(linkage, q, qd, prescribed.efforts)
 
-        assert asked.efforts[2] == 7.0
-        np.testing.assert_allclose(again.qdd, asked.qdd, rtol=1e-9, atol=1e-9)
+        assert prescribed.efforts[2] == 7.0
+        np.testing.assert_allclose(again.qdd, prescribed.qdd, rtol=1e-9, atol=1e-9)
 
 
 def test_motor_on_a_sledge_turns_what_guides_it(rng: np.random.Generator) -> None:
@@ -251,10 +251,10 @@ def test_weights_and_loads_do_the_work_of_their_energy(rng: np.random.Generator)
     """At rest the generalised forces are the slope of the potential energy, load by load."""
     linkage = tree(rng)
     q, _ = moving(linkage, rng)
-    rest = np.zeros_like(q)
-    force = np.array(free_forces(Placement(linkage, list(q), list(rest))))
+    still = np.zeros_like(q)
+    force = np.array(free_forces(Placement(linkage, list(q), list(still))))
 
     step = 1e-6
     for i in range(len(q)):
-        up, down = (found(linkage, q + s * step * np.eye(len(q))[i], rest).energy[1] for s in (1.0, -1.0))
+        up, down = (rates_of(linkage, q + s * step * np.eye(len(q))[i], still).energy[1] for s in (1.0, -1.0))
         assert -(up - down) / (2 * step) == pytest.approx(force[i], abs=1e-7)

@@ -27,8 +27,8 @@ AFTER = 5e-6
 @pytest.fixture(scope="module", params=[0.0, 0.05], ids=["smooth", "rubbing"])
 def linkage(request: pytest.FixtureRequest) -> Linkage:
     """The arm with friction of the surfaces, or without."""
-    found = load_linkage("five-bar")
-    return attrs.evolve(found, material=attrs.evolve(found.material, friction=request.param))
+    five_bar_linkage = load_linkage("five-bar")
+    return attrs.evolve(five_bar_linkage, material=attrs.evolve(five_bar_linkage.material, friction=request.param))
 
 
 @pytest.mark.drawn(0.5)
@@ -36,7 +36,7 @@ def test_up_to_the_impacts(linkage: Linkage) -> None:
     """Both tips go the same way until they slow down, to 5 µm of 1 mm, and the nearer the finer its steps."""
     settings = Settings(step=2e-6, sample=EVERY, impact="carvalho-martins")
     task = prepare(linkage, beginning(thesis_path("y1"), END + EVERY), settings)
-    found = simulate(task, [CLEARANCE] * 3)
+    run = simulate(task, [CLEARANCE] * 3)
     samples = round(END / EVERY) + 1
     efforts = task.ideal.efforts
 
@@ -47,11 +47,11 @@ def test_up_to_the_impacts(linkage: Linkage) -> None:
     K = float(contact_stiffness(linkage, np.full(3, CLEARANCE))[0])
     apart = {}
     for step in (1e-5, 5e-6):
-        tip = simulated(linkage, found.q[0], torques, K, duration=END, step=step, every=EVERY)
-        apart[step] = np.linalg.norm(tip[:samples] - found.tip[:samples], axis=-1)
+        tip = simulated(linkage, run.q[0], torques, K, duration=END, step=step, every=EVERY)
+        apart[step] = np.linalg.norm(tip[:samples] - run.tip[:samples], axis=-1)
 
     before = slice(0, round(JUMP / EVERY) + 1)
-    assert found.distance[:samples].min() > 0.7e-3
+    assert run.distance[:samples].min() > 0.7e-3
     assert apart[1e-5][before].max() < (BEFORE if linkage.material.friction == 0 else BEFORE_RUBBING)
     assert apart[1e-5].max() < AFTER
     assert apart[5e-6][-1] == pytest.approx(apart[1e-5][-1] / 2, rel=0.2)

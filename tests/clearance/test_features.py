@@ -25,10 +25,10 @@ def along(size: Array, direction: tuple[float, float] = (0.6, 0.8)) -> Array:
 
 def test_straight_line() -> None:
     """A curve that begins with 0.55 mm and falls by 0.08 mm/s has that intercept and that slope."""
-    found = features_of(TIME, along(0.55e-3 - 0.08e-3 * TIME))
+    curve_features = features_of(TIME, along(0.55e-3 - 0.08e-3 * TIME))
 
-    assert found.slope == pytest.approx(-0.08e-3, rel=1e-9)
-    assert found.intercept == pytest.approx(0.55e-3, rel=1e-12)
+    assert curve_features.slope == pytest.approx(-0.08e-3, rel=1e-9)
+    assert curve_features.intercept == pytest.approx(0.55e-3, rel=1e-12)
 
 
 def test_only_the_window_counts() -> None:
@@ -36,10 +36,10 @@ def test_only_the_window_counts() -> None:
     inside = (TIME > 0.07 - 1e-9) & (TIME < 0.12 + 1e-9)
     wild = np.where(inside, 0.5e-3 + 1e-3 * TIME, 0.5e-3 * (2 + np.sin(900 * TIME)))
 
-    found = features_of(TIME, along(wild))
+    curve_features = features_of(TIME, along(wild))
 
-    assert found.slope == pytest.approx(1e-3, rel=1e-9)
-    assert found.intercept == pytest.approx(0.5e-3, rel=1e-11)
+    assert curve_features.slope == pytest.approx(1e-3, rel=1e-9)
+    assert curve_features.intercept == pytest.approx(0.5e-3, rel=1e-11)
 
 
 def test_another_window() -> None:
@@ -56,10 +56,10 @@ def test_another_window() -> None:
 def test_mean_and_wave(mean: float, wave: float, turns: int) -> None:
     """A wave of 0.1 mm about 0.45 mm has an amplitude of 0.1 mm; the thesis' one is twice the mean, 0.9 mm."""
     time = TIME[:-1]
-    found = features_of(time, along(mean + wave * np.sin(2 * np.pi * turns * time / 0.25 + 0.3)))
+    curve_features = features_of(time, along(mean + wave * np.sin(2 * np.pi * turns * time / 0.25 + 0.3)))
 
-    assert found.amp_dc == pytest.approx(2 * mean, rel=1e-12)
-    assert found.amp_ac == pytest.approx(wave, rel=1e-9)
+    assert curve_features.amp_dc == pytest.approx(2 * mean, rel=1e-12)
+    assert curve_features.amp_ac == pytest.approx(wave, rel=1e-9)
 
 
 def test_spectrum_of_waves() -> None:
@@ -77,20 +77,20 @@ def test_offset_at_the_start() -> None:
     error = np.full((2501, 2), 1e-3)
     error[0] = 0.2e-3, -0.9e-3
 
-    found = features_of(TIME, error)
+    curve_features = features_of(TIME, error)
 
-    assert (found.offset_x, found.offset_y) == (0.2e-3, -0.9e-3)
+    assert (curve_features.offset_x, curve_features.offset_y) == (0.2e-3, -0.9e-3)
 
 
 def test_size_not_direction(rng: np.random.Generator) -> None:
     """An error that turns about while its size stays has neither slope nor wave."""
     angle = np.cumsum(rng.normal(0.0, 0.1, len(TIME)))
 
-    found = features_of(TIME, 0.4e-3 * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
+    curve_features = features_of(TIME, 0.4e-3 * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
-    assert found.intercept == pytest.approx(0.4e-3)
-    assert abs(found.slope) < 1e3 * ROUNDING
-    assert found.amp_ac < ROUNDING
+    assert curve_features.intercept == pytest.approx(0.4e-3)
+    assert abs(curve_features.slope) < 1e3 * ROUNDING
+    assert curve_features.amp_ac < ROUNDING
 
 
 def test_many_curves(rng: np.random.Generator) -> None:
@@ -112,12 +112,12 @@ def test_units() -> None:
 
 def test_simulation_starts_where_it_rests(five_bar: Linkage) -> None:
     """A simulated arm A starts y1 at its place of rest, and follows it with 0.537 mm off (spec of the clearance)."""
-    found = features(simulate(prepare(five_bar, named_path("y1"), CENTRE), ARM_A))
+    curve_features = features(simulate(prepare(five_bar, named_path("y1"), CENTRE), ARM_A))
 
     # 0.01 mm between steps of 10 and of 2 µs.
-    assert found.intercept == pytest.approx(0.5370e-3, abs=0.01e-3)
-    assert found.offset_y < 0
-    assert np.hypot(found.offset_x, found.offset_y) == pytest.approx(0.5e-3, rel=0.2)
+    assert curve_features.intercept == pytest.approx(0.5370e-3, abs=0.01e-3)
+    assert curve_features.offset_y < 0
+    assert np.hypot(curve_features.offset_x, curve_features.offset_y) == pytest.approx(0.5e-3, rel=0.2)
 
 
 @pytest.mark.parametrize("window", [(0.3, 0.4), (0.1, 0.1), (0.2, 0.1)])

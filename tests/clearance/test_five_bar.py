@@ -86,9 +86,9 @@ def well_posed(bar: FiveBar, cranks: Sequence[float], assembly: Any = "below") -
 def links_end(bar: FiveBar, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return where each arm ends, link after link, as eq. (3.8) has it."""
     ways = np.stack([np.sin(angles), -np.cos(angles)], axis=-1)
-    left = bar.motors[0] + bar.cranks[0] * ways[..., 0, :] + bar.rods[0] * ways[..., 1, :]
+    left_end = bar.motors[0] + bar.cranks[0] * ways[..., 0, :] + bar.rods[0] * ways[..., 1, :]
     right = bar.motors[1] + bar.cranks[1] * ways[..., 3, :] + bar.rods[1] * ways[..., 2, :]
-    return left, right
+    return left_end, right
 
 
 # ---- inverse and forward kinematics ------------------------------------------------------------------------------
@@ -96,17 +96,17 @@ def links_end(bar: FiveBar, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def test_thesis_start(bar: FiveBar) -> None:
     """At the start of path y1 the links stand as computed from the thesis: -1.252325, 0.369776, -0.756151, 0.711901."""
-    found = inverse(bar, [-0.15, -0.7])
+    angles = inverse(bar, [-0.15, -0.7])
 
-    np.testing.assert_allclose(found, (-1.252325, 0.369776, -0.756151, 0.711901), atol=PRINTED)
+    np.testing.assert_allclose(angles, (-1.252325, 0.369776, -0.756151, 0.711901), atol=PRINTED)
 
 
 def test_second_goal(bar: FiveBar) -> None:
     """At Q2, in the middle, the arms mirror one another: θ1 = -θ4 = -1.375401, θ2 = -θ3 = 0.651779."""
-    found = inverse(bar, [0.0, -0.456])
+    angles = inverse(bar, [0.0, -0.456])
 
-    assert found[0] == pytest.approx(-found[3], abs=ROUNDING)
-    assert found[1] == pytest.approx(-found[2], abs=ROUNDING)
+    assert angles[0] == pytest.approx(-angles[3], abs=ROUNDING)
+    assert angles[1] == pytest.approx(-angles[2], abs=ROUNDING)
 
 
 @given(UNEQUAL, CRANKS, st.sampled_from(sorted(ASSEMBLIES)))
@@ -123,12 +123,14 @@ def test_one_mode_of_four_comes_back(bar: FiveBar, cranks: tuple[float, float], 
     """Of the four ways to stand at a tip exactly one has the cranks where they were, and all four reach the tip."""
     tip, angles = well_posed(bar, cranks, assembly)
 
-    found = inverse_all(bar, tip)
+    angles_by_mode = inverse_all(bar, tip)
 
-    off = {mode: np.abs(np.sin((one - angles) / 2)).max() for mode, one in found.items()}
-    assert sorted(size < ROUNDING / WELL**2 for size in off.values()) == [False, False, False, True]
-    for one in found.values():
-        np.testing.assert_allclose(links_end(bar, one), [tip, tip], atol=ROUNDING / WELL)
+    deviations = {
+        mode: np.abs(np.sin((mode_angles - angles) / 2)).max() for mode, mode_angles in angles_by_mode.items()
+    }
+    assert sorted(size < ROUNDING / WELL**2 for size in deviations.values()) == [False, False, False, True]
+    for mode_angles in angles_by_mode.values():
+        np.testing.assert_allclose(links_end(bar, mode_angles), [tip, tip], atol=ROUNDING / WELL)
 
 
 @given(UNEQUAL, CRANKS)
@@ -149,7 +151,7 @@ def test_elbows_where_the_name_says(bar: FiveBar) -> None:
         # The line from a motor to the tip, at the height of the elbow.
         heights = bar.cranks * np.cos(angles[[0, 3]])
         line_x = middle * (1 - heights / 0.8)
-        ways[mode] = tuple("left" if x < at else "right" for x, at in zip(elbow_x, line_x, strict=True))
+        ways[mode] = tuple("left" if x < line else "right" for x, line in zip(elbow_x, line_x, strict=True))
 
     assert ways == {
         "out": ("left", "right"), "left": ("left", "left"), "right": ("right", "right"), "in": ("right", "left"),
@@ -160,13 +162,13 @@ def test_assemblies_mirror(bar: FiveBar) -> None:
     """Both assemblies lie symmetric to the line through the elbows."""
     angles = inverse(bar, [[0.05, -0.6], [-0.1, -0.75]])
 
-    below, above = (forward(bar, angles[:, [0, 3]], one)[0] for one in ("below", "above"))
+    below, above = (forward(bar, angles[:, [0, 3]], assembly)[0] for assembly in ("below", "above"))
 
-    left = bar.motors[0] + bar.cranks[0] * np.stack([np.sin(angles[:, 0]), -np.cos(angles[:, 0])], axis=-1)
+    elbow = bar.motors[0] + bar.cranks[0] * np.stack([np.sin(angles[:, 0]), -np.cos(angles[:, 0])], axis=-1)
     for tip in (below, above):
-        np.testing.assert_allclose(np.linalg.norm(tip - left, axis=-1), bar.rods[0], atol=ROUNDING)
+        np.testing.assert_allclose(np.linalg.norm(tip - elbow, axis=-1), bar.rods[0], atol=ROUNDING)
     right = bar.motors[1] + bar.cranks[1] * np.stack([np.sin(angles[:, 3]), -np.cos(angles[:, 3])], axis=-1)
-    np.testing.assert_allclose(np.sum((above - below) * (right - left), axis=-1), 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(np.sum((above - below) * (right - elbow), axis=-1), 0.0, atol=ROUNDING)
 
 
 def test_batches_keep_their_axes(bar: FiveBar) -> None:
@@ -182,10 +184,10 @@ def test_batches_keep_their_axes(bar: FiveBar) -> None:
 
 def test_law_takes_floats_and_arrays() -> None:
     """The law of an arm gives the same for a float as for an array of one."""
-    one = arm_angles(Vec2(0.05, -0.7), 0.3, 0.65, 1.0)
+    scalars = arm_angles(Vec2(0.05, -0.7), 0.3, 0.65, 1.0)
     many = arm_angles(Vec2(np.array([0.05]), np.array([-0.7])), 0.3, 0.65, 1.0)
 
-    assert (one.crank, one.rod) == pytest.approx((many.crank[0], many.rod[0]), abs=1e-15)
+    assert (scalars.crank, scalars.rod) == pytest.approx((many.crank[0], many.rod[0]), abs=1e-15)
 
 
 # ---- against the generic linkage -----------------------------------------------------------------------------------
@@ -214,7 +216,7 @@ def test_speeds_and_accelerations_agree(
     bar = FiveBar.of(linkage)
     _, angles = well_posed(bar, cranks)
     q = configuration(linkage, angles)
-    names = [str(one) for one in linkage.coordinates]
+    names = [str(coordinate) for coordinate in linkage.coordinates]
     links = [names.index(f"link{i}.angle") for i in range(1, 5)]
 
     motion = ideal.ideal_motion(linkage, q, velocity, acceleration, by_tip=True)
@@ -231,12 +233,12 @@ def test_along_a_test_path(linkage: Linkage, bar: FiveBar) -> None:
     """All along path x3 the closed form is the motion that the simulation was prepared with."""
     task = prepare(linkage, thesis_path("x3"))
     t = np.arange(task.steps + 1) * task.h
-    at = task.path.evaluate(t)
+    state = task.path.evaluate(t)
 
-    angles = inverse(bar, at.position)
+    angles = inverse(bar, state.position)
 
     np.testing.assert_allclose(angles, task.ideal.q[:, [0, 3, 6, 7]], atol=ROUNDING)
-    np.testing.assert_allclose(speeds(bar, angles, at.velocity), task.ideal.qd[:, [0, 3, 6, 7]], atol=1e-10)
+    np.testing.assert_allclose(speeds(bar, angles, state.velocity), task.ideal.qd[:, [0, 3, 6, 7]], atol=1e-10)
 
 
 @pytest.mark.parametrize("mode", sorted(MODES))
@@ -275,11 +277,11 @@ def test_condition_by_hand(bar: FiveBar) -> None:
     """
     angles = inverse(bar, [0.0, -0.6])
 
-    found = transmission(bar, angles)
+    result = transmission(bar, angles)
 
     ratio = abs(np.tan(angles[1]))
-    assert found.condition == pytest.approx(max(ratio, 1 / ratio), rel=1e-12)
-    assert found.angles[1] == pytest.approx(2 * abs(angles[1]), abs=ROUNDING)
+    assert result.condition == pytest.approx(max(ratio, 1 / ratio), rel=1e-12)
+    assert result.angles[1] == pytest.approx(2 * abs(angles[1]), abs=ROUNDING)
 
 
 def test_condition_grows_without_bound(bar: FiveBar) -> None:
@@ -332,9 +334,9 @@ def test_mask_is_the_inverse(bar: FiveBar, x: float, y: float) -> None:
 @given(UNEQUAL, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(-np.pi, np.pi))
 def test_distance_is_one(bar: FiveBar, x: float, y: float, way: float) -> None:
     """Nobody comes nearer to the border by more than the way that he goes."""
-    places = bar.motors.mean(axis=0) + np.array([x, y]) + 0.1 * np.outer([0, 1], [np.cos(way), np.sin(way)])
+    points = bar.motors.mean(axis=0) + np.array([x, y]) + 0.1 * np.outer([0, 1], [np.cos(way), np.sin(way)])
 
-    here, there = boundary_distance(bar, places)
+    here, there = boundary_distance(bar, points)
 
     assert abs(here - there) <= 0.1 + ROUNDING
 
@@ -346,18 +348,18 @@ def test_distance_against_the_grid(bar: FiveBar) -> None:
     size = grid.x[1] - grid.x[0]
     outside = np.array([[0.0, 0.0], [-0.1, 0.0], [1.3, 0.2], [0.0, -1.4], [0.0, 0.3]])
 
-    found = -boundary_distance(bar, outside)
+    result = -boundary_distance(bar, outside)
 
     nearest = np.linalg.norm(outside[:, None] - inside, axis=-1).min(axis=1)
-    np.testing.assert_allclose(found, nearest, atol=size)
+    np.testing.assert_allclose(result, nearest, atol=size)
 
 
 def test_area_of_a_ring() -> None:
     """With both motors at nearly one place the workspace is a ring: π (0.95² - 0.35²) m²."""
-    found = workspace(FiveBar.symmetric(1e-9, 0.3, 0.65), 400)
+    ring = workspace(FiveBar.symmetric(1e-9, 0.3, 0.65), 400)
 
     # A cell on the border counts as a whole or not at all: an error of a random half cell for each.
-    assert found.area == pytest.approx(np.pi * (0.95**2 - 0.35**2), rel=2e-3)
+    assert ring.area == pytest.approx(np.pi * (0.95**2 - 0.35**2), rel=2e-3)
 
 
 def test_borders_are_serial(bar: FiveBar) -> None:
@@ -385,9 +387,9 @@ def test_parallel_curves(bar: FiveBar) -> None:
     assert curves
     for curve in curves:
         for mode in set(curve.modes.tolist()) - {""}:
-            places = curve.points[curve.modes == mode]
-            good = boundary_distance(bar, places) > 1e-4
-            sines = singularity(inverse(bar, places[good], mode)).parallel
+            positions = curve.points[curve.modes == mode]
+            good = boundary_distance(bar, positions) > 1e-4
+            sines = singularity(inverse(bar, positions[good], mode)).parallel
             np.testing.assert_allclose(sines, 0.0, atol=1e-6)
 
 
@@ -396,10 +398,10 @@ def test_thesis_rods_only_fold(bar: FiveBar) -> None:
 
     They are in one line only where the elbows fall together, at (0, ±0.2828) m: circles of 0.65 m round these.
     """
-    places = np.concatenate([curve.points for curve in singular_curves(bar) if curve.kind == "parallel"])
+    positions = np.concatenate([curve.points for curve in singular_curves(bar) if curve.kind == "parallel"])
 
     height = np.sqrt(0.3**2 - 0.1**2)
-    away = np.linalg.norm(places[:, None] - [[0.0, height], [0.0, -height]], axis=-1)
+    away = np.linalg.norm(positions[:, None] - [[0.0, height], [0.0, -height]], axis=-1)
     np.testing.assert_allclose(np.abs(away - 0.65).min(axis=1), 0.0, atol=ROUNDING)
 
 
@@ -505,12 +507,12 @@ def test_any_naming_and_axes(bar: FiveBar) -> None:
         tip=BodyPoint("left rod", "t"),
     )  # fmt: skip
 
-    found = FiveBar.of(other)
+    recognised = FiveBar.of(other)
 
     for name in ("motors", "cranks", "rods"):
-        np.testing.assert_allclose(getattr(found, name), getattr(bar, name), atol=ROUNDING)
+        np.testing.assert_allclose(getattr(recognised, name), getattr(bar, name), atol=ROUNDING)
     tip = np.array([-0.12, -0.63])
-    q = configuration(other, inverse(found, tip, "left"))
+    q = configuration(other, inverse(recognised, tip, "left"))
     np.testing.assert_allclose(ideal.gaps_of(other, q), 0.0, atol=ROUNDING)
     np.testing.assert_allclose(ideal.tip_of(other, q), tip, atol=ROUNDING)
 

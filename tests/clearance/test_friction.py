@@ -44,54 +44,54 @@ def slope(tangent: float) -> Linkage:
 
 
 @pytest.fixture(scope="module")
-def found() -> Simulation:
+def run() -> Simulation:
     return simulate(laid(floor(), Settings(sample=1e-3), 0.85, SPEED), frictions=FRICTIONS)
 
 
 class TestBraking:
     """Thrown along the floor with 0.1 m/s."""
 
-    def test_stops(self, found: Simulation) -> None:
+    def test_stops(self, run: Simulation) -> None:
         """It stops after (v² + s²) / 2a: friction takes all down to the threshold s, and in proportion below it."""
-        threshold = found.scenario.settings.threshold
+        threshold = run.scenario.settings.threshold
         # Below the threshold it would never stop; after half a second of the slowest only 1e-11 of it is left.
         way = (SPEED**2 + threshold**2) / (2 * BRAKING)
-        np.testing.assert_allclose(found.q[:, -1, 0], way, rtol=CLOSE)
+        np.testing.assert_allclose(run.q[:, -1, 0], way, rtol=CLOSE)
 
-    def test_slows_down(self, found: Simulation) -> None:
+    def test_slows_down(self, run: Simulation) -> None:
         """Until then its speed falls along a straight line, by μ g m / M."""
-        falling = found.qd[..., 0] > 2 * found.scenario.settings.threshold
-        line = SPEED - BRAKING[:, None] * found.time
-        np.testing.assert_allclose(found.qd[..., 0][falling], line[falling], rtol=0, atol=CLOSE * SPEED)
+        falling = run.qd[..., 0] > 2 * run.scenario.settings.threshold
+        line = SPEED - BRAKING[:, None] * run.time
+        np.testing.assert_allclose(run.qd[..., 0][falling], line[falling], rtol=0, atol=CLOSE * SPEED)
 
-    def test_heat(self, found: Simulation) -> None:
+    def test_heat(self, run: Simulation) -> None:
         """All its energy, a hundredth of a joule, goes into friction, and nothing into impacts."""
-        np.testing.assert_allclose(found.works["friction loss"][:, -1], MASS * SPEED**2 / 2, rtol=CLOSE)
-        assert np.abs(found.works["impact loss"]).max() < 1e-9
-        assert np.abs(imbalance(found)).max() < CLOSE * MASS * SPEED**2 / 2
+        np.testing.assert_allclose(run.works["friction loss"][:, -1], MASS * SPEED**2 / 2, rtol=CLOSE)
+        assert np.abs(run.works["impact loss"]).max() < 1e-9
+        assert np.abs(imbalance(run)).max() < CLOSE * MASS * SPEED**2 / 2
 
 
 def test_slope() -> None:
     """On a slope it speeds up by g (sin α - μ cos α m / M), or creeps at the part of the threshold that holds it."""
     tangent, frictions = 0.2, np.array((0.0, 0.1, 0.3, 0.5, 0.8))
-    found = simulate(laid(slope(tangent), Settings(sample=1e-3), 0.1), frictions=frictions)
+    run = simulate(laid(slope(tangent), Settings(sample=1e-3), 0.1), frictions=frictions)
 
     down, up = GRAVITY * np.sin(np.arctan(tangent)), frictions * GRAVITY * np.cos(np.arctan(tangent)) / MASS
     slides = frictions < MASS * tangent
-    speeding = np.ptp(found.qd[:, 50:, 0], axis=-1) / np.ptp(found.time[50:])
+    speeding = np.ptp(run.qd[:, 50:, 0], axis=-1) / np.ptp(run.time[50:])
     np.testing.assert_allclose(speeding[slides], (down - up)[slides], rtol=CLOSE)
-    creeping = found.scenario.settings.threshold * (down / up[~slides])
-    np.testing.assert_allclose(found.qd[~slides, -1, 0], creeping, rtol=CLOSE)
+    creeping = run.scenario.settings.threshold * (down / up[~slides])
+    np.testing.assert_allclose(run.qd[~slides, -1, 0], creeping, rtol=CLOSE)
 
 
 def test_brushes_hold() -> None:
     """On brushes it creeps by -(g/σ0) ln(1 - F / N g) while they bend, and then lies still."""
     tangent, frictions = 0.02, np.array((0.1, 0.2))
     settings = Settings(friction=FrictionModel(law="lugre"), sample=1e-3)
-    found = simulate(laid(slope(tangent), settings, 0.1), frictions=frictions)
+    run = simulate(laid(slope(tangent), settings, 0.1), frictions=frictions)
 
-    held = Bristles.static_ratio * frictions
-    creep = -held / Bristles.stiffness * np.log(1 - MASS * tangent / held)
+    limit = Bristles.static_ratio * frictions
+    creep = -limit / Bristles.stiffness * np.log(1 - MASS * tangent / limit)
     # Where it creeps fastest, 0.1 mm/s, Stribeck's curve is a hundredth below its top.
-    np.testing.assert_allclose(found.q[:, -1, 0], creep, rtol=1e-2)
-    assert np.abs(found.q[:, -1, 0] - found.q[:, 60, 0]).max() < 1e-3 * creep.min()
+    np.testing.assert_allclose(run.q[:, -1, 0], creep, rtol=1e-2)
+    assert np.abs(run.q[:, -1, 0] - run.q[:, 60, 0]).max() < 1e-3 * creep.min()

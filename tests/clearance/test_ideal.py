@@ -77,19 +77,19 @@ class TestSqueezer:
         """At the start the motor speeds β up with 14222.44 rad/s², and the first loop carries 98.57 N."""
         linkage, q = squeezer(START[2]), ours(START)
 
-        found = free_run(lambda pull: ideal_motion(linkage, q, [0.0], [pull], by_tip=False), MOMENT)
+        fall = free_run(lambda pull: ideal_motion(linkage, q, [0.0], [pull], by_tip=False), MOMENT)
 
-        np.testing.assert_allclose(found.qdd, ours(START_ACCELERATIONS), rtol=1e-11, atol=1e-8)
-        np.testing.assert_allclose(found.reactions, START_FORCES, rtol=1e-11, atol=1e-8)
+        np.testing.assert_allclose(fall.qdd, ours(START_ACCELERATIONS), rtol=1e-11, atol=1e-8)
+        np.testing.assert_allclose(fall.reactions, START_FORCES, rtol=1e-11, atol=1e-8)
 
     def test_end(self) -> None:
         """After 0.03 s, at 1140 rad/s, all speeds follow from the motor's, and the loops carry the multipliers."""
         linkage, q, qd = squeezer(END[2]), ours(END), ours(END_SPEEDS)
 
-        found = free_run(lambda pull: ideal_motion(linkage, q, qd[:1], [pull], by_tip=False), MOMENT)
+        fall = free_run(lambda pull: ideal_motion(linkage, q, qd[:1], [pull], by_tip=False), MOMENT)
 
-        np.testing.assert_allclose(found.qd, qd, rtol=0, atol=1e-9 * np.abs(qd).max())
-        np.testing.assert_allclose(found.reactions, END_FORCES, rtol=0, atol=self.OF_MULTIPLIERS * 200)
+        np.testing.assert_allclose(fall.qd, qd, rtol=0, atol=1e-9 * np.abs(qd).max())
+        np.testing.assert_allclose(fall.reactions, END_FORCES, rtol=0, atol=self.OF_MULTIPLIERS * 200)
 
     def test_turns_are_angles_against_the_ground(self) -> None:
         """Seven of theirs make seven of ours."""
@@ -131,8 +131,8 @@ def falls(angle: float, spin: float) -> float:
     """How fast it speeds up when nothing drives it [rad/s²]."""
     linkage = bars()
     q = np.array((angle, angle, angle, 0.0, 0.0))
-    found = free_run(lambda pull: ideal_motion(linkage, q, [spin], [pull], by_tip=False))
-    return float(found.qdd[0])
+    fall = free_run(lambda pull: ideal_motion(linkage, q, [spin], [pull], by_tip=False))
+    return float(fall.qdd[0])
 
 
 class TestTwoFourBars:
@@ -155,8 +155,8 @@ class TestTwoFourBars:
             atol=1e-11,
         )
 
-        at = tip_of(bars(), np.array((*[done.y[0, -1]] * 3, 0.0, 0.0)))
-        np.testing.assert_allclose(at, (0.695287, 0.718733), rtol=0, atol=PRINTED)
+        tip = tip_of(bars(), np.array((*[done.y[0, -1]] * 3, 0.0, 0.0)))
+        np.testing.assert_allclose(tip, (0.695287, 0.718733), rtol=0, atol=PRINTED)
 
 
 class TestSliderCrank:
@@ -170,9 +170,9 @@ class TestSliderCrank:
         crank = np.array((0.0, np.pi))
         q = np.stack([crank, 0 * crank, 0.12 + 0.05 * np.cos(crank)], axis=-1)
 
-        found = ideal_motion(linkage, q, [self.SPEED], [0.0], by_tip=False)
+        motion = ideal_motion(linkage, q, [self.SPEED], [0.0], by_tip=False)
 
-        np.testing.assert_allclose(found.qdd[:, 2], (-19419.36, 7996.21), rtol=0, atol=5.1e-3)
+        np.testing.assert_allclose(motion.qdd[:, 2], (-19419.36, 7996.21), rtol=0, atol=5.1e-3)
 
     def test_all_round(self) -> None:
         """The slider is at r cos θ + √(l² - r² sin² θ), all round."""
@@ -239,7 +239,7 @@ def five_bar_path() -> Path:
         ("four-bar", four_bar_path()),
         ("slider-crank", constant_speed_path("round", 0.3, 40.0, 0.3)),
     ],
-    ids=lambda one: one if isinstance(one, str) else "",
+    ids=lambda name: name if isinstance(name, str) else "",
 )
 def test_drives_give_the_energy(name: str, path: Path) -> None:
     """What the drives of a linkage give is what its energy grows by, to the last joule: reactions do no work."""
@@ -270,9 +270,9 @@ def test_many_as_one(name: str, rng: np.random.Generator) -> None:
 
     assert many.reactions.shape == (2, 3, len(linkage.pins), 2)
     for index in np.ndindex(2, 3):
-        one = ideal_motion(linkage, q[index], speeds[index], pulls[index], by_tip=False)
-        np.testing.assert_allclose(one.efforts, many.efforts[index], rtol=1e-12)
-        np.testing.assert_allclose(one.reactions, many.reactions[index], rtol=1e-12, atol=1e-12)
+        single = ideal_motion(linkage, q[index], speeds[index], pulls[index], by_tip=False)
+        np.testing.assert_allclose(single.efforts, many.efforts[index], rtol=1e-12)
+        np.testing.assert_allclose(single.reactions, many.reactions[index], rtol=1e-12, atol=1e-12)
 
 
 def test_tip_or_drives_lead_alike() -> None:

@@ -37,8 +37,8 @@ def struck(
     return simulate(task)
 
 
-def rebound(found: Simulation) -> float:
-    return float(found.qd[..., 1].max() / -found.qd[0, 1])
+def rebound(run: Simulation) -> float:
+    return float(run.qd[..., 1].max() / -run.qd[0, 1])
 
 
 def stiffness() -> float:
@@ -51,10 +51,10 @@ def stiffness() -> float:
 @pytest.mark.parametrize("law", IMPACT_LAWS)
 def test_blows_rebound_by_the_closed_form(law: ImpactLaw, restitution: float) -> None:
     """A block that hits a wall at 1 m/s leaves it with 1 + e = ln[(1 + χ) / (1 - χ e)] / χ, whatever the law."""
-    found = struck(restitution, impact=law)
+    run = struck(restitution, impact=law)
 
-    e, chi = rebound(found), damping(law, restitution)
-    assert found.impacts.tolist() == [1]
+    e, chi = rebound(run), damping(law, restitution)
+    assert run.impacts.tolist() == [1]
     if chi == 0:
         assert e == pytest.approx(1.0, abs=AT_FINE)
     else:
@@ -71,36 +71,36 @@ def test_exact_law_gives_back_what_is_asked(restitution: float) -> None:
 @pytest.mark.parametrize("law", IMPACT_LAWS)
 def test_depth_of_blows(law: ImpactLaw) -> None:
     """The journal goes as deep into the wall as δ_max = [5 m v² (χ - ln(1 + χ)) / (2 K χ²)]^0.4."""
-    found = struck(0.7, impact=law)
+    run = struck(0.7, impact=law)
 
     chi = damping(law, 0.7)
     by_hand = (2.5 * MASS * SPEED**2 / stiffness() * (chi - math.log1p(chi)) / chi**2) ** 0.4
-    assert found.depths.max() == pytest.approx(by_hand, rel=AT_FINE)
+    assert run.depths.max() == pytest.approx(by_hand, rel=AT_FINE)
 
 
 @pytest.mark.parametrize("speed", [0.1, 0.5, 1.0])
 def test_time_of_elastic_blows(speed: float) -> None:
     """A blow without loss lasts 2.94328 δ_max / v and presses with K δ_max^1.5, δ_max = (5 m v² / 4 K)^0.4."""
-    found = struck(1.0, speed=speed)
+    run = struck(1.0, speed=speed)
 
     depth = (1.25 * MASS * speed**2 / stiffness()) ** 0.4
-    depths, time = found.depths[:, 0], found.time
+    depths, time = run.depths[:, 0], run.time
     down = np.flatnonzero((depths[:-1] <= 0) & (depths[1:] > 0))[0]
     up = np.flatnonzero((depths[:-1] > 0) & (depths[1:] <= 0))[0]
     # Between samples the journal goes straight on: outside the wall its speed is constant.
     first = time[down] + FINE * -depths[down] / (speed * FINE)
     last = time[up + 1] - depths[up + 1] / -speed
     assert last - first == pytest.approx(ELASTIC_TIME * depth / speed, rel=1e-4)
-    assert found.peaks[0] == pytest.approx(stiffness() * depth**1.5, rel=1e-3)
+    assert run.peaks[0] == pytest.approx(stiffness() * depth**1.5, rel=1e-3)
 
 
 def test_blows_lose_what_the_ledger_says() -> None:
     """A blow at 1 m/s on 1 kg loses (1 - e²) / 2 joule, and the ledger closes at every moment."""
-    found = struck(0.8, impact="hu-guo")
+    run = struck(0.8, impact="hu-guo")
 
     e = restitution_of(damping("hu-guo", 0.8))
-    assert found.works["impact loss"][-1] == pytest.approx((1 - e * e) / 2, rel=2 * AT_FINE)
-    assert np.abs(imbalance(found)).max() < LEAK
+    assert run.works["impact loss"][-1] == pytest.approx((1 - e * e) / 2, rel=2 * AT_FINE)
+    assert np.abs(imbalance(run)).max() < LEAK
 
 
 def test_slow_blows_count_as_blows_of_a_millimetre_a_second() -> None:
@@ -108,11 +108,11 @@ def test_slow_blows_count_as_blows_of_a_millimetre_a_second() -> None:
     speed = 1e-4
     linkage = block(restitution=0.6, clearance=5e-7)
     settings = Settings(step=FINE, sample=FINE, impact="hu-guo", start="centred")
-    found = simulate(thrown(linkage, settings, 0.0095, (0.0, -speed)))
+    run = simulate(thrown(linkage, settings, 0.0095, (0.0, -speed)))
 
     chi = damping("hu-guo", 0.6) * speed / SLOWEST_IMPACT
-    assert found.impacts.tolist() == [1]
-    assert rebound(found) == pytest.approx(restitution_of(chi), rel=AT_FINE)
+    assert run.impacts.tolist() == [1]
+    assert rebound(run) == pytest.approx(restitution_of(chi), rel=AT_FINE)
 
 
 def test_side_wall_is_struck_by_both_masses() -> None:
@@ -135,9 +135,9 @@ class TestLocated:
         """Rebounds of blows that come at different moments of a step."""
         settings = Settings(step=self.STEP, sample=self.STEP, impact="exact", start="centred", located=located)
         task = thrown(block(restitution=0.5), settings, 0.0022, (0.0, -SPEED))
-        found = simulate(task, np.linspace(4.96e-4, 5.06e-4, runs)[:, None])
-        assert np.all(found.impacts == 1)
-        return np.asarray(found.qd[..., 1].max(axis=-1))
+        run = simulate(task, np.linspace(4.96e-4, 5.06e-4, runs)[:, None])
+        assert np.all(run.impacts == 1)
+        return np.asarray(run.qd[..., 1].max(axis=-1))
 
     def test_blows_of_long_steps_come_nearer_to_the_closed_form(self) -> None:
         """At steps of 10 µs a blow of 1 m/s gives back 0.5 of its speed ten times better if its moment is located."""
@@ -164,7 +164,7 @@ class TestLocated:
     def test_ledger_closes(self) -> None:
         """What is made in two parts is added up in two parts: no energy comes from nowhere."""
         settings = Settings(step=FINE, sample=1e-4, start="centred", located=True)
-        found = simulate(thrown(block(restitution=0.7), settings, 0.01, (0.3, -SPEED)))
+        run = simulate(thrown(block(restitution=0.7), settings, 0.01, (0.3, -SPEED)))
 
-        assert found.impacts[0] > 3
-        assert np.abs(imbalance(found)).max() < found.impacts[0] * LEAK
+        assert run.impacts[0] > 3
+        assert np.abs(imbalance(run)).max() < run.impacts[0] * LEAK

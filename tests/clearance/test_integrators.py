@@ -37,9 +37,9 @@ def test_simple_pendulum() -> None:
     tip = swung("rk4", 1e-3, 10.0)
 
     published = ((0.986292, -0.165011), (-0.942305, -0.334754), (-0.275087, -0.961419))
-    for second, place in zip((1, 5, 10), published, strict=True):
+    for second, position in zip((1, 5, 10), published, strict=True):
         np.testing.assert_allclose(tip[second], bob(second), rtol=0, atol=1e-9)
-        np.testing.assert_allclose(tip[second], place, rtol=0, atol=PRINTED)
+        np.testing.assert_allclose(tip[second], position, rtol=0, atol=PRINTED)
 
 
 @pytest.mark.parametrize(("integrator", "order", "step"), [("rk4", 4, 0.02), ("semi-implicit", 1, 2e-3)])
@@ -54,11 +54,11 @@ def test_order_in_the_air(integrator: str, order: int, step: float) -> None:
 def slid(integrator: str, step: float) -> tuple[np.ndarray, float]:
     """Where the block is that slides in the hole like a pendulum, pressed to the wall by its weight; and its ledger."""
     settings = Settings(step=step, sample=2e-4, integrator=integrator)  # type: ignore[arg-type]
-    found = simulate(thrown(block(gravity=GRAVITY, clearance=5e-3), settings, 0.002, (0.15, 0.0)))
-    assert found.depths.min() > 0
+    run = simulate(thrown(block(gravity=GRAVITY, clearance=5e-3), settings, 0.002, (0.15, 0.0)))
+    assert run.depths.min() > 0
     # Going round in the hole presses half as much again as weight does: the indentation swings.
-    assert np.ptp(found.depths) > 0.1 * found.depths[0]
-    return np.concatenate([found.q[-1], found.qd[-1]]), float(np.abs(imbalance(found)).max())
+    assert np.ptp(run.depths) > 0.1 * run.depths[0]
+    return np.concatenate([run.q[-1], run.qd[-1]]), float(np.abs(imbalance(run)).max())
 
 
 @pytest.mark.parametrize(("integrator", "order", "step"), [("rk4", 4, 2e-5), ("semi-implicit", 1, 2e-5)])
@@ -79,25 +79,25 @@ def test_controller_brings_it_to_its_goal() -> None:
     """A pendulum that is held with 200 N m/rad and 10 N m s/rad swings into its goal as a linear one does."""
     settings = Settings(step=1e-4, sample=1e-2, control="pd+ff", gains=(200.0, 10.0))
     task = prepare(pendulum(), still(0.3, -np.pi / 2), settings)
-    off = task.ideal.q.copy()
-    off[0] += 1e-3
-    found = simulate(attrs.evolve(task, ideal=attrs.evolve(task.ideal, q=off)))
+    displaced = task.ideal.q.copy()
+    displaced[0] += 1e-3
+    run = simulate(attrs.evolve(task, ideal=attrs.evolve(task.ideal, q=displaced)))
 
     # Near its lowest place weight is a spring of m g l; inertia is m l².
     a, b = 10.0 / 2, np.sqrt(200.0 + GRAVITY - 25.0)
-    t = found.time
+    t = run.time
     by_hand = 1e-3 * np.exp(-a * t) * (np.cos(b * t) + a / b * np.sin(b * t))
-    np.testing.assert_allclose(found.q[:, 0] + np.pi / 2, by_hand, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(run.q[:, 0] + np.pi / 2, by_hand, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("part", [0.32, 0.5, 0.83])
 def test_order_across_a_jump_within_a_step(part: float) -> None:
     """Where the acceleration jumps within a step, Runge-Kutta keeps its order 4: the step is cut at the jump."""
     linkage, clearances = load_linkage("five-bar"), np.full(3, 0.3e-3)
-    whole = straight("diagonal", (-0.12, -0.68), (0.11, -0.47))
+    line = straight("diagonal", (-0.12, -0.68), (0.11, -0.47))
     # Up to 10 ms beyond the jump at 50 ms, before a journal comes down for the first time; the jump is off the steps.
     knots = np.array([0.0, 0.05, 0.05 + 0.05 * 20 / (100 + part)])
-    path = attrs.evolve(whole, knots=knots, pieces=whole.pieces[:2], targets=())
+    path = attrs.evolve(line, knots=knots, pieces=line.pieces[:2], targets=())
     errors = []
     for steps in (3000, 6000, 12000, 24000):
         task = prepare(linkage, path, Settings(step=path.duration / steps, sample=path.duration / 4))
@@ -105,8 +105,8 @@ def test_order_across_a_jump_within_a_step(part: float) -> None:
         assert task.lengths.sum() == pytest.approx(path.duration, abs=1e-15)
         errors.append(simulate(task, clearances, frictions=0.0).error[-1])
 
-    off = np.linalg.norm(np.array(errors[:-1]) - errors[-1], axis=1)
-    np.testing.assert_allclose(np.log2(off[:-1] / off[1:]), 4, atol=0.4)
+    differences = np.linalg.norm(np.array(errors[:-1]) - errors[-1], axis=1)
+    np.testing.assert_allclose(np.log2(differences[:-1] / differences[1:]), 4, atol=0.4)
 
 
 def test_located_impacts_in_parted_steps() -> None:

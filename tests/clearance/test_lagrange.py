@@ -27,12 +27,12 @@ def five_bar() -> Linkage:
     return attrs.evolve(linkage, material=attrs.evolve(linkage.material, restitution=1.0))
 
 
-def beside(task: Scenario, found: Simulation, wall: Wall) -> np.ndarray:
+def beside(task: Scenario, run: Simulation, wall: Wall) -> np.ndarray:
     """The same motion on the other road, in the coordinates of the linkage."""
     ideal = task.ideal
     torques = CubicSpline(np.arange(len(ideal.efforts)) * task.h, ideal.efforts)
-    q, v = cartesian(found.q[0]), cartesian(found.qd[0], speeds_at=found.q[0])
-    other = motion(q, v, torques, wall, found.time)
+    q, v = cartesian(run.q[0]), cartesian(run.qd[0], speeds_at=run.q[0])
+    other = motion(q, v, torques, wall, run.time)
     return other[:, [2, 3, 4, 5, 6, 7, 8, 11]]
 
 
@@ -51,12 +51,12 @@ def test_without_contact(five_bar: Linkage) -> None:
     """While journals fly, links tied by multipliers go the same way as links that hang in trees."""
     settings = Settings(step=1e-5, sample=2e-3, start="centred")
     task = prepare(five_bar, beginning(thesis_path("y1"), 0.04), settings)
-    found = simulate(task, [0.1] * 3)
+    run = simulate(task, [0.1] * 3)
 
-    assert found.depths.max() < -0.03
-    other = beside(task, found, Wall(clearance=0.1, stiffness=1.0))
+    assert run.depths.max() < -0.03
+    other = beside(task, run, Wall(clearance=0.1, stiffness=1.0))
     assert np.ptp(other[:, 0]) > 0.01
-    np.testing.assert_allclose(found.q, other, rtol=0, atol=IN_FLIGHT)
+    np.testing.assert_allclose(run.q, other, rtol=0, atol=IN_FLIGHT)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.05])
@@ -65,9 +65,9 @@ def test_in_contact(five_bar: Linkage, friction: float) -> None:
     """With journals on their walls, pushed and rubbed, both go the same way too: the levers and signs are right."""
     settings = Settings(step=2e-6, sample=1e-3)
     task = prepare(five_bar, beginning(thesis_path("y1"), 0.006), settings)
-    found = simulate(task, frictions=friction)
+    run = simulate(task, frictions=friction)
 
     K = float(contact_stiffness(five_bar, np.full(3, 5e-4))[0])
-    other = beside(task, found, Wall(5e-4, K, friction, settings.threshold))
+    other = beside(task, run, Wall(5e-4, K, friction, settings.threshold))
     assert np.ptp(other[:, 3]) > 1e-4
-    np.testing.assert_allclose(found.q, other, rtol=0, atol=IN_CONTACT)
+    np.testing.assert_allclose(run.q, other, rtol=0, atol=IN_CONTACT)

@@ -33,7 +33,7 @@ class TestWhatItIs:
 
     def test_coordinates(self, five_bar: Linkage) -> None:
         """A crank has an angle, a free rod the place of its centre and an angle: eight for the five-bar."""
-        names = [str(one) for one in five_bar.coordinates]
+        names = [str(coordinate) for coordinate in five_bar.coordinates]
 
         assert names == [
             "link1.angle", "link2.x", "link2.y", "link2.angle", "link3.x", "link3.y", "link3.angle", "link4.angle",

@@ -90,9 +90,9 @@ class TestHermite:
 
     def test_scipy(self, rng: np.random.Generator) -> None:
         """They are SciPy's cubic Hermite spline, with its slopes."""
-        places, velocities = rng.uniform(-1, 1, (2, 4, 2))
-        path = hermite("curve", self.TIMES, places, velocities, (1, 3))
-        spline = CubicHermiteSpline(self.TIMES, places, velocities)
+        positions, velocities = rng.uniform(-1, 1, (2, 4, 2))
+        path = hermite("curve", self.TIMES, positions, velocities, (1, 3))
+        spline = CubicHermiteSpline(self.TIMES, positions, velocities)
         t = np.linspace(0.0, 0.4, 83)
 
         now = path.evaluate(t)

@@ -13,7 +13,7 @@ from clearance.trees import tree
 ROUNDING = 1e-12
 # Central differences over 1e-5 s, of speeds around 1.
 DIFFERENCE = 1e-8
-PLACES = [BodyPoint(body, "c") for body in ("arm", "sledge", "lever", "finger", "bolt", "loose")]
+POINTS = [BodyPoint(body, "c") for body in ("arm", "sledge", "lever", "finger", "bolt", "loose")]
 
 
 def by_hand(linkage: Linkage, q: np.ndarray) -> dict[str, complex]:
@@ -34,13 +34,13 @@ def by_hand(linkage: Linkage, q: np.ndarray) -> dict[str, complex]:
         ("finger", "lever", 3),
         ("bolt", "finger", 4),
     ):
-        at = origin[on] + cmath.exp(1j * angle[on]) * z(b[on].points["b"])
+        position = origin[on] + cmath.exp(1j * angle[on]) * z(b[on].points["b"])
         if name in ("sledge", "bolt"):
-            at += q[number] * cmath.exp(1j * (angle[on] + joints[name].direction))
+            position += q[number] * cmath.exp(1j * (angle[on] + joints[name].direction))
             angle[name] = angle[on] + joints[name].angle
         else:
             angle[name] = q[number] + zero
-        origin[name] = at - cmath.exp(1j * angle[name]) * z(b[name].points["a"])
+        origin[name] = position - cmath.exp(1j * angle[name]) * z(b[name].points["a"])
     angle["loose"] = q[7] + zero
     origin["loose"] = complex(q[5], q[6]) - cmath.exp(1j * angle["loose"]) * z(b["loose"].centre)
     return {name: origin[name] + cmath.exp(1j * angle[name]) * z(b[name].points["c"]) for name in b}
@@ -48,7 +48,7 @@ def by_hand(linkage: Linkage, q: np.ndarray) -> dict[str, complex]:
 
 def points(linkage: Linkage, q: np.ndarray, qd: np.ndarray) -> list[Point]:
     placed = Placement(linkage, list(q), list(qd))
-    return [placed.point(place) for place in PLACES]
+    return [placed.point(body_point) for body_point in POINTS]
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -61,9 +61,9 @@ class TestTree:
         linkage = tree(rng)
         q = rng.uniform(-3, 3, 8)
 
-        wanted = by_hand(linkage, q)
-        for place, point in zip(PLACES, points(linkage, q, 0 * q), strict=True):
-            assert complex(*point.position) == pytest.approx(wanted[place.body], abs=ROUNDING)
+        expected = by_hand(linkage, q)
+        for body_point, point in zip(POINTS, points(linkage, q, 0 * q), strict=True):
+            assert complex(*point.position) == pytest.approx(expected[body_point.body], abs=ROUNDING)
 
     def test_velocities(self, seed: int) -> None:
         """A point's velocity is the change of its place in time, and its partial derivatives times the speeds."""
@@ -73,12 +73,15 @@ class TestTree:
 
         now = points(linkage, q, qd)
         later, sooner = (points(linkage, q + s * dt * qd, qd) for s in (1, -1))
-        for one, after, before in zip(now, later, sooner, strict=True):
+        for point, after, before in zip(now, later, sooner, strict=True):
             np.testing.assert_allclose(
-                one.velocity, (np.array(after.position) - np.array(before.position)) / (2 * dt), rtol=0, atol=DIFFERENCE
+                point.velocity,
+                (np.array(after.position) - np.array(before.position)) / (2 * dt),
+                rtol=0,
+                atol=DIFFERENCE,
             )
-            summed = sum(np.array(partial) * qd[i] for i, partial in one.partials.items())
-            np.testing.assert_allclose(summed, one.velocity, rtol=0, atol=ROUNDING)
+            summed = sum(np.array(partial) * qd[i] for i, partial in point.partials.items())
+            np.testing.assert_allclose(summed, point.velocity, rtol=0, atol=ROUNDING)
 
     def test_bias(self, seed: int) -> None:
         """While no speed changes a point's acceleration is its bias: turning, and Coriolis' on what slides."""
@@ -88,18 +91,18 @@ class TestTree:
 
         now = points(linkage, q, qd)
         later, sooner = (points(linkage, q + s * dt * qd, qd) for s in (1, -1))
-        for one, after, before in zip(now, later, sooner, strict=True):
+        for point, after, before in zip(now, later, sooner, strict=True):
             slope = (np.array(after.velocity) - np.array(before.velocity)) / (2 * dt)
-            np.testing.assert_allclose(one.bias, slope, rtol=0, atol=DIFFERENCE)
+            np.testing.assert_allclose(point.bias, slope, rtol=0, atol=DIFFERENCE)
 
 
 def test_hanging_crank() -> None:
     """At angle 0 the thesis' crank hangs down from its motor; at 90 degrees it points to the right."""
     linkage = load_linkage("five-bar")
-    place = BodyPoint("link1", "J2")
+    body_point = BodyPoint("link1", "J2")
 
-    down = Placement(linkage, [0.0] * 8, [0.0] * 8).point(place)
-    right = Placement(linkage, [np.pi / 2] + [0.0] * 7, [2.0] + [0.0] * 7).point(place)
+    down = Placement(linkage, [0.0] * 8, [0.0] * 8).point(body_point)
+    right = Placement(linkage, [np.pi / 2] + [0.0] * 7, [2.0] + [0.0] * 7).point(body_point)
 
     assert down.position == pytest.approx((-0.1, -0.3), abs=ROUNDING)
     assert right.position == pytest.approx((0.2, 0.0), abs=ROUNDING)

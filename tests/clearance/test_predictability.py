@@ -29,7 +29,7 @@ def test_claim_holds_against_other_runs(five_bar: Linkage, sample: Sample) -> No
         finer = prepare(five_bar, path, Settings(step=task.h / 4), guess=task.ideal.q[0])
         errors = [*simulate(task, others).error, simulate(finer, c).error]
         until = run.time <= predictability.until
-        apart = [float(np.linalg.norm(one[until] - run.error[until], axis=-1).max()) for one in errors]
+        apart = [float(np.linalg.norm(other[until] - run.error[until], axis=-1).max()) for other in errors]
         for name, far in zip(worst, (max(apart[1:-1]), apart[0], apart[-1]), strict=True):
             worst[name] = max(worst[name], far)
         over += any(far > APART for far in apart)

@@ -40,7 +40,7 @@ def test_catalogue_can_be_put_together(name: str) -> None:
 
     q = closed(linkage, guess, drives=guess[list(linkage.driven)])
 
-    angles = [i for i, one in enumerate(linkage.coordinates) if one.kind == "angle"]
+    angles = [i for i, coordinate in enumerate(linkage.coordinates) if coordinate.kind == "angle"]
     assert np.abs(q - guess)[angles].max() < np.pi / 2
     assert len(linkage.coordinates) == len(linkage.drives) + 2 * len(linkage.pins)
 
@@ -83,8 +83,12 @@ def test_a_path_is_a_file(tmp_path: Path) -> None:
     assert load_linkage(str(path)).name == "mine"
 
 
-def same(one: Linkage, other: Linkage) -> bool:
-    return one.coordinates == other.coordinates and one.clearances == other.clearances and one.joints == other.joints
+def same(linkage: Linkage, other: Linkage) -> bool:
+    return (
+        linkage.coordinates == other.coordinates
+        and linkage.clearances == other.clearances
+        and linkage.joints == other.joints
+    )
 
 
 def test_name_or_path(tmp_path: Path) -> None:

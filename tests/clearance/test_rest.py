@@ -42,9 +42,9 @@ def test_first_goal_of_the_thesis(
     linkage: Linkage, clearances: Array, offset_mm: tuple[float, float], size_mm: float
 ) -> None:
     """At (-180, -600) mm the tip of arm A hangs 0.5619 mm off, that of arm B 0.9146 mm (thesis: 0.562 and 0.915)."""
-    rest = at_rest(linkage, ideal(linkage, FIRST_GOAL), clearances)
+    equilibrium = at_rest(linkage, ideal(linkage, FIRST_GOAL), clearances)
 
-    error = rest.tip - FIRST_GOAL
+    error = equilibrium.tip - FIRST_GOAL
     np.testing.assert_allclose(error, np.array(offset_mm) * 1e-3, rtol=0, atol=PRINTED)
     assert np.linalg.norm(error) == pytest.approx(size_mm * 1e-3, abs=PRINTED)
 
@@ -63,14 +63,14 @@ def test_start_of_y1(linkage: Linkage) -> None:
 def test_nothing_moves(linkage: Linkage, clearances: Array) -> None:
     """With its drives held a linkage that lies at rest is in balance: no body begins to move."""
     K = contact_stiffness(linkage, clearances)
-    rest = at_rest(linkage, ideal(linkage, FIRST_GOAL), clearances, K)
+    equilibrium = at_rest(linkage, ideal(linkage, FIRST_GOAL), clearances, K)
 
-    held = attrs.evolve(linkage, drives=[attrs.evolve(drive, kind="motion") for drive in linkage.drives])
+    locked = attrs.evolve(linkage, drives=[attrs.evolve(drive, kind="motion") for drive in linkage.drives])
     contacts = [Contact(*row, 0.15, 0.0, 1e-3) for row in np.stack([clearances, K], axis=-1)]
-    state = State(list(rest.q), [0.0] * 8, [ContactMemory(1.0, 1e-3)] * 3)
-    now = rates(held, FrictionModel(), state, [0.0, 0.0], contacts)
+    state = State(list(equilibrium.q), [0.0] * 8, [ContactMemory(1.0, 1e-3)] * 3)
+    now = rates(locked, FrictionModel(), state, [0.0, 0.0], contacts)
 
-    np.testing.assert_allclose([pin.normal for pin in now.pins], rest.forces, rtol=1e-7)
+    np.testing.assert_allclose([pin.normal for pin in now.pins], equilibrium.forces, rtol=1e-7)
     lightest = 0.0282
     np.testing.assert_allclose(np.array(now.qdd) * lightest, 0.0, atol=BALANCED)
 
@@ -78,18 +78,18 @@ def test_nothing_moves(linkage: Linkage, clearances: Array) -> None:
 def test_lowest_place(linkage: Linkage, rng: np.random.Generator) -> None:
     """In rigid walls no other way to lean has less energy: links and load hang as low as they can."""
     q = ideal(linkage, FIRST_GOAL)
-    rest = at_rest(linkage, q, ARM_A)
+    equilibrium = at_rest(linkage, q, ARM_A)
 
     def energy(q: Array) -> Array:
         placement = Placement(linkage, [q[..., i] for i in range(8)], [0.0] * 8)
         return np.asarray(potential_energy(placement))
 
-    angles = np.arctan2(rest.gaps[:, 1], rest.gaps[:, 0]) + rng.normal(0.0, 0.5, (500, 3))
+    angles = np.arctan2(equilibrium.gaps[:, 1], equilibrium.gaps[:, 0]) + rng.normal(0.0, 0.5, (500, 3))
     sizes = ARM_A * rng.choice([1.0, 0.9], (500, 3))
     gaps = sizes[..., None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    others = closed(linkage, rest.q, drives=q[[0, 7]], gaps=gaps)
+    others = closed(linkage, equilibrium.q, drives=q[[0, 7]], gaps=gaps)
 
-    assert np.all(energy(others) > energy(rest.q))
+    assert np.all(energy(others) > energy(equilibrium.q))
 
 
 def test_play_shifts_in_proportion(linkage: Linkage) -> None:
@@ -106,10 +106,10 @@ def test_play_shifts_in_proportion(linkage: Linkage) -> None:
 
 def test_no_play(linkage: Linkage) -> None:
     """Without play the tip is where it should be, and the pins carry what they carry."""
-    rest = at_rest(linkage, ideal(linkage, FIRST_GOAL), [0.0, 0.0, 0.0])
+    equilibrium = at_rest(linkage, ideal(linkage, FIRST_GOAL), [0.0, 0.0, 0.0])
 
-    np.testing.assert_allclose(rest.tip, FIRST_GOAL, rtol=0, atol=1e-12)
-    assert np.all(rest.forces > 1.0)
+    np.testing.assert_allclose(equilibrium.tip, FIRST_GOAL, rtol=0, atol=1e-12)
+    assert np.all(equilibrium.forces > 1.0)
 
 
 def test_leading_axes(linkage: Linkage, rng: np.random.Generator) -> None:
@@ -117,10 +117,10 @@ def test_leading_axes(linkage: Linkage, rng: np.random.Generator) -> None:
     q = closed(linkage, assembly_guess(linkage), tip=[[-0.1, -0.6], [0.1, -0.5]])
     c = rng.uniform(1e-4, 5e-4, (4, 1, 3))
 
-    rest = at_rest(linkage, q, c)
+    equilibrium = at_rest(linkage, q, c)
 
-    assert rest.tip.shape == (4, 2, 2)
-    np.testing.assert_allclose(at_rest(linkage, q[1], c[2, 0]).tip, rest.tip[2, 1], rtol=0, atol=1e-13)
+    assert equilibrium.tip.shape == (4, 2, 2)
+    np.testing.assert_allclose(at_rest(linkage, q[1], c[2, 0]).tip, equilibrium.tip[2, 1], rtol=0, atol=1e-13)
 
 
 def test_slack_pins_are_refused(linkage: Linkage) -> None:

@@ -43,12 +43,14 @@ class TestSamples:
     def test_seldom(self, five_bar: Linkage) -> None:
         """Two samples of a run are its first and its last: the tip ends where it does with many."""
         path = thesis_path("y1")
-        often, seldom = (simulate(prepare(five_bar, path, Settings(step=2e-5, sample=one))) for one in (2e-5, 10.0))
+        often, seldom = (
+            simulate(prepare(five_bar, path, Settings(step=2e-5, sample=target))) for target in (2e-5, 10.0)
+        )
 
         np.testing.assert_array_equal(seldom.time, [0.0, often.time[-1]])
         np.testing.assert_array_equal(seldom.tip, often.tip[[0, -1]])
         np.testing.assert_allclose(tip_at(seldom, np.array([0.0, 0.25])), seldom.tip, atol=ROUNDING)
-        assert [one["time"] for one in ClearanceRun.of(seldom).as_data()["targets"]] == pytest.approx(
+        assert [target["time"] for target in ClearanceRun.of(seldom).as_data()["targets"]] == pytest.approx(
             [0.0, 0.25], abs=ROUNDING
         )
 
@@ -59,12 +61,12 @@ class TestDiverging:
     def test_numbers(self, five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
         """With a step ten times too long a run diverges without a warning; what is shown of it is finite."""
         monkeypatch.setattr(simulation, "check_step", lambda *_: None)
-        found = simulate(prepare(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=2e-4)), [1e-4] * 3)
-        told = ClearanceRun.of(found).as_data()
+        run = simulate(prepare(five_bar, thesis_path("y1"), Settings(step=2e-4, sample=2e-4)), [1e-4] * 3)
+        data = ClearanceRun.of(run).as_data()
 
-        assert found.status == Status.DIVERGED
-        assert told["sound_until"] < 0.25
-        json.dumps(told, allow_nan=False)
+        assert run.status == Status.DIVERGED
+        assert data["sound_until"] < 0.25
+        json.dumps(data, allow_nan=False)
 
     def test_advice(self, five_bar: Linkage) -> None:
         """The step that is advised instead of one that is too long is one that is accepted."""
@@ -123,8 +125,8 @@ def test_dwell(tmp_path: Path) -> None:
 
     def written(end: float) -> Path:
         times = np.arange(0.0, end, 1e-3)
-        places = way.evaluate(times).position * 1e3 + times[:, None]
-        rows = (f"y1,{t:.4f},{x:.9f},{y:.9f}" for t, (x, y) in zip(times, places, strict=True))
+        positions = way.evaluate(times).position * 1e3 + times[:, None]
+        rows = (f"y1,{t:.4f},{x:.9f},{y:.9f}" for t, (x, y) in zip(times, positions, strict=True))
         file.write_text("\n".join(["path,t_s,x_mm,y_mm", *rows]), encoding="utf-8")
         return file
 
@@ -154,12 +156,12 @@ def test_gains() -> None:
 
 def test_other_linkage(five_bar: Linkage) -> None:
     """A sweep is one of the linkage it was made of, whatever its own clearances, and of no other."""
-    kept = json.loads(json.dumps(FeatureSweep(linkage=five_bar, paths=("y1",)).settings))
+    stored = json.loads(json.dumps(FeatureSweep(linkage=five_bar, paths=("y1",)).settings))
 
-    assert is_sweep_of(kept, five_bar)
-    assert is_sweep_of(kept, five_bar.with_clearances({"J2": 0.1e-3}))
-    assert not is_sweep_of(kept, load_linkage("four-bar"))
-    assert not is_sweep_of(kept, attrs.evolve(five_bar, loads=()))
+    assert is_sweep_of(stored, five_bar)
+    assert is_sweep_of(stored, five_bar.with_clearances({"J2": 0.1e-3}))
+    assert not is_sweep_of(stored, load_linkage("four-bar"))
+    assert not is_sweep_of(stored, attrs.evolve(five_bar, loads=()))
     assert not is_sweep_of({}, five_bar)
 
 
@@ -178,8 +180,8 @@ def test_uneven_readings(tmp_path: Path) -> None:
         lines += [f"{name},0,-700,{x:.9f},{y:.9f}" for x, y in (0.01 * rng.standard_normal((count, 2)) + (0, -700))]
     file = tmp_path / "rest.csv"
     file.write_text("\n".join(lines), encoding="utf-8")
-    found = read_measured(file)
+    measurement = read_measured(file)
 
-    assert isinstance(found, RestMeasurement)
+    assert isinstance(measurement, RestMeasurement)
     # The deviation of 8000 numbers is told to about a hundredth.
-    assert found.noise == pytest.approx(1e-5, rel=0.05)
+    assert measurement.noise == pytest.approx(1e-5, rel=0.05)

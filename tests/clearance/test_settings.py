@@ -97,12 +97,12 @@ def test_longest_step_is_stable() -> None:
     longest = float(str(refused.value).split("at most ")[1].split()[0])
     settings = Settings(step=0.9 * longest, start="centred", impact="exact")
 
-    found = simulate(thrown(linkage, settings, 0.3, (0.0, 0.0)))
+    run = simulate(thrown(linkage, settings, 0.3, (0.0, 0.0)))
 
-    assert found.status == Status.FINISHED
-    assert found.impacts[0] > 5
-    assert np.abs(found.qd[-1]).max() < 1e-3
-    assert found.forces[-1, 0] == pytest.approx(GRAVITY, rel=0.02)
+    assert run.status == Status.FINISHED
+    assert run.impacts[0] > 5
+    assert np.abs(run.qd[-1]).max() < 1e-3
+    assert run.forces[-1, 0] == pytest.approx(GRAVITY, rel=0.02)
 
 
 @pytest.mark.parametrize(("step", "duration"), [(5e-324, 1.0), (1e-5, 1e308), (1e-5, float("inf"))])

@@ -69,21 +69,21 @@ class TestFiveBar:
     @pytest.mark.parametrize("friction", [0.0, 0.05])
     def test_ledger(self, y1: Scenario, friction: float) -> None:
         """What the motors give is in the arm, or lost in impacts and friction, at every moment."""
-        found = simulate(y1, frictions=friction)
+        run = simulate(y1, frictions=friction)
 
-        assert found.works["driven"].max() > 10.0
-        assert found.works["impact loss"][-1] > 1e-2
-        assert (found.works["friction loss"][-1] > 1e-2) == (friction > 0)
-        assert np.abs(imbalance(found)).max() < LEAK
+        assert run.works["driven"].max() > 10.0
+        assert run.works["impact loss"][-1] > 1e-2
+        assert (run.works["friction loss"][-1] > 1e-2) == (friction > 0)
+        assert np.abs(imbalance(run)).max() < LEAK
 
     @pytest.mark.parametrize(("path", "thesis"), [("y1", 0.5504), ("y3", 0.5439), ("y7", 0.5187)])
     def test_intercepts_of_arm_a(self, five_bar: Linkage, path: str, thesis: float) -> None:
         """With friction of the centres' speed arm A's straight parts begin within 3 % of where the thesis' do."""
         settings = Settings(friction=FrictionModel(velocity="centre"), threshold=1e-2)
-        found = simulate(prepare(five_bar, thesis_path(path), settings), np.array((0.328, 0.171, 0.483)) * 1e-3)
+        run = simulate(prepare(five_bar, thesis_path(path), settings), np.array((0.328, 0.171, 0.483)) * 1e-3)
 
-        part = (found.time > 0.07 - 1e-9) & (found.time < 0.12 + 1e-9)
-        intercept = np.polyfit(found.time[part], found.distance[part] * 1e3, 1)[1]
+        part = (run.time > 0.07 - 1e-9) & (run.time < 0.12 + 1e-9)
+        intercept = np.polyfit(run.time[part], run.distance[part] * 1e3, 1)[1]
         assert intercept == pytest.approx(thesis, rel=0.03)
 
     def test_journals_stay_in_their_bearings(self, smooth: Simulation) -> None:
@@ -106,7 +106,7 @@ CLEARANCES = np.array((5e-4, 2e-4, 1e-4, 5e-5))
 
 
 @pytest.fixture(scope="module")
-def found() -> Simulation:
+def run() -> Simulation:
     """Two turns of the slider-crank."""
     settings = Settings(step=2e-6, sample=1e-5, start="centred")
     task = prepare(load_linkage("slider-crank"), constant_speed_path("round", 0.0, SPEED, 0.024), settings)
@@ -116,33 +116,33 @@ def found() -> Simulation:
 class TestSliderCrank:
     """The slider-crank of the papers at 5000 revolutions a minute, two turns of it."""
 
-    def test_crank_does_not_care(self, found: Simulation) -> None:
+    def test_crank_does_not_care(self, run: Simulation) -> None:
         """The crank goes round as it is told."""
-        np.testing.assert_allclose(found.q[0, :, 0], SPEED * found.time, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(run.q[0, :, 0], SPEED * run.time, rtol=0, atol=1e-9)
 
-    def test_slider_stays_near(self, found: Simulation) -> None:
+    def test_slider_stays_near(self, run: Simulation) -> None:
         """The slider is off by no more than play and indentation, seen along the leaning rod: less with less play."""
         lean = np.sqrt(1 - (0.05 / 0.12) ** 2)
-        reach = (CLEARANCES + found.depths.max(axis=(-1, -2))) / lean
-        off = np.abs(found.error[..., 0]).max(axis=-1)
+        reach = (CLEARANCES + run.depths.max(axis=(-1, -2))) / lean
+        largest = np.abs(run.error[..., 0]).max(axis=-1)
 
-        assert np.all(off < reach)
-        assert np.all(off > 0.8 * CLEARANCES)
+        assert np.all(largest < reach)
+        assert np.all(largest > 0.8 * CLEARANCES)
 
-    def test_rattles(self, found: Simulation) -> None:
+    def test_rattles(self, run: Simulation) -> None:
         """With half a millimetre the journal flies a good part of the time, and presses with many times the force."""
-        flying = (found.depths[..., 0] <= 0).mean(axis=-1)
+        flying = (run.depths[..., 0] <= 0).mean(axis=-1)
         ideal = 0.14 * 19419.36
 
         assert 0.1 < flying[0] < 0.6
         assert np.all(flying[1:] < flying[0])
-        assert found.depths[0].max() < 0.2 * CLEARANCES[0]
-        assert found.peaks[0, 0] > 3 * ideal
+        assert run.depths[0].max() < 0.2 * CLEARANCES[0]
+        assert run.peaks[0, 0] > 3 * ideal
 
-    def test_ledger(self, found: Simulation) -> None:
+    def test_ledger(self, run: Simulation) -> None:
         """What the crank's drive gives is in the motion, or was lost in the impacts."""
-        assert found.works["impact loss"][0, -1] > 1.0
-        assert np.abs(imbalance(found)).max() < 1e-4 * found.works["driven"].max()
+        assert run.works["impact loss"][0, -1] > 1.0
+        assert np.abs(imbalance(run)).max() < 1e-4 * run.works["driven"].max()
 
     def test_stiffness(self) -> None:
         """Its pin has the stiffness of the papers, 6.6102e10 N/m^1.5."""
@@ -150,10 +150,10 @@ class TestSliderCrank:
         assert stiffness(pin.clearance, pin.journal_radius, 207e9, 0.3) == pytest.approx(6.6102e10, rel=5e-5)
 
 
-def assert_same(one: Simulation, other: Simulation, index: Any = ...) -> None:
+def assert_same(run: Simulation, other: Simulation, index: Any = ...) -> None:
     for what in ("q", "qd", "forces", "impacts", "peaks", "status"):
-        np.testing.assert_array_equal(getattr(one, what), getattr(other, what)[index])
-    for name, work in one.works.items():
+        np.testing.assert_array_equal(getattr(run, what), getattr(other, what)[index])
+    for name, work in run.works.items():
         np.testing.assert_array_equal(work, other.works[name][index])
 
 
@@ -179,21 +179,21 @@ class TestManyAtOnce:
 
     def test_leading_axes(self, y1: Scenario, many: Simulation) -> None:
         """Clearances and frictions make a table of runs."""
-        found = simulate(y1, many.clearances[:2, None], frictions=[many.frictions[0], 0.3, 0.0])
+        run = simulate(y1, many.clearances[:2, None], frictions=[many.frictions[0], 0.3, 0.0])
 
-        assert found.tip.shape == (2, 3, len(found.time), 2)
-        assert found.impacts.shape == (2, 3, 3)
-        np.testing.assert_array_equal(found.q[0, 0], many.q[0])
+        assert run.tip.shape == (2, 3, len(run.time), 2)
+        assert run.impacts.shape == (2, 3, 3)
+        np.testing.assert_array_equal(run.q[0, 0], many.q[0])
 
     def test_diverging_run_leaves_its_neighbours(self, y1: Scenario, many: Simulation) -> None:
         """A run whose friction no step can follow is a row that says so; those beside it do not know."""
         frictions = many.frictions[:5].copy()
         frictions[2] = 1e9
-        found = simulate(y1, many.clearances[:5], frictions=frictions)
+        run = simulate(y1, many.clearances[:5], frictions=frictions)
 
-        assert found.status.tolist() == [Status.FINISHED] * 2 + [Status.DIVERGED] + [Status.FINISHED] * 2
+        assert run.status.tolist() == [Status.FINISHED] * 2 + [Status.DIVERGED] + [Status.FINISHED] * 2
         for i in (0, 1, 3, 4):
-            np.testing.assert_array_equal(found.q[i], many.q[i])
+            np.testing.assert_array_equal(run.q[i], many.q[i])
 
     def test_none(self, y1: Scenario) -> None:
         """No clearances, no runs."""
@@ -203,11 +203,11 @@ class TestManyAtOnce:
 def test_samples() -> None:
     """Samples come at the multiples of their time, from the start to the end, whatever the step."""
     task = thrown(block(), Settings(step=1e-5, sample=2.5e-4, start="centred"), 0.01, (0.01, 0.02))
-    found = simulate(task)
+    run = simulate(task)
 
-    np.testing.assert_allclose(found.time, np.arange(41) * 2.5e-4, atol=1e-15)
-    flying = found.time < 0.02
-    np.testing.assert_allclose(found.q[flying], found.time[:, None] * (0.01, 0.02), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(run.time, np.arange(41) * 2.5e-4, atol=1e-15)
+    flying = run.time < 0.02
+    np.testing.assert_allclose(run.q[flying], run.time[:, None] * (0.01, 0.02), rtol=0, atol=1e-14)
 
 
 def test_what_lies_has_not_struck(five_bar: Linkage) -> None:
@@ -231,22 +231,20 @@ def test_names_of_points_count() -> None:
     for first, second in (("P", "Q"), ("Q", "P")):
         body = attrs.evolve(falling, points={first: (0.0, 0.0), second: (0.0, 0.1)})
         named = attrs.evolve(linkage, name="named", bodies=[cross, body], pins=[pin])
-        found = simulate(thrown(named, settings, 0.01, (0.0, 0.0)))
+        run = simulate(thrown(named, settings, 0.01, (0.0, 0.0)))
 
         # In the middle of its hole, without weight, nothing moves.
-        np.testing.assert_array_equal(found.qd, 0.0)
-        np.testing.assert_allclose(found.depths, -pin.clearance, rtol=1e-9)
+        np.testing.assert_array_equal(run.qd, 0.0)
+        np.testing.assert_allclose(run.depths, -pin.clearance, rtol=1e-9)
 
 
 def test_no_play_at_all() -> None:
     """A linkage without any pin that has play is simulated like any other; there is nothing in its pins."""
-    found = simulate(
-        left_alone(prepare(pendulum(), still(0.1, 0.0), Settings(step=1e-3, sample=1e-2))), frictions=[0, 1]
-    )
+    run = simulate(left_alone(prepare(pendulum(), still(0.1, 0.0), Settings(step=1e-3, sample=1e-2))), frictions=[0, 1])
 
-    assert found.gaps.shape == (2, 11, 0, 2)
-    assert found.forces.shape == (2, 11, 0)
-    np.testing.assert_allclose(found.q[:, -1, 0], -9.81 * 0.1**2 / 2, rtol=1e-4)
+    assert run.gaps.shape == (2, 11, 0, 2)
+    assert run.forces.shape == (2, 11, 0)
+    np.testing.assert_allclose(run.q[:, -1, 0], -9.81 * 0.1**2 / 2, rtol=1e-4)
 
 
 class TestRefused:
@@ -300,7 +298,7 @@ def test_other_assembly(five_bar: Linkage) -> None:
     settings = Settings(step=1e-3)
     inside = attrs.evolve(five_bar, assembly={"link1": 0.9, "link2": -1.0, "link3": -0.75, "link4": 0.7})
 
-    own, other = (prepare(one, thesis_path("y1"), settings).ideal.q for one in (five_bar, inside))
+    own, other = (prepare(linkage, thesis_path("y1"), settings).ideal.q for linkage in (five_bar, inside))
 
     assert np.abs(other[:, 0] - own[:, 0]).min() > 1.0
     np.testing.assert_allclose(other[:, 4:], own[:, 4:], rtol=0, atol=1e-10)

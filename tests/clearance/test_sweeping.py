@@ -87,11 +87,11 @@ def test_chance_is_told_from_what_a_design_changes(five_bar: Linkage) -> None:
 def test_chance_that_is_left_in_means(rng: np.random.Generator) -> None:
     """Means over four runs of pure chance vary by a quarter of its variance, and are not taken for more."""
     runs = rng.normal(0.0, 1.0, (400, 4))
-    told = rng.normal(0.0, 1.1, 400)[:, None]
+    means = rng.normal(0.0, 1.1, 400)[:, None]
 
     assert is_chance(runs.mean(axis=1), runs.std(axis=1, ddof=1), 4)
-    assert is_chance((0.7 * told + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
-    assert not is_chance((1.2 * told + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
+    assert is_chance((0.7 * means + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
+    assert not is_chance((1.2 * means + runs).mean(axis=1), runs.std(axis=1, ddof=1), 4)
 
 
 def test_friction_is_a_parameter(five_bar: Linkage, task: FeatureSweep) -> None:
@@ -113,10 +113,12 @@ def test_said_beforehand(task: FeatureSweep) -> None:
     rows = evaluate(both, ARM_A[None])
 
     check_task(both, both.parameters)
-    told = [*Features._fields, "peak"]
-    told += [f"{name}_spread" for name in told] + ["until"]
-    assert {*rows.dtype.names} - {"status", "message"} == {f"{path}_{name}" for path in ("y1", "x2") for name in told}
-    units = {name: one.units for name, one in both.outputs.items()}
+    columns = [*Features._fields, "peak"]
+    columns += [f"{name}_spread" for name in columns] + ["until"]
+    assert {*rows.dtype.names} - {"status", "message"} == {
+        f"{path}_{name}" for path in ("y1", "x2") for name in columns
+    }
+    units = {name: output.units for name, output in both.outputs.items()}
     assert (units["x2_slope"], units["x2_slope_spread"], units["x2_until"]) == ("m/s", "m/s", "s")
     plain = json.loads(json.dumps(dict(both.settings)))
     assert plain["simulation"]["friction"]["velocity"] == "centre"
@@ -162,9 +164,9 @@ def test_same_bits(task: FeatureSweep, tmp_path: Path) -> None:
             {"workers": 2, "block": 3},
             {"scheduler": cluster.scheduler_address, "block": 2},
         ]
-        found = [bits(run(task, design, tmp_path / str(i), **way)) for i, way in enumerate(ways)]
+        result = [bits(run(task, design, tmp_path / str(i), **way)) for i, way in enumerate(ways)]
 
-    assert all(one == found[0] for one in found[1:])
+    assert all(copy == result[0] for copy in result[1:])
 
 
 def test_diverging_run(task: FeatureSweep, tmp_path: Path) -> None:
@@ -174,13 +176,13 @@ def test_diverging_run(task: FeatureSweep, tmp_path: Path) -> None:
     well = np.array([[*ARM_A, 0.05], [*ARM_B, 0.05], [*ARM_A, 0.0]])
     points = np.insert(well, 1, [*ARM_B, STUCK], axis=0)
 
-    found = run(with_friction, Design(names=with_friction.parameters, points=points), tmp_path / "out", workers=1)
+    results = run(with_friction, Design(names=with_friction.parameters, points=points), tmp_path / "out", workers=1)
 
-    assert found.status.values.tolist() == [Status.DONE, Status.FAILED, Status.DONE, Status.DONE]
-    assert found.message.values[1] == "the simulation diverged"
-    assert np.isnan(found.y1_slope[1])
+    assert results.status.values.tolist() == [Status.DONE, Status.FAILED, Status.DONE, Status.DONE]
+    assert results.message.values[1] == "the simulation diverged"
+    assert np.isnan(results.y1_slope[1])
     alone = with_friction(well)
-    np.testing.assert_array_equal(found.y1_amp_dc.values[[0, 2, 3]], alone["y1_amp_dc"])
+    np.testing.assert_array_equal(results.y1_amp_dc.values[[0, 2, 3]], alone["y1_amp_dc"])
 
 
 def test_impossible_rows(task: FeatureSweep, tmp_path: Path) -> None:
@@ -188,17 +190,17 @@ def test_impossible_rows(task: FeatureSweep, tmp_path: Path) -> None:
     pytest.importorskip("xarray")
     points = np.array([ARM_A, (0.0, 1e-4, 1e-4), (2.0, 2.0, 2.0), ARM_B])
 
-    found = run(task, Design(names=task.parameters, points=points), tmp_path / "out", workers=1)
+    results = run(task, Design(names=task.parameters, points=points), tmp_path / "out", workers=1)
 
-    assert found.status.values.tolist() == [Status.DONE, Status.FAILED, Status.FAILED, Status.DONE]
-    assert "clearances: contact needs them above 0, got 0 mm" in str(found.message.values[1])
-    assert "the loops do not close" in str(found.message.values[2])
+    assert results.status.values.tolist() == [Status.DONE, Status.FAILED, Status.FAILED, Status.DONE]
+    assert "clearances: contact needs them above 0, got 0 mm" in str(results.message.values[1])
+    assert "the loops do not close" in str(results.message.values[2])
 
 
 def test_stopped_and_begun_again(task: FeatureSweep, design: Design, tmp_path: Path) -> None:
     """A sweep that was stopped goes on where it was, and ends with the bits of one that was not."""
     pytest.importorskip("xarray")
-    seen: list[Progress] = []
+    reports: list[Progress] = []
 
     def stop(now: Progress) -> None:
         if now.done == 16:
@@ -206,9 +208,9 @@ def test_stopped_and_begun_again(task: FeatureSweep, design: Design, tmp_path: P
 
     with pytest.raises(InterruptedError):
         run(task, design, tmp_path / "out", block=8, workers=1, progress=stop)
-    again = run(task, design, tmp_path / "out", block=8, workers=1, progress=seen.append)
+    again = run(task, design, tmp_path / "out", block=8, workers=1, progress=reports.append)
 
-    assert (seen[0].resumed, seen[-1].done) == (16, 24)
+    assert (reports[0].resumed, reports[-1].done) == (16, 24)
     assert bits(again) == bits(run(task, design, tmp_path / "whole", workers=1))
 
 

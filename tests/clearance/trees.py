@@ -67,17 +67,17 @@ def to_pinocchio(linkage: Linkage) -> tuple[pinocchio.Model, np.ndarray, np.ndar
     shift = np.zeros(len(coordinates))
     joints, turns, zeros = {"ground": 0}, {"ground": np.zeros(len(coordinates))}, {"ground": 0.0}
     # Pinocchio's frames begin where a body is held.
-    held = {"ground": np.zeros(2)}
+    origins = {"ground": np.zeros(2)}
     for body in linkage.bodies:
         joint, row = linkage.joint(body.name), model.nv
         if joint is None:
             number = planar(model)
             T[row : row + 3, row : row + 3] = np.eye(3)
             turns[body.name], shift[row + 2] = T[row + 2], linkage.zero
-            held[body.name] = body.centre
+            origins[body.name] = body.centre
         else:
-            on = np.array((*(linkage.point(joint.on) - held[joint.on.body]), 0.0))
-            held[body.name] = body.points[joint.point]
+            on = np.array((*(linkage.point(joint.on) - origins[joint.on.body]), 0.0))
+            origins[body.name] = body.points[joint.point]
             if isinstance(joint, Pin):
                 number = model.addJoint(
                     joints[joint.on.body], pinocchio.JointModelRZ(), pinocchio.SE3(np.eye(3), on), body.name
@@ -96,7 +96,7 @@ def to_pinocchio(linkage: Linkage) -> tuple[pinocchio.Model, np.ndarray, np.ndar
                 zeros[body.name] = zeros[joint.on.body] + joint.angle
                 T[row, row] = 1.0
         joints[body.name] = number
-        lever = np.array((*(body.centre - held[body.name]), 0.0))
+        lever = np.array((*(body.centre - origins[body.name]), 0.0))
         inertia = pinocchio.Inertia(body.mass, lever, np.diag((0.0, 0.0, body.inertia)))
         model.appendBodyToJoint(number, inertia, pinocchio.SE3.Identity())
     return model, T, shift

@@ -26,9 +26,9 @@ def test_fit_finds_the_report(fit: Coefficients) -> None:
     """
     slips = {"b4", "k2", "b20"}
     for field in attrs.fields(Coefficients):
-        found, printed = getattr(fit, field.name), getattr(PRINTED, field.name)
-        near = abs(found - printed) <= max(0.03 * abs(printed), 0.5e-3)
-        assert near == (field.name not in slips), (field.name, found, printed)
+        fitted_value, printed = getattr(fit, field.name), getattr(PRINTED, field.name)
+        near = abs(fitted_value - printed) <= max(0.03 * abs(printed), 0.5e-3)
+        assert near == (field.name not in slips), (field.name, fitted_value, printed)
 
 
 def test_fit_by_hand(fit: Coefficients) -> None:
@@ -65,8 +65,8 @@ def test_efforts_are_inertias_and_gravity(rng: np.random.Generator) -> None:
     tau = bejczy_efforts(q, qdd, gravity=9.80621)
 
     assert tau.shape == (3, 4, 6)
-    one = q[1, 2].tolist()
-    expected = np.array(bejczy_inertias(PRINTED, one)) * qdd[1, 2] + bejczy_gravity(PRINTED, one, 9.80621)
+    row = q[1, 2].tolist()
+    expected = np.array(bejczy_inertias(PRINTED, row)) * qdd[1, 2] + bejczy_gravity(PRINTED, row, 9.80621)
     np.testing.assert_allclose(tau[1, 2], expected)
 
 

@@ -83,8 +83,8 @@ def test_floats_and_arrays_are_one_equation(rng: np.random.Generator) -> None:
     many = forward_dynamics(arm, q, qd, tau)
 
     for k in range(4):
-        one, _ = articulated_body(arm, q[k].tolist(), qd[k].tolist(), tau[k].tolist())
-        np.testing.assert_allclose(one, many[k], rtol=1e-12, atol=1e-12)
+        scalars, _ = articulated_body(arm, q[k].tolist(), qd[k].tolist(), tau[k].tolist())
+        np.testing.assert_allclose(scalars, many[k], rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("solve", [forward_dynamics, toacc])

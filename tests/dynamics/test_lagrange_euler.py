@@ -43,7 +43,7 @@ def test_pose_derivatives_are_derivatives(rng: np.random.Generator) -> None:
     arm = random_arm(rng, 4)
     q, step = rng.normal(size=4), 1e-4
     shifts = step * np.eye(4)
-    found = pose_derivatives(arm, q.tolist())
+    derivatives = pose_derivatives(arm, q.tolist())
 
     def pose_of_link(i: int, position: np.ndarray) -> np.ndarray:
         return link_poses(arm, position)[i + 1]
@@ -51,21 +51,21 @@ def test_pose_derivatives_are_derivatives(rng: np.random.Generator) -> None:
     for i in range(4):
         for j in range(i + 1):
             slope = (pose_of_link(i, q + shifts[j]) - pose_of_link(i, q - shifts[j])) / (2 * step)
-            np.testing.assert_allclose(found.first[i][j], slope, atol=1e-6)
+            np.testing.assert_allclose(derivatives.first[i][j], slope, atol=1e-6)
             for k in range(j, i + 1):
                 bend = sum(
                     sign * other * pose_of_link(i, q + sign * shifts[j] + other * shifts[k])
                     for sign in (1, -1)
                     for other in (1, -1)
                 ) / (4 * step**2)
-                np.testing.assert_allclose(found.second[i][j, k], bend, atol=1e-5)
+                np.testing.assert_allclose(derivatives.second[i][j, k], bend, atol=1e-5)
 
 
 def test_pseudo_inertia_of_a_point() -> None:
     """A point of 2 kg at (1, 2, 3) has mass times coordinate times coordinate everywhere, and itself in the corner."""
-    place = np.array((1.0, 2.0, 3.0, 1.0))
+    position = np.array((1.0, 2.0, 3.0, 1.0))
 
-    np.testing.assert_allclose(pseudo_inertia(Link(mass=2.0, com=place[:3])), 2 * np.outer(place, place))
+    np.testing.assert_allclose(pseudo_inertia(Link(mass=2.0, com=position[:3])), 2 * np.outer(position, position))
 
 
 def test_pseudo_inertia_has_the_products(rng: np.random.Generator) -> None:

@@ -100,8 +100,8 @@ def test_floats_and_arrays_are_one_equation(rng: np.random.Generator) -> None:
     many = inverse_dynamics(arm, q, qd, qdd, drives=False)
 
     for k in range(4):
-        one = newton_euler(arm, q[k].tolist(), qd[k].tolist(), qdd[k].tolist())
-        np.testing.assert_allclose(one, many[k], rtol=1e-13, atol=1e-13)
+        scalars = newton_euler(arm, q[k].tolist(), qd[k].tolist(), qdd[k].tolist())
+        np.testing.assert_allclose(scalars, many[k], rtol=1e-13, atol=1e-13)
 
 
 def test_shapes_that_do_not_fit() -> None:

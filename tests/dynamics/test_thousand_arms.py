@@ -30,20 +30,20 @@ COMPLEX_STEP = 1e-30  # no difference is taken, so it may be as small as one lik
 
 def test_inverse_dynamics() -> None:
     """Pinocchio asks the same efforts of the links."""
-    found = largest_deviation(
+    deviation = largest_deviation(
         lambda case: inverse_dynamics(case.arm, case.q, case.qd, case.qdd, drives=False),
         lambda case: pin.rnea(*case.links, case.q, case.qd, case.qdd),
     )
-    assert found < AGREEMENT
+    assert deviation < AGREEMENT
 
 
 def test_inverse_dynamics_of_a_driven_and_pushed_arm() -> None:
     """With rotors, viscous friction and a push on the tool the efforts are Pinocchio's, friction added."""
-    found = largest_deviation(
+    deviation = largest_deviation(
         lambda case: inverse_dynamics(case.arm, case.q, case.qd, case.qdd, wrench=case.wrench),
         lambda case: pin.rnea(*case.driven, case.q, case.qd, case.qdd, case.push) + case.friction,
     )
-    assert found < AGREEMENT
+    assert deviation < AGREEMENT
 
 
 def test_inverse_dynamics_on_a_base_that_accelerates() -> None:
@@ -77,8 +77,8 @@ def test_load_joined_to_the_last_link() -> None:
         link = payload(case.arm, case.load.mass, case.load.com, case.load.inertia).links[-1]
         model, _ = case.loaded
         # From the frame of the last link to that of its joint.
-        place = case.links[0].frames[case.tool].placement * pin.SE3(case.arm.tool).inverse()
-        body = pin.Inertia(link.mass, link.com, link.inertia).se3Action(place)
+        tool_placement = case.links[0].frames[case.tool].placement * pin.SE3(case.arm.tool).inverse()
+        body = pin.Inertia(link.mass, link.com, link.inertia).se3Action(tool_placement)
         worst = max(worst, deviation(body.matrix(), model.inertias[case.arm.n].matrix()))
 
     assert worst < AGREEMENT
@@ -107,10 +107,10 @@ def test_mass_matrix_by_unit_accelerations() -> None:
 
 def test_gravity() -> None:
     """Pinocchio holds the arms with the same efforts."""
-    found = largest_deviation(
+    deviation = largest_deviation(
         lambda case: gravity_efforts(case.arm, case.q), lambda case: pin.computeGeneralizedGravity(*case.links, case.q)
     )
-    assert found < AGREEMENT
+    assert deviation < AGREEMENT
 
 
 def test_coriolis_efforts() -> None:
@@ -125,11 +125,11 @@ def test_coriolis_efforts() -> None:
 
 def test_coriolis_matrix() -> None:
     """Pinocchio's Coriolis matrix is made of the Christoffel symbols as well: entry by entry it is ours."""
-    found = largest_deviation(
+    deviation = largest_deviation(
         lambda case: coriolis_matrix(case.arm, case.q, case.qd),
         lambda case: pin.computeCoriolisMatrix(*case.links, case.q, case.qd),
     )
-    assert found < AGREEMENT
+    assert deviation < AGREEMENT
 
 
 def test_energies() -> None:
@@ -157,29 +157,29 @@ def test_energies() -> None:
 @pytest.mark.parametrize("solve", [forward_dynamics, toacc])
 def test_forward_dynamics(solve: Callable[..., Array]) -> None:
     """Articulated bodies and TOACC both give Pinocchio's accelerations, rotors, friction and push included."""
-    found = largest_deviation(
+    deviation = largest_deviation(
         lambda case: solve(case.arm, case.q, case.qd, case.tau, wrench=case.wrench),
         lambda case: pin.aba(*case.driven, case.q, case.qd, case.tau - case.friction, case.push),
     )
-    assert found < AGREEMENT
+    assert deviation < AGREEMENT
 
 
 @pytest.mark.parametrize("solve", [forward_dynamics, toacc])
 def test_forward_dynamics_of_links_alone(solve: Callable[..., Array]) -> None:
     """So they do without drives."""
-    found = largest_deviation(
+    deviation = largest_deviation(
         lambda case: solve(case.arm, case.q, case.qd, case.tau, drives=False),
         lambda case: pin.aba(*case.links, case.q, case.qd, case.tau),
     )
-    assert found < AGREEMENT
+    assert deviation < AGREEMENT
 
 
 def test_terms() -> None:
     """Every cause asks of the joints what Pinocchio finds for it alone, and together they ask what it finds for all."""
 
     def ours(case: Case) -> dict[str, Array]:
-        found = terms(case.arm, case.q, case.qd, case.qdd, load=case.load, wrench=case.wrench)
-        return {name: getattr(found, name) for name in (*(field.name for field in attrs.fields(Terms)), "total")}
+        efforts = terms(case.arm, case.q, case.qd, case.qdd, load=case.load, wrench=case.wrench)
+        return {name: getattr(efforts, name) for name in (*(field.name for field in attrs.fields(Terms)), "total")}
 
     worst: dict[str, float] = {}
     for case in thousand_arms():
@@ -218,11 +218,11 @@ def _terms_of_pinocchio(case: Case) -> dict[str, Array]:
 
 def test_lagrange_euler_against_newton_euler() -> None:
     """Energies and free bodies lead to the same efforts, ten times closer than to those of Pinocchio."""
-    found = largest_deviation(
+    deviation = largest_deviation(
         lambda case: lagrange_euler(case.arm, case.q.tolist(), case.qd.tolist(), case.qdd.tolist()),
         lambda case: newton_euler(case.arm, case.q.tolist(), case.qd.tolist(), case.qdd.tolist()),
     )
-    assert found < TWO_WAYS
+    assert deviation < TWO_WAYS
 
 
 def test_skew_symmetry() -> None:

@@ -47,8 +47,8 @@ def test_graph_against_floats(name: str, rng: np.random.Generator) -> None:
 
         expected = np.array(EQUATIONS[name](arm, *numbers.tolist()))
 
-        found = evaluate(graph, outputs, numbers.ravel().tolist())
-        np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * max(1.0, np.abs(expected).max()))
+        values = evaluate(graph, outputs, numbers.ravel().tolist())
+        np.testing.assert_allclose(values, expected, rtol=0, atol=ROUNDING * max(1.0, np.abs(expected).max()))
 
 
 def test_articulated_bodies_grow_with_the_joints() -> None:

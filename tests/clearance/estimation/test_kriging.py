@@ -57,9 +57,9 @@ def test_slope_of_a_surface(known: Surrogate) -> None:
         (-0.2 * v * np.exp(-u * v), 1 - 0.2 * u * np.exp(-u * v)),
     ]
 
-    found = [process.gradient(np.array([u, v])) for process in known.processes]
+    result = [process.gradient(np.array([u, v])) for process in known.processes]
 
-    np.testing.assert_allclose(found, by_hand, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(result, by_hand, rtol=0, atol=2e-3)
 
 
 def test_noise_is_told_from_the_surface(rng: np.random.Generator) -> None:
@@ -67,8 +67,8 @@ def test_noise_is_told_from_the_surface(rng: np.random.Generator) -> None:
     points = design(256)
     shaken = smooth(points) + rng.normal(0.0, 0.05, (256, 2))
 
-    found = learn(NAMES, points, ("f", "g"), shaken)
-    mean, deviation = found.predict(np.array([[3e-4, 0.1]]))
+    surrogate = learn(NAMES, points, ("f", "g"), shaken)
+    mean, deviation = surrogate.predict(np.array([[3e-4, 0.1]]))
 
     np.testing.assert_allclose(deviation, 0.05, rtol=0.2)
     np.testing.assert_allclose(mean, smooth(np.array([[3e-4, 0.1]])), rtol=0, atol=0.03)
@@ -80,11 +80,11 @@ def test_what_surfaces_miss_together(rng: np.random.Generator) -> None:
     chance = 0.02 * rng.standard_normal(len(points))
     values = smooth(points) + np.stack([chance, -chance], axis=-1)
 
-    found = learn(NAMES, points, ("f", "g"), values)
+    surrogate = learn(NAMES, points, ("f", "g"), values)
 
-    assert found.correlation[0, 1] < -0.8
-    np.testing.assert_allclose(np.diag(found.correlation), 1.0)
-    assert found.select(("g",)).correlation.shape == (1, 1)
+    assert surrogate.correlation[0, 1] < -0.8
+    np.testing.assert_allclose(np.diag(surrogate.correlation), 1.0)
+    assert surrogate.select(("g",)).correlation.shape == (1, 1)
 
 
 def test_spread_of_single_runs_is_that_of_neighbours() -> None:
@@ -93,12 +93,12 @@ def test_spread_of_single_runs_is_that_of_neighbours() -> None:
     late = points[:, 0] > 3e-4
     spreads = np.where(late, 0.1, 0.0)[:, None] * [1.0, 0.0]
 
-    found = learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads)
-    _, deviation = found.predict(np.array([[1e-4, 0.1], [5e-4, 0.1]]))
+    surrogate = learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads)
+    _, deviation = surrogate.predict(np.array([[1e-4, 0.1], [5e-4, 0.1]]))
 
     np.testing.assert_allclose(deviation[1], (0.1, 0.0), rtol=0.05, atol=1e-3)
     assert deviation[0].max() < 0.02
-    assert found.select(("g",)).predict(points)[1].max() < 1e-3
+    assert surrogate.select(("g",)).predict(points)[1].max() < 1e-3
     with pytest.raises(ShapeError, match=r"spreads: expected \(256, 2\), as the values, got \(256, 1\)"):
         learn(NAMES, points, ("f", "g"), smooth(points), spreads=spreads[:, :1])
 
@@ -107,33 +107,33 @@ def test_inverse(known: Surrogate, rng: np.random.Generator) -> None:
     """Features of a known function tell the parameters that they are of."""
     true = rng.uniform(*np.array(list(BOUNDS.values())).T, (20, 2))
 
-    found = np.array([solve_features(known, one) for one in smooth(true)])
+    parameters = np.array([solve_features(known, features) for features in smooth(true)])
 
-    np.testing.assert_allclose((found - true) / [4e-4, 0.2], 0.0, rtol=0, atol=1e-3)
+    np.testing.assert_allclose((parameters - true) / [4e-4, 0.2], 0.0, rtol=0, atol=1e-3)
 
 
 def test_weights(known: Surrogate) -> None:
     """Where the features contradict one another, the one that is known better wins."""
     true = np.array([[2e-4, 0.05]])
     half = known.select(["f", "f", "g"])
-    seen = smooth(true)[0][[0, 0, 1]] + [0.0, 0.1, 0.0]
+    measured = smooth(true)[0][[0, 0, 1]] + [0.0, 0.1, 0.0]
 
-    first = solve_features(half, seen, [1e-4, 1.0, 1e-4])
-    second = solve_features(half, seen, [1.0, 1e-4, 1e-4])
+    first = solve_features(half, measured, [1e-4, 1.0, 1e-4])
+    second = solve_features(half, measured, [1.0, 1e-4, 1e-4])
 
-    np.testing.assert_allclose(half.predict(first[None])[0][0, 0], seen[0], rtol=0, atol=1e-3)
-    np.testing.assert_allclose(half.predict(second[None])[0][0, 1], seen[1], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(half.predict(first[None])[0][0, 0], measured[0], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(half.predict(second[None])[0][0, 1], measured[1], rtol=0, atol=1e-3)
 
 
 def test_many_points() -> None:
     """Of more points than are needed some are taken, the same for the same seed, spread over all."""
     points = design(512)
-    found = learn(NAMES, points, ("f",), smooth(points)[:, :1], seed=4)
+    surrogate = learn(NAMES, points, ("f",), smooth(points)[:, :1], seed=4)
     again = learn(NAMES, points, ("f",), smooth(points)[:, :1], seed=4)
 
-    assert len(found.processes[0].x) == MOST_POINTS
-    np.testing.assert_array_equal(found.processes[0].weights, again.processes[0].weights)
-    np.testing.assert_allclose(found.predict(points)[0], smooth(points)[:, :1], rtol=0, atol=5e-4)
+    assert len(surrogate.processes[0].x) == MOST_POINTS
+    np.testing.assert_array_equal(surrogate.processes[0].weights, again.processes[0].weights)
+    np.testing.assert_allclose(surrogate.predict(points)[0], smooth(points)[:, :1], rtol=0, atol=5e-4)
 
 
 def test_failed_runs_are_left_out(known: Surrogate) -> None:
@@ -142,20 +142,20 @@ def test_failed_runs_are_left_out(known: Surrogate) -> None:
     values = smooth(points)
     more = np.vstack([points, [[2e-4, 0.1], [3e-4, 0.15]]])
 
-    found = learn(
+    surrogate = learn(
         NAMES, more, ("f", "g"), np.vstack([values, [[np.nan, 1.0], [np.nan, np.nan]]]), ranges=list(BOUNDS.values())
     )
 
-    np.testing.assert_array_equal(found.processes[0].weights, known.processes[0].weights)
+    np.testing.assert_array_equal(surrogate.processes[0].weights, known.processes[0].weights)
 
 
 def test_progress() -> None:
     """Each feature is told before it is learnt."""
-    points, told = design(16), []
+    points, names = design(16), []
 
-    learn(NAMES, points, ("f", "g"), smooth(points), progress=told.append)
+    learn(NAMES, points, ("f", "g"), smooth(points), progress=names.append)
 
-    assert told == ["f", "g"]
+    assert names == ["f", "g"]
 
 
 class TestFiveBar:
@@ -166,45 +166,45 @@ class TestFiveBar:
 
         What impacts do to the amplitude is chance, and the surface says so: nine of ten lie within its 90 %.
         """
-        held = rng.uniform(*RANGE, (48, 3))
-        seen = swept.seen(held)
+        held_out = rng.uniform(*RANGE, (48, 3))
+        measured = swept.features(held_out)
 
-        mean, deviation = swept.surrogate.predict(held)
+        mean, deviation = swept.surrogate.predict(held_out)
 
-        part = ((mean - seen) ** 2).sum(axis=0) / ((seen - seen.mean(axis=0)) ** 2).sum(axis=0)
-        for name, one in zip(swept.surrogate.features, 1 - part, strict=True):
-            assert one > (0.99 if "amp" in name else 0.9994), name
+        part = ((mean - measured) ** 2).sum(axis=0) / ((measured - measured.mean(axis=0)) ** 2).sum(axis=0)
+        for name, accuracy_part in zip(swept.surrogate.features, 1 - part, strict=True):
+            assert accuracy_part > (0.99 if "amp" in name else 0.9994), name
         amplitudes = [i for i, name in enumerate(swept.surrogate.features) if "amp" in name]
-        inside = np.abs(mean - seen)[:, amplitudes] < 1.645 * deviation[:, amplitudes]
+        inside = np.abs(mean - measured)[:, amplitudes] < 1.645 * deviation[:, amplitudes]
         assert 0.8 < inside.mean() < 0.97
 
     @pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
     def test_all_features(self, swept: Swept, clearances: Array) -> None:
         """All features of the error curves together tell arms A and B to 99.99 % without noise."""
-        found = solve_features(swept.surrogate, swept.seen(clearances)[0])
+        parameters = solve_features(swept.surrogate, swept.features(clearances)[0])
 
-        assert accuracy(found, clearances) > 99.99 > WITHOUT_NOISE
+        assert accuracy(parameters, clearances) > 99.99 > WITHOUT_NOISE
 
     def test_held_out(self, swept: Swept, rng: np.random.Generator) -> None:
         """Forty arms that nothing was learnt from are told to 99.99 % on average, the worst to 99.9 %."""
         true = rng.uniform(*RANGE, (40, 3))
 
-        found = [solve_features(swept.surrogate, one) for one in swept.seen(true)]
+        parameters = [solve_features(swept.surrogate, row) for row in swept.features(true)]
 
-        right = accuracy(found, true)
+        right = accuracy(parameters, true)
         assert right.mean() > 99.99
         assert right.min() > 99.9 > WITHOUT_NOISE
 
     def test_more_features_tell_more(self, swept: Swept, rng: np.random.Generator) -> None:
         """The thesis' way, one feature of three paths, tells less than its three features together, and these 99 %."""
         true = rng.uniform(*RANGE, (20, 3))
-        seen = swept.seen(true)
+        measured = swept.features(true)
         names = swept.surrogate.features
 
         def right(chosen: Callable[[str], bool]) -> float:
             some = [i for i, name in enumerate(names) if chosen(name)]
             part = swept.surrogate.select([names[i] for i in some])
-            return float(np.median(accuracy([solve_features(part, one) for one in seen[:, some]], true)))
+            return float(np.median(accuracy([solve_features(part, row) for row in measured[:, some]], true)))
 
         amplitude, nine = right(lambda name: "amp_dc" in name), right(lambda name: "offset" not in name)
         assert amplitude < 97
@@ -218,8 +218,8 @@ class TestFiveBar:
         rested = rest_offsets(swept.task.linkage, STARTS, swept.points)
 
         for k, path in enumerate(PATHS):
-            found = np.stack([swept.values[f"{path}_offset_{axis}"] for axis in "xy"], axis=-1)
-            np.testing.assert_allclose(found, rested[:, k], rtol=0, atol=1e-12)
+            result = np.stack([swept.values[f"{path}_offset_{axis}"] for axis in "xy"], axis=-1)
+            np.testing.assert_allclose(result, rested[:, k], rtol=0, atol=1e-12)
 
 
 def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,7 +240,7 @@ def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "error", "said"),
+    ("change", "error", "message"),
     [
         ({"values": np.zeros((16, 3))}, ShapeError, r"expected \(m, 2\) points and \(m, 2\) values, got \(16, 2\) and"),
         (
@@ -254,10 +254,10 @@ def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"ranges": [(1e-4, 3e-4), (0.0, 0.2)]}, InvalidValueError, "ranges: a point lies outside"),
     ],
 )
-def test_bad_tables(change: dict[str, Any], error: type[Exception], said: str) -> None:
+def test_bad_tables(change: dict[str, Any], error: type[Exception], message: str) -> None:
     """Tables that do not fit, too few runs, and parameters that do not vary are told."""
     points = design(16)
-    with pytest.raises(error, match=said):
+    with pytest.raises(error, match=message):
         learn(**{"parameters": NAMES, "points": points, "features": ("f", "g"), "values": smooth(points), **change})
 
 
@@ -272,9 +272,9 @@ def test_feature_of_chance_alone_teaches_nothing(rng: np.random.Generator) -> No
     x = rng.random((96, 3))
     values = np.column_stack([x @ [1.0, 0.5, 0.2], rng.standard_normal(96)])
 
-    found = learn("pqr", x, ("smooth", "chance"), values, ranges=[(0, 1)] * 3)
+    surrogate = learn("pqr", x, ("smooth", "chance"), values, ranges=[(0, 1)] * 3)
 
     new = rng.random((200, 3))
-    mean, deviation = found.predict(new)
+    mean, deviation = surrogate.predict(new)
     assert np.abs(mean[:, 0] - new @ [1.0, 0.5, 0.2]).max() < 1e-2
     assert np.median(deviation[:, 1]) > 0.7 * values[:, 1].std()

@@ -24,9 +24,9 @@ def rest_file(path: Path, unit: str, scale: float, offsets: Array, order: Callab
     """Readings (k, r, 2) of offsets at the three starts, with the columns in some order."""
     names = order(["pose", f"commanded_x_{unit}", f"commanded_y_{unit}", f"x_{unit}", f"y_{unit}"])
     rows = [",".join(names)]
-    for i, (place, own) in enumerate(zip(STARTS, offsets, strict=True)):
-        for off in own:
-            cells = [f"P{i}", *(f"{x * scale:.9f}" for x in (*place, *(place + off)))]
+    for i, (pose, own) in enumerate(zip(STARTS, offsets, strict=True)):
+        for offset in own:
+            cells = [f"P{i}", *(f"{x * scale:.9f}" for x in (*pose, *(pose + offset)))]
             rows.append(",".join(order(cells)))
     path.write_text("\n".join(rows) + "\n", encoding="utf-8")
     return path
@@ -38,13 +38,13 @@ def test_rest_in_any_unit(unit: str, scale: float, tmp_path: Path, five_bar: Lin
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     path = rest_file(tmp_path / "rest.csv", unit, scale, offsets[:, None], lambda cells: cells[::-1])
 
-    found = read_measured(path)
+    measurement = read_measured(path)
 
-    assert isinstance(found, RestMeasurement)
-    assert (found.names, found.readings, found.noise) == (("P0", "P1", "P2"), (1, 1, 1), None)
-    np.testing.assert_allclose(found.poses, STARTS, rtol=0, atol=WRITTEN)
-    np.testing.assert_allclose(found.offsets, offsets, rtol=0, atol=2 * WRITTEN)
-    assert accuracy(found.estimate(five_bar).values, ARM_A) > 99.99
+    assert isinstance(measurement, RestMeasurement)
+    assert (measurement.names, measurement.readings, measurement.noise) == (("P0", "P1", "P2"), (1, 1, 1), None)
+    np.testing.assert_allclose(measurement.poses, STARTS, rtol=0, atol=WRITTEN)
+    np.testing.assert_allclose(measurement.offsets, offsets, rtol=0, atol=2 * WRITTEN)
+    assert accuracy(measurement.estimate(five_bar).values, ARM_A) > 99.99
 
 
 def test_repeated_readings(tmp_path: Path, five_bar: Linkage, rng: np.random.Generator) -> None:
@@ -53,26 +53,26 @@ def test_repeated_readings(tmp_path: Path, five_bar: Linkage, rng: np.random.Gen
     noise = rng.normal(0.0, sigma, (3, count, 2))
     offsets = rest_offsets(five_bar, STARTS, ARM_A)[:, None] + noise
 
-    found = read_measured(rest_file(tmp_path / "rest.csv", "mm", 1e3, offsets, list))
+    measurement = read_measured(rest_file(tmp_path / "rest.csv", "mm", 1e3, offsets, list))
 
-    assert isinstance(found, RestMeasurement)
-    assert found.readings == (count,) * 3
-    np.testing.assert_allclose(found.offsets, offsets.mean(axis=1), rtol=0, atol=WRITTEN)
-    assert found.noise == pytest.approx(sigma, rel=0.1)
-    own, told = found.estimate(five_bar), found.estimate(five_bar, 4 * sigma)
-    np.testing.assert_allclose(told.deviations / own.deviations, 4.0, rtol=0.1)
+    assert isinstance(measurement, RestMeasurement)
+    assert measurement.readings == (count,) * 3
+    np.testing.assert_allclose(measurement.offsets, offsets.mean(axis=1), rtol=0, atol=WRITTEN)
+    assert measurement.noise == pytest.approx(sigma, rel=0.1)
+    own, wider = measurement.estimate(five_bar), measurement.estimate(five_bar, 4 * sigma)
+    np.testing.assert_allclose(wider.deviations / own.deviations, 4.0, rtol=0.1)
 
 
 def path_rows(noise: Array | None = None, name: str = "y1", unit: str = "mm", seconds: str = "s") -> list[str]:
     """A run along a path with an error of 0.3 and -0.4 mm, every millisecond."""
-    wanted = named_path(name)
-    t = np.linspace(0.0, wanted.duration, round(wanted.duration / 1e-3) + 1)
+    path = named_path(name)
+    t = np.linspace(0.0, path.duration, round(path.duration / 1e-3) + 1)
     scale, tick = {"m": 1.0, "mm": 1e3}[unit], {"s": 1.0, "ms": 1e3}[seconds]
-    places = wanted.evaluate(t).position + (3e-4, -4e-4) + (0.0 if noise is None else noise)
+    positions = path.evaluate(t).position + (3e-4, -4e-4) + (0.0 if noise is None else noise)
     head = f"path,t_{seconds},x_{unit},y_{unit}"
     return [
         head,
-        *(f"{name},{a * tick:.9g},{x * scale:.12g},{y * scale:.12g}" for a, (x, y) in zip(t, places, strict=True)),
+        *(f"{name},{a * tick:.9g},{x * scale:.12g},{y * scale:.12g}" for a, (x, y) in zip(t, positions, strict=True)),
     ]
 
 
@@ -90,12 +90,12 @@ def test_paths(unit: str, seconds: str, tmp_path: Path) -> None:
         *path_rows(name="x2", unit=unit, seconds=seconds)[1:],
     ]
 
-    found = read_measured(written(tmp_path / "paths.csv", rows))
+    measurement = read_measured(written(tmp_path / "paths.csv", rows))
 
-    assert isinstance(found, PathMeasurement)
-    assert list(found.errors) == ["y1", "x2"]
-    np.testing.assert_allclose(found.errors["x2"], np.broadcast_to((3e-4, -4e-4), (291, 2)), rtol=0, atol=WRITTEN)
-    features = found.features()["y1"]
+    assert isinstance(measurement, PathMeasurement)
+    assert list(measurement.errors) == ["y1", "x2"]
+    np.testing.assert_allclose(measurement.errors["x2"], np.broadcast_to((3e-4, -4e-4), (291, 2)), rtol=0, atol=WRITTEN)
+    features = measurement.features()["y1"]
     assert features.intercept == pytest.approx(5e-4, abs=WRITTEN)
     assert features.amp_dc == pytest.approx(1e-3, abs=WRITTEN)
     assert abs(features.slope) < 1e-7
@@ -103,22 +103,22 @@ def test_paths(unit: str, seconds: str, tmp_path: Path) -> None:
 
 def test_pick_and_place(tmp_path: Path) -> None:
     """The pick-and-place path can be measured too."""
-    found = read_measured(written(tmp_path / "paths.csv", path_rows(name="pick-and-place")))
+    measurement = read_measured(written(tmp_path / "paths.csv", path_rows(name="pick-and-place")))
 
-    assert isinstance(found, PathMeasurement)
-    assert found.times["pick-and-place"][-1] == pytest.approx(0.5)
+    assert isinstance(measurement, PathMeasurement)
+    assert measurement.times["pick-and-place"][-1] == pytest.approx(0.5)
 
 
 def test_noise_of_features(tmp_path: Path, rng: np.random.Generator) -> None:
     """What noise of the samples does to the features is what many noisy runs show."""
-    found = read_measured(written(tmp_path / "paths.csv", path_rows()))
-    assert isinstance(found, PathMeasurement)
+    measurement = read_measured(written(tmp_path / "paths.csv", path_rows()))
+    assert isinstance(measurement, PathMeasurement)
     names, noise = ("y1_intercept", "y1_slope", "y1_offset_x"), 10e-6
 
-    covariance = found.feature_covariance(names, noise, draws=800)
+    covariance = measurement.feature_covariance(names, noise, draws=800)
 
-    error = found.errors["y1"]
-    many = features_of(found.times["y1"], error + noise * rng.standard_normal((800, *error.shape)))
+    error = measurement.errors["y1"]
+    many = features_of(measurement.times["y1"], error + noise * rng.standard_normal((800, *error.shape)))
     table = np.stack([many.intercept, many.slope, many.offset_x], axis=-1)
     # The standard deviation of a variance of 800 draws is 5 %.
     np.testing.assert_allclose(np.diag(covariance), table.var(axis=0, ddof=1), rtol=0.3)
@@ -128,20 +128,20 @@ def test_noise_of_features(tmp_path: Path, rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(covariance, covariance.T)
 
 
-REST = ["pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm", "P1,-150,-700,-150.1,-700.5", "P2,150,-700,150.1,-700.5"]
+REST_ROWS = ["pose,commanded_x_mm,commanded_y_mm,x_mm,y_mm", "P1,-150,-700,-150.1,-700.5", "P2,150,-700,150.1,-700.5"]
 
 
 def changed(row: int, old: str, new: str) -> list[str]:
-    assert old in REST[row]
-    return [*REST[:row], REST[row].replace(old, new), *REST[row + 1 :]]
+    assert old in REST_ROWS[row]
+    return [*REST_ROWS[:row], REST_ROWS[row].replace(old, new), *REST_ROWS[row + 1 :]]
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "message"),
     [
         ([], "the file is empty; its first line should name the columns"),
         (["", "  "], "the file is empty"),
-        (REST[:1], ": no rows below the names of the columns"),
+        (REST_ROWS[:1], ": no rows below the names of the columns"),
         (
             changed(0, "x_mm,y_mm", "x_m,y_m"),
             ":1: x_m: lengths have one unit in a file, and commanded",
@@ -165,21 +165,21 @@ def changed(row: int, old: str, new: str) -> list[str]:
         (changed(2, "150.1", "nan"), ":3: x_mm: every number must be finite and no larger than 1e+100, got nan"),
         (changed(2, "150.1", "inf"), ":3: x_mm: every number must be finite and no larger than 1e+100, got inf"),
         (changed(2, "150.1", "-"), ":3: x_mm: expected a number, got '-'"),
-        ([*REST, "P1,-140,-700,-140.1,-700.5"], ":2: P1: this pose is commanded at different positions"),
-        ([row.replace("_mm", "_m") for row in REST], "is 509.9 m from its commanded position"),
+        ([*REST_ROWS, "P1,-140,-700,-140.1,-700.5"], ":2: P1: this pose is commanded at different positions"),
+        ([row.replace("_mm", "_m") for row in REST_ROWS], "is 509.9 m from its commanded position"),
         (changed(2, "150.1", "-150.1"), ":3: P2: the tip is 300.1 mm from its commanded position; are"),
         (changed(1, "P1", ""), ":2: pose: empty; expected a word"),
-        ([*REST, "P1," + "7" * 200_000 + ",0,0,0"], "not valid CSV: field larger than field limit"),
+        ([*REST_ROWS, "P1," + "7" * 200_000 + ",0,0,0"], "not valid CSV: field larger than field limit"),
     ],
 )
-def test_mistakes_at_rest(rows: list[str], said: str, tmp_path: Path) -> None:
+def test_mistakes_at_rest(rows: list[str], message: str, tmp_path: Path) -> None:
     """Every mistake in a file of readings is told with its line and what is expected."""
-    if said.startswith("is 509.9"):
+    if message.startswith("is 509.9"):
         # Metres by their names, millimetres by their numbers: half a millimetre has become half a metre.
-        said = "the tip is 509.9 mm from its commanded position; are the units right"
+        message = "the tip is 509.9 mm from its commanded position; are the units right"
     with pytest.raises(FileFormatError) as caught:
         read_measured(written(tmp_path / "rest.csv", rows))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
     assert str(caught.value).startswith(str(tmp_path / "rest.csv"))
 
 
@@ -188,7 +188,7 @@ def path_slip(change: Callable[[list[str]], list[str]]) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "message"),
     [
         (path_slip(lambda rows: [row.replace("y1,", "y15,") for row in rows]), ":2: path: no path 'y15'. Did you mean"),
         (path_slip(lambda rows: [*rows[:100], *rows[101:]]), ":101: t_s: samples must be equally spaced in time"),
@@ -214,11 +214,11 @@ def path_slip(change: Callable[[list[str]], list[str]]) -> list[str]:
         ),
     ],
 )
-def test_mistakes_on_paths(rows: list[str], said: str, tmp_path: Path) -> None:
+def test_mistakes_on_paths(rows: list[str], message: str, tmp_path: Path) -> None:
     """Every mistake in a file of runs is told, too: gaps, repeats, wrong units, a part of a path, an unknown path."""
     with pytest.raises(FileFormatError) as caught:
         read_measured(written(tmp_path / "paths.csv", rows))
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_no_such_file(tmp_path: Path) -> None:
@@ -236,28 +236,28 @@ def test_bytes_that_are_no_text(tmp_path: Path) -> None:
 
 def test_spreadsheets(tmp_path: Path) -> None:
     """A spreadsheet's mark at the start of a file, and capitals or blanks in the names, do no harm."""
-    text = "\ufeff" + "\r\n".join(["Pose , Commanded_X_mm,commanded_y_mm, X_MM,y_mm", *REST[1:]])
+    text = "\ufeff" + "\r\n".join(["Pose , Commanded_X_mm,commanded_y_mm, X_MM,y_mm", *REST_ROWS[1:]])
     (tmp_path / "rest.csv").write_text(text, encoding="utf-8", newline="")
 
-    found = read_measured(tmp_path / "rest.csv")
+    measurement = read_measured(tmp_path / "rest.csv")
 
-    assert isinstance(found, RestMeasurement)
-    np.testing.assert_allclose(found.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
+    assert isinstance(measurement, RestMeasurement)
+    np.testing.assert_allclose(measurement.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
 
 
 def test_tracker_export(tmp_path: Path) -> None:
     """Nominal and measured columns, semicolons, decimal commas, other names and a gap, as an instrument writes them."""
     rows = ["Pkt;X nominal [mm];Y nominal [mm];X measured [mm];Y measured [mm]"]
-    rows += [row.replace(",", ";").replace(".", ",") for row in [*REST[1:], "P2,150,-700,,-700.5"]]
+    rows += [row.replace(",", ";").replace(".", ",") for row in [*REST_ROWS[1:], "P2,150,-700,,-700.5"]]
 
     with pytest.warns(
         IncompleteRowsWarning, match=r"1 row left out for empty cells, 2 read: X measured \[mm\] in line 4"
     ):
-        found = read_measured(written(tmp_path / "rest.csv", rows), columns={"pkt": "pose"}, skip_incomplete=True)
+        measurement = read_measured(written(tmp_path / "rest.csv", rows), columns={"pkt": "pose"}, skip_incomplete=True)
 
-    assert isinstance(found, RestMeasurement)
-    assert found.names == ("P1", "P2")
-    np.testing.assert_allclose(found.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
+    assert isinstance(measurement, RestMeasurement)
+    assert measurement.names == ("P1", "P2")
+    np.testing.assert_allclose(measurement.offsets, [(-1e-4, -5e-4), (1e-4, -5e-4)], rtol=0, atol=WRITTEN)
 
 
 def test_few_readings_make_intervals_wider() -> None:
@@ -284,9 +284,11 @@ def test_unknown_noise_is_what_is_left(rng: np.random.Generator) -> None:
     offsets = rest_offsets(linkage, poses, true) + rng.normal(0.0, 2e-5, poses.shape)
     names = tuple(map(str, range(12)))
 
-    found = RestMeasurement(names=names, poses=poses, offsets=offsets, readings=(1,) * 12, noise=None).estimate(linkage)
+    result = RestMeasurement(names=names, poses=poses, offsets=offsets, readings=(1,) * 12, noise=None).estimate(
+        linkage
+    )
 
-    assert found.noise == pytest.approx(2e-5, rel=0.5)
-    assert found.noise_freedom == 21
-    low, high = found.interval(0.999).T
+    assert result.noise == pytest.approx(2e-5, rel=0.5)
+    assert result.noise_freedom == 21
+    low, high = result.interval(0.999).T
     assert np.all((low <= true) & (true <= high))

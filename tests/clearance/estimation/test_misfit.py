@@ -21,7 +21,9 @@ from samples import Sample
 
 def doubled(linkage: Linkage) -> Linkage:
     """The same with twice the payload."""
-    return attrs.evolve(linkage, loads=tuple(attrs.evolve(one, force=2 * np.array(one.force)) for one in linkage.loads))
+    return attrs.evolve(
+        linkage, loads=tuple(attrs.evolve(load, force=2 * np.array(load.force)) for load in linkage.loads)
+    )
 
 
 def at_rest(poses: Array, offsets: Array) -> RestMeasurement:
@@ -45,31 +47,31 @@ def test_refusal_names_what_is_far_off_and_what_is_at_a_bound() -> None:
     with pytest.raises(ContradictionError) as refused:
         refuse_contradiction(1e-9, [("a", 1.0), ("b", -7.0), ("c", 5.0), ("d", 0.1)], ["J2 at 0.5 mm"])
 
-    said = str(refused.value)
-    assert "the data contradict the model" in said
-    assert "b by -7, c by +5, a by +1; at a bound: J2 at 0.5 mm; check the payload" in said
+    message = str(refused.value)
+    assert "the data contradict the model" in message
+    assert "b by -7, c by +5, a by +1; at a bound: J2 at 0.5 mm; check the payload" in message
 
 
 def test_bound_at_rest(five_bar: Linkage) -> None:
     """Offsets that would need a clearance below nothing leave it at nothing, and the others make up for it."""
     offsets = rest_offsets(five_bar, STARTS, (0.3e-3, 0.2e-3, 1e-7)) + np.array((2e-6, 0.0))
 
-    found = estimate_at_rest(five_bar, STARTS, offsets, 2e-6)
+    estimate = estimate_at_rest(five_bar, STARTS, offsets, 2e-6)
 
-    assert found.at_bound.tolist() == [False, False, True]
-    assert found.identifiable(1e-3) == (True, True, False)
+    assert estimate.at_bound.tolist() == [False, False, True]
+    assert estimate.identifiable(1e-3) == (True, True, False)
     # No other pair of the two that are left leaves less.
     for step in (1e-7, -1e-7):
         for pin in range(2):
-            other = offsets - rest_offsets(five_bar, STARTS, found.values + step * np.eye(3)[pin])
-            assert np.sum(other**2) > np.sum(found.residuals**2)
+            other = offsets - rest_offsets(five_bar, STARTS, estimate.values + step * np.eye(3)[pin])
+            assert np.sum(other**2) > np.sum(estimate.residuals**2)
 
 
 @pytest.mark.parametrize("fault", ["none", "noise understated", "sign", "swapped"])
 @pytest.mark.drawn(0.34)
 def test_attacked_at_rest(five_bar: Linkage, fault: str, sample: Sample) -> None:
     """Resting tips with a fault are refused, or their intervals grow; nothing is told of columns that are swapped."""
-    told = held = refused = 0
+    identified = covered = refused = 0
     count = sample.count(300)
     for rng in sample.cases(300):
         c, k = rng.uniform(*RANGE, 3), int(rng.integers(3, 8))
@@ -78,25 +80,27 @@ def test_attacked_at_rest(five_bar: Linkage, fault: str, sample: Sample) -> None
         offsets = rest_offsets(five_bar, poses, c) + rng.normal(0.0, noise, poses.shape)
         offsets = {"sign": -offsets, "swapped": offsets[:, ::-1]}.get(fault, offsets)
         try:
-            found = at_rest(poses, offsets).estimate(five_bar, noise / 3 if fault == "noise understated" else noise)
+            result = at_rest(poses, offsets).estimate(five_bar, noise / 3 if fault == "noise understated" else noise)
         except ContradictionError:
             refused += 1
             continue
-        low, high = found.interval(0.9).T
-        sure = np.array(found.identifiable(float(found.values.max())))
-        told, held = told + int(sure.sum()), held + int((sure & (low <= c) & (c <= high)).sum())
-    sample.record(f"resting tips, fault: {fault}", count, told - held, refused=refused, told=told, held=held)
+        low, high = result.interval(0.9).T
+        sure = np.array(result.identifiable(float(result.values.max())))
+        identified, covered = identified + int(sure.sum()), covered + int((sure & (low <= c) & (c <= high)).sum())
+    sample.record(
+        f"resting tips, fault: {fault}", count, identified - covered, refused=refused, told=identified, held=covered
+    )
 
     if fault in {"sign", "swapped"}:
         assert refused == count
     elif fault == "none":
         assert refused <= 1
         # Nine in ten; correlated within one arm.
-        assert held >= 0.8 * told
+        assert covered >= 0.8 * identified
     else:
         assert refused > 0.4 * count
         # Intervals that do not grow would hold the truth in less than half of all cases.
-        assert told < 60 or held >= 0.5 * told
+        assert identified < 60 or covered >= 0.5 * identified
 
 
 def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.Generator) -> PathMeasurement:
@@ -121,15 +125,15 @@ def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: 
         model = doubled(five_bar) if fault == "payload" else five_bar
         measured = measured_on_paths(model, rng.uniform(*RANGE, 3), 2e-6, rng)
         turned = {"sign": lambda x: -x, "swapped": lambda x: x[:, ::-1]}.get(fault, lambda x: x)
-        measured = attrs.evolve(measured, errors={name: turned(one) for name, one in measured.errors.items()})
+        measured = attrs.evolve(measured, errors={name: turned(curve) for name, curve in measured.errors.items()})
         features = measured.features()
-        seen = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
-        found = posterior(swept.surrogate, seen, measured.feature_covariance(swept.surrogate.features, 2e-6))
+        values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
+        distribution = posterior(swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6))
         try:
-            found.checked()
+            distribution.checked()
         except ContradictionError as error:
             refused += "the data contradict the model" in str(error)
-        assert not any(found.identifiable[name] for name in found.bounds)
+        assert not any(distribution.identifiable[name] for name in distribution.bounds)
     assert refused == count or (fault == "payload" and (refused >= 0.5 * count or not sample.whole))
     sample.record(f"tips on paths, fault: {fault}", count, 0, refused=refused)
 
@@ -138,20 +142,22 @@ def test_beyond_the_sweep(swept: Swept, five_bar: Linkage, rng: np.random.Genera
     """A clearance beyond the end of the sweep is not told with the deviation that the end makes small."""
     measured = measured_on_paths(five_bar, np.array((0.3e-3, 0.2e-3, 0.503e-3)), 2e-6, rng)
     features = measured.features()
-    seen = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
+    values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 
-    found = posterior(swept.surrogate, seen, measured.feature_covariance(swept.surrogate.features, 2e-6))
+    distribution = posterior(swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6))
 
-    assert found.bounds == {"c_J4": 0.5e-3}
-    assert found.identifiable["c_J4"] is False
+    assert distribution.bounds == {"c_J4": 0.5e-3}
+    assert distribution.identifiable["c_J4"] is False
 
 
 def test_arm_of_the_model_is_not_refused(swept: Swept, five_bar: Linkage, rng: np.random.Generator) -> None:
     """Arm A on the paths of the sweep is explained, and its clearances lie within their intervals."""
     measured = measured_on_paths(five_bar, ARM_A, 2e-6, rng)
     features = measured.features()
-    seen = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
+    values = [float(getattr(features[path], feature)) for path in PATHS for feature in FEATURES]
 
-    found = posterior(swept.surrogate, seen, measured.feature_covariance(swept.surrogate.features, 2e-6)).checked()
+    distribution = posterior(
+        swept.surrogate, values, measured.feature_covariance(swept.surrogate.features, 2e-6)
+    ).checked()
 
-    assert np.all(np.abs(found.mean - ARM_A) < 4 * found.deviations)
+    assert np.all(np.abs(distribution.mean - ARM_A) < 4 * distribution.deviations)

@@ -18,7 +18,7 @@ from clearance.conftest import RANGE
 from cli_calls import armwright
 from samples import Sample
 
-REST = Path(__file__).parents[3] / "examples" / "five_bar_rest.csv"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "five_bar_rest.csv"
 # Up to here a fault is small enough that its shift of the tip is proportional to it.
 SMALL = {"1": 0.5, "m": 2e-3, "rad": 5e-3}
 NOISE = 1e-6
@@ -43,14 +43,16 @@ def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -
     for rng in sample.cases(300):
         c, k = rng.uniform(*RANGE, 3), int(rng.integers(4, 9))
         poses = np.column_stack([rng.uniform(-0.18, 0.18, k), rng.uniform(-0.7, -0.45, k)])
-        found = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, c), NOISE)
-        seen = [one for one in model_errors(five_bar, poses, found) if one.detectable_from < SMALL[one.unit]]
+        estimate = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, c), NOISE)
+        detectable = [
+            error for error in model_errors(five_bar, poses, estimate) if error.detectable_from < SMALL[error.unit]
+        ]
         # Load and masses, lengths, zeros: none is left out because others are more.
-        kind = rng.choice(sorted({one.unit for one in seen}))
-        one = rng.choice(np.array([i for i, fault in enumerate(seen) if fault.unit == kind]))
+        kind = rng.choice(sorted({error.unit for error in detectable}))
+        error = rng.choice(np.array([i for i, fault in enumerate(detectable) if fault.unit == kind]))
         noise = rng.normal(0.0, NOISE, poses.shape)
         offsets = [
-            offsets_of_wrong_model(five_bar, poses, c, seen[one].name, part * seen[one].detectable_from)
+            offsets_of_wrong_model(five_bar, poses, c, detectable[error].name, part * detectable[error].detectable_from)
             for part in (1.0, 0.2)
         ]
         count += 1
@@ -66,20 +68,20 @@ def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -
 
 def test_shifts_of_clearances(five_bar: Linkage) -> None:
     """A model that is wrong by a little shifts the clearances by what is told."""
-    found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
+    estimate = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
     usual = {"1": 0.05, "m": 5e-5, "rad": 2e-4}
 
-    for one in model_errors(five_bar, STARTS, found):
-        by = usual[one.unit]
-        offsets = offsets_of_wrong_model(five_bar, STARTS, ARM_A, one.name, by)
+    for error in model_errors(five_bar, STARTS, estimate):
+        amount = usual[error.unit]
+        offsets = offsets_of_wrong_model(five_bar, STARTS, ARM_A, error.name, amount)
         shifted = estimate_at_rest(five_bar, STARTS, offsets, NOISE).values - ARM_A
-        np.testing.assert_allclose(shifted, by * one.shifts, rtol=0.1, atol=2e-7, err_msg=one.name)
+        np.testing.assert_allclose(shifted, amount * error.shifts, rtol=0.1, atol=2e-7, err_msg=error.name)
 
 
 def test_play_and_length_look_alike(five_bar: Linkage) -> None:
     """A rod that is longer than in the model looks like play in its pin: it is hardly seen, and shifts J2 as much."""
-    found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
-    by_name = {one.name: one for one in model_errors(five_bar, STARTS, found)}
+    estimate = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
+    by_name = {error.name: error for error in model_errors(five_bar, STARTS, estimate)}
 
     rod, crank = by_name["length of link2"], by_name["length of link1"]
     assert 0.9 < abs(rod.shifts[0]) < 1.3
@@ -91,20 +93,22 @@ def test_play_and_length_look_alike(five_bar: Linkage) -> None:
 def test_nothing_contradicts(five_bar: Linkage) -> None:
     """Without numbers to spare, or without a known noise, no wrong model is ever seen."""
     for poses, known in ((STARTS[:2], True), (STARTS, False)):
-        found = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A), NOISE)
-        told = model_errors(five_bar, poses, found, noise_is_known=known)
-        assert all(np.isinf(one.detectable_from) for one in told) == (not known or found.degrees_of_freedom < 1)
+        estimate = estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A), NOISE)
+        errors = model_errors(five_bar, poses, estimate, noise_is_known=known)
+        assert all(np.isinf(error.detectable_from) for error in errors) == (
+            not known or estimate.degrees_of_freedom < 1
+        )
 
 
 def test_told_by_the_command() -> None:
     """An estimate at rest says what its readings would contradict, as a table and as data."""
-    text = armwright("clearance", "estimate", "five-bar", REST, columns=120).stdout
-    told = json.loads(armwright("clearance", "estimate", "five-bar", REST, "--json").stdout)["model_errors"]
+    text = armwright("clearance", "estimate", "five-bar", EXAMPLE, columns=120).stdout
+    errors = json.loads(armwright("clearance", "estimate", "five-bar", EXAMPLE, "--json").stdout)["model_errors"]
 
     lines = {line.split("  ")[0].strip(): line for line in text.splitlines()}
     assert "beyond 100 %" in lines["load at link3:J3"]
     assert "0.1 mm" in lines["length of link2"]
     assert "Smaller errors are taken for clearance: they shift the estimates in proportion" in " ".join(text.split())
-    by_name = {error["name"]: error for error in told}
+    by_name = {error["name"]: error for error in errors}
     assert by_name["load at link3:J3"]["unit"] == "1"
     assert set(by_name["zero of link1"]["shifts"]) == {"J2", "J3", "J4"}

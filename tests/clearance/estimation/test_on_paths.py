@@ -29,21 +29,21 @@ STRAIGHT = ("slope", "intercept")
 def folder(five_bar: Linkage, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sweep of 32 linkages on a quiet path, and on one that rattles from the start."""
     task = FeatureSweep(linkage=five_bar, paths=("y1", "y13"))
-    place = tmp_path_factory.mktemp("sweep") / "out"
-    run(task, sobol(dict.fromkeys(task.parameters, RANGE), 32, 0), place, workers=1).close()
-    return place
+    output = tmp_path_factory.mktemp("sweep") / "out"
+    run(task, sobol(dict.fromkeys(task.parameters, RANGE), 32, 0), output, workers=1).close()
+    return output
 
 
 def test_chance_is_left_out_and_named(folder: Path, five_bar: Linkage) -> None:
     """Of two paths the straight part of the one that rattles teaches nothing; all else is learnt with its spread."""
-    found = surrogate_from_sweep(folder, five_bar, ("y1", "y13"), (*STRAIGHT, "amp_dc"))
+    sweep = surrogate_from_sweep(folder, five_bar, ("y1", "y13"), (*STRAIGHT, "amp_dc"))
 
-    assert found.random_features == ("y13_slope", "y13_intercept")
-    assert found.surrogate.features == ("y1_slope", "y1_intercept", "y1_amp_dc", "y13_amp_dc")
-    assert 2 * found.predictable_until["y13"] < 0.2 < found.predictable_until["y1"]
-    assert found.runs == 32
-    assert found.surrogate.spreads is not None
-    _, deviation = found.surrogate.predict(np.full((1, 3), 0.3e-3))
+    assert sweep.random_features == ("y13_slope", "y13_intercept")
+    assert sweep.surrogate.features == ("y1_slope", "y1_intercept", "y1_amp_dc", "y13_amp_dc")
+    assert 2 * sweep.predictable_until["y13"] < 0.2 < sweep.predictable_until["y1"]
+    assert sweep.runs == 32
+    assert sweep.surrogate.spreads is not None
+    _, deviation = sweep.surrogate.predict(np.full((1, 3), 0.3e-3))
     # The mean error of y13 differs by tens of micrometres from run to run, and that of y1 by less than one.
     assert deviation[0, 3] > 10e-6
 
@@ -110,6 +110,6 @@ def test_without_runs_beside_each(five_bar: Linkage, tmp_path: Path) -> None:
     task = FeatureSweep(linkage=five_bar, paths=("y1",), replicates=0)
     run(task, sobol(dict.fromkeys(task.parameters, RANGE), 16, 0), tmp_path / "out", workers=1).close()
 
-    found = surrogate_from_sweep(tmp_path / "out", five_bar, ("y1",), STRAIGHT)
+    sweep = surrogate_from_sweep(tmp_path / "out", five_bar, ("y1",), STRAIGHT)
 
-    assert (found.random_features, found.predictable_until, found.surrogate.spreads) == ((), {}, None)
+    assert (sweep.random_features, sweep.predictable_until, sweep.surrogate.spreads) == ((), {}, None)

@@ -57,96 +57,98 @@ TRUE = np.array((0.45, 0.5, 0.6))
 class TestLinear:
     """Features that are linear in the parameters: the posterior is a Gaussian that one can write down."""
 
-    def check(self, found: Posterior, mean: Array, covariance: Array) -> None:
+    def check(self, distribution: Posterior, mean: Array, covariance: Array) -> None:
         """Means, deviations and correlations are those of the Gaussian."""
         deviations = np.sqrt(np.diag(covariance))
-        np.testing.assert_allclose((found.mean - mean) / deviations, 0.0, rtol=0, atol=MEAN)
-        np.testing.assert_allclose(found.deviations, deviations, rtol=SPREAD)
-        np.testing.assert_allclose(found.correlation, covariance / np.outer(deviations, deviations), rtol=0, atol=0.1)
+        np.testing.assert_allclose((distribution.mean - mean) / deviations, 0.0, rtol=0, atol=MEAN)
+        np.testing.assert_allclose(distribution.deviations, deviations, rtol=SPREAD)
+        np.testing.assert_allclose(
+            distribution.correlation, covariance / np.outer(deviations, deviations), rtol=0, atol=0.1
+        )
 
     def test_closed_form(self) -> None:
         """Mean and covariance are (Jᵀ S⁻¹ J)⁻¹ Jᵀ S⁻¹ y and (Jᵀ S⁻¹ J)⁻¹, with each feature's own noise."""
         noise = np.array((0.01, 0.02, 0.03, 0.02, 0.01))
-        seen = J @ TRUE + noise * np.array((0.5, -1.0, 0.3, 0.8, -0.2))
+        measured = J @ TRUE + noise * np.array((0.5, -1.0, 0.3, 0.8, -0.2))
         covariance = np.linalg.inv(J.T @ np.diag(noise**-2) @ J)
 
-        found = posterior(planes(J), seen, noise)
+        distribution = posterior(planes(J), measured, noise)
 
-        self.check(found, covariance @ J.T @ (seen / noise**2), covariance)
-        assert found.identifiable == {"p": True, "q": True, "r": True}
-        low, high = found.interval(0.9).T
+        self.check(distribution, covariance @ J.T @ (measured / noise**2), covariance)
+        assert distribution.identifiable == {"p": True, "q": True, "r": True}
+        low, high = distribution.interval(0.9).T
         np.testing.assert_allclose((high - low) / (2 * 1.645), np.sqrt(np.diag(covariance)), rtol=SPREAD)
 
     def test_correlated_noise(self) -> None:
         """Noise that all features share is a whole matrix: a common shift tells nothing against it."""
         common = 0.01**2 * np.eye(5) + 0.1**2
         covariance = np.linalg.inv(J.T @ np.linalg.inv(common) @ J)
-        seen = J @ TRUE
+        measured = J @ TRUE
 
-        found = posterior(planes(J), seen, common)
+        distribution = posterior(planes(J), measured, common)
 
-        self.check(found, TRUE, covariance)
+        self.check(distribution, TRUE, covariance)
 
     def test_chance_adds(self) -> None:
         """What the surface leaves to chance counts as noise of the measurement does."""
-        seen = J @ TRUE
+        measured = J @ TRUE
         covariance = (0.03**2 + 0.04**2) * np.linalg.inv(J.T @ J)
 
-        self.check(posterior(planes(J, 0.04), seen, np.full(5, 0.03)), TRUE, covariance)
+        self.check(posterior(planes(J, 0.04), measured, np.full(5, 0.03)), TRUE, covariance)
 
     def test_flat_direction(self) -> None:
         """A parameter that no feature feels may be anything: uniform over its range, and told so."""
         flat = J * [1.0, 1.0, 0.0]
 
-        found = posterior(planes(flat), flat @ TRUE, np.full(5, 0.01))
+        distribution = posterior(planes(flat), flat @ TRUE, np.full(5, 0.01))
 
-        assert found.identifiable == {"p": True, "q": True, "r": False}
-        assert found.deviations[2] == pytest.approx(1 / np.sqrt(12), rel=SPREAD)
-        np.testing.assert_allclose(found.interval(0.9)[2], (0.05, 0.95), rtol=0, atol=0.06)
+        assert distribution.identifiable == {"p": True, "q": True, "r": False}
+        assert distribution.deviations[2] == pytest.approx(1 / np.sqrt(12), rel=SPREAD)
+        np.testing.assert_allclose(distribution.interval(0.9)[2], (0.05, 0.95), rtol=0, atol=0.06)
 
     def test_only_a_sum_is_told(self) -> None:
         """Of two parameters that only their sum is seen of neither is told, and they lean against one another."""
         sums = np.array([[1.0, 1.0], [2.0, 2.0]])
 
-        found = posterior(planes(sums), sums @ [0.5, 0.5], np.full(2, 0.01))
+        distribution = posterior(planes(sums), sums @ [0.5, 0.5], np.full(2, 0.01))
 
-        assert found.identifiable == {"p": False, "q": False}
-        assert found.correlation[0, 1] < -0.99
-        assert found.samples.sum(axis=1).std() == pytest.approx(0.01 / np.sqrt(5), rel=SPREAD)
+        assert distribution.identifiable == {"p": False, "q": False}
+        assert distribution.correlation[0, 1] < -0.99
+        assert distribution.samples.sum(axis=1).std() == pytest.approx(0.01 / np.sqrt(5), rel=SPREAD)
 
     def test_at_the_edge(self) -> None:
         """A parameter seen below its range lies at its end, and no sample lies outside."""
-        found = posterior(planes(np.eye(3)), [0.5, -0.02, 0.5], np.full(3, 0.02))
+        distribution = posterior(planes(np.eye(3)), [0.5, -0.02, 0.5], np.full(3, 0.02))
 
-        assert found.samples.min() >= 0.0
+        assert distribution.samples.min() >= 0.0
         # Half a Gaussian whose middle lies a deviation outside: its mean is 0.525 deviations above the end.
-        assert found.mean[1] == pytest.approx(0.525 * 0.02, rel=0.1)
+        assert distribution.mean[1] == pytest.approx(0.525 * 0.02, rel=0.1)
 
     def test_misfit(self) -> None:
         """Features that contradict one another by far more than their noise show that something is wrong."""
         noise = np.full(5, 0.01)
-        seen = J @ TRUE
+        measured = J @ TRUE
         aside = np.linalg.svd(J)[0][:, -1]
 
-        assert posterior(planes(J), seen + 0.01 * aside, noise).misfit > 0.05
-        assert posterior(planes(J), seen + 0.1 * aside, noise).misfit < 1e-6
+        assert posterior(planes(J), measured + 0.01 * aside, noise).misfit > 0.05
+        assert posterior(planes(J), measured + 0.1 * aside, noise).misfit < 1e-6
 
     def test_valley_that_was_missed(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Where the search for the likeliest ends in a wrong valley the walkers leave it, and what they find counts."""
         corner = np.full(3, 0.99)
         monkeypatch.setattr("armwright.clearance.estimation.posterior.solve_features", lambda *_: corner)
 
-        found = posterior(planes(J), J @ TRUE, np.full(5, 0.01))
+        distribution = posterior(planes(J), J @ TRUE, np.full(5, 0.01))
 
-        np.testing.assert_allclose(found.best, TRUE, atol=0.05)
-        assert found.misfit > 0.05
-        assert found.widening < 1.5
-        np.testing.assert_allclose(found.mean, TRUE, atol=0.02)
+        np.testing.assert_allclose(distribution.best, TRUE, atol=0.05)
+        assert distribution.misfit > 0.05
+        assert distribution.widening < 1.5
+        np.testing.assert_allclose(distribution.mean, TRUE, atol=0.02)
 
     def test_same_seed(self) -> None:
         """The same seed draws the same samples, another one others of the same distribution."""
-        seen, noise = J @ TRUE, np.full(5, 0.01)
-        first, again, other = (posterior(planes(J), seen, noise, seed=seed) for seed in (1, 1, 2))
+        measured, noise = J @ TRUE, np.full(5, 0.01)
+        first, again, other = (posterior(planes(J), measured, noise, seed=seed) for seed in (1, 1, 2))
 
         np.testing.assert_array_equal(first.samples, again.samples)
         np.testing.assert_allclose((first.mean - other.mean) / first.deviations, 0.0, rtol=0, atol=2 * MEAN)
@@ -181,22 +183,22 @@ def test_intervals_cover(swept: Swept, rng: np.random.Generator, sample: Sample)
     true = rng.uniform(*RANGE, (count, 3))
     values: dict[str, Array] = {}
     for path, task in zip(PATHS, swept.task.tasks, strict=True):
-        found = noisy(simulate(task, true), noise, rng)
-        values |= {f"{path}_{name}": one for name, one in found._asdict().items()}
-    seen = feature_vector(values, PATHS, FEATURES)
+        noisy_features = noisy(simulate(task, true), noise, rng)
+        values |= {f"{path}_{name}": entry for name, entry in noisy_features._asdict().items()}
+    measured = feature_vector(values, PATHS, FEATURES)
     covariance = covariance_of(swept, swept.surrogate.features, noise)
 
-    known = [posterior(swept.surrogate, one, covariance) for one in seen]
+    known = [posterior(swept.surrogate, entry, covariance) for entry in measured]
 
-    ends = np.array([one.interval(0.9) for one in known])
-    held = int(((ends[..., 0] <= true) & (true <= ends[..., 1])).sum())
+    ends = np.array([entry.interval(0.9) for entry in known])
+    covered = int(((ends[..., 0] <= true) & (true <= ends[..., 1])).sum())
     # Of 42 intervals of 90 % fewer than 32 hold once in 300 times where they are honest, and half do where they are
     # half as wide as they should be.
-    assert held >= binom.ppf(1 / 300, 3 * count, 0.9)
-    assert np.mean([accuracy(one.mean, c) for one, c in zip(known, true, strict=True)]) > 99
+    assert covered >= binom.ppf(1 / 300, 3 * count, 0.9)
+    assert np.mean([accuracy(entry.mean, c) for entry, c in zip(known, true, strict=True)]) > 99
     # What lies at the end of the sweep may lie beyond it.
-    assert all(sure or name in one.bounds for one in known for name, sure in one.identifiable.items())
-    assert np.median([one.misfit for one in known]) > 0.05
+    assert all(sure or name in entry.bounds for entry in known for name, sure in entry.identifiable.items())
+    assert np.median([entry.misfit for entry in known]) > 0.05
 
 
 def test_unknown_friction(swept: Swept) -> None:
@@ -208,11 +210,11 @@ def test_unknown_friction(swept: Swept) -> None:
     three = FEATURES[:3]
     surrogate = learn(task.parameters, points, names, feature_vector(task(points), PATHS, three))
     # An arm with more friction than its maker says, 0.08 and not 0.05.
-    seen = feature_vector(task(np.array([[*ARM_A, 0.08]])), PATHS, three)[0]
+    measured = feature_vector(task(np.array([[*ARM_A, 0.08]])), PATHS, three)[0]
     covariance = covariance_of(swept, names, 2e-6)
 
-    free = posterior(surrogate, seen, covariance)
-    sure = posterior(swept.surrogate.select(names), seen, covariance)
+    free = posterior(surrogate, measured, covariance)
+    sure = posterior(swept.surrogate.select(names), measured, covariance)
 
     low, high = free.interval(0.99).T
     truth = np.array([*ARM_A, 0.08])

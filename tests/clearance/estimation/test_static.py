@@ -29,12 +29,12 @@ def triples(rng: np.random.Generator, count: int) -> Array:
 @pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
 def test_without_noise(five_bar: Linkage, clearances: Array) -> None:
     """Where the tip rests at three poses tells the clearances of arms A and B to the last digit."""
-    found = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, clearances))
+    estimate = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, clearances))
 
-    assert accuracy(found.values, clearances) > WITHOUT_NOISE
-    np.testing.assert_allclose(found.values, clearances, rtol=1e-9)
-    assert found.residual_rms < 1e-12
-    assert found.names == ("J2", "J3", "J4")
+    assert accuracy(estimate.values, clearances) > WITHOUT_NOISE
+    np.testing.assert_allclose(estimate.values, clearances, rtol=1e-9)
+    assert estimate.residual_rms < 1e-12
+    assert estimate.names == ("J2", "J3", "J4")
 
 
 def test_held_out(five_bar: Linkage, rng: np.random.Generator) -> None:
@@ -42,11 +42,11 @@ def test_held_out(five_bar: Linkage, rng: np.random.Generator) -> None:
     true = triples(rng, 100)
     offsets = rest_offsets(five_bar, STARTS, true)
 
-    found = estimate_at_rest(five_bar, STARTS, offsets)
+    estimate = estimate_at_rest(five_bar, STARTS, offsets)
     linear = offsets.reshape(100, -1) @ np.linalg.pinv(rest_matrix(five_bar, STARTS).reshape(-1, 3)).T
 
-    assert accuracy(found.values, true).min() > WITHOUT_NOISE
-    np.testing.assert_allclose(found.values, true, rtol=1e-7)
+    assert accuracy(estimate.values, true).min() > WITHOUT_NOISE
+    np.testing.assert_allclose(estimate.values, true, rtol=1e-7)
     assert WITHOUT_NOISE < accuracy(linear, true).mean() < 99.99
 
 
@@ -56,11 +56,11 @@ def test_with_noise(five_bar: Linkage, clearances: Array, rng: np.random.Generat
     offsets = rest_offsets(five_bar, STARTS, clearances)
     noise = rng.normal(0.0, DWELL_NOISE, (300, *offsets.shape))
 
-    found = estimate_at_rest(five_bar, STARTS, offsets + noise, DWELL_NOISE)
+    estimate = estimate_at_rest(five_bar, STARTS, offsets + noise, DWELL_NOISE)
 
-    assert accuracy(found.values, clearances).mean() > WITH_NOISE
+    assert accuracy(estimate.values, clearances).mean() > WITH_NOISE
     # The standard deviation of one that is taken of 300 draws is 4 %.
-    np.testing.assert_allclose(found.values.std(axis=0), np.sqrt(np.diag(found.covariance)), rtol=0.16)
+    np.testing.assert_allclose(estimate.values.std(axis=0), np.sqrt(np.diag(estimate.covariance)), rtol=0.16)
 
 
 def test_intervals_cover(five_bar: Linkage, rng: np.random.Generator) -> None:
@@ -68,23 +68,23 @@ def test_intervals_cover(five_bar: Linkage, rng: np.random.Generator) -> None:
     true = triples(rng, 1000)
     offsets = rest_offsets(five_bar, STARTS, true)
 
-    found = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, DWELL_NOISE, offsets.shape), DWELL_NOISE)
+    estimate = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, DWELL_NOISE, offsets.shape), DWELL_NOISE)
 
-    low, high = np.moveaxis(found.interval(0.9), -1, 0)
-    held = ((low <= true) & (true <= high)).sum(axis=0)
+    low, high = np.moveaxis(estimate.interval(0.9), -1, 0)
+    covered = ((low <= true) & (true <= high)).sum(axis=0)
     # By chance a thousand honest intervals hold more or fewer once in half a million.
     assert binom.sf(949, 1000, 0.9) + binom.cdf(850, 1000, 0.9) < 2e-6
-    assert np.all((held >= 850) & (held <= 950))
-    assert accuracy(found.values, true).mean() > WITH_NOISE
+    assert np.all((covered >= 850) & (covered <= 950))
+    assert accuracy(estimate.values, true).mean() > WITH_NOISE
 
 
 def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) -> None:
     """Six numbers for three clearances: what is left of the noise is the root of a half, on average."""
     offsets = rest_offsets(five_bar, STARTS, triples(rng, 400))
 
-    found = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 1e-6, offsets.shape))
+    estimate = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 1e-6, offsets.shape))
 
-    assert np.sqrt(np.mean(found.residual_rms**2)) == pytest.approx(1e-6 * np.sqrt(0.5), rel=0.1)
+    assert np.sqrt(np.mean(estimate.residual_rms**2)) == pytest.approx(1e-6 * np.sqrt(0.5), rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -94,9 +94,9 @@ def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) 
 )
 def test_singular_values(five_bar: Linkage, poses: Array, singular: tuple[float, ...]) -> None:
     """Three poses tell the worst mixture of clearances with 0.42, one pose not at all, 24 poses with 1.32."""
-    found = np.linalg.svd(rest_matrix(five_bar, poses).reshape(-1, 3), compute_uv=False)
+    result = np.linalg.svd(rest_matrix(five_bar, poses).reshape(-1, 3), compute_uv=False)
 
-    np.testing.assert_allclose(found, singular, rtol=0, atol=PRINTED)
+    np.testing.assert_allclose(result, singular, rtol=0, atol=PRINTED)
 
 
 def test_deviations_of_the_spec(five_bar: Linkage) -> None:
@@ -114,10 +114,10 @@ def test_deviations_of_the_spec(five_bar: Linkage) -> None:
 
 def test_map_at_the_first_goal(five_bar: Linkage) -> None:
     """At (-180, -600) mm a millimetre in J4 shifts the tip by 0.872 mm to the left and 0.313 mm down."""
-    found = rest_matrix(five_bar, [(-0.18, -0.6)])[0]
+    result = rest_matrix(five_bar, [(-0.18, -0.6)])[0]
 
     # The spec's numbers are those of arm A, where the tip hangs half a millimetre lower.
-    np.testing.assert_allclose(found, [[0.6545, 0.6187, -0.8721], [-0.8197, -0.7748, -0.3134]], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(result, [[0.6545, 0.6187, -0.8721], [-0.8197, -0.7748, -0.3134]], rtol=0, atol=1e-3)
 
 
 def test_map_is_the_derivative(five_bar: Linkage) -> None:
@@ -127,7 +127,7 @@ def test_map_is_the_derivative(five_bar: Linkage) -> None:
 
     own, *more = rest_offsets(stiff, STARTS, steps)
 
-    columns = [(one - own) / 1e-6 for one in more]
+    columns = [(offset - own) / 1e-6 for offset in more]
     # At 10 µm of play what is not linear is a few parts in a hundred thousand.
     np.testing.assert_allclose(np.stack(columns, axis=-1), rest_matrix(five_bar, STARTS), rtol=0, atol=1e-4)
 
@@ -135,19 +135,19 @@ def test_map_is_the_derivative(five_bar: Linkage) -> None:
 def test_best_poses(five_bar: Linkage, rng: np.random.Generator) -> None:
     """Four poses that are chosen tell all clearances together better than any of a hundred random fours."""
     x, y = np.meshgrid(np.linspace(-0.18, 0.18, 7), np.linspace(-0.7, -0.45, 6))
-    places = np.stack([x.ravel(), y.ravel()], axis=-1)
-    B = rest_matrix(five_bar, places)
+    positions = np.stack([x.ravel(), y.ravel()], axis=-1)
+    B = rest_matrix(five_bar, positions)
 
-    def told(numbers: list[int]) -> float:
+    def information(numbers: list[int]) -> float:
         return float(np.linalg.slogdet(np.einsum("kai,kaj->ij", B[numbers], B[numbers]))[1])
 
-    best = best_poses(five_bar, places, 4)
-    random = [told(rng.choice(len(places), 4, replace=False).tolist()) for _ in range(100)]
+    best = best_poses(five_bar, positions, 4)
+    random = [information(rng.choice(len(positions), 4, replace=False).tolist()) for _ in range(100)]
 
     assert len(set(best)) == 4
-    assert told(best) > max(random)
-    offsets = rest_offsets(five_bar, places[best], ARM_A)
-    assert estimate_at_rest(five_bar, places[best], offsets).deviations.max() < 1.8e-6
+    assert information(best) > max(random)
+    offsets = rest_offsets(five_bar, positions[best], ARM_A)
+    assert estimate_at_rest(five_bar, positions[best], offsets).deviations.max() < 1.8e-6
 
 
 def test_all_poses_can_be_taken(five_bar: Linkage) -> None:
@@ -159,11 +159,11 @@ def test_told_or_not(five_bar: Linkage) -> None:
     """Poses 10 µm apart tell no clearance with a noise of 1 µm; good ones tell all three."""
     near = STARTS[:1] + np.array([(0.0, 0.0), (1e-5, 0.0), (0.0, 1e-5)])
 
-    def found(poses: Array) -> Estimate:
+    def estimated(poses: Array) -> Estimate:
         return estimate_at_rest(five_bar, poses, rest_offsets(five_bar, poses, ARM_A), 1e-6)
 
-    assert found(STARTS).identifiable(0.4e-3) == (True, True, True)
-    assert found(near).identifiable(0.4e-3)[:2] == (False, False)
+    assert estimated(STARTS).identifiable(0.4e-3) == (True, True, True)
+    assert estimated(near).identifiable(0.4e-3)[:2] == (False, False)
 
 
 def test_too_few_poses(five_bar: Linkage) -> None:
@@ -194,17 +194,17 @@ def test_pins_without_play(five_bar: Linkage, rng: np.random.Generator) -> None:
     """Noise about a pin without play makes no negative clearance."""
     offsets = rest_offsets(five_bar, STARTS, (0.3e-3, 1e-7, 0.3e-3))
 
-    found = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 2e-6, (50, *offsets.shape)))
+    estimate = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 2e-6, (50, *offsets.shape)))
 
-    assert found.values.min() > 0
-    assert np.abs(found.values[:, 2] - 0.3e-3).max() < 10e-6
+    assert estimate.values.min() > 0
+    assert np.abs(estimate.values[:, 2] - 0.3e-3).max() < 10e-6
 
 
 def test_a_pose_weighs_as_often_as_it_was_read(five_bar: Linkage, rng: np.random.Generator) -> None:
     """The mean of several readings counts as they do one by one: the same clearances, as well known."""
     counts = np.array([1, 2, 5, 3])[: len(STARTS)]
     offsets = rest_offsets(five_bar, STARTS, ARM_A) + rng.normal(0.0, 1e-5, STARTS.shape)
-    again = (np.repeat(one, counts, axis=0) for one in (STARTS, offsets))
+    again = (np.repeat(table, counts, axis=0) for table in (STARTS, offsets))
 
     mean = estimate_at_rest(five_bar, STARTS, offsets, 1e-5, counts)
     single = estimate_at_rest(five_bar, *again, 1e-5)
@@ -221,7 +221,9 @@ def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatc
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     closings = []
     closed_at_poses = static.closed_at_poses
-    monkeypatch.setattr(static, "closed_at_poses", lambda *given: (closings.append(given), closed_at_poses(*given))[1])
+    monkeypatch.setattr(
+        static, "closed_at_poses", lambda *arguments: (closings.append(arguments), closed_at_poses(*arguments))[1]
+    )
 
     estimate_at_rest(five_bar, STARTS, offsets)
 
@@ -232,12 +234,12 @@ def test_nothing_is_told_from_none(five_bar: Linkage, rng: np.random.Generator) 
     """No interval reaches below nothing, and a clearance less than its deviation is told to be none, not identified."""
     true = np.array((0.328e-3, 0.171e-3, 0.0))
     exact = rest_offsets(five_bar, STARTS, np.maximum(true, 1e-9))
-    told = []
+    identified = []
     for _ in range(40):
-        found = estimate_at_rest(five_bar, STARTS, exact + rng.normal(scale=2e-6, size=exact.shape), noise=2e-6)
-        low = found.interval()[2, 0]
+        estimate = estimate_at_rest(five_bar, STARTS, exact + rng.normal(scale=2e-6, size=exact.shape), noise=2e-6)
+        low = estimate.interval()[2, 0]
         assert low >= 0
-        told.append(found.identifiable(1e-3)[2])
-        assert told[-1] == (found.values[2] > max(found.deviations[2], 2e-7))
+        identified.append(estimate.identifiable(1e-3)[2])
+        assert identified[-1] == (estimate.values[2] > max(estimate.deviations[2], 2e-7))
 
-    assert 2 <= sum(told) <= 20
+    assert 2 <= sum(identified) <= 20
