@@ -1,7 +1,4 @@
-"""Arrays at the door: named converters that check shape and meaning, copy to float64 and make read-only.
-
-And how many cores work on them.
-"""
+"""Converters of arrays, which check shape and values, copy to float64 and make read-only; and the cores for them."""
 
 import operator
 import os
@@ -22,7 +19,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 ArrayLike: TypeAlias = npt.ArrayLike
 Flags: TypeAlias = npt.NDArray[np.bool_]
 
-# No quantity of a robot is larger, and products of three such numbers are still numbers.
+# Larger than any quantity of a robot; products of three such numbers are still finite.
 LARGEST = 1e100
 _ANY = sys.float_info.max
 
@@ -32,18 +29,18 @@ def floats(value: ArrayLike, what: str, largest: float = _ANY) -> Array:
 
     Args:
         value: numbers of any shape.
-        what: how they are called in a message.
-        largest: what none of them may exceed; ``LARGEST`` for what is multiplied further.
+        what: their name in a message.
+        largest: bound of their absolute values; ``LARGEST`` for numbers that are multiplied.
 
     Raises:
-        KindError: the value is something else than real numbers: texts, truth values, complex numbers, nothing.
+        KindError: the value is not real numbers: texts, booleans, complex numbers, None.
         ShapeError: its rows differ in length.
         InvalidValueError: a number is NaN, infinite, or too large.
     """
     array = _plain(value, what)
-    if array.size and not np.abs(array).max() <= largest:  # what is NaN compares with nothing
-        place = tuple(int(i) for i in np.argwhere(~(np.abs(array) <= largest))[0])
-        wrong, where = array[place], f" at {shown(place)}" if place else ""
+    if array.size and not np.abs(array).max() <= largest:  # not fulfilled by NaN
+        index = tuple(int(i) for i in np.argwhere(~(np.abs(array) <= largest))[0])
+        wrong, where = array[index], f" at {shown(index)}" if index else ""
         if np.isfinite(wrong):
             raise InvalidValueError(f"{what}: expected numbers no larger than {largest:g}, got {wrong:g}{where}")
         raise InvalidValueError(f"{what}: every number must be finite, got {wrong}{where}")
@@ -51,11 +48,11 @@ def floats(value: ArrayLike, what: str, largest: float = _ANY) -> Array:
 
 
 def number(value: float, what: str) -> float:
-    """Return one real number as a float; it may be NaN or infinite.
+    """Return a real number as a float; it may be NaN or infinite.
 
     Raises:
-        KindError: the value is something else than a real number.
-        InvalidValueError: it has more digits than a float can tell.
+        KindError: the value is not a real number.
+        InvalidValueError: the number is larger than any float.
     """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
@@ -70,29 +67,29 @@ def number(value: float, what: str) -> float:
 
 
 def integer(value: int, what: str, *, least: int) -> int:
-    """Return a whole number.
+    """Return an integer.
 
     Raises:
-        KindError: the value is something else than a whole number.
-        InvalidValueError: it is below ``least``.
+        KindError: the value is not an integer.
+        InvalidValueError: the integer is below ``least``.
     """
     try:
-        whole = operator.index(value)
+        result = operator.index(value)
     except TypeError as error:
         raise KindError(f"{what}: expected a whole number, got {shown(value)}") from error
     if isinstance(value, bool):
         raise KindError(f"{what}: expected a whole number, got {value}")
-    if whole < least:
-        raise InvalidValueError(f"{what}: expected a whole number not below {least}, got {whole}")
-    return whole
+    if result < least:
+        raise InvalidValueError(f"{what}: expected a whole number not below {least}, got {result}")
+    return result
 
 
 def of_shape(value: ArrayLike, shape: tuple[int, ...], what: str, largest: float = _ANY) -> Array:
     """Return a read-only float64 copy of ``value``, whose last axes must have ``shape``; see ``floats``.
 
     Raises:
-        KindError: the value is something else than real numbers.
-        ShapeError: the last axes are not as asked.
+        KindError: the value is not real numbers.
+        ShapeError: the last axes are not ``shape``.
         InvalidValueError: a number is NaN or infinite.
     """
     array = floats(value, what, largest)
@@ -106,8 +103,8 @@ def exact_shape(value: ArrayLike, shape: tuple[int, ...], what: str, largest: fl
     """Return a read-only float64 copy of ``value``, which must have ``shape``; see ``floats``.
 
     Raises:
-        KindError: the value is something else than real numbers.
-        ShapeError: it has another shape.
+        KindError: the value is not real numbers.
+        ShapeError: the shape is another.
         InvalidValueError: a number is NaN or infinite.
     """
     array = of_shape(value, shape, what, largest)
@@ -120,12 +117,12 @@ def joint_array(q: ArrayLike, joints: int, what: str = "q") -> Array:
     """Return ``q`` as read-only float64 of shape (..., n).
 
     Args:
-        q: (..., n) one number per joint, leading axes free.
+        q: (..., n) a number per joint, with any leading axes.
         joints: n.
-        what: how the array is called in a message.
+        what: name of the array in a message.
 
     Raises:
-        KindError: the value is something else than real numbers.
+        KindError: the value is not real numbers.
         ShapeError: the last axis is not n long.
         InvalidValueError: a number is NaN, infinite, or larger than any of a robot.
     """
@@ -137,7 +134,7 @@ def joint_array(q: ArrayLike, joints: int, what: str = "q") -> Array:
 
 
 def one_per_joint(q: ArrayLike, joints: int, what: str = "q") -> Array:
-    """Return ``q`` as read-only float64 of shape (n,); all else as ``joint_array``.
+    """Return ``q`` as read-only float64 of shape (n,); see ``joint_array``.
 
     Raises:
         ShapeError: the shape is another.
@@ -149,7 +146,7 @@ def one_per_joint(q: ArrayLike, joints: int, what: str = "q") -> Array:
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return a copy that cannot be written to: the converter of fields of results, which need no check."""
+    """Return a read-only copy: the converter of fields of results, which need no check."""
     copy = np.array(array)
     copy.setflags(write=False)
     return copy
@@ -161,9 +158,9 @@ def cores() -> int:
 
 
 def one_core() -> AbstractContextManager[Any]:
-    """Keep linear algebra on one core while small matrices are worked on: there several only wait for one another.
+    """Restrict linear algebra to a single core, which is faster for small matrices.
 
-    Without threadpoolctl, which comes with scikit-learn, nothing is changed.
+    This needs threadpoolctl, which comes with scikit-learn; without it nothing changes.
     """
     try:
         from threadpoolctl import threadpool_limits  # noqa: PLC0415 - not part of the core
@@ -174,16 +171,16 @@ def one_core() -> AbstractContextManager[Any]:
 
 
 def array_key(array: Array) -> tuple[tuple[int, ...], bytes]:
-    """Return what arrays have in common when they are equal: fields are compared and hashed by it."""
+    """Return a key by which equal arrays compare and hash as equal."""
     return array.shape, (array + 0.0).tobytes()  # -0.0 + 0.0 is 0.0
 
 
 def reduce_by_fields(value: Any) -> tuple[Callable[..., Any], tuple[type, Mapping[str, Any]]]:
-    """Take a value of an attrs class apart for ``copy`` and ``pickle``: its ``__reduce__``.
+    """Reduce a value of an attrs class to its fields for ``copy`` and ``pickle``: its ``__reduce__``.
 
-    NumPy makes every copy of a read-only array writable. Built anew from its fields, a value has its arrays read-only.
+    NumPy makes copies of read-only arrays writable; a value that is rebuilt from its fields has read-only arrays.
     """
-    return _built, (type(value), {one.alias: getattr(value, one.name) for one in attrs.fields(type(value))})
+    return _built, (type(value), {field.alias: getattr(value, field.name) for field in attrs.fields(type(value))})
 
 
 def _built(kind: Callable[..., Any], fields: Mapping[str, Any]) -> Any:
@@ -193,9 +190,9 @@ def _built(kind: Callable[..., Any], fields: Mapping[str, Any]) -> Any:
 def _plain(value: ArrayLike, what: str) -> Array:
     """Return real numbers of any kind as float64."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise InvalidValueError(f"{what}: masked entries have no value; fill them or leave them out")
+        raise InvalidValueError(f"{what}: masked entries have no value; fill them or omit them")
     try:
-        array = np.array(value, order="C")  # how it was stored must not change a bit of a result
+        array = np.array(value, order="C")  # the memory layout must not affect results
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{what}: expected numbers in rows of one length, got {shown(value)}") from error
     if array.dtype == np.float64:
@@ -203,12 +200,12 @@ def _plain(value: ArrayLike, what: str) -> Array:
     if array.dtype.kind not in "fiu" and not (array.dtype == object and all(map(_is_real, array.flat))):
         raise KindError(f"{what}: expected numbers, got {shown(value)}")
     try:
-        with np.errstate(over="ignore"):  # what becomes infinite is refused
+        with np.errstate(over="ignore"):  # infinite numbers are refused
             return array.astype(np.float64)
     except (OverflowError, TypeError, ValueError) as error:
         raise InvalidValueError(f"{what}: expected numbers no larger than {_ANY:.3g}, got {shown(value)}") from error
 
 
 def _is_real(entry: object) -> bool:
-    """Whether an object is a real number, such as a fraction; a truth value is none."""
+    """Whether an object is a real number, such as a fraction, and not a boolean."""
     return isinstance(entry, Real | Decimal) and not isinstance(entry, bool)

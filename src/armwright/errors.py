@@ -1,6 +1,6 @@
-"""What can go wrong for a caller: one tree of errors, each also the built-in error it resembles.
+"""The errors for callers: a tree of classes, each also a subclass of the built-in error that it resembles.
 
-A message says what, what was got, what was expected and, where there is one, the nearest valid choice.
+A message names the object, the expected and the actual value, and the nearest valid choice if there is one.
 """
 
 import enum
@@ -9,20 +9,20 @@ from functools import lru_cache
 from pathlib import Path
 from typing import ClassVar
 
-# Glyphs that a scan, a listing or a tired eye takes for one another.
+# Glyphs that are easily confused in a scan or a listing.
 _CONFUSABLE = str.maketrans({"I": "1", "L": "1", "O": "0", "-": "_", "S": "5", "B": "8"})
-# A longer word is no misspelt name, and comparing two such takes the square of their length.
+# A longer word is not compared with names, as this takes time quadratic in the length.
 _LONGEST_NAME = 100
-# Of the names that are known, a message lists this many.
+# Known names that a message lists at most.
 _MOST_LISTED = 100
-# Of a value that is not what was expected, a message shows this many characters.
+# Characters of an invalid value that a message shows at most.
 _LONGEST_SHOWN = 60
-# Of a message so many characters are kept at its beginning, and so many at its end.
+# Characters at the beginning and at the end of a message that is shortened.
 _BEGINNING, _ENDING = 4000, 500
 
 
 class ExitStatus(enum.IntEnum):
-    """How a command of the command line ended (docs/exit_status.md)."""
+    """The exit status of a command (docs/exit_status.md)."""
 
     DONE = 0
     PROGRAM_ERRORS = 1
@@ -38,21 +38,21 @@ class ExitStatus(enum.IntEnum):
 
 
 class ArmwrightError(Exception):
-    """The caller asked for something that cannot be; the text says what and what to do.
+    """The base class of errors that a caller can cause; the message has the cause and a remedy.
 
     Attributes:
-        exit_status: with which a command ends that raises it; each class has its own.
+        exit_status: exit status of a command that raises the error; subclasses override it.
     """
 
     exit_status: ClassVar[ExitStatus] = ExitStatus.INFEASIBLE
 
     def __str__(self) -> str:
-        """Return the text, without the middle of a name or value that is a page long."""
+        """Return the message, without the middle of a very long one."""
         return shortened(super().__str__())
 
 
 class KindError(ArmwrightError, TypeError):
-    """A value is of the wrong kind: a text where numbers belong, a name where an arm does."""
+    """A value has the wrong type: a text instead of numbers, or a name instead of an arm."""
 
     exit_status = ExitStatus.USAGE
 
@@ -64,30 +64,36 @@ class ShapeError(ArmwrightError, ValueError):
 
 
 class InvalidValueError(ArmwrightError, ValueError):
-    """A value is of the right kind but has no meaning here."""
+    """A value has the right type and is invalid."""
 
     exit_status = ExitStatus.USAGE
 
 
 class TooFewError(InvalidValueError):
-    """Too little was measured: fewer cycles than a standard asks for, or too few readings for what is sought."""
+    """There are too few measurements for a standard, or for the estimated parameters."""
 
     exit_status = ExitStatus.INFEASIBLE
 
 
 class IncapableArmError(InvalidValueError):
-    """An arm cannot make a motion at any speed: its joints are too weak, or its file leaves open what they may do."""
+    """An arm cannot execute a motion at any speed: its joints are too weak, or their limits are unknown."""
 
     exit_status = ExitStatus.INFEASIBLE
 
 
 class UnknownNameError(ArmwrightError, LookupError):
-    """A name stands for nothing; the text lists what there is."""
+    """A name is unknown; the message lists the known names."""
 
     exit_status = ExitStatus.USAGE
 
     def __init__(self, kind: str, name: object, known: Iterable[str]) -> None:
-        """Say that no ``kind`` is called ``name``, and what is known instead."""
+        """Compose the message with the nearest and all known names.
+
+        Args:
+            kind: kind of the named object, for the message.
+            name: the unknown name.
+            known: the known names.
+        """
         name, choices = str(name), sorted(known)
         near = closest(name, choices)
         hint = f" Did you mean '{near}'?" if near else ""
@@ -98,75 +104,75 @@ class UnknownNameError(ArmwrightError, LookupError):
 
 
 class FileFormatError(ArmwrightError, ValueError):
-    """A file does not say what it should; the text names file, line and key."""
+    """The content of a file is invalid; the message names file, line and key."""
 
     exit_status = ExitStatus.FILE
 
     def __init__(self, path: Path | str, line: int | None, key: str, message: str) -> None:
-        """Point at ``key`` in ``line`` of ``path`` and say what is wrong there."""
+        """Compose the message from its location, the ``key`` in ``line`` of ``path``, and the error."""
         self.path, self.line, self.key = Path(path), line, key
-        place = f"{path}:{line}" if line else f"{path}"
-        super().__init__(f"{place}: {key}: {message}" if key else f"{place}: {message}")
+        location = f"{path}:{line}" if line else f"{path}"
+        super().__init__(f"{location}: {key}: {message}" if key else f"{location}: {message}")
 
 
 class ContradictionError(ArmwrightError, ValueError):
-    """What was measured contradicts the model: no values of its parameters explain the data."""
+    """Measurements contradict the model: no values of its parameters explain the data."""
 
 
 class DoubtfulError(ContradictionError):
-    """All was done and told, and the data contradict the model all the same; the text says by what."""
+    """A result is complete, but the data contradict its model; the message has the reasons."""
 
 
 class CheckFailedError(ArmwrightError, ValueError):
-    """All was done, and what was to be checked does not hold; the text says what."""
+    """A check has failed after a complete computation; the message has the failed checks."""
 
     exit_status = ExitStatus.CHECK_FAILED
 
 
 class UnsupportedArmError(ArmwrightError, ValueError):
-    """The method does not fit this arm."""
+    """The method does not apply to this arm."""
 
 
 class MissingExtraError(ArmwrightError, ImportError):
-    """Something needs a library that the core does not install; the text says how to get it."""
+    """A function needs a library that the core does not install; the message has the command that installs it."""
 
 
 class OutputError(ArmwrightError, OSError):
-    """A result could not be written; nothing half-written was left behind."""
+    """A result could not be written; incomplete files have been removed."""
 
     exit_status = ExitStatus.FILE
 
 
 class GravityWarning(UserWarning):
-    """An arm states a gravity of its own, and stands in a cell, whose gravity counts."""
+    """An arm states its own gravity, but is in a cell, whose gravity is used."""
 
 
 class RotationWarning(UserWarning):
-    """A matrix typed as a rotation is nearly one; the nearest rotation has been taken."""
+    """A matrix is nearly a rotation; the nearest rotation is used."""
 
 
 class UnitWarning(UserWarning):
-    """A number looks as if it were in another unit: degrees where radians belong."""
+    """A number is probably in another unit: degrees instead of radians."""
 
 
 class IncompleteRowsWarning(UserWarning):
-    """Rows of a table were left out as asked, since cells are empty."""
+    """Rows of a table with empty cells were omitted on request."""
 
 
 class CacheWarning(UserWarning):
-    """The cache folder cannot be trusted and is not used; every start compiles anew."""
+    """The cache folder is not private and is not used; every start compiles again."""
 
 
 def one_of(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return ``name`` if it is one of those known.
+    """Return ``name`` if it is a known name.
 
     Args:
-        kind: what is named, as a message calls it.
-        name: what was asked for.
-        known: what there is.
+        kind: kind of the named object, for the message.
+        name: the requested name.
+        known: the known names.
 
     Raises:
-        UnknownNameError: there is nothing of that name; the nearest is told.
+        UnknownNameError: the name is unknown; the message has the nearest known name.
     """
     choices = tuple(known)
     if not isinstance(name, str) or name not in choices:
@@ -175,33 +181,33 @@ def one_of(kind: str, name: str, known: Iterable[str]) -> str:
 
 
 def shown(value: object) -> str:
-    """Write a value for a message: on one line, not too long."""
+    """Return the text of a value for a message: on a single line and of limited length."""
     text = " ".join(repr(value).split())
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
 
 
 def counted(count: int, thing: str) -> str:
-    """Return how many there are of a thing, such as ``1 move`` and ``2 moves``."""
+    """Return a number with a noun, such as ``1 move`` and ``2 moves``."""
     return f"{count} {thing}{'' if count == 1 else 's'}"
 
 
 def shortened(text: str) -> str:
-    """Return a message without its middle where it is longer than anybody reads: it repeats what was given."""
+    """Return a message without its middle if it is very long, as it may repeat an input."""
     if len(text) <= _BEGINNING + _ENDING:
         return text
     return f"{text[:_BEGINNING]} ... {text[-_ENDING:]}"
 
 
 def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
-    """Return the known name that ``name`` was most likely meant to be.
+    """Return the known name that ``name`` most likely stands for.
 
     Letters of either case count as equal. Names that differ only in glyphs easily confused (l, 1, I; O, 0;
     - and _) come before all others; then the smallest edit distance wins, a swap of neighbours counting one.
 
     Args:
-        name: what was written.
-        known: what could have been meant.
-        limit: the largest edit distance still taken for a slip.
+        name: the name as it was written.
+        known: the known names.
+        limit: the largest edit distance of a misspelling.
 
     Returns:
         The nearest name, or None when none is near.
@@ -218,7 +224,7 @@ def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
         if glyphs == other.translate(_CONFUSABLE):
             return choice
         distance = edit_distance(word, other)
-        # A slip changes less than half of a word: "A" is not a misspelt "B".
+        # A misspelling changes less than half of a word: "A" is not a misspelt "B".
         if distance <= limit and 2 * distance < max(len(word), len(other)) and (best is None or distance < best[0]):
             best = (distance, choice)
     return best[1] if best else None
@@ -226,12 +232,12 @@ def closest(name: str, known: Iterable[str], limit: int = 2) -> str | None:
 
 @lru_cache(maxsize=4096)
 def edit_distance(a: str, b: str) -> int:
-    """Count the insertions, deletions, changes and neighbour swaps that turn ``a`` into ``b``.
+    """Return the number of insertions, deletions, changes and neighbour swaps between ``a`` and ``b``.
 
     Source:
         Damerau (1964), restricted form: no part is edited twice.
     """
-    # What both begin or end with costs nothing.
+    # Common beginnings and endings cost nothing.
     while a and b and a[0] == b[0]:
         a, b = a[1:], b[1:]
     while a and b and a[-1] == b[-1]:

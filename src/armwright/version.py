@@ -1,3 +1,3 @@
-"""The version of armwright, in one place."""
+"""The version of armwright."""
 
 __version__ = "0.2.0"

@@ -83,7 +83,7 @@ def test_slips_of_the_user() -> None:
     assert any(line.startswith("`nobody` is not declared") for line in said)
     assert "there is no breakpoint 7" in said
     assert "cannot assign to `1`" in said
-    assert "expected 1 to 1, the number of a process" in said
+    assert "expected the number of a process, 1 to 1, got 3" in said
     assert any(line.startswith("n         next statement") for line in said)
 
 

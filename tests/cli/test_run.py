@@ -200,11 +200,11 @@ def test_collisions_are_not_looked_for(stacked: Path, tmp_path: Path) -> None:
     failed = armwright("run", "far.rlo", "--cell", STANFORD, "-o", "out", "--json", cwd=tmp_path)
 
     assert armwright(*program).stdout.rstrip().endswith("Collisions are not checked.")
-    assert json.loads(armwright(*program, "--json").stdout)["collisions"] == "not looked for"
-    assert (failed.returncode, json.loads(failed.stdout)["collisions"]) == (3, "not looked for")
+    assert json.loads(armwright(*program, "--json").stdout)["collisions"] == "not checked"
+    assert (failed.returncode, json.loads(failed.stdout)["collisions"]) == (3, "not checked")
     for folder in (stacked, tmp_path / "out"):
-        assert json.loads((folder / "run.json").read_text())["collisions"] == "not looked for"
-        assert "<dt>Collisions</dt><dd>not looked for</dd>" in (folder / "report.html").read_text()
+        assert json.loads((folder / "run.json").read_text())["collisions"] == "not checked"
+        assert "<dt>Collisions</dt><dd>not checked</dd>" in (folder / "report.html").read_text()
 
 
 def test_json_summary() -> None:
@@ -249,11 +249,11 @@ def test_a_way_round(tmp_path: Path) -> None:
     ptp, line, _ = run["stages"]
     assert ptp["detour"] is None
     detour = line["detour"]
-    assert (detour["by"], detour["cause"], detour["joint"], detour["via"]) == ("damped", "singular", 6, None)
+    assert (detour["method"], detour["cause"], detour["joint"], detour["via"]) == ("damped", "singular", 6, None)
     assert detour["along"] == pytest.approx(detour["fraction"] * detour["line"])
-    assert 0 < detour["off_the_line"] < 0.01
-    assert line["deviation"] == detour["off_the_line"]
-    assert f"{detour['off_the_line'] * 1e3:.1f} mm off the line" in done.stdout
+    assert 0 < detour["position_deviation"] < 0.01
+    assert line["deviation"] == detour["position_deviation"]
+    assert f"{detour['position_deviation'] * 1e3:.1f} mm off the line" in done.stdout
     page = (tmp_path / "out" / "report.html").read_text()
     assert "the straight way is stopped 50 % of the way there" in page
 
@@ -557,7 +557,7 @@ def test_a_long_stream(tmp_path: Path) -> None:
 
     done = armwright("run", program, "--cell", STANFORD, "-o", out, "--motion-rows", "500", "-q")
 
-    said = "motion.csv holds the first 0.500 s of 2.000 s: 500 of 2001 rows; `--motion-rows 2001` keeps all"
+    said = "motion.csv holds the first 0.500 s of 2.000 s: 500 of 2001 rows; `--motion-rows 2001` writes all"
     assert done.returncode == 0
     assert done.stderr == f"armwright: {said}\n"
     assert json.loads((out / "run.json").read_text())["left_out"] == [said]
@@ -619,11 +619,11 @@ def test_a_terminal_of_many_lines(tmp_path: Path) -> None:
     told = json.loads(armwright(*call, "--json").stdout)
 
     assert "... and 19,001 more; all in events.jsonl\n" in kept.stdout.replace(" \n", "\n")
-    assert "... and 19,001 more; `-o FOLDER` writes all to events.jsonl" in shown.stdout
+    assert "... and 19,001 more; `-o FOLDER` keeps all in events.jsonl" in shown.stdout
     assert 'PRINT "500"' in shown.stdout
     assert 'PRINT "501"' not in shown.stdout
     assert len(shown.stdout.splitlines()) < 1020
-    assert told["trace"][2000] == "... and 16,000 more; `-o FOLDER` writes all to events.jsonl"
+    assert told["trace"][2000] == "... and 16,000 more; `-o FOLDER` keeps all in events.jsonl"
 
 
 def test_a_page_of_many_frames_and_changes(tmp_path: Path) -> None:

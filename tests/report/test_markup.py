@@ -104,7 +104,7 @@ def record_with(arm: ArmRecord, **changes: object) -> ArmRecord:
         ({"tau": np.zeros((900, 6))}, "record of 'ARM_1': 901 instants but 900 rows of efforts"),
         ({"hand": np.zeros((901, 2))}, "path: expected shape (N, 3), one row per instant, got (901, 2)"),
         ({"qd": np.zeros(901)}, "joint quantities: expected shape (N, any), one row per instant, got (901,)"),
-        ({"t": -np.arange(901.0)}, "instants: expected each at or after the one before it"),
+        ({"t": -np.arange(901.0)}, "instants: expected each at or after the previous one"),
     ],
 )
 def test_records_that_do_not_fit(bench, changes, message: str) -> None:
@@ -141,7 +141,7 @@ def test_film_that_does_not_fit(bench: RunPage) -> None:
         attrs.evolve(animation, frames=[attrs.evolve(animation.frames[0], poses=np.zeros((10, 12)))])
     with pytest.raises(ShapeError, match="figure of 'ARM_1': 226 instants but 3 rows of grip"):
         attrs.evolve(animation, arms={"ARM_1": attrs.evolve(animation.arms["ARM_1"], grip=np.zeros(3))})
-    with pytest.raises(ShapeError, match="arm figure: 4 pieces between the points but 2 radii"):
+    with pytest.raises(ShapeError, match="arm figure: 4 segments between the points but 2 radii"):
         attrs.evolve(animation.arms["ARM_1"], radii=[0.1, 0.1])
     with pytest.raises(ShapeError, match="animation: expected at least one instant"):
         Animation(fps=25, t=[])

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armwright.motion.certificate import LimitName
     from armwright.motion.moves import Move
     from armwright.motion.poses_file import PosesFile
-    from armwright.report.move_page import Moved
+    from armwright.report.move_page import PlannedMove
 
 # Bounds of the options [ms], [mm].
 _PERIOD_MS, _DEVIATION_MM = (0.01, 1000.0), (1e-4, 100.0)
@@ -186,13 +186,15 @@ def _planned(
         raise ArmwrightError(f"{poses}: {error}{hint}") from error
 
 
-def _report_data(planned: "Move", file: "PosesFile", poses: Path, period: float, notes: "Iterable[str]") -> "Moved":
+def _report_data(
+    planned: "Move", file: "PosesFile", poses: Path, period: float, notes: "Iterable[str]"
+) -> "PlannedMove":
     from armwright.dynamics.newton_euler import inverse_dynamics
-    from armwright.report.move_page import Moved
+    from armwright.report.move_page import PlannedMove
     from armwright.report.page import Message
 
     samples = planned.trajectory.sampled(period)
-    return Moved(
+    return PlannedMove(
         move=planned,
         file=file,
         name=poses.name,
@@ -203,7 +205,7 @@ def _report_data(planned: "Move", file: "PosesFile", poses: Path, period: float,
     )
 
 
-def _files(moved: "Moved", uses: "dict[LimitName, Any]", *, film: bool, quiet: bool) -> dict[str, Any]:
+def _files(moved: "PlannedMove", uses: "dict[LimitName, Any]", *, film: bool, quiet: bool) -> dict[str, Any]:
     """Return the files of a move by name."""
     from armwright.kinematics.forward_kinematics import forward
     from armwright.report import move_figures

@@ -1,4 +1,4 @@
-"""Figures of measured accuracy: clouds of poses, deviation along paths, coming to rest, corners, speeds, weaves."""
+"""Figures of measured accuracy: clouds of poses, deviation along paths, settling, corners, speeds, weaving."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -21,48 +21,48 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Samples of a run that are drawn, and how far round a corner, in parts of its round-off or of the shorter leg.
+# Samples of a run that are drawn, and the drawn range about a corner, relative to its round-off or the shorter leg.
 _DRAWN, _AROUND, _OF_LEG = 2000, 5.0, 0.15
 _MARKS = "osD^v"
 
 
-def drawings(found: Assessment) -> list[Drawing]:
+def drawings(assessment: Assessment) -> list[Drawing]:
     """Return the figures of an assessment, in the order of its tests."""
     drawn: list[Drawing] = []
-    for test, results in zip(found.tests, found.results, strict=True):
-        of = f"{test.name}{f', {test.condition}' if test.condition else ''}"
+    for test, results in zip(assessment.tests, assessment.results, strict=True):
+        title = f"{test.name}{f', {test.condition}' if test.condition else ''}"
         for result in results:
             if type(result) not in _DRAW:
                 continue
             draw, caption = _DRAW[type(result)]
-            what = "velocity" if isinstance(result, PathVelocity) else test.kind
+            kind = "velocity" if isinstance(result, PathVelocity) else test.kind
             figure = empty_figure((7.4, 4.2))
             draw(figure, test, result)
-            figure.suptitle(literal(f"{what}: {of}"))
-            drawn.append(Drawing(f"{len(drawn) + 1:02d}-{what}", f"{what} {of}: {caption}", svg_text(figure)))
+            figure.suptitle(literal(f"{kind}: {title}"))
+            drawn.append(Drawing(f"{len(drawn) + 1:02d}-{kind}", f"{kind} {title}: {caption}", svg_text(figure)))
     return drawn
 
 
 def _views(figure: "Figure", size: int) -> "list[tuple[Axes, int, int]]":
-    """Return one set of axes in a plane, two in space, with the coordinates that they show."""
+    """Return the axes for a plane or the two axes for space, with the coordinates that they show."""
     pairs = [(0, 1)] if size == 2 else [(0, 1), (0, 2)]
-    found = []
+    views = []
     for axis, (i, j) in zip(figure.subplots(1, len(pairs), squeeze=False)[0], pairs, strict=True):
         axis.set(xlabel=f"{'xyz'[i]}, mm", ylabel=f"{'xyz'[j]}, mm")
         axis.set_aspect("equal", adjustable="datalim")
         axis.grid(visible=True, alpha=0.3)
-        found.append((axis, i, j))
-    return found
+        views.append((axis, i, j))
+    return views
 
 
 def _cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability) -> None:
     from matplotlib.patches import Circle  # noqa: PLC0415
 
     cloud = test.clouds[0]
-    assert cloud.commanded is not None  # noqa: S101 - no test of a pose is read without
-    places, centre = (cloud.places - cloud.commanded) * 1e3, (result.barycentre - cloud.commanded) * 1e3
+    assert cloud.commanded is not None  # noqa: S101 - every test of a pose has it
+    points, centre = (cloud.places - cloud.commanded) * 1e3, (result.barycentre - cloud.commanded) * 1e3
     for axis, i, j in _views(figure, test.size):
-        axis.plot(places[:, i], places[:, j], "o", markersize=3.5, color="C0", label="attained")
+        axis.plot(points[:, i], points[:, j], "o", markersize=3.5, color="C0", label="attained")
         axis.plot(centre[i], centre[j], "s", markersize=6, color="C1", label="barycentre")
         axis.plot(0, 0, "+", markersize=13, markeredgewidth=1.8, color="C3", label="commanded")
         circle = Circle((centre[i], centre[j]), result.radius * 1e3, fill=False, color="C1", linewidth=1.4)
@@ -74,13 +74,10 @@ def _clouds(figure: "Figure", test: PoseTest, result: Variation) -> None:
     origin = result.barycentres.mean(axis=0)
     for axis, i, j in _views(figure, test.size):
         for number, (cloud, centre) in enumerate(zip(test.clouds, result.barycentres, strict=True)):
-            places, middle = (cloud.places - origin) * 1e3, (centre - origin) * 1e3
-            style: dict[str, Any] = {
-                "marker": _MARKS[number % len(_MARKS)],
-                "color": f"C{number % 10}",
-                "linestyle": "",
-            }
-            axis.plot(places[:, i], places[:, j], **style, markersize=3.5, fillstyle="none", alpha=0.7)
+            points, middle = (cloud.places - origin) * 1e3, (centre - origin) * 1e3
+            marker, colour = _MARKS[number % len(_MARKS)], f"C{number % 10}"
+            style: dict[str, Any] = {"marker": marker, "color": colour, "linestyle": ""}
+            axis.plot(points[:, i], points[:, j], **style, markersize=3.5, fillstyle="none", alpha=0.7)
             axis.plot(middle[i], middle[j], **style, markersize=8, markeredgecolor="k", label=literal(cloud.label))
     figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
 
@@ -94,7 +91,7 @@ def _drift(figure: "Figure", _test: PoseTest, result: PoseDrift) -> None:
 
 
 def _settling(figure: "Figure", test: PathTest, result: Settling | PosingTime) -> None:
-    axis = _axes(figure, "time, s", "distance from the attained place, mm")
+    axis = _axes(figure, "time, s", "distance from the attained position, mm")
     for j, run in enumerate(test.runs):
         t = run.timed("settling")
         some = spread(len(t), _DRAWN)
@@ -111,12 +108,12 @@ def _settling(figure: "Figure", test: PathTest, result: Settling | PosingTime) -
 def _deviation(figure: "Figure", _test: PathTest, result: PathDeviation) -> None:
     axis = _axes(figure, "along the path, mm", "mm")
     s = result.stations * 1e3
-    for name, values, at, style in (
+    for name, values, station, style in (
         ("AT", result.offsets, result.accuracy_at, "-"),
         ("RT", result.radii, result.repeatability_at, "--"),
     ):
         line = axis.plot(s, values * 1e3, style, linewidth=1.4, label=f"{name} {values.max() * 1e3:.4g} mm")[0]
-        axis.plot(at * 1e3, values.max() * 1e3, "o", markersize=5, color=line.get_color())
+        axis.plot(station * 1e3, values.max() * 1e3, "o", markersize=5, color=line.get_color())
     axis.set_ylim(bottom=0)
     axis.legend()
 
@@ -125,12 +122,12 @@ def _speeds(figure: "Figure", test: PathTest, result: PathVelocity) -> None:
     axis = _axes(figure, "along the path, mm", "speed, mm/s")
     for speeds in result.speeds:
         axis.plot(result.stations * 1e3, speeds * 1e3, linewidth=1.0, color="C0", alpha=0.7)
-    assert test.speed is not None  # noqa: S101 - there is no result without
+    assert test.speed is not None  # noqa: S101 - every result has it
     axis.axhline(test.speed * 1e3, color="C3", linestyle="--", linewidth=1.2)
 
 
 def _corner(figure: "Figure", test: PathTest, result: CornerDeviation) -> None:
-    assert test.commanded is not None  # noqa: S101 - no test of a corner is read without
+    assert test.commanded is not None  # noqa: S101 - every test of a corner has it
     path = test.commanded.places
     near = np.linalg.norm(path - result.place, axis=1)
     reach = max(_AROUND * max(result.round_off, result.overshoot), 1e-6)
@@ -143,7 +140,7 @@ def _corner(figure: "Figure", test: PathTest, result: CornerDeviation) -> None:
 
 
 def _weave(figure: "Figure", test: PathTest, _result: WeavingDeviation) -> None:
-    assert test.commanded is not None  # noqa: S101 - no test of a weave is read without
+    assert test.commanded is not None  # noqa: S101 - every test of weaving has it
     for axis, i, j in _views(figure, test.size):
         _lines(axis, [run.places[:, [i, j]] * 1e3 for run in test.runs])
         axis.plot(*(test.commanded.places[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
@@ -170,16 +167,19 @@ def _axes(figure: "Figure", x: str, y: str) -> "Axes":
     return axis
 
 
-# How each result is drawn, and what the figure shows.
+# The function that draws each kind of result, and the caption of the figure.
 _DRAW: dict[type, tuple[Callable[["Figure", Any, Any], None], str]] = {
-    PoseRepeatability: (_cloud, "attained places about the commanded one, their barycentre, and the circle of RP"),
-    Variation: (_clouds, "attained places by direction or robot, about the mean of all; barycentres filled"),
+    PoseRepeatability: (_cloud, "attained positions about the commanded one, their barycentre, and the circle of RP"),
+    Variation: (_clouds, "attained positions by direction or robot, about the mean of all; barycentres filled"),
     PoseDrift: (_drift, "AP and RP over time"),
-    Settling: (_settling, "distance from the attained place; dotted lines: the band is entered, full lines: for good"),
-    PosingTime: (_settling, "distance from the attained place, from departure to rest"),
+    Settling: (
+        _settling,
+        "distance from the attained position; dotted lines: the band is entered, full lines: the last time",
+    ),
+    PosingTime: (_settling, "distance from the attained position, from departure to rest"),
     PathDeviation: (_deviation, "distance of the mean run from the path (AT), and spread of the runs (RT)"),
     PathVelocity: (_speeds, "speed of every run on the steady part of the path; the commanded one dashed"),
-    CornerDeviation: (_corner, "the runs round the corner, from which places are counted; the commanded path dashed"),
+    CornerDeviation: (_corner, "the runs about the corner, which is the origin; the commanded path dashed"),
     WeavingDeviation: (_weave, "the runs; the commanded path dashed"),
     StaticCompliance: (_compliance, "displacement under load along every axis, and the straight lines fitted"),
 }

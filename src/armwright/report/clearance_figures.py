@@ -1,4 +1,4 @@
-"""Figures of linkages with play beyond one run: features over clearances, paths as they are and corrected."""
+"""Figures of several runs of linkages with clearance: features over clearances, original and corrected paths."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,11 +13,11 @@ def surface(title: str, x: Array, y: Array, z: Array, labels: Sequence[str]) -> 
     """Draw a quantity over two others, as a surface with its points and the contours below it.
 
     Args:
-        title: of the figure.
-        x: (a,) along the first axis.
-        y: (b,) along the second.
-        z: (a, b) over both.
-        labels: of the three axes, with units.
+        title: title of the figure.
+        x: (a,) values along the first axis.
+        y: (b,) values along the second axis.
+        z: (a, b) the quantity.
+        labels: labels of the three axes, with units.
 
     Returns:
         An SVG file's text.
@@ -43,15 +43,15 @@ def marked_curves(
     spans: Sequence[tuple[float, float]] = (),
     fits: Mapping[str, tuple[Array, Array]] | None = None,
 ) -> str:
-    """Draw curves over a common axis, with stretches that are shaded and straight lines laid through them.
+    """Draw curves over a common axis, with shaded intervals and fitted straight lines.
 
     Args:
-        title: of the figure.
+        title: title of the figure.
         x: (m,) the common axis.
         lines: (m,) values by the name of the curve.
-        labels: of both axes, with units.
-        spans: from where to where to shade.
-        fits: by name the places (k,) and values (k,) of lines to draw over the curves.
+        labels: labels of both axes, with units.
+        spans: bounds of the shaded intervals.
+        fits: abscissae (k,) and values (k,) of lines over the curves, by name.
 
     Returns:
         An SVG file's text.
@@ -60,8 +60,8 @@ def marked_curves(
     axis = figure.subplots()
     for name, y in lines.items():
         axis.plot(x, y, linewidth=1.3, label=literal(name))
-    for name, (at, values) in (fits or {}).items():
-        axis.plot(at, values, "k--", linewidth=1.4, label=literal(name))
+    for name, (abscissae, values) in (fits or {}).items():
+        axis.plot(abscissae, values, "k--", linewidth=1.4, label=literal(name))
     for low, high in spans:
         axis.axvspan(low, high, color="0.88", zorder=0)
     axis.set(title=literal(title), xlabel=labels[0], ylabel=labels[1], xlim=(float(x[0]), float(x[-1])))
@@ -72,13 +72,13 @@ def marked_curves(
 
 
 def lines_of_spectrum(title: str, frequencies: Array, spectra: Mapping[str, Array], unit: str) -> str:
-    """Draw amplitudes over frequency, those of several curves side by side.
+    """Draw amplitudes over frequency, with the lines of several spectra side by side.
 
     Args:
-        title: of the figure.
+        title: title of the figure.
         frequencies: (m,) [Hz].
         spectra: (m,) by name.
-        unit: of the amplitudes.
+        unit: unit of the amplitudes.
 
     Returns:
         An SVG file's text.
@@ -100,8 +100,8 @@ def paths(title: str, panels: Mapping[str, Mapping[str, Array]], targets: Array)
     """Draw paths in the plane, several panels side by side, and around each target what happens there.
 
     Args:
-        title: of the figure.
-        panels: by title, (m, 2) places by the name of the path [mm].
+        title: title of the figure.
+        panels: by title, (m, 2) positions by the name of the path [mm].
         targets: (k, 2) [mm].
 
     Returns:

@@ -1,6 +1,6 @@
-"""The page of a clearance run: the linkage along its path, its journals in their bearings, and everything over time.
+"""The page of a clearance run: the moving linkage, its journals in their bearings, and charts over time.
 
-The page is one HTML file that needs no other. Its arrays carry their unit in their name.
+The page is a single HTML file. The names of its arrays end with their unit.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,36 +20,36 @@ from armwright.report.figures import Drawing
 from armwright.report.markup import asset, page_html
 from armwright.version import __version__
 
-# Rows that a page carries at most, and the largest error on the screen as a part of the size of the linkage.
+# Rows of a page at most, and the size of the largest error on the screen relative to that of the linkage.
 _ROWS, _SHOWN = 2600, 0.09
 _SCRIPTS = ("plane.js", "bearings.js", "charts.js", "clearance_run_charts.js", "clearance_run.js")
 _MICRO = 1e6
-# Figures that the page has no chart of its own for.
+# Figures that are not charts drawn by the scripts.
 _PRINTED = ("path", "bearings", "spectrum", "workspace")
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Film:
-    """What the scripts of the page read, at r instants.
+    """The data of the scripts of the page, at r instants.
 
     Attributes:
-        duration: of what is shown [s].
+        duration: shown duration [s].
         t: (r,) instants [s].
-        ground_m: places on the ground, (x, y) each.
+        ground_m: points on the ground, (x, y) each.
         rails: guides on the ground: x, y [m] and direction [rad] of each.
-        bodies: of each its name and the numbers of its points.
-        motors: of each drive x, y of its joint on the ground, or the number of the point it sits at.
-        points_m: (r, 2 k) where the points of all bodies would be without play.
-        shifts_um: (r, 2 k) by how much play shifts them.
-        tip: number of the point that is the tip.
-        path_m: (r, 2) where the tip would be without play.
-        error_um: (r, 2) by how much it is off.
-        pins: of each name, clearance, the numbers of the points in the middle of bearing and journal, largest force.
-        gaps_um: (r, 2 p) from the middle of each bearing to that of its journal.
-        forces_N: (r, p) of the contacts; the largest since the row before.
-        flies: (r, p) 1 where a journal touches no wall.
+        bodies: names of the bodies with the indices of their points.
+        motors: for each drive x, y of its joint on the ground, or the index of its point.
+        points_m: (r, 2 k) positions of the points of all bodies without clearance.
+        shifts_um: (r, 2 k) displacements of the points by clearance.
+        tip: index of the point that is the tip.
+        path_m: (r, 2) positions of the tip without clearance.
+        error_um: (r, 2) error of the tip.
+        pins: name, clearance, indices of the centres of bearing and journal, and largest force of each pin.
+        gaps_um: (r, 2 p) vectors from the centre of each bearing to that of its journal.
+        forces_N: (r, p) contact forces; the largest since the previous row.
+        flies: (r, p) 1 where a journal does not touch its bearing.
         energy_J: (r, 6) driven, kinetic, potential, impact loss, friction loss, not explained.
-        magnification: of the shifts, to begin with.
+        magnification: initial magnification of the displacements.
     """
 
     duration: float
@@ -110,11 +110,11 @@ def film(run: ClearanceRun) -> Film:
 
 
 def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: str, command: str) -> str:
-    """Return the whole text of the page.
+    """Return the text of the page.
 
     Args:
-        run: what happened.
-        drawn: its printed figures.
+        run: the run.
+        drawn: its figures.
         title: heading of the page.
         command: the command line that made it.
 
@@ -133,7 +133,7 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
             targets=table(targets.heads, targets.rows, numbers=targets.numbers),
             totals=pairs((name, f"{value} {unit}") for name, value, unit in totals.rows),
             settings=pairs(_settings(data)),
-            figures=figures(one for one in drawn if one.name in _PRINTED),
+            figures=figures(drawing for drawing in drawn if drawing.name in _PRINTED),
         ),
         styles=("clearance_run.css",),
         scripts=_SCRIPTS,
@@ -145,16 +145,16 @@ def clearance_run_page(run: ClearanceRun, drawn: Sequence[Drawing], *, title: st
 # ---- the film ------------------------------------------------------------------------------------------------------
 
 
-def _pins(run: ClearanceRun, places: Sequence[BodyPoint]) -> list[dict[str, Any]]:
-    """Return the pins; a bearing or journal on the ground has no number, but a place."""
+def _pins(run: ClearanceRun, points: Sequence[BodyPoint]) -> list[dict[str, Any]]:
+    """Return the pins; a bearing or journal on the ground has a position instead of an index."""
     linkage = run.simulation.scenario.linkage
-    found = []
+    pins = []
     for i, pin in enumerate(linkage.pins):
         ends = {
-            name: places.index(place) if place in places else [float(x) for x in linkage.point(place)]
-            for name, place in (("bearing", pin.bearing), ("journal", pin.journal))
+            name: points.index(point) if point in points else [float(x) for x in linkage.point(point)]
+            for name, point in (("bearing", pin.bearing), ("journal", pin.journal))
         }
-        found.append(
+        pins.append(
             {
                 "name": pin.name,
                 "clearance_um": float(run.simulation.clearances[i]) * _MICRO,
@@ -162,7 +162,7 @@ def _pins(run: ClearanceRun, places: Sequence[BodyPoint]) -> list[dict[str, Any]
                 **ends,
             }
         )
-    return found
+    return pins
 
 
 def _rails(linkage: Linkage) -> list[list[float]]:
@@ -170,12 +170,12 @@ def _rails(linkage: Linkage) -> list[list[float]]:
     return [[*(float(x) for x in linkage.point(guide.on)), guide.direction] for guide in guides]
 
 
-def _motor(linkage: Linkage, body: str, places: Sequence[BodyPoint]) -> int | list[float]:
+def _motor(linkage: Linkage, body: str, points: Sequence[BodyPoint]) -> int | list[float]:
     joint = linkage.joint(body)
     assert joint is not None  # noqa: S101 - a linkage has no drive without one
     if isinstance(joint, Pin) and joint.on.body == GROUND:
         return [float(x) for x in linkage.point(joint.on)]
-    return places.index(BodyPoint(joint.body, joint.point))
+    return points.index(BodyPoint(joint.body, joint.point))
 
 
 def _magnification(points: Array, shifts: Array) -> float:
@@ -184,7 +184,7 @@ def _magnification(points: Array, shifts: Array) -> float:
     return round_number(_SHOWN * size / largest) if largest > 0 else 1.0
 
 
-# ---- the words -----------------------------------------------------------------------------------------------------
+# ---- texts ---------------------------------------------------------------------------------------------------------
 
 
 def _facts(data: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
@@ -197,17 +197,20 @@ def _facts(data: Mapping[str, Any], command: str) -> Iterator[tuple[str, str]]:
 
 
 def _settings(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    how = data["settings"]
-    located = ", impacts located" if how["located"] else ""
-    yield "Integrator", f"{how['integrator']}, step {how['step']:.3g} s{located}, sampled every {how['sample']:.3g} s"
-    gains = f", {how['gains'][0]:g} N m/rad and {how['gains'][1]:g} N m s/rad" if "gains" in how else ""
-    yield "Control", f"{how['control']}{gains}"
-    yield "Start", how["start"]
-    asked, given = how["restitution_asked"], how["restitution_given"]
-    yield "Impact", f"{how['impact_law']}, restitution {asked:g} asked, {given:.3g} given"
-    threshold = "" if how["friction_law"] == "lugre" else f", fading below {how['friction_threshold'] * 1e3:g} mm/s"
-    yield "Friction", f"{how['friction']:g}, {how['friction_law']}, of the {how['friction_velocity']}{threshold}"
-    yield "Material", f"E {how['young'] / 1e9:g} GPa, ν {how['poisson']:g}"
-    radii = ", ".join(f"{name} {radius * 1e3:g}" for name, radius in how["journal_radius"].items())
+    used = data["settings"]
+    located = ", impacts located" if used["located"] else ""
+    yield (
+        "Integrator",
+        f"{used['integrator']}, step {used['step']:.3g} s{located}, sampled every {used['sample']:.3g} s",
+    )
+    gains = f", {used['gains'][0]:g} N m/rad and {used['gains'][1]:g} N m s/rad" if "gains" in used else ""
+    yield "Control", f"{used['control']}{gains}"
+    yield "Start", used["start"]
+    nominal, computed = used["restitution_asked"], used["restitution_given"]
+    yield "Impact", f"{used['impact_law']}, restitution {nominal:g} nominal, {computed:.3g} computed"
+    threshold = "" if used["friction_law"] == "lugre" else f", fading below {used['friction_threshold'] * 1e3:g} mm/s"
+    yield "Friction", f"{used['friction']:g}, {used['friction_law']}, of the {used['friction_velocity']}{threshold}"
+    yield "Material", f"E {used['young'] / 1e9:g} GPa, ν {used['poisson']:g}"
+    radii = ", ".join(f"{name} {radius * 1e3:g}" for name, radius in used["journal_radius"].items())
     yield "Radius of the journals", f"{radii} mm"
     yield "Versions", ", ".join(f"{name} {version}" for name, version in data["versions"].items())

@@ -1,4 +1,4 @@
-"""Printed figures: curves over a common axis, as SVG text that is the same for the same numbers."""
+"""Figures as SVG text that is identical for identical numbers: curves, bars, and parts of other figures."""
 
 import base64
 import html
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Line styles in the order of the curves: the first is the reference, the others are told apart without colour too.
+# Line styles in the order of the curves: the first is the reference; all are distinguishable without colour.
 _STYLES = ("-", "--", "-.", ":")
-# Of a name or a title so many characters are shown.
+# Characters of a name or title that are shown at most.
 _LONGEST = 40
 
 
 class Drawing(NamedTuple):
-    """One figure.
+    """A figure.
 
     Attributes:
-        name: of its file, without the ending.
-        caption: what it shows, in words.
+        name: name of its file without the suffix.
+        caption: its caption.
         svg: text of the file.
     """
 
@@ -36,7 +36,7 @@ class Drawing(NamedTuple):
 
     @property
     def element(self) -> str:
-        """The figure as an element of a page, which carries it."""
+        """The figure as an element of a page, which includes its data."""
         data = base64.b64encode(self.svg.encode()).decode()
         caption = html.escape(self.caption)
         image = f'<img src="data:image/svg+xml;base64,{data}" alt="{caption}">'
@@ -47,11 +47,11 @@ def curves(title: str, x: Array, lines: Mapping[str, Array], *, x_label: str, y_
     """Draw curves over a common axis.
 
     Args:
-        title: of the figure.
+        title: title of the figure.
         x: (m,) the common axis.
         lines: (m,) values by the name of the curve.
-        x_label: what ``x`` is, with its unit.
-        y_label: what the curves are, with their unit.
+        x_label: quantity and unit of ``x``.
+        y_label: quantity and unit of the curves.
 
     Returns:
         An SVG file's text.
@@ -73,11 +73,11 @@ def bars(
     """Draw groups of bars side by side.
 
     Args:
-        title: of the figure.
-        names: of the groups.
-        values: one per group, by the name of the kind.
-        y_label: what they are, with their unit.
-        logarithmic: whether the axis is.
+        title: title of the figure.
+        names: names of the groups.
+        values: a value per group, by the name of the series.
+        y_label: quantity and unit of the values.
+        logarithmic: whether the axis of the values is logarithmic.
 
     Returns:
         An SVG file's text.
@@ -96,14 +96,14 @@ def bars(
 
 
 def empty_figure(size: tuple[float, float]) -> "Figure":
-    """Return a figure of this width and height [inch], whose parts keep out of each other's way."""
+    """Return a figure of this width and height [inch], whose parts do not overlap."""
     from matplotlib.figure import Figure  # noqa: PLC0415 - costs half a second, and only figures need it
 
     return Figure(figsize=size, layout="constrained")
 
 
 def plain_axes(figure: "Figure", x: str, y: str) -> "Axes":
-    """Return the one pair of axes of a figure, with their names and units, and a grid."""
+    """Return the axes of a figure with a single plot, with their names and units, and a grid."""
     axes = figure.subplots()
     axes.set(xlabel=x, ylabel=y)
     axes.grid(visible=True, alpha=0.3)
@@ -111,16 +111,16 @@ def plain_axes(figure: "Figure", x: str, y: str) -> "Axes":
 
 
 def equal_scales(axes: Any, low: Array, high: Array, *, least: float = 0.0) -> float:
-    """Show the same length along x, y and z, so that right angles look like right angles.
+    """Set equal scales along x, y and z, so that right angles appear as right angles.
 
     Args:
-        axes: in space.
-        low: (3,) smallest places.
-        high: (3,) largest places.
-        least: half of the length that is shown at least.
+        axes: axes in space.
+        low: (3,) smallest coordinates.
+        high: (3,) largest coordinates.
+        least: half of the shown length at least.
 
     Returns:
-        Half of the length that is shown.
+        Half of the shown length.
     """
     middle, half = (low + high) / 2, max(float((high - low).max()) / 2, least)
     for set_limits, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
@@ -130,7 +130,7 @@ def equal_scales(axes: Any, low: Array, high: Array, *, least: float = 0.0) -> f
 
 
 def spread(count: int, most: int) -> Array:
-    """Return the numbers of so many rows at most, evenly spread over all, the first and the last among them."""
+    """Return the indices of at most this many rows, evenly distributed, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, most).astype(int))
 
 
@@ -139,18 +139,18 @@ def svg_text(figure: "Figure") -> str:
     import matplotlib as mpl  # noqa: PLC0415
 
     text = io.StringIO()
-    # Without a date and with fixed names of its parts, a figure changes only when its numbers do.
+    # Without a date and with fixed identifiers, a figure changes only when its numbers do.
     with mpl.rc_context({"svg.hashsalt": "armwright"}):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return steady(text.getvalue())
 
 
 def literal(text: str) -> str:
-    """Return a text of a user's as figures show it: no dollar begins a formula, and every character is a letter.
+    """Return a text of the user for a figure: dollars begin no formulas, and all characters are printable.
 
-    Tabs and ends of lines become blanks, other characters that no font has become marks, and of a page its beginning
-    is shown.
+    Tabs and line breaks become blanks, other unprintable characters become replacement characters, and a long text is
+    truncated.
     """
     text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
-    letters = (one if one.isprintable() else " " if one.isspace() else "\N{REPLACEMENT CHARACTER}" for one in text)
+    letters = (c if c.isprintable() else " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" for c in text)
     return "".join(letters).replace("$", r"\$")

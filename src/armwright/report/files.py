@@ -1,4 +1,4 @@
-"""The files of a run: motion, events, frames, what made them, and the page."""
+"""The files of a run: motion, events, frames, its record, and its page."""
 
 import hashlib
 import json
@@ -28,22 +28,22 @@ from armwright.version import __version__
 
 # Digits of the numbers in the JSON files: micrometres and microradians to a millionth.
 _DIGITS = 12
-# Rows of motion.csv unless more are asked for: some 220 MB, or one arm for a quarter of an hour at 1 ms.
+# Rows of motion.csv by default: some 220 MB, or an arm for a quarter of an hour at 1 ms.
 MOTION_ROWS = 1_000_000
 
 
 @attrs.frozen(kw_only=True)
 class Origin:
-    """What made a run.
+    """The inputs of a run.
 
     Attributes:
         program: path of the program.
         cell: path of the cell file; None where the program imports its cell.
         imports: paths of the files that the program imports.
         command: the command line.
-        options: those that shape the result, by name.
-        motion_rows: how many rows ``motion.csv`` may have.
-        text: of the program where it is written with the results; None where it was read.
+        options: options that affect the result, by name.
+        motion_rows: limit of the rows of ``motion.csv``.
+        text: text of the program where it is written with the results; None where it was read.
     """
 
     program: Path
@@ -58,16 +58,16 @@ class Origin:
 def result_files(
     recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin
 ) -> dict[str, str | Iterable[str]]:
-    """Return the files of a run by name, the same text for the same run; of one that failed, up to the failure.
+    """Return the files of a run by name, identical for identical runs; those of a failed run end at the failure.
 
     Args:
-        recording: what happened.
-        code: the program that ran.
-        diagnostics: warnings of translation and run.
-        origin: what made it.
+        recording: the recording of the run.
+        code: the program.
+        diagnostics: diagnostics of compilation and run.
+        origin: the inputs of the run.
     """
     return {
-        "motion.csv": motion_rows(recording.streams, _kept(recording, origin.motion_rows)),
+        "motion.csv": motion_rows(recording.streams, _written_ticks(recording, origin.motion_rows)),
         "events.jsonl": _events(recording, code),
         "frames.json": _json(frames(recording, code)),
         "report.html": run_page(
@@ -77,7 +77,7 @@ def result_files(
 
 
 def frames(recording: Recording, code: Code) -> dict[str, Any]:
-    """Return the final frame tree: per frame its parent and its pose, seen from the world and from the parent."""
+    """Return the final frame tree: the parent of each frame, and its poses relative to the world and the parent."""
     tree = recording.tree
     table = {}
     for name in tree:
@@ -96,7 +96,7 @@ def frames(recording: Recording, code: Code) -> dict[str, Any]:
 
 
 def ending(recording: Recording, code: Code) -> dict[str, Any]:
-    """Return how a run ended: its exit status, and of one that failed why, where and when."""
+    """Return the exit status of a run, and the error of a failed run with its location and time."""
     failure = recording.failure
     if failure is None:
         return {"ended": "finished", "exit_status": int(ExitStatus.DONE)}
@@ -112,40 +112,34 @@ def ending(recording: Recording, code: Code) -> dict[str, Any]:
     return {"ended": "failed", "exit_status": int(RunError.exit_status), "error": error}
 
 
-def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], where: str = KEPT) -> dict[str, Any]:
-    """Return a run in short, as plain data in SI units.
+def summary(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], hint: str = KEPT) -> dict[str, Any]:
+    """Return a summary of a run as plain data in SI units.
 
     Args:
-        recording: what happened.
-        code: the program that ran.
-        diagnostics: warnings of translation and run, and what ended it.
-        where: what is said of the lines of a trace that is too long.
+        recording: the recording of the run.
+        code: the program.
+        diagnostics: diagnostics of compilation and run, with the error that ended it.
+        hint: note on the omitted lines of a trace that is too long.
     """
-    found = {
+    data = {
         "program": code.source.name,
         "cell": recording.cell.name,
         "duration": recording.duration,
-        "trace": listed(recording.trace(), IN_A_LIST, where),
+        "trace": listed(recording.trace(), IN_A_LIST, hint),
         "contacts": [
-            {
-                "line": code.source.line(one.span.start),
-                "arm": one.arm,
-                "t0": one.t0,
-                "t1": one.t1,
-                **one.data["contact"],
-            }
-            for one in _contacts(recording).joined()
+            {"line": code.source.line(e.span.start), "arm": e.arm, "t0": e.t0, "t1": e.t1, **e.data["contact"]}
+            for e in _contacts(recording).joined()
         ],
         "collisions": COLLISIONS,
         "stages": [_stage(stage, recording, code) for stage in recording.stages],
-        "diagnostics": [to_json(one, code.source) for one in diagnostics],
+        "diagnostics": [to_json(diagnostic, code.source) for diagnostic in diagnostics],
     }
-    return {name: rounded(value) for name, value in found.items()}
+    return {name: rounded(value) for name, value in data.items()}
 
 
 def _contacts(recording: Recording) -> Excerpt[Effect]:
-    # Where an arm is braked its STOP has the contact too.
-    return excerpt([one for one in recording.effects if one.kind == "MOVE" and "contact" in one.data], IN_A_LIST)
+    # The STOP of an arm that is braked has the contact too.
+    return excerpt([e for e in recording.effects if e.kind == "MOVE" and "contact" in e.data], IN_A_LIST)
 
 
 def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
@@ -174,34 +168,34 @@ def _stage(run: RunStage, recording: Recording, code: Code) -> dict[str, Any]:
 
 
 def _detour(stage: Stage) -> dict[str, Any] | None:
-    """Return what stopped a straight line, how the stage goes round it and the price; None where nothing did."""
+    """Return the obstacle of a straight line with the detour of the stage and its cost; None without an obstacle."""
     obstacle, detour = stage.obstacle, stage.detour
     if obstacle is None or detour is None:
         return None
     return {
-        "by": detour.by,
+        "method": detour.by,
         "via": None if detour.via is None else _numbers(to_noap(detour.via)),
-        "stopped_by": obstacle.reason,
+        "obstacle": obstacle.reason,
         "cause": obstacle.cause,
         "joint": obstacle.joint,
         "fraction": obstacle.fraction,
         "along": obstacle.along,
         "line": obstacle.length,
-        "place": _numbers(obstacle.place),
-        "off_the_line": detour.price.distance,
-        "turned_off": detour.price.turn,
-        "longer_by": detour.price.time,
+        "position": _numbers(obstacle.place),
+        "position_deviation": detour.price.distance,
+        "rotation_deviation": detour.price.turn,
+        "extra_time": detour.price.time,
     }
 
 
 def rounded(value: Any) -> Any:
-    """Return plain data with its numbers as people write them: ticks times the period is 6.7490000000000006."""
+    """Return plain data with rounded numbers: a number of ticks times the period may be 6.7490000000000006."""
     if isinstance(value, float):
         return round(value, _DIGITS) + 0.0  # adding 0 turns -0 into 0
     if isinstance(value, Mapping):
-        return {name: rounded(one) for name, one in value.items()}
+        return {name: rounded(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [rounded(one) for one in value]
+        return [rounded(item) for item in value]
     return value
 
 
@@ -224,28 +218,28 @@ def _events(recording: Recording, code: Code) -> Iterator[str]:
 
 
 def left_out(recording: Recording, most_rows: int) -> tuple[str, ...]:
-    """Say what the files of a run leave out, since there is too much of it; empty where they have all.
+    """Return notes on what the files of a run omit because of their limits; empty where they are complete.
 
     Args:
-        recording: what happened.
-        most_rows: of ``motion.csv``.
+        recording: the recording of the run.
+        most_rows: limit of the rows of ``motion.csv``.
     """
-    rows, contacts = sum(len(one.t) for one in recording.streams), _contacts(recording).left_out
+    rows, contacts = sum(len(stream.t) for stream in recording.streams), _contacts(recording).left_out
     more_contacts = (f"run.json lists the first and the last contacts: {more(contacts)}",) if contacts else ()
     if rows <= most_rows:
         return more_contacts
-    ticks, kept = len(recording.streams[0].t), _kept(recording, most_rows)
-    first, end, _ = kept.indices(ticks)
+    ticks = len(recording.streams[0].t)
+    first, end, _ = _written_ticks(recording, most_rows).indices(ticks)
     part = "last" if first else "first"
     text = (
         f"motion.csv holds the {part} {(end - first) * recording.cell.period:.3f} s of {recording.duration:.3f} s: "
-        f"{(end - first) * len(recording.streams)} of {rows} rows; `--motion-rows {rows}` keeps all"
+        f"{(end - first) * len(recording.streams)} of {rows} rows; `--motion-rows {rows}` writes all"
     )
     return (text, *more_contacts)
 
 
-def _kept(recording: Recording, most_rows: int) -> slice:
-    """Return the ticks that ``motion.csv`` holds: the first ones, or the last ones before a failure."""
+def _written_ticks(recording: Recording, most_rows: int) -> slice:
+    """Return the ticks in ``motion.csv``: the first ones, or the last ones before a failure."""
     ticks = most_rows // max(len(recording.streams), 1)
     if recording.failure is None or not recording.streams:
         return slice(0, ticks)
@@ -253,15 +247,15 @@ def _kept(recording: Recording, most_rows: int) -> slice:
 
 
 def run_record(recording: Recording, code: Code, diagnostics: Sequence[Diagnostic], origin: Origin) -> dict[str, Any]:
-    """Return what ``run.json`` says of a run: how it ended, what made it, what was left out, and the summary.
+    """Return the record of a run for ``run.json``: its end, inputs, options, omissions, and the summary.
 
     Args:
-        recording: what happened.
-        code: the program that ran.
-        diagnostics: warnings of translation and run, and what ended it.
-        origin: what made it.
+        recording: the recording of the run.
+        code: the program.
+        diagnostics: diagnostics of compilation and run, with the error that ended it.
+        origin: the inputs of the run.
     """
-    arms = {name: place.arm.name for name, place in recording.cell.arms.items()}
+    arms = {name: arm.arm.name for name, arm in recording.cell.arms.items()}
     return {
         **ending(recording, code),
         "command": origin.command,

@@ -1,4 +1,4 @@
-"""The workspace of a five-bar with its singular places, and how well its motors move the tip in it."""
+"""The workspace of a five-bar with its singularities, and the conditioning of its transmission."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,25 +17,25 @@ from armwright.report.figures import Drawing, empty_figure, svg_text
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Rods so little bent are in one line, and have no condition: the sine of their angle.
+# Sine of the angle between rods below which they are aligned, and have no condition number.
 _IN_LINE = 1e-9
-# Angles so near to one another are the same [rad], and a path is drawn with so many points.
+# Difference of equal angles at most [rad], and points of a path that are drawn.
 _SAME, _DRAWN = 1e-6, 200
 # Cells of the map along its longer side.
 _CELLS = 260
 
 
 def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = ()) -> Drawing:
-    """Return the workspace with its singular places, in one assembly mode.
+    """Return the workspace with its singularities, in an assembly mode.
 
     Args:
         bar: the five-bar.
-        mode: where its elbows are.
-        paths: (k, 2) places to draw into it [m], the arm at the start of the first.
+        mode: assembly mode of its elbows.
+        paths: (k, 2) positions of paths to draw [m]; the arm is drawn at the start of the first.
 
     Raises:
-        UnknownNameError: there is no such mode.
-        InvalidValueError: its arms never meet, or a path starts out of reach.
+        UnknownNameError: the mode is unknown.
+        InvalidValueError: the rods cannot meet, or a path starts out of reach.
     """
     one_of("assembly mode", mode, MODES)
     figure = empty_figure((7.4, 6.6))
@@ -63,7 +63,7 @@ def workspace_figure(bar: FiveBar, mode: Mode = "out", paths: Sequence[Array] = 
 
 
 def workspace_of(scenario: Scenario) -> Drawing | None:
-    """Return the workspace of the five-bar that does a scenario, with its path; None where it is no five-bar."""
+    """Return the workspace of the five-bar of a scenario, with its path; None for another linkage."""
     try:
         bar = FiveBar.of(scenario.linkage)
     except InvalidValueError:
@@ -72,20 +72,20 @@ def workspace_of(scenario: Scenario) -> Drawing | None:
     for mode, angles in inverse_all(bar, tips[0]).items():
         if np.abs(np.sin((configuration(scenario.linkage, angles) - scenario.ideal.q[0]) / 2)).max() < _SAME:
             return workspace_figure(bar, mode, [tips[:: max(1, len(tips) // _DRAWN)]])
-    raise AssertionError("a five-bar stands in one of four modes")
+    raise AssertionError("a five-bar has four assembly modes")
 
 
 def _evenness(bar: FiveBar, space: Workspace, mode: Mode) -> Array:
-    """Return one over the condition, (j, i); NaN out of reach."""
-    found = np.full(space.distance.shape, np.nan)
+    """Return the reciprocal condition number of the transmission, (j, i); NaN out of reach."""
+    evenness = np.full(space.distance.shape, np.nan)
     inside = space.distance > 0
-    places = np.stack(np.meshgrid(space.x, space.y), axis=-1)[inside]
-    angles = inverse(bar, places, mode)
-    values = np.zeros(len(places))
+    positions = np.stack(np.meshgrid(space.x, space.y), axis=-1)[inside]
+    angles = inverse(bar, positions, mode)
+    values = np.zeros(len(positions))
     bent = np.abs(singularity(angles).parallel) > _IN_LINE
     values[bent] = 1.0 / transmission(bar, angles[bent]).condition
-    found[inside] = values
-    return found
+    evenness[inside] = values
+    return evenness
 
 
 def _draw_curves(axis: "Axes", bar: FiveBar, mode: Mode) -> None:
@@ -94,22 +94,22 @@ def _draw_curves(axis: "Axes", bar: FiveBar, mode: Mode) -> None:
         "parallel singularity": {"color": "C3", "linewidth": 1.8},
         "in another mode": {"color": "C3", "linewidth": 0.8, "linestyle": ":"},
     }
-    seen: set[str] = set()
+    labelled: set[str] = set()
     for curve in singular_curves(bar):
         own = "parallel singularity" if curve.modes[0] == mode else "in another mode"
         label = "serial singularity" if curve.kind == "serial" else own
-        axis.plot(*(curve.points * 1e3).T, **styles[label], label=None if label in seen else label)
-        seen.add(label)
+        axis.plot(*(curve.points * 1e3).T, **styles[label], label=None if label in labelled else label)
+        labelled.add(label)
 
 
 def _draw_arm(axis: "Axes", bar: FiveBar, angles: Array, tip: Array) -> None:
-    left, right = elbows(bar, angles[[0, 3]]) * 1e3
-    points = np.stack([bar.motors[0] * 1e3, left, np.asarray(tip) * 1e3, right, bar.motors[1] * 1e3])
+    elbow_0, elbow_1 = elbows(bar, angles[[0, 3]]) * 1e3
+    points = np.stack([bar.motors[0] * 1e3, elbow_0, np.asarray(tip) * 1e3, elbow_1, bar.motors[1] * 1e3])
     axis.plot(*points.T, "-", color="0.25", linewidth=3.2, solid_capstyle="round", zorder=5)
     axis.plot(*points.T, "o", color="w", markeredgecolor="0.25", markersize=6, zorder=6)
 
 
 def _middle(space: Workspace) -> Array:
-    """Return the place farthest from the border, of those below the motors if it has some."""
+    """Return the position farthest from the border, below the motors if the workspace extends there."""
     j, i = np.unravel_index(int(space.distance[: max(1, len(space.y) // 2)].argmax()), space.distance.shape)
     return np.array([space.x[i], space.y[j]])

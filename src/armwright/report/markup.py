@@ -1,4 +1,4 @@
-"""One HTML text out of template, style, scripts and data, which no data can break out of."""
+"""An HTML file from a template, styles, scripts and escaped data."""
 
 import html
 import json
@@ -14,9 +14,9 @@ from armwright.arrays import Array
 
 # Five significant digits are below a pixel on any screen; instants of a long run take more.
 _DIGITS, _DIGITS_OF_SCALARS = 5, 8
-# What is smaller is rounding, and costs letters.
+# Decimals at most; smaller parts of a number are rounding errors.
 _DECIMALS = 7
-# A row of a track that equals the one before it is written as this.
+# Stands for a row that equals the previous row.
 _REPEATED = 0
 _NO_SCRIPTS = (
     '<noscript><p class="empty">This page draws with a script of its own; please allow scripts for it.</p></noscript>'
@@ -35,19 +35,19 @@ def page_html(
     scripts: Sequence[str] = (),
     data: object = None,
 ) -> str:
-    """Return a whole page: one head and one heading for all, and below them what each has of its own.
+    """Return a page: the head and heading of all pages, and its own parts below them.
 
     Args:
         title: plain text.
         main: HTML text of the page's own parts.
-        generated: plain text, what made it.
-        badge: HTML text beside the heading, and so are the facts and notes below it.
-        facts: names and texts.
-        notes: items of a list.
+        generated: plain text, the program and command that made it.
+        badge: HTML text beside the heading.
+        facts: HTML text below the heading, names and texts.
+        notes: HTML text below the heading, items of a list.
         styles: names of style sheets beyond the common one.
-        scripts: names of the page's scripts, in the order in which the browser reads them: each uses only what stands
-            before it. A page with scripts has a clock.
-        data: what the scripts read: attrs objects, mappings, sequences, arrays, strings, numbers, None.
+        scripts: names of the page's scripts, in the order in which the browser reads them: each uses only earlier
+            ones. A page with scripts has a clock.
+        data: data of the scripts: attrs objects, mappings, sequences, arrays, strings, numbers, None.
 
     Returns:
         HTML text.
@@ -72,7 +72,7 @@ def page_html(
 
 
 def json_text(data: object) -> str:
-    """Return ``data`` as JSON that may stand inside a script element: ASCII, and no ``<`` in it."""
+    """Return ``data`` as JSON for a script element: in ASCII, and without ``<``."""
     text = json.dumps(_plain(data), ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c")
 
@@ -83,7 +83,7 @@ def asset(name: str) -> str:
 
 
 def _plain(value: object) -> object:
-    """Turn ``value`` into what JSON knows."""
+    """Convert ``value`` to types of JSON."""
     if isinstance(value, np.ndarray):
         return _rows(value)
     if isinstance(value, (int, float, np.number)) and not isinstance(value, bool):
@@ -98,7 +98,7 @@ def _plain(value: object) -> object:
 
 
 def _short(number: float, digits: int) -> float | int | None:
-    """Round to significant digits; whole numbers lose their point, and what is infinite becomes None."""
+    """Round to significant digits; an integral number becomes an int, and an infinite one None."""
     if not math.isfinite(number):
         return None
     rounded = round(float(f"{number:.{digits}g}"), _DECIMALS)
@@ -106,7 +106,7 @@ def _short(number: float, digits: int) -> float | int | None:
 
 
 def _rows(array: Array) -> list[object]:
-    """Write an array over time: numbers for one axis, else one flat list a row, 0 for a row that stays as it was."""
+    """Return an array over time: numbers for a single axis, else a flat list per row, or 0 for a repeated row."""
     if array.ndim == 1:
         return [_short(number, _DIGITS_OF_SCALARS) for number in array.tolist()]
     rows: list[object] = []

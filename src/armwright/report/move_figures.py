@@ -1,4 +1,4 @@
-"""Printed figures of a move: joints and hand over time, and the path of the hand in space with its approach vectors."""
+"""Figures of a move: joints and tool over time, and the path of the tool in space with its approach vectors."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)))
-# Approach vectors along a path, and their length as a part of its extent.
+# Approach vectors along a path, and their length relative to its extent.
 _ARROWS, _ARROW_LENGTH = 26, 0.16
 
 
@@ -22,8 +22,8 @@ class Panel(NamedTuple):
     """Curves over a common axis.
 
     Attributes:
-        title: what they show; may be empty.
-        unit: of the curves.
+        title: the quantity; may be empty.
+        unit: unit of the curves.
         lines: (m,) values by the name of the curve.
     """
 
@@ -35,13 +35,13 @@ class Panel(NamedTuple):
 def panels(
     title: str, t: Array, shown: Sequence[Panel], *, marks: Mapping[str, float] | None = None, columns: int = 1
 ) -> str:
-    """Draw panels of curves over time, one above the other.
+    """Draw panels of curves over time, stacked.
 
     Args:
-        title: of the figure.
+        title: title of the figure.
         t: (m,) times [s].
-        shown: the panels, from above, column by column.
-        marks: moments to name above the panels, such as those of poses [s].
+        shown: the panels, from the top, column by column.
+        marks: times by the names that are printed above the panels, such as those of poses [s].
         columns: number of columns.
 
     Returns:
@@ -52,13 +52,13 @@ def panels(
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axis, panel in zip(grid.T.flat, shown, strict=False):
         draw_curves(axis, t, panel)
-        for moment in (marks or {}).values():
-            axis.axvline(moment, color="0.6", linewidth=0.7, linestyle=":", zorder=0)
+        for time in (marks or {}).values():
+            axis.axvline(time, color="0.6", linewidth=0.7, linestyle=":", zorder=0)
     for axis in grid[0]:
-        for name, moment in (marks or {}).items():
-            # Above the name of the panel.
+        for name, time in (marks or {}).items():
+            # Above the title of the panel.
             above = {"xytext": (0, 17), "textcoords": "offset points", "ha": "center", "va": "bottom", "color": "0.4"}
-            axis.annotate(literal(name), (moment, 1), xycoords=("data", "axes fraction"), **above)
+            axis.annotate(literal(name), (time, 1), xycoords=("data", "axes fraction"), **above)
     for axis in grid[-1]:
         axis.set_xlabel("time, s")
     figure.suptitle(literal(title))
@@ -66,12 +66,12 @@ def panels(
 
 
 def path_in_space(title: str, X: Array, marks: Mapping[str, Array]) -> str:
-    """Draw the path of the hand with its approach vectors.
+    """Draw the path of the tool with its approach vectors.
 
     Args:
-        title: of the figure.
+        title: title of the figure.
         X: (m, 4, 4) poses along the path.
-        marks: (3,) places to name [m].
+        marks: (3,) positions to mark, by name [m].
 
     Returns:
         An SVG file's text.
@@ -86,11 +86,11 @@ def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapp
     """Draw three panels over time and the path in space in a square.
 
     Args:
-        title: of the figure.
+        title: title of the figure.
         t: (m,) times [s].
         three: the panels: left above, right above, left below.
         X: (k, 4, 4) poses along the path, drawn right below.
-        marks: (3,) places to name [m].
+        marks: (3,) positions to mark, by name [m].
 
     Returns:
         An SVG file's text.
@@ -106,7 +106,7 @@ def overview(title: str, t: Array, three: Sequence[Panel], X: Array, marks: Mapp
 
 
 def joint_panels(samples: Samples, revolute: Sequence[bool]) -> list[Panel]:
-    """Return positions, speeds and accelerations of joints: angles in degrees, slides in cm."""
+    """Return panels of positions, speeds and accelerations of joints, in degrees or cm."""
     names = [f"joint {i + 1}" for i in range(len(revolute))]
     scale = np.where(revolute, 180 / np.pi, 100.0)
     unit = "deg" if all(revolute) else "cm" if not any(revolute) else "deg, cm"
@@ -118,24 +118,24 @@ def joint_panels(samples: Samples, revolute: Sequence[bool]) -> list[Panel]:
 
 
 def hand_panels(t: Array, X: Array) -> list[Panel]:
-    """Return place and ZYZ angles of the hand (m, 4, 4), and their rates and accelerations, by differences."""
-    places = X[:, :3, 3] * 100
+    """Return panels of position and ZYZ angles of the tool (m, 4, 4), and of their differences in time."""
+    positions = X[:, :3, 3] * 100
     angles = np.degrees(zyz_angles(X[:, :3, :3]))
-    found = []
-    for unit, names, values in (("cm", "xyz", places), ("deg", ("phi", "theta", "psi"), angles)):
+    made = []
+    for unit, names, values in (("cm", "xyz", positions), ("deg", ("phi", "theta", "psi"), angles)):
         rate = _rate(values, t)
-        what = "place" if unit == "cm" else "ZYZ angles"
+        quantity = "position" if unit == "cm" else "ZYZ angles"
         for title, per, curve in (
-            (what, "", values),
-            (f"speed of the {what}", "/s", rate),
-            (f"acceleration of the {what}", "/s²", _rate(rate, t)),
+            (quantity, "", values),
+            (f"speed of the {quantity}", "/s", rate),
+            (f"acceleration of the {quantity}", "/s²", _rate(rate, t)),
         ):
-            found.append(Panel(title, unit + per, dict(zip(names, curve.T, strict=True))))
-    return found
+            made.append(Panel(title, unit + per, dict(zip(names, curve.T, strict=True))))
+    return made
 
 
 def _rate(values: Array, t: Array) -> Array:
-    """Return the rates of values (m, k), as exactly as so few or many samples tell them."""
+    """Return the rates of values (m, k) by differences of second order where there are enough samples."""
     if len(t) < 2:
         return np.zeros_like(values)
     return np.asarray(np.gradient(values, t, axis=0, edge_order=2 if len(t) > 2 else 1))
@@ -159,8 +159,8 @@ def draw_path(axis: Any, X: Array, marks: Mapping[str, Array]) -> None:
     a = X[some, :3, 2] * _ARROW_LENGTH * extent
     axis.plot(*p.T, linewidth=2.0, color="C0")
     axis.quiver(*p[some].T, *a.T, color="C1", linewidth=1.0, arrow_length_ratio=0.25)
-    for name, place in marks.items():
-        x, y, z = place * 100
+    for name, position in marks.items():
+        x, y, z = position * 100
         axis.plot([x], [y], [z], "o", color="C3", markersize=5)
         axis.text(x, y, z, f"  {literal(name)}", color="C3")
     tips = p[some] + a

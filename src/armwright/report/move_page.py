@@ -1,4 +1,4 @@
-"""The page of a move through poses: the arm moving, the poses it passes, and the charts of its joints."""
+"""The page of a move through poses: the moving arm, the poses, and the charts of its joints."""
 
 from collections.abc import Iterator
 
@@ -15,23 +15,23 @@ from armwright.report.sticks import joints_of, sticks, thinned
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
-# Looks at the way of the hand from pose to pose.
-_LOOKS = 200
-# Instants of the animation: so many for a short move, but no more per second than a screen shows, nor in all.
+# Samples of the path of the tool from pose to pose.
+_SAMPLES = 200
+# Instants of the animation: for a short move, bounds per second, and at most.
 _INSTANTS, _FPS, _MOST = 240, (30.0, 60.0), 1200
 _ARM = "ARM"
 
 
 @attrs.frozen(kw_only=True, eq=False)
-class Moved:
-    """A move that was planned, and all that is told of it.
+class PlannedMove:
+    """A planned move, and the data of its page.
 
     Attributes:
         move: the move.
-        file: the poses, as they were given.
-        name: of that file.
+        file: the file of the poses.
+        name: name of that file.
         samples: the motion at the ticks of a servo.
-        tau: (k, n) efforts there, drives included [N m] or [N].
+        tau: (k, n) efforts at the samples, drives included [N m] or [N].
         command: the command line.
         notes: warnings and remarks.
     """
@@ -45,22 +45,22 @@ class Moved:
     notes: tuple[Message, ...]
 
 
-def move_page(moved: Moved) -> RunPage:
+def move_page(planned: PlannedMove) -> RunPage:
     """Return the page of a move."""
-    move, samples = moved.move, moved.samples
+    move, samples = planned.move, planned.samples
     rows = thinned(len(samples.times))
     return RunPage(
-        title=moved.file.title or f"{move.arm.name} through {moved.name}",
-        program_name=moved.name,
-        program_text=moved.file.text,
+        title=planned.file.title or f"{move.arm.name} through {planned.name}",
+        program_name=planned.name,
+        program_text=planned.file.text,
         text_kind="Poses",
         cell_name="",
         generated_by=f"armwright {__version__}",
-        command=moved.command,
+        command=planned.command,
         duration=move.trajectory.duration,
-        messages=moved.notes,
-        effects=_effects(move, moved.file),
-        stages=_stages(moved),
+        messages=planned.notes,
+        effects=_effects(move, planned.file),
+        stages=_stages(planned),
         arms=[
             ArmRecord(
                 name=_ARM,
@@ -70,27 +70,27 @@ def move_page(moved: Moved) -> RunPage:
                 q=samples.q[rows],
                 qd=samples.qd[rows],
                 qdd=samples.qdd[rows],
-                tau=moved.tau[rows],
+                tau=planned.tau[rows],
                 hand=forward(move.arm, samples.q[rows])[:, :3, 3],
             )
         ],
-        animation=_animation(move, moved.file),
+        animation=_animation(move, planned.file),
     )
 
 
 def _effects(move: Move, file: PosesFile) -> Iterator[Effect]:
     for i, (name, t, line) in enumerate(zip(file.names, move.times.tolist(), file.lines, strict=True)):
-        met = move.misses[i] == 0
-        passed = "met" if met else f"passed {move.misses[i] * 1e3:.1f} mm beside" if move.hand else "passed beside"
-        yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {passed}")
+        deviation = f" with a deviation of {move.misses[i] * 1e3:.1f} mm" if move.hand else " approximately"
+        passage = "reached" if move.misses[i] == 0 else f"passed{deviation}"
+        yield Effect(t0=t, t1=t, line=line, text=f"pose {name} {passage}")
 
 
-def _stages(moved: Moved) -> Iterator[Stage]:
-    move, file, samples = moved.move, moved.file, moved.samples
+def _stages(planned: PlannedMove) -> Iterator[Stage]:
+    move, file, samples = planned.move, planned.file, planned.samples
     for i, (t0, t1) in enumerate(zip(move.times[:-1].tolist(), move.times[1:].tolist(), strict=True)):
-        hand = forward(move.arm, move.trajectory(np.linspace(t0, t1, _LOOKS)))[:, :3, 3]
+        hand = forward(move.arm, move.trajectory(np.linspace(t0, t1, _SAMPLES)))[:, :3, 3]
         during = (samples.times >= t0 - 1e-12) & (samples.times <= t1 + 1e-12)
-        if not during.any():  # a way shorter than a tick
+        if not during.any():  # a segment shorter than a tick
             during = np.abs(samples.times - (t0 + t1) / 2) == np.abs(samples.times - (t0 + t1) / 2).min()
         detour = move.detours[i] if move.detours else None
         yield Stage(
@@ -102,7 +102,7 @@ def _stages(moved: Moved) -> Iterator[Stage]:
             to=(file.names[i + 1],),
             speed=100.0,
             peak_speed=np.abs(samples.qd[during]).max(axis=0).tolist(),
-            peak_effort=np.abs(moved.tau[during]).max(axis=0).tolist(),
+            peak_effort=np.abs(planned.tau[during]).max(axis=0).tolist(),
             hand_length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
             deviation=detour.price.distance if detour else move.certificate.deviation if move.certificate else None,
             note=f"by {detour.by}: {detour.price}" if detour and detour.by != "line" else "",

@@ -1,4 +1,4 @@
-"""A move as a film: the arm of sticks and the path of its hand, as GIF or MP4."""
+"""A move as a film: the stick figure of the arm and the path of its tool, as GIF or MP4."""
 
 import shutil
 import tempfile
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter
     from matplotlib.figure import Figure
 
-# Pictures per second, as many as there are at most; a longer move is shown faster.
+# Images per second, and images at most; a longer move is shown faster.
 _FPS, _MOST = 20, 90
 _SIZE, _DPI = (4.8, 4.4), 100
-# Length of the approach vector, as a part of half the scene.
+# Length of the approach vector relative to half the scene.
 _APPROACH = 0.25
 
 
@@ -30,7 +30,7 @@ def films(move: Move, watch: Callable[[int, int], None] | None = None) -> dict[s
 
     Args:
         move: the move.
-        watch: told how many pictures of how many are drawn.
+        watch: called with the number of finished images and the number of all.
     """
     from matplotlib.animation import FFMpegWriter, PillowWriter  # noqa: PLC0415
 
@@ -56,11 +56,11 @@ def films(move: Move, watch: Callable[[int, int], None] | None = None) -> dict[s
 
 
 def _stage(points: Array, hand: Array, move: Move) -> "tuple[Figure, Callable[[int], None]]":
-    """Return a figure with the arm in it, and what moves it to one of m instants.
+    """Return a figure with the arm, and a function that sets it to any of m instants.
 
     Args:
         points: (m, k, 3) the corners of the arm [m].
-        hand: (m, 4, 4) poses of the hand.
+        hand: (m, 4, 4) poses of the tool.
         move: the move.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415

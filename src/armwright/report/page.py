@@ -1,7 +1,7 @@
-"""The page of a run: what it shows, and the one HTML file that shows it.
+"""The page of a run: its data, and the HTML file that shows them.
 
-Everything in here is SI and radians; the page itself turns them into degrees and millimetres. The file carries its
-style, its script and its numbers, and asks nothing of any network.
+All data are in SI units and radians; the scripts convert them to degrees and millimetres. The file includes its style,
+its scripts and its data, and uses no network.
 """
 
 import math
@@ -22,30 +22,30 @@ StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND", "JOINT", "HAND"
 TextKind: TypeAlias = Literal["Program", "Poses"]
 JointKind: TypeAlias = Literal["revolute", "prismatic"]
 
-# What is said of collisions wherever a motion is reported, until they are looked for.
-COLLISIONS = "not looked for"
+# The text on collisions wherever a motion is reported, until they are checked.
+COLLISIONS = "not checked"
 
 _SCRIPTS = ("scene.js", "camera.js", "solids.js", "view.js", "charts.js", "joint_charts.js", "lists.js", "run.js")
 _SAME = attrs.cmp_using(eq=np.array_equal)
 
 
-def _all(items: Iterable[Any]) -> tuple[Any, ...]:
+def _tuple(items: Iterable[Any]) -> tuple[Any, ...]:
     return tuple(items)
 
 
-def _by_name(items: Mapping[str, Any]) -> dict[str, Any]:
+def _dict(items: Mapping[str, Any]) -> dict[str, Any]:
     return dict(items)
 
 
 @attrs.frozen(kw_only=True)
 class Message:
-    """A word of the checker or of the run.
+    """A message of the compiler or of the run.
 
     Attributes:
         severity: ``error``, ``warning`` or ``note``.
         text: the message.
         code: such as ``W201``; may be empty.
-        line: line of the program, from 1; None where it belongs to none.
+        line: line of the program, from 1; None without a line.
     """
 
     severity: Severity
@@ -56,14 +56,14 @@ class Message:
 
 @attrs.frozen(kw_only=True)
 class Effect:
-    """One executed statement.
+    """An executed statement.
 
     Attributes:
         t0: when it began [s].
-        t1: when it ended [s]; equal to t0 where it takes no time.
+        t1: when it ended [s]; equal to t0 if it takes no time.
         line: line of the program, from 1.
-        text: what it did, such as ``ARM_1 [obj1] MOVE: PTP obj2 @100``.
-        process: that did it, such as ``branch 2``; empty where there is only one.
+        text: its effect, such as ``ARM_1 [obj1] MOVE: PTP obj2 @100``.
+        process: its process, such as ``branch 2``; empty where there is only one process.
     """
 
     t0: float
@@ -75,7 +75,7 @@ class Effect:
 
 @attrs.frozen(kw_only=True)
 class Stage:
-    """One piece of motion.
+    """A stage of a motion.
 
     Attributes:
         t0: when it began [s].
@@ -83,13 +83,13 @@ class Stage:
         line: line of the program, from 1.
         arm: name of the arm.
         kind: ``PTP``, ``LINE``, ``SPLINE`` or ``BLEND`` of a program; ``JOINT`` or ``HAND`` of a move through poses.
-        to: the frames it goes to, the last one its goal.
-        speed: what the program asked for, 100 being normal.
+        to: its target frames; the last is the goal.
+        speed: the speed in the program, 100 being normal.
         peak_speed: n largest joint speeds [rad/s] or [m/s].
         peak_effort: n largest torques [N m] or forces [N]; None where no dynamics was computed.
-        hand_length: way of the hand [m].
-        deviation: largest distance from the straight line [m]; None where there is none to keep.
-        note: anything worth a word, such as ``slowed by joint 2 speed``.
+        hand_length: length of the path of the tool [m].
+        deviation: largest distance from the straight line [m]; None without a line.
+        note: a remark, such as ``slowed by joint 2 speed``.
     """
 
     t0: float
@@ -97,10 +97,10 @@ class Stage:
     line: int
     arm: str
     kind: StageKind
-    to: tuple[str, ...] = attrs.field(converter=_all)
+    to: tuple[str, ...] = attrs.field(converter=_tuple)
     speed: float
-    peak_speed: tuple[float, ...] = attrs.field(converter=_all)
-    peak_effort: tuple[float, ...] | None = attrs.field(default=None, converter=attrs.converters.optional(_all))
+    peak_speed: tuple[float, ...] = attrs.field(converter=_tuple)
+    peak_effort: tuple[float, ...] | None = attrs.field(default=None, converter=attrs.converters.optional(_tuple))
     hand_length: float
     deviation: float | None = None
     note: str = ""
@@ -108,7 +108,7 @@ class Stage:
 
 @attrs.frozen(kw_only=True)
 class JointInfo:
-    """A joint and its limits, infinite where nothing is known.
+    """A joint and its limits, infinite where unknown.
 
     Attributes:
         name: such as ``joint 1``.
@@ -131,23 +131,23 @@ class JointInfo:
 
 @attrs.frozen(kw_only=True)
 class ArmRecord:
-    """What one arm did, at N instants (some 2000 are enough for a screen).
+    """The motion of an arm at N instants (some 2000 suffice for a screen).
 
     Attributes:
-        name: as the program calls it, such as ``ARM_1``.
-        model: what arm it is, such as ``stanford``.
+        name: its name in the program, such as ``ARM_1``.
+        model: its name in the catalogue, such as ``stanford``.
         joints: n joints from base to hand.
         t: (N,) instants [s].
         q: (N, n) positions [rad] or [m].
         qd: (N, n) speeds.
         qdd: (N, n) accelerations.
         tau: (N, n) torques [N m] or forces [N]; None where no dynamics was computed.
-        hand: (N, 3) the hand in the world [m].
+        hand: (N, 3) positions of the tool in the world [m].
     """
 
     name: str
     model: str
-    joints: tuple[JointInfo, ...] = attrs.field(converter=_all)
+    joints: tuple[JointInfo, ...] = attrs.field(converter=_tuple)
     t: Array = attrs.field(converter=instants, eq=_SAME)
     q: Array = attrs.field(converter=per_joint, eq=_SAME)
     qd: Array = attrs.field(converter=per_joint, eq=_SAME)
@@ -160,23 +160,23 @@ class ArmRecord:
         owner = f"record of '{self.name}'"
         columns = {"positions": self.q, "speeds": self.qd, "accelerations": self.qdd, "efforts": self.tau}
         check_rows(owner, len(self.t), {**columns, "hand path": self.hand})
-        for what, track in columns.items():
+        for quantity, track in columns.items():
             if track is not None and track.shape[1] != len(self.joints):
-                raise ShapeError(f"{owner}: {len(self.joints)} joints but {track.shape[1]} columns of {what}")
+                raise ShapeError(f"{owner}: {len(self.joints)} joints but {track.shape[1]} columns of {quantity}")
 
 
 @attrs.frozen(kw_only=True)
 class ArmFigure:
-    """How an arm looks at the M instants of the animation.
+    """The stick figure of an arm at the M instants of the animation.
 
     Attributes:
-        points: (M, K, 3) the skeleton from the base to the hand, in the world [m]. Corners between joint origins may
-            be put in; coinciding points do no harm.
-        hand_axes: (M, 9) columns n, o, a of the hand in the world; the fingers point along a and open along o.
+        points: (M, K, 3) the skeleton from the base to the tool, in the world [m]. It may have corners between joint
+            origins, and points may coincide.
+        hand_axes: (M, 9) columns n, o, a of the tool in the world; the fingers point along a and open along o.
         grip: (M,) 0 closed to 1 open.
-        joint_axes: (M, n, 6) a point on the axis of each joint [m] and its direction, drawn as drums; None to
-            draw balls at the points instead.
-        radii: (K-1,) radius of each piece of the skeleton [m]; None to let the page choose.
+        joint_axes: (M, n, 6) a point on the axis of each joint [m] and its direction, drawn as cylinders; None draws
+            spheres at the points instead.
+        radii: (K-1,) radius of each segment of the skeleton [m]; None lets the page choose.
     """
 
     points: Array = attrs.field(converter=skeleton, eq=_SAME)
@@ -186,18 +186,18 @@ class ArmFigure:
     radii: Array | None = attrs.field(default=None, converter=attrs.converters.optional(numbers), eq=_SAME)
 
     def __attrs_post_init__(self) -> None:
-        """Refuse radii that do not fit the pieces of the skeleton."""
-        pieces = self.points.shape[1] - 1
-        if self.radii is not None and len(self.radii) != pieces:
-            raise ShapeError(f"arm figure: {pieces} pieces between the points but {len(self.radii)} radii")
+        """Refuse radii that do not fit the segments of the skeleton."""
+        segments = self.points.shape[1] - 1
+        if self.radii is not None and len(self.radii) != segments:
+            raise ShapeError(f"arm figure: {segments} segments between the points but {len(self.radii)} radii")
 
 
 @attrs.frozen(kw_only=True)
 class FrameTrack:
-    """Where a frame was at the M instants of the animation.
+    """The poses of a frame at the M instants of the animation.
 
     Attributes:
-        name: as the program spells it.
+        name: its name as the program spells it.
         poses: (M, 12) columns n, o, a, p in the world; rows before ``visible_from`` are finite but not shown.
         visible_from: first row at which the frame has a value.
     """
@@ -209,12 +209,12 @@ class FrameTrack:
 
 @attrs.frozen(kw_only=True)
 class TreeChange:
-    """A frame begins to hang on another one; what hangs there from the start has t = 0.
+    """A frame gets another parent; its first parent has t = 0.
 
     Attributes:
-        t: when [s].
-        child: the frame that is hung up.
-        parent: what it hangs on: ``WORLD``, an arm, or a frame.
+        t: time [s].
+        child: the frame.
+        parent: its new parent: ``WORLD``, an arm, or a frame.
     """
 
     t: float
@@ -224,21 +224,21 @@ class TreeChange:
 
 @attrs.frozen(kw_only=True)
 class Animation:
-    """What the three-dimensional view shows.
+    """The data of the three-dimensional view.
 
     Attributes:
         fps: instants per second.
         t: (M,) instants [s], at least one.
-        arms: by name.
-        frames: in the order in which they are drawn.
-        tree: changes in order of time.
+        arms: figures of the arms by name.
+        frames: frames in the order in which they are drawn.
+        tree: changes of the frame tree in order of time.
     """
 
     fps: float
     t: Array = attrs.field(converter=instants, eq=_SAME)
-    arms: Mapping[str, ArmFigure] = attrs.field(factory=dict, converter=_by_name)
-    frames: tuple[FrameTrack, ...] = attrs.field(default=(), converter=_all)
-    tree: tuple[TreeChange, ...] = attrs.field(default=(), converter=_all)
+    arms: Mapping[str, ArmFigure] = attrs.field(factory=dict, converter=_dict)
+    frames: tuple[FrameTrack, ...] = attrs.field(default=(), converter=_tuple)
+    tree: tuple[TreeChange, ...] = attrs.field(default=(), converter=_tuple)
 
     def __attrs_post_init__(self) -> None:
         """Refuse figures and frames without one row per instant."""
@@ -256,23 +256,23 @@ class Animation:
 
 @attrs.frozen(kw_only=True)
 class RunPage:
-    """Everything the page of a run shows.
+    """The data of the page of a run.
 
     Attributes:
         title: heading of the page.
         program_name: such as ``bench.rlo``.
-        program_text: the source as written.
+        program_text: the source.
         cell_name: such as ``cell1.json``.
         generated_by: such as ``armwright 0.1.0``.
         command: the command line that made the page.
         duration: simulated time [s].
-        status: how it ended, ``finished`` where all went well.
+        status: how the run ended; ``finished`` without an error.
         messages: warnings and notes.
         effects: executed statements, in order.
-        stages: pieces of motion, in order.
+        stages: stages of the motion, in order.
         arms: records of the arms.
-        animation: what the view shows; None where there is nothing to see.
-        text_kind: what the text is, ``Program`` or ``Poses``.
+        animation: the data of the view; None without a view.
+        text_kind: kind of the text, ``Program`` or ``Poses``.
     """
 
     title: str
@@ -283,33 +283,31 @@ class RunPage:
     command: str
     duration: float
     status: str = "finished"
-    messages: tuple[Message, ...] = attrs.field(default=(), converter=_all)
-    effects: tuple[Effect, ...] = attrs.field(default=(), converter=_all)
-    stages: tuple[Stage, ...] = attrs.field(default=(), converter=_all)
-    arms: tuple[ArmRecord, ...] = attrs.field(default=(), converter=_all)
+    messages: tuple[Message, ...] = attrs.field(default=(), converter=_tuple)
+    effects: tuple[Effect, ...] = attrs.field(default=(), converter=_tuple)
+    stages: tuple[Stage, ...] = attrs.field(default=(), converter=_tuple)
+    arms: tuple[ArmRecord, ...] = attrs.field(default=(), converter=_tuple)
     animation: Animation | None = None
     text_kind: TextKind = "Program"
 
     def __attrs_post_init__(self) -> None:
-        """Refuse a duration that is none, and stages of arms or joints that are not there."""
+        """Refuse an invalid duration, and stages of unknown arms or with a wrong number of joints."""
         if not 0 <= self.duration < math.inf:
             raise InvalidValueError(f"run: duration must be 0 s or more, got {self.duration}")
         joints = {arm.name: len(arm.joints) for arm in self.arms}
         for stage in self.stages:
             if stage.arm not in joints:
                 raise UnknownNameError("arm", stage.arm, joints)
-            for what, peaks in (("speeds", stage.peak_speed), ("efforts", stage.peak_effort)):
-                if peaks is not None and len(peaks) != joints[stage.arm]:
-                    raise ShapeError(
-                        f"stage on line {stage.line}: {joints[stage.arm]} joints but {len(peaks)} peak {what}"
-                    )
+            for quantity, peaks in (("speeds", stage.peak_speed), ("efforts", stage.peak_effort)):
+                if peaks is not None and len(peaks) != (count := joints[stage.arm]):
+                    raise ShapeError(f"stage on line {stage.line}: {count} joints but {len(peaks)} peak {quantity}")
 
 
 def run_page(data: RunPage) -> str:
-    """Return the whole text of the page, one HTML file that needs no other.
+    """Return the text of the page, a single HTML file.
 
     Args:
-        data: what happened.
+        data: the data of the run.
 
     Returns:
         HTML text; write it as UTF-8.

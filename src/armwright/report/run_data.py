@@ -1,4 +1,4 @@
-"""From the recording of a run to what its page shows: thinned for a screen, with the arm as a figure of sticks."""
+"""The data of the page of a run, from its recording: thinned for a screen, with the arms as stick figures."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,24 +16,15 @@ from armwright.program.language.diagnostic import Diagnostic
 from armwright.program.vm.excerpt import IN_A_LIST, KEPT, excerpt, more, one_line
 from armwright.program.vm.move_diagnostics import note_of
 from armwright.program.vm.recording import Effect as RunEffect, Recording, RunStage, Stream
-from armwright.report.page import (
-    Animation,
-    ArmRecord,
-    Effect,
-    FrameTrack,
-    Message,
-    RunPage,
-    Stage,
-    TreeChange,
-)
+from armwright.report.page import Animation, ArmRecord, Effect, FrameTrack, Message, RunPage, Stage, TreeChange
 from armwright.report.sticks import joints_of, sticks, thinned
 from armwright.spatial.poses import to_noap
 from armwright.version import __version__
 
-# Enough for a screen: instants of the animation.
+# Instants of the animation at most, which suffice for a screen.
 _FRAMES_PER_SECOND = 30.0
 _MOST_INSTANTS = 1200
-# Frames that the view draws: more hide one another, and each has a pose at every instant.
+# Frames that the view draws at most: more would hide each other, and each has a pose at every instant.
 _MOST_FRAMES = 400
 _T = TypeVar("_T")
 
@@ -45,24 +36,23 @@ def page_of(
     command: str,
     left_out: Sequence[str] = (),
 ) -> RunPage:
-    """Return the page of a run; of one that failed it says so first.
+    """Return the page of a run, also of one that failed.
 
     Args:
-        recording: what happened.
-        code: the program that ran.
-        diagnostics: warnings of translation and run.
+        recording: the recording of the run.
+        code: the program.
+        diagnostics: diagnostics of compilation and run.
         command: the command line, as shown on the page.
-        left_out: what other files leave out, as it is said there.
+        left_out: notes on what other files of the run omit.
     """
     source, cell, failure = code.source, recording.cell, recording.failure
     stages, fewer_stages = _fewer(recording.stages, IN_A_LIST, "stages", "all in run.json")
     animation, fewer_frames = _animation(recording, code)
     status = "finished" if failure is None else f"failed: {failure.diagnostic.code} at {failure.time:.3f} s"
-    why = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
-    said, fewer = _fewer(
-        sorted(diagnostics, key=lambda one: not one.is_error), IN_A_LIST, "messages", "all in run.json"
-    )
-    notes = (*why, *left_out, *fewer, *fewer_stages, *fewer_frames)
+    reasons = () if failure is None else (*failure.diagnostic.notes, *failure.diagnostic.helps)
+    errors_first = sorted(diagnostics, key=lambda diagnostic: not diagnostic.is_error)
+    listed, fewer = _fewer(errors_first, IN_A_LIST, "messages", "all in run.json")
+    notes = (*reasons, *left_out, *fewer, *fewer_stages, *fewer_frames)
     return RunPage(
         title=f"{source.name} in {cell.name}" + ("" if failure is None else ": failed"),
         status=status,
@@ -73,35 +63,35 @@ def page_of(
         command=command,
         duration=recording.duration,
         messages=[
-            Message(severity=one.severity.value, code=one.code, line=source.line(one.span.start), text=one.message)
-            for one in said
+            Message(severity=d.severity.value, code=d.code, line=source.line(d.span.start), text=d.message)
+            for d in listed
         ]
         + [Message(severity="note", text=text) for text in notes],
         effects=_effects(recording, code),
-        stages=[_stage(one, source.line(one.span.start)) for one in stages],
-        arms=[_record(one, cell) for one in recording.streams],
+        stages=[_stage(run, source.line(run.span.start)) for run in stages],
+        arms=[_record(stream, cell) for stream in recording.streams],
         animation=animation,
     )
 
 
-def _fewer(items: Sequence[_T], most: int, what: str, where: str = KEPT) -> tuple[list[_T], list[str]]:
-    """Return as many items as a page can hold, the first and the last, and a note where that is not all."""
-    found = excerpt(items, most)
-    text = f"this page shows the first and the last {len(found.first):,} of {len(items):,} {what}; {where}"
-    return found.joined(), [text] if found.left_out else []
+def _fewer(items: Sequence[_T], most: int, name: str, hint: str = KEPT) -> tuple[list[_T], list[str]]:
+    """Return the first and last items, as many as a page can hold, and a note if others are omitted."""
+    shown = excerpt(items, most)
+    text = f"this page shows the first and the last {len(shown.first):,} of {len(items):,} {name}; {hint}"
+    return shown.joined(), [text] if shown.left_out else []
 
 
 def _effects(recording: Recording, code: Code) -> list[Effect]:
-    """Return what happened, in place of what a page cannot hold a line that says so."""
+    """Return the effects of a run; a line stands for those that a page cannot hold."""
     several = len(recording.processes) > 1
-    found = excerpt(recording.effects, IN_A_LIST)
+    effects = excerpt(recording.effects, IN_A_LIST)
 
-    def shown(one: RunEffect) -> Effect:
-        number, process = code.source.line(one.span.start), one.process if several else ""
-        return Effect(t0=one.t0, t1=one.t1, line=number, text=one_line(one.text), process=process)
+    def shown(effect: RunEffect) -> Effect:
+        number, process = code.source.line(effect.span.start), effect.process if several else ""
+        return Effect(t0=effect.t0, t1=effect.t1, line=number, text=one_line(effect.text), process=process)
 
-    rest = [attrs.evolve(shown(found.first[-1]), text=more(found.left_out))] if found.left_out else []
-    return found.mapped(shown).joined(*rest)
+    omitted = [attrs.evolve(shown(effects.first[-1]), text=more(effects.left_out))] if effects.left_out else []
+    return effects.mapped(shown).joined(*omitted)
 
 
 def _stage(run: RunStage, line: int) -> Stage:
@@ -122,30 +112,30 @@ def _stage(run: RunStage, line: int) -> Stage:
 
 
 def _record(stream: Stream, cell: Cell) -> ArmRecord:
-    place = cell.arms[stream.arm]
+    arm = cell.arms[stream.arm]
     rows = thinned(len(stream.t))
     return ArmRecord(
         name=stream.arm,
-        model=place.arm.name,
-        joints=joints_of(place.arm),
+        model=arm.arm.name,
+        joints=joints_of(arm.arm),
         t=stream.t[rows],
         q=stream.q[rows],
         qd=stream.qd[rows],
         qdd=stream.qdd[rows],
         tau=stream.tau[rows],
-        hand=_poses_in_world(place, stream.q[rows])[:, -1, :3, 3],
+        hand=_poses_in_world(arm, stream.q[rows])[:, -1, :3, 3],
     )
 
 
 def _animation(recording: Recording, code: Code) -> tuple[Animation, list[str]]:
-    """Return what the view shows, and notes of what it leaves out."""
+    """Return the animation, and notes on what it omits."""
     fps = min(_FRAMES_PER_SECOND, _MOST_INSTANTS / max(recording.duration, 1e-9))
     t = np.append(np.arange(math.ceil(recording.duration * fps)) / fps, recording.duration)
     arms = recording.cell.arms
-    links = {one.arm: _poses_in_world(arms[one.arm], _sampled(one, t)) for one in recording.streams}
+    links = {s.arm: _poses_in_world(arms[s.arm], _sampled(s, t)) for s in recording.streams}
     hands = {name: poses[:, -1] for name, poses in links.items()}
-    seen = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
-    names, fewer_frames = _fewer(seen, _MOST_FRAMES, "frames", "all in frames.json")
+    visible = [name for name in recording.tree if _shown(name, recording.cell) and recording.tree.has_value(name)]
+    names, fewer_frames = _fewer(visible, _MOST_FRAMES, "frames", "all in frames.json")
     changes, fewer_changes = _fewer([*_tree_changes(recording, code, t)], IN_A_LIST, "changes of the tree of frames")
     animation = Animation(
         fps=fps,
@@ -162,12 +152,12 @@ def _sampled(stream: Stream, t: Array) -> Array:
     return np.asarray(stream.q[np.clip(np.round(t / period).astype(int), 0, len(stream.t) - 1)])
 
 
-def _poses_in_world(place: CellArm, q: Array) -> Array:
-    return np.asarray(place.base @ link_poses(place.arm, q))
+def _poses_in_world(arm: CellArm, q: Array) -> Array:
+    return np.asarray(arm.base @ link_poses(arm.arm, q))
 
 
 def _grip(effects: Sequence[RunEffect], arm: str, t: Array) -> Array:
-    """Return how far the fingers are open at each instant, 0 to 1; they begin closed."""
+    """Return the opening of the fingers at each instant, 0 to 1; they are closed at the start."""
     times, values = [0.0], [0.0]
     for effect in effects:
         if effect.arm == arm and effect.kind in ("OPEN", "GRASP"):
@@ -181,36 +171,36 @@ def _tracks(
 ) -> Iterator[FrameTrack]:
     poses = {name: np.tile(np.eye(4), (len(t), 1, 1)) for name in names}
     first: dict[str, int] = {}
-    for _, rows, tree in _reigns(recording, t):
-        places: dict[str, Array] = {WORLD: np.eye(4), **{arm: hand[rows] for arm, hand in hands.items()}}
+    for _, rows, tree in _valid_trees(recording, t):
+        known: dict[str, Array] = {WORLD: np.eye(4), **{arm: hand[rows] for arm, hand in hands.items()}}
         for name in names:
-            if _found(name, tree, places):
-                poses[name][rows] = places[name]
+            if _locate(name, tree, known):
+                poses[name][rows] = known[name]
                 first.setdefault(name, rows.start)
     for name in names:
         if name in first:
             yield FrameTrack(name=code.spelled(name), poses=to_noap(poses[name]), visible_from=first[name])
 
 
-def _found(name: str, tree: FrameTree, places: dict[str, Array]) -> bool:
-    """Work out where a frame is, and whatever it hangs on; return whether it is anywhere."""
-    way = []
-    while name not in places:
+def _locate(name: str, tree: FrameTree, poses: dict[str, Array]) -> bool:
+    """Add the poses of a frame and of its ancestors; return whether they have values."""
+    chain = []
+    while name not in poses:
         node = tree.nodes.get(name)
         if node is None or node.relation is None:
             return False
-        way.append((name, node.relation))
+        chain.append((name, node.relation))
         name = node.parent
-    X = places[name]
-    for below, relation in reversed(way):
-        places[below] = X = X @ relation
+    X = poses[name]
+    for child, relation in reversed(chain):
+        poses[child] = X = X @ relation
     return True
 
 
-def _reigns(recording: Recording, t: Array) -> Iterator[tuple[float, slice, FrameTree]]:
-    """Give since when each frame tree holds [s], the rows of ``t`` during which it does, and the tree.
+def _valid_trees(recording: Recording, t: Array) -> Iterator[tuple[float, slice, FrameTree]]:
+    """Yield for each frame tree the time since which it is valid [s], the rows of ``t`` at which it is, and the tree.
 
-    Trees that hold at none of these instants are passed over.
+    Trees that are valid at none of these instants are skipped.
     """
     starts = [time for time, _ in recording.trees]
     rows = [int(np.searchsorted(t, time - 1e-9)) for time in starts] + [len(t)]
@@ -220,10 +210,10 @@ def _reigns(recording: Recording, t: Array) -> Iterator[tuple[float, slice, Fram
 
 
 def _tree_changes(recording: Recording, code: Code, t: Array) -> Iterator[TreeChange]:
-    """Give the changes of the tree that can be seen at the instants of the view."""
+    """Yield the changes of the frame tree that are visible at the instants of the view."""
     before: Mapping[str, Node] = {}
     shown: dict[str, str] = {}
-    for time, _, tree in _reigns(recording, t):
+    for time, _, tree in _valid_trees(recording, t):
         for name, node in tree.nodes.items():
             if node is before.get(name) or node.relation is None or name.endswith(".BASE"):
                 continue

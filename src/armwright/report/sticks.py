@@ -1,4 +1,4 @@
-"""An arm as the page draws it: a figure of sticks, and what its joints are."""
+"""The stick figure of an arm on the page, and the data of its joints."""
 
 import math
 
@@ -9,14 +9,14 @@ from armwright.arm.model import Arm
 from armwright.arrays import Array
 from armwright.report.page import ArmFigure, JointInfo
 
-# Enough rows for the charts of a screen.
+# Rows of the charts at most, which suffice for a screen.
 _CHART_ROWS = 1500
-# The thickness of a drawn arm, as part of its reach, at the base and at the hand.
+# Radius of the figure relative to the reach of the arm, at the base and at the tool.
 _THICK, _THIN = 0.045, 0.016
 
 
 def joints_of(arm: Arm) -> list[JointInfo]:
-    """Return what the page says of the joints of an arm."""
+    """Return the joints of an arm for the page."""
     return [
         JointInfo(
             name=f"joint {i + 1}",
@@ -32,12 +32,12 @@ def joints_of(arm: Arm) -> list[JointInfo]:
 
 
 def sticks(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
-    """Draw an arm along its Denavit-Hartenberg steps: first along z, then along x, so that offsets show.
+    """Draw an arm along its Denavit-Hartenberg transforms: first along z, then along x, so that offsets are visible.
 
     Args:
         arm: the arm, with n joints.
-        poses: (M, n + 2, 4, 4) of its frames in the world, as ``link_poses`` has them.
-        grip: (M,) how far the fingers are open, 0 to 1.
+        poses: (M, n + 2, 4, 4) poses of its frames in the world, by ``link_poses``.
+        grip: (M,) opening of the fingers, 0 to 1.
     """
     points = skeleton_of(arm, poses)
     origins, z_axes = poses[:, : arm.n, :3, 3], poses[:, : arm.n, :3, 2]
@@ -52,7 +52,7 @@ def sticks(arm: Arm, poses: Array, grip: Array) -> ArmFigure:
 
 
 def skeleton_of(arm: Arm, poses: Array) -> Array:
-    """Return the corners (M, K, 3) of the sticks, from the floor to the hand; arguments as of ``sticks``."""
+    """Return the corners (M, K, 3) of the figure, from the floor to the tool; arguments as of ``sticks``."""
     origins, z_axes = poses[:, :, :3, 3], poses[:, :, :3, 2]
     points = [_foot(origins[:, 0]), origins[:, 0]]
     for i in range(1, arm.n + 1):
@@ -64,13 +64,13 @@ def skeleton_of(arm: Arm, poses: Array) -> Array:
 
 
 def thinned(count: int) -> npt.NDArray[np.intp]:
-    """Return the rows of so many that a chart shows, the last one among them."""
+    """Return the indices of the rows that a chart shows of this many, with the last."""
     stride = max(1, math.ceil(count / _CHART_ROWS))
     return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
 
 def _foot(origin: Array) -> Array:
-    """Return the point on the floor below a base that stands above it, on which it is drawn to rest."""
+    """Return the point on the floor below a raised base, from which the figure is drawn."""
     foot = origin.copy()
     foot[:, 2] = np.minimum(origin[:, 2], 0.0)
     return foot

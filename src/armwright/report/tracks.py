@@ -1,4 +1,4 @@
-"""Arrays over time: one row per instant, checked at the door."""
+"""Converters of arrays over time, which check that there is a row per instant."""
 
 from collections.abc import Mapping
 
@@ -11,31 +11,31 @@ def instants(value: ArrayLike) -> Array:
 
     Raises:
         ShapeError: there is more than one axis.
-        InvalidValueError: an instant comes before the one in front of it.
+        InvalidValueError: an instant is earlier than the previous one.
     """
     array = _track(value, "instants")
     if (array[1:] < array[:-1]).any():
-        raise InvalidValueError("instants: expected each at or after the one before it")
+        raise InvalidValueError("instants: expected each at or after the previous one")
     return array
 
 
 def numbers(value: ArrayLike) -> Array:
-    """Return one number per instant or piece, (N,)."""
+    """Return a number per instant or segment, (N,)."""
     return _track(value, "numbers")
 
 
 def per_joint(value: ArrayLike) -> Array:
-    """Return one number per joint, (N, n)."""
+    """Return a number per joint, (N, n)."""
     return _track(value, "joint quantities", 0)
 
 
 def path(value: ArrayLike) -> Array:
-    """Return places, (N, 3) [m]."""
+    """Return positions, (N, 3) [m]."""
     return _track(value, "path", 3)
 
 
 def skeleton(value: ArrayLike) -> Array:
-    """Return K places, (N, K, 3) [m]."""
+    """Return K positions, (N, K, 3) [m]."""
     return _track(value, "skeleton", 0, 3)
 
 
@@ -55,7 +55,7 @@ def poses(value: ArrayLike) -> Array:
 
 
 def check_rows(owner: str, rows: int, tracks: Mapping[str, Array | None]) -> None:
-    """Refuse tracks that do not have one row per instant.
+    """Refuse tracks that do not have a row per instant.
 
     Raises:
         ShapeError: a track is longer or shorter than ``rows``.
