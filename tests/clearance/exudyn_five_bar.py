@@ -89,7 +89,7 @@ def _torque(torques: Callable[[float], np.ndarray], number: int) -> Any:
 
 
 def _local(linkage: Linkage, body_point: Any) -> list[float]:
-    """A place from the centre of a free body, or from the pin of a crank."""
+    """A point from the centre of a free body, or from the pin of a crank."""
     origin = linkage.body(body_point.body).centre if linkage.joint(body_point.body) is None else 0.0
     return [*(linkage.point(body_point) - origin), 0.0]
 

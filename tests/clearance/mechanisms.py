@@ -27,7 +27,7 @@ def block(
 ) -> Linkage:
     """A block of 1 kg in a round hole, that moves up and down on a cross of 1 kg, that moves from side to side.
 
-    Up and down 1 kg moves, from side to side 2 kg; nothing turns.
+    Up and down 1 kg moves, from side to side 2 kg; nothing rotates.
     """
     return Linkage(
         name="block",

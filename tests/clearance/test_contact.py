@@ -188,7 +188,7 @@ class TestSliding:
     """How the friction of dry surfaces depends on the speed of sliding."""
 
     def test_straight_line(self) -> None:
-        """Below the threshold friction grows along a straight line, above it is whole, and it opposes both ways."""
+        """Below the threshold friction grows along a straight line, above it is full, opposing both directions."""
         speeds = np.array((-5.0, -1.0, -0.25, 0.0, 0.5, 1.0, 3.0))
 
         np.testing.assert_allclose(linear_slip(speeds, 1.0), (-1, -1, -0.25, 0, 0.5, 1, 1), atol=1e-15)

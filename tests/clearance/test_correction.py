@@ -132,7 +132,7 @@ class TestShifted:
         np.testing.assert_allclose(path.evaluate([0.0, 0.25]).velocity, 0.0, atol=1e-14)
 
     def test_smooth(self, rng: np.random.Generator) -> None:
-        """Place and speed go on over every knot, those of the path and those of the shift."""
+        """Position and speed are continuous at every knot, those of the path and those of the shift."""
         path, _ = self.moved(rng)
         knots = path.knots[1:-1]
         pieces = np.arange(len(knots))
@@ -163,7 +163,7 @@ class TestShifted:
 
 
 def test_contacts_that_are_lost() -> None:
-    """Up to where y1 brakes no contact is lost; there the force turns about, and all three journals fly."""
+    """Up to where y1 brakes no contact is lost; there the force reverses, and all three journals fly."""
     intervals = lost_contacts(linkage(), named_path("y1"))
     run = y1()
 
@@ -201,7 +201,7 @@ def test_forces_of_the_ideal_arm() -> None:
 
 
 def test_leaning_tip() -> None:
-    """Where contact lasts and nothing rubs, the error needs no simulation: 10 µm of 0.95 mm are all it is off by.
+    """Where contact lasts and nothing rubs, the error needs no simulation: 10 µm of 0.95 mm are its whole error.
 
     Later the cranks drift, which nothing but the ideal effort drives; the leaning knows nothing of that.
     """
@@ -225,7 +225,7 @@ def test_leaning_grows_with_play() -> None:
 
 
 def test_between_samples() -> None:
-    """Between its samples a tip on a smooth way is where a cubic puts it."""
+    """Between its samples a tip on a smooth path is where a cubic puts it."""
     run = y1()
     way = np.stack([np.sin(9 * run.time), np.cos(7 * run.time)], axis=-1)
     times = np.array([0.0, 0.033_333, 0.12345, run.time[-1]])
@@ -236,7 +236,7 @@ def test_between_samples() -> None:
 
 
 def test_bad_input() -> None:
-    """Goals that do not fit, too few knots, and clearances in a wrong shape are told."""
+    """Goals that do not fit, too few knots, and clearances in a wrong shape are refused."""
     with pytest.raises(InvalidValueError, match="expected one target for each of 3 goals, got 1"):
         tip_errors(y1(), PickAndPlace().nodes)
     with pytest.raises(InvalidValueError, match="knots: expected 2 to 1000, got 1"):
@@ -276,7 +276,7 @@ def test_best_round_is_kept() -> None:
 
 
 def test_mean_over_runs_that_nobody_can_tell_apart() -> None:
-    """On x4, which is chance from a third on, the mean error is corrected, and the spread that is told is that of runs.
+    """On x4, which is chance from a third on, the mean error is corrected, and the reported spread is that of runs.
 
     Other runs a nanometre away come to the goals as far off as is said.
     """

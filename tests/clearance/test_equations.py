@@ -74,7 +74,7 @@ def full(linkage: Linkage, q: np.ndarray) -> np.ndarray:
 
 
 class TestBesidePinocchio:
-    """Pins on pins, pins on guides, guides on what turns, and a free body, against Pinocchio's."""
+    """Pins on pins, pins on guides, guides on rotating bodies, and a free body, against Pinocchio's."""
 
     @pytest.mark.parametrize("seed", range(6))
     def test_inertia(self, seed: int) -> None:
@@ -169,7 +169,7 @@ class TestWhatMotionKeeps:
         assert moment.sum() == pytest.approx(0.0, abs=ROUNDING)
 
     def test_moment_about_the_contact(self, rng: np.random.Generator) -> None:
-        """About the point where they touch no body's angular momentum changes, though each turns ever faster."""
+        """About the point where they touch no body's angular momentum changes, though each rotates ever faster."""
         linkage = pair(rng)
         q, qd = pressed(linkage, rng)
 
@@ -243,7 +243,7 @@ class TestGivenMotions:
 
 
 def test_motor_on_a_sledge_turns_what_guides_it(rng: np.random.Generator) -> None:
-    """A motor on what slides along a turning arm pushes back on that arm, for the sledge cannot turn on it."""
+    """A motor on what slides along a turning arm pushes back on that arm, for the sledge cannot rotate on it."""
     assert drive_weights(tree(rng), "lever") == {2: 1.0, 0: -1.0}
 
 

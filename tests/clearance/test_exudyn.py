@@ -33,7 +33,7 @@ def linkage(request: pytest.FixtureRequest) -> Linkage:
 
 @pytest.mark.drawn(0.5)
 def test_up_to_the_impacts(linkage: Linkage) -> None:
-    """Both tips go the same way until they slow down, to 5 µm of 1 mm, and the nearer the finer its steps."""
+    """Both tips follow the same path until they slow down, to 5 µm of 1 mm, and the nearer the finer its steps."""
     settings = Settings(step=2e-6, sample=EVERY, impact="carvalho-martins")
     task = prepare(linkage, beginning(thesis_path("y1"), END + EVERY), settings)
     run = simulate(task, [CLEARANCE] * 3)

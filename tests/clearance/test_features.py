@@ -63,7 +63,7 @@ def test_mean_and_wave(mean: float, wave: float, turns: int) -> None:
 
 
 def test_spectrum_of_waves() -> None:
-    """A spectrum has the amplitude of each wave at the number of its turns, and twice the mean in front."""
+    """A spectrum has the amplitude of each wave at the number of its periods, and twice the mean in front."""
     part = np.arange(1000) / 1000
     amplitudes = spectrum(0.7 + 0.2 * np.cos(2 * np.pi * 5 * part) + 0.03 * np.sin(2 * np.pi * 80 * part))
 
@@ -83,7 +83,7 @@ def test_offset_at_the_start() -> None:
 
 
 def test_size_not_direction(rng: np.random.Generator) -> None:
-    """An error that turns about while its size stays has neither slope nor wave."""
+    """An error that rotates while its size stays has neither slope nor wave."""
     angle = np.cumsum(rng.normal(0.0, 0.1, len(TIME)))
 
     curve_features = features_of(TIME, 0.4e-3 * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
@@ -106,12 +106,12 @@ def test_many_curves(rng: np.random.Generator) -> None:
 
 
 def test_units() -> None:
-    """Every feature is told with its unit."""
+    """Every feature has its unit."""
     assert set(UNITS) == set(Features._fields)
 
 
 def test_simulation_starts_where_it_rests(five_bar: Linkage) -> None:
-    """A simulated arm A starts y1 at its place of rest, and follows it with 0.537 mm off (spec of the clearance)."""
+    """A simulated arm A starts y1 at its resting position, and follows it with 0.537 mm off (spec of the clearance)."""
     curve_features = features(simulate(prepare(five_bar, named_path("y1"), CENTRE), ARM_A))
 
     # 0.01 mm between steps of 10 and of 2 µs.
@@ -122,6 +122,6 @@ def test_simulation_starts_where_it_rests(five_bar: Linkage) -> None:
 
 @pytest.mark.parametrize("window", [(0.3, 0.4), (0.1, 0.1), (0.2, 0.1)])
 def test_empty_windows_are_refused(window: tuple[float, float]) -> None:
-    """A line needs two samples, and what there is instead is told."""
+    """A line needs two samples, and the message states their number."""
     with pytest.raises(InvalidValueError, match=r"window: expected two samples or more from .* of 2501 up to 0.25 s"):
         features_of(TIME, along(TIME), window)

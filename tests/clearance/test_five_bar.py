@@ -120,7 +120,7 @@ def test_arms_meet(bar: FiveBar, cranks: tuple[float, float], assembly: Any) -> 
 
 @given(UNEQUAL, CRANKS, st.sampled_from(sorted(ASSEMBLIES)))
 def test_one_mode_of_four_comes_back(bar: FiveBar, cranks: tuple[float, float], assembly: Any) -> None:
-    """Of the four ways to stand at a tip exactly one has the cranks where they were, and all four reach the tip."""
+    """Of the four modes at a tip exactly one has the cranks where they were, and all four reach the tip."""
     tip, angles = well_posed(bar, cranks, assembly)
 
     angles_by_mode = inverse_all(bar, tip)
@@ -258,7 +258,7 @@ def test_configuration_chooses_the_mode(linkage: Linkage, bar: FiveBar, mode: An
 
 @given(BARS, CRANKS)
 def test_jacobian_moves_the_tip(bar: FiveBar, cranks: tuple[float, float]) -> None:
-    """The tip moves by the Jacobian times the turn of the cranks, to second order in the turn."""
+    """The tip moves by the Jacobian times the rotation of the cranks, to second order."""
     _, angles = well_posed(bar, cranks)
     turn = 1e-6 * np.array([0.6, -0.8])
 
@@ -285,7 +285,7 @@ def test_condition_by_hand(bar: FiveBar) -> None:
 
 
 def test_condition_grows_without_bound(bar: FiveBar) -> None:
-    """The condition doubles when the border is four times as near: the elbow angle goes with the root of the way."""
+    """The condition doubles when the border is four times as near: the elbow angle is the root of the distance."""
     depths = np.array([1e-6, 4e-6])
     tips = bar.motors[1] + (0.95 - depths)[:, None] * DOWN_LEFT
 
@@ -307,7 +307,7 @@ def test_singular_rows_are_refused(bar: FiveBar) -> None:
 
 
 def test_elbow_angle_to_the_singularity(bar: FiveBar) -> None:
-    """The angle that an elbow still has to turn is the one after whose turn the arm is straight."""
+    """The remaining angle of an elbow is that after which the arm is straight."""
     angles = inverse(bar, [-0.1, -0.7])
     near = singularity(angles)
 
@@ -319,7 +319,7 @@ def test_elbow_angle_to_the_singularity(bar: FiveBar) -> None:
 
 @given(UNEQUAL, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6))
 def test_mask_is_the_inverse(bar: FiveBar, x: float, y: float) -> None:
-    """A place is inside the border exactly if the inverse kinematics has an answer for it."""
+    """A point is inside the border exactly if the inverse kinematics has an answer for it."""
     tip = bar.motors.mean(axis=0) + np.array([x, y])
     distance = boundary_distance(bar, tip)
     assume(abs(distance) > ROUNDING)
@@ -333,7 +333,7 @@ def test_mask_is_the_inverse(bar: FiveBar, x: float, y: float) -> None:
 
 @given(UNEQUAL, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(-np.pi, np.pi))
 def test_distance_is_one(bar: FiveBar, x: float, y: float, way: float) -> None:
-    """Nobody comes nearer to the border by more than the way that he goes."""
+    """Nobody comes nearer to the border by more than his distance."""
     points = bar.motors.mean(axis=0) + np.array([x, y]) + 0.1 * np.outer([0, 1], [np.cos(way), np.sin(way)])
 
     here, there = boundary_distance(bar, points)
@@ -355,7 +355,7 @@ def test_distance_against_the_grid(bar: FiveBar) -> None:
 
 
 def test_area_of_a_ring() -> None:
-    """With both motors at nearly one place the workspace is a ring: π (0.95² - 0.35²) m²."""
+    """With both motors at nearly one point the workspace is a ring: π (0.95² - 0.35²) m²."""
     ring = workspace(FiveBar.symmetric(1e-9, 0.3, 0.65), 400)
 
     # A cell on the border counts as a whole or not at all: an error of a random half cell for each.
@@ -363,7 +363,7 @@ def test_area_of_a_ring() -> None:
 
 
 def test_borders_are_serial(bar: FiveBar) -> None:
-    """On every border curve an arm is stretched or folded, and beyond it the place is out of reach."""
+    """On every border curve an arm is stretched or folded, and beyond it the point is out of reach."""
     curves = [curve for curve in singular_curves(bar) if curve.kind == "serial"]
     assert len(curves) >= 3
     for curve in curves:
@@ -409,7 +409,7 @@ def test_thesis_rods_only_fold(bar: FiveBar) -> None:
 
 
 def test_out_of_reach_says_how_far(bar: FiveBar) -> None:
-    """A place out of reach is named with its row, by how much it is out, and of which arm."""
+    """A point out of reach is named with its row, by how much it is out, and of which arm."""
     with pytest.raises(InvalidValueError, match=r"tip 1: \(800, -600\) mm .* 131\.7 mm too far from the left motor"):
         inverse(bar, [[0.0, -0.5], [0.8, -0.6]])
     with pytest.raises(InvalidValueError, match=r"50 mm too near to the right motor, whose arm reaches 350 to 950 mm"):
@@ -430,7 +430,7 @@ def test_rods_that_do_not_meet() -> None:
 
 
 def test_elbows_that_fall_together(bar: FiveBar) -> None:
-    """Where both elbows are at one place equal rods may stand anywhere, and that is said."""
+    """Where both elbows coincide equal rods may have any angle, and the message says so."""
     theta = np.arcsin(1 / 3)
     with pytest.raises(InvalidValueError, match="the elbows coincide"):
         forward(bar, [theta, -theta])

@@ -141,7 +141,7 @@ class TestTwoFourBars:
     @pytest.mark.parametrize("angle", [0.1, 0.8, 1.5, 2.9, 4.0, 6.0])
     @pytest.mark.parametrize("spin", [0.0, -3.0])
     def test_falls_like_a_pendulum_on_its_head(self, angle: float, spin: float) -> None:
-        """Three bars that turn and two that circle fall with 7 g / 6 times the sine of the lean, fast or slow."""
+        """Three bars that rotate and two that circle fall with 7 g / 6 times the sine of the lean, fast or slow."""
         assert falls(angle, spin) == pytest.approx(-7 * 9.81 / 6 * np.cos(angle), rel=1e-11)
 
     def test_half_a_second(self) -> None:
@@ -323,7 +323,7 @@ class TestRefused:
     """What cannot be."""
 
     def test_out_of_reach(self) -> None:
-        """A place two metres away cannot be reached by arms of a metre."""
+        """A point two metres away cannot be reached by arms of a metre."""
         linkage = load_linkage("five-bar")
         with pytest.raises(InvalidValueError, match=r"five-bar: the path cannot be followed.*out of reach"):
             closed(linkage, assembly_guess(linkage), tip=[0.0, -2.0])
@@ -377,7 +377,7 @@ class TestRefused:
             closed(linkage, assembly_guess(linkage), tip=[0.17, 0.0])
 
     def test_singular(self) -> None:
-        """A parallelogram that lies flat can go on in two ways."""
+        """A parallelogram that lies flat can continue in two assemblies."""
         linkage = bars()
         with pytest.raises(InvalidValueError, match="singular configuration"):
             ideal_motion(linkage, np.zeros(5), [1.0], [0.0], by_tip=False)

@@ -20,7 +20,7 @@ PRINTED = 6e-7
 
 
 def swung(integrator: str, step: float, duration: float = 1.0) -> np.ndarray:
-    """(s, 2) where the pendulum's bob is each second, let go from the level on the left."""
+    """(s, 2) where the pendulum's bob is each second, released from the level on the left."""
     settings = Settings(step=step, sample=1.0, integrator=integrator)  # type: ignore[arg-type]
     return simulate(left_alone(prepare(pendulum(), still(duration, -np.pi), settings))).tip
 
@@ -33,7 +33,7 @@ def bob(t: float) -> np.ndarray:
 
 
 def test_simple_pendulum() -> None:
-    """Let go at (-1, 0) the bob is where elliptic functions and benchmark A01 say, after 1, 5 and 10 seconds."""
+    """Released at (-1, 0) the bob is where elliptic functions and benchmark A01 say, after 1, 5 and 10 seconds."""
     tip = swung("rk4", 1e-3, 10.0)
 
     published = ((0.986292, -0.165011), (-0.942305, -0.334754), (-0.275087, -0.961419))
@@ -110,7 +110,7 @@ def test_order_across_a_jump_within_a_step(part: float) -> None:
 
 
 def test_located_impacts_in_parted_steps() -> None:
-    """Cutting steps at impacts as well as at jumps comes to the same place as a quarter of the step."""
+    """Cutting steps at impacts as well as at jumps comes to the same position as a quarter of the step."""
     linkage, clearances = load_linkage("five-bar"), np.full(3, 0.3e-3)
     path = straight("diagonal", (-0.12, -0.68), (0.11, -0.47))
     # Beyond the jump; later impacts differ.

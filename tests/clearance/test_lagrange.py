@@ -48,7 +48,7 @@ def cartesian(q: np.ndarray, speeds_at: np.ndarray | None = None) -> np.ndarray:
 
 
 def test_without_contact(five_bar: Linkage) -> None:
-    """While journals fly, links tied by multipliers go the same way as links that hang in trees."""
+    """While journals fly, links tied by multipliers follow the same path as links that hang in trees."""
     settings = Settings(step=1e-5, sample=2e-3, start="centred")
     task = prepare(five_bar, beginning(thesis_path("y1"), 0.04), settings)
     run = simulate(task, [0.1] * 3)
@@ -62,7 +62,7 @@ def test_without_contact(five_bar: Linkage) -> None:
 @pytest.mark.parametrize("friction", [0.0, 0.05])
 @pytest.mark.drawn(0.5)
 def test_in_contact(five_bar: Linkage, friction: float) -> None:
-    """With journals on their walls, pushed and rubbed, both go the same way too: the levers and signs are right."""
+    """With journals on their walls and friction, both follow the same path too: the levers and signs are right."""
     settings = Settings(step=2e-6, sample=1e-3)
     task = prepare(five_bar, beginning(thesis_path("y1"), 0.006), settings)
     run = simulate(task, frictions=friction)

@@ -32,7 +32,7 @@ class TestWhatItIs:
     """Coordinates, drives and pins."""
 
     def test_coordinates(self, five_bar: Linkage) -> None:
-        """A crank has an angle, a free rod the place of its centre and an angle: eight for the five-bar."""
+        """A crank has an angle, a free rod the position of its centre and an angle: eight for the five-bar."""
         names = [str(coordinate) for coordinate in five_bar.coordinates]
 
         assert names == [
@@ -140,7 +140,7 @@ class TestWhatItCannotBe:
             attrs.evolve(five_bar, drives=[Drive(body="link1", kind="force")])  # type: ignore[arg-type]
 
     def test_motion_of_what_is_carried(self) -> None:
-        """The motion of a rod cannot be given against a crank that turns as it likes."""
+        """The motion of a rod cannot be given against a crank that rotates freely."""
         linkage = load_linkage("four-bar")
         with pytest.raises(InvalidValueError, match=r"drive of coupler: its motion .* only if that of crank"):
             attrs.evolve(linkage, drives=[Drive(body="coupler", kind="motion")])

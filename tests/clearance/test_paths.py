@@ -37,7 +37,7 @@ class TestStraight:
 
     @pytest.mark.parametrize("name", TEST_PATHS)
     def test_all_24(self, name: str) -> None:
-        """Every test path goes from its start to its goal and stops there, without a jump of its place or its speed."""
+        """Every test path moves from its start to its goal and stops there, without a jump of position or speed."""
         path = thesis_path(name)
         start, goal = TEST_PATHS[name]
 
@@ -84,7 +84,7 @@ class TestStraight:
 
 
 class TestHermite:
-    """Cubic pieces through places with given velocities."""
+    """Cubic pieces through positions with specified velocities."""
 
     TIMES = (0.0, 0.1, 0.35, 0.4)
 
@@ -109,12 +109,12 @@ class TestHermite:
             hermite("x", times, np.zeros((2, 2)), np.zeros((2, 2)), ())
 
     def test_places_without_times(self) -> None:
-        """There are as many places as times."""
+        """There are as many positions as times."""
         with pytest.raises(ShapeError, match=r"expected \(m \+ 1\) times and \(m \+ 1, 2\) positions and velocities"):
             hermite("x", (0, 1), np.zeros((3, 2)), np.zeros((3, 2)), ())
 
     def test_pick_and_place(self) -> None:
-        """It picks at (-180, -600), passes (0, -575) at 1.5 m/s, and places at (180, -600) mm, 0.25 s apart."""
+        """It picks at (-180, -600), passes (0, -575) at 1.5 m/s, and ends at (180, -600) mm, 0.25 s apart."""
         path = PickAndPlace().path()
 
         now = path.evaluate(path.targets)

@@ -17,7 +17,7 @@ POINTS = [BodyPoint(body, "c") for body in ("arm", "sledge", "lever", "finger", 
 
 
 def by_hand(linkage: Linkage, q: np.ndarray) -> dict[str, complex]:
-    """Where the point c of each body is: turns are factors e^{iθ}, shifts are sums."""
+    """Where the point c of each body is: rotations are factors e^{iθ}, shifts are sums."""
 
     def z(pair: np.ndarray) -> complex:
         return complex(*pair)
@@ -66,7 +66,7 @@ class TestTree:
             assert complex(*point.position) == pytest.approx(expected[body_point.body], abs=ROUNDING)
 
     def test_velocities(self, seed: int) -> None:
-        """A point's velocity is the change of its place in time, and its partial derivatives times the speeds."""
+        """A point's velocity is the change of its position in time, and its partial derivatives times the speeds."""
         rng = np.random.default_rng(seed)
         linkage, dt = tree(rng), 1e-5
         q, qd = rng.uniform(-1, 1, (2, 8))
@@ -119,7 +119,7 @@ def test_ground_stands_still() -> None:
 
 
 def test_pairs() -> None:
-    """Vectors of the plane add, and turn to the left."""
+    """Vectors of the plane add, and rotate to the left."""
     a, b = Vec2(1.0, 2.0), Vec2(-3.0, 0.5)
 
     assert a.plus(b) == (-2.0, 2.5)

@@ -14,10 +14,10 @@ from samples import Sample
 
 @pytest.mark.share(0.034)
 def test_claim_holds_against_other_runs(five_bar: Linkage, sample: Sample) -> None:
-    """Until the time that is told, runs that the claim has not seen stay with the run.
+    """Until the reported time, runs that the claim has not seen stay with the run.
 
     Fifteen with clearances a nanometre away at most, one whose J2 differs by 15 picometres, and one with a quarter of
-    the step, whose error is next to none: it tells whether what is asked of a half and a third of the step is enough.
+    the step, whose error is next to none: it shows whether what is asked of a half and a third of the step is enough.
     """
     worst = dict.fromkeys(("a nanometre", "15 pm", "a quarter of the step"), 0.0)
     count, over = sample.count(30), 0

@@ -34,7 +34,7 @@ def test_catalogue() -> None:
 
 @pytest.mark.parametrize("name", linkage_names())
 def test_catalogue_can_be_put_together(name: str) -> None:
-    """Every linkage of the catalogue closes within a quarter turn of its assembly, and has a drive per freedom."""
+    """Every linkage of the catalogue closes within 90° of its assembly, and has a drive per freedom."""
     linkage = load_linkage(name)
     guess = assembly_guess(linkage)
 

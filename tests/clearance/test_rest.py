@@ -76,7 +76,7 @@ def test_nothing_moves(linkage: Linkage, clearances: Array) -> None:
 
 
 def test_lowest_place(linkage: Linkage, rng: np.random.Generator) -> None:
-    """In rigid walls no other way to lean has less energy: links and load hang as low as they can."""
+    """In rigid walls no other contact directions have less energy: links and load hang as low as they can."""
     q = ideal(linkage, FIRST_GOAL)
     equilibrium = at_rest(linkage, q, ARM_A)
 
@@ -113,7 +113,7 @@ def test_no_play(linkage: Linkage) -> None:
 
 
 def test_leading_axes(linkage: Linkage, rng: np.random.Generator) -> None:
-    """Many clearances at many places make a table of offsets, each as it is alone."""
+    """Many clearances at many poses make a table of offsets, each as it is alone."""
     q = closed(linkage, assembly_guess(linkage), tip=[[-0.1, -0.6], [0.1, -0.5]])
     c = rng.uniform(1e-4, 5e-4, (4, 1, 3))
 

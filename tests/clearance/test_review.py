@@ -1,4 +1,4 @@
-"""What a stranger tried: odd samples, singular places, diverging runs, sweeps of other linkages."""
+"""What a stranger tried: odd samples, singular positions, diverging runs, sweeps of other linkages."""
 
 import json
 from pathlib import Path
@@ -56,7 +56,7 @@ class TestSamples:
 
 
 class TestDiverging:
-    """A run that diverges is told as such, in numbers that JSON knows."""
+    """A run that diverges is reported as such, in numbers that JSON knows."""
 
     def test_numbers(self, five_bar: Linkage, monkeypatch: pytest.MonkeyPatch) -> None:
         """With a step ten times too long a run diverges without a warning; what is shown of it is finite."""
@@ -85,7 +85,7 @@ class TestNothingToLean:
     """Where a pin carries no force, or a linkage is singular, no number comes out, and no traceback."""
 
     def test_weightless(self, five_bar: Linkage) -> None:
-        """Without gravity and load nothing presses a journal to its wall: the tip at rest tells nothing."""
+        """Without gravity and load nothing presses a journal to its wall: the tip at rest determines nothing."""
         floating = attrs.evolve(five_bar, gravity=(0.0, 0.0), loads=())
 
         with pytest.raises(InvalidValueError, match="pin J2 of five-bar carries no force at rest"):
@@ -94,7 +94,7 @@ class TestNothingToLean:
             estimate_at_rest(floating, POSES, np.zeros((3, 2)))
 
     def test_singular(self, five_bar: Linkage) -> None:
-        """Both rods in one line hold the tip in no place: how it shifts with the gaps is not told."""
+        """Both rods in one line hold the tip nowhere: how it shifts with the gaps is not told."""
         q = np.zeros(len(five_bar.coordinates))
 
         with pytest.raises(InvalidValueError, match="singular"):
@@ -102,7 +102,7 @@ class TestNothingToLean:
 
     @pytest.mark.parametrize(("name", "freedoms"), [("four-bar", "1 freedom,"), ("slider-crank", "1 freedom,")])
     def test_freedoms(self, name: str, freedoms: str) -> None:
-        """A linkage of one freedom cannot follow a place in the plane, and hears how many freedoms it has."""
+        """A linkage of one freedom cannot follow a position in the plane, and hears how many freedoms it has."""
         with pytest.raises(InvalidValueError, match=f"with its pins closed it has {freedoms}"):
             rest_matrix(load_linkage(name), POSES)
 

@@ -49,7 +49,7 @@ def test_gains() -> None:
 
 @pytest.mark.parametrize(("duration", "steps"), [(0.25, 25_000), (1e-5, 1), (1.04e-5, 2), (0.3, 30_000)])
 def test_steps(duration: float, steps: int) -> None:
-    """A path of 0.25 s takes 25,000 steps of 10 µs; what is left over is another step."""
+    """A path of 0.25 s takes 25,000 steps of 10 µs; the remainder is another step."""
     assert Settings(step=1e-5).steps(duration) == steps
 
 

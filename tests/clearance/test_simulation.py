@@ -51,7 +51,7 @@ class TestFiveBar:
     """The thesis' arm on its path y1."""
 
     def test_converged(self, smooth: Simulation) -> None:
-        """With half a millimetre of play, without friction, the tip is off by what an independent program gave."""
+        """With half a millimetre of play, without friction, the tip has the error that an independent program gave."""
         wanted_mm = ((0.2672, -0.9250), (0.2306, -0.9535), (0.1977, -0.8913), (0.0745, -0.6729))
         np.testing.assert_allclose(
             smooth.error[1, [50, 100, 150, 200]], np.array(wanted_mm) * 1e-3, rtol=0, atol=CONVERGED
@@ -107,21 +107,21 @@ CLEARANCES = np.array((5e-4, 2e-4, 1e-4, 5e-5))
 
 @pytest.fixture(scope="module")
 def run() -> Simulation:
-    """Two turns of the slider-crank."""
+    """Two revolutions of the slider-crank."""
     settings = Settings(step=2e-6, sample=1e-5, start="centred")
     task = prepare(load_linkage("slider-crank"), constant_speed_path("round", 0.0, SPEED, 0.024), settings)
     return simulate(task, CLEARANCES[:, None])
 
 
 class TestSliderCrank:
-    """The slider-crank of the papers at 5000 revolutions a minute, two turns of it."""
+    """The slider-crank of the papers at 5000 revolutions a minute, two revolutions of it."""
 
     def test_crank_does_not_care(self, run: Simulation) -> None:
-        """The crank goes round as it is told."""
+        """The crank rotates as commanded."""
         np.testing.assert_allclose(run.q[0, :, 0], SPEED * run.time, rtol=0, atol=1e-9)
 
     def test_slider_stays_near(self, run: Simulation) -> None:
-        """The slider is off by no more than play and indentation, seen along the leaning rod: less with less play."""
+        """The error of the slider is at most clearance and indentation along the leaning rod."""
         lean = np.sqrt(1 - (0.05 / 0.12) ** 2)
         reach = (CLEARANCES + run.depths.max(axis=(-1, -2))) / lean
         largest = np.abs(run.error[..., 0]).max(axis=-1)
@@ -288,7 +288,7 @@ class TestRefused:
             prepare(five_bar, path)
 
     def test_no_assembly(self, five_bar: Linkage) -> None:
-        """Where nothing says how the arm is put together, all its links hang down, and it may go either way."""
+        """Where nothing says how the arm is put together, all its links hang down, and it may go to either side."""
         with pytest.raises(InvalidValueError, match="singular configuration"):
             prepare(attrs.evolve(five_bar, assembly={}), thesis_path("y1"), Settings(step=1e-3))
 

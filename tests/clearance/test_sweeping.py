@@ -215,7 +215,7 @@ def test_stopped_and_begun_again(task: FeatureSweep, design: Design, tmp_path: P
 
 
 def test_folder_of_other_settings(task: FeatureSweep, design: Design, tmp_path: Path) -> None:
-    """A folder of sweeps with the other friction is refused, and what differs is told."""
+    """A folder of sweeps with the other friction is refused, and the difference is named."""
     pytest.importorskip("xarray")
     few = attrs.evolve(design, points=design.points[:2])
     run(task, few, tmp_path / "out", workers=1)
@@ -228,7 +228,7 @@ def test_folder_of_other_settings(task: FeatureSweep, design: Design, tmp_path: 
 def test_unknown_path(five_bar: Linkage) -> None:
     """A path that there is not is answered with what there is; none is swept twice, and one is needed.
 
-    Pick and place has no straight part to look at.
+    Pick and place has no straight part.
     """
     for name in ("y15", "pick-and-place"):
         with pytest.raises(UnknownNameError, match=f"no test path '{name}'"):

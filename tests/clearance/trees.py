@@ -7,7 +7,7 @@ from armwright.clearance.linkage import Body, BodyPoint, ClearancePin, Drive, Gu
 
 
 def tree(rng: np.random.Generator) -> Linkage:
-    """A pin on the ground, a guide on what turns, a pin on what slides, a pin on that, a guide on it, a free body.
+    """A pin on the ground, a guide on a rotating body, a pin on what slides, a pin on that, a guide on it, a free body.
 
     One pin with play joins the last of the tree to the free body. Every body has its centre anywhere, the drives push
     three joints, and a load pulls at the end.

@@ -22,7 +22,7 @@ def test_fit_finds_the_report(fit: Coefficients) -> None:
     """Of the sixteen numbers all but three come out as printed, to 3 % or to the last printed digit.
 
     The report adds the rotor of joint 3 to what the slide carries, in b4 and k2, and in b20 it has forty times what
-    the hand resists about its own axis.
+    the gripper resists about its own axis.
     """
     slips = {"b4", "k2", "b20"}
     for field in attrs.fields(Coefficients):

@@ -49,7 +49,7 @@ def test_gravity_is_the_slope_of_the_potential(rng: np.random.Generator) -> None
 
 
 def test_report_load() -> None:
-    """A cube of 1.8 kg in the hand of the arm at JPL makes link 6 what the report's appendix II prints.
+    """A cube of 1.8 kg at the tool of the arm at JPL makes link 6 what the report's appendix II prints.
 
     The report cuts some digits where others round, so one unit of the last printed digit is allowed. It keeps the
     0.0014 m of the bare link for y of the centre of mass; 0.51 kg of 2.31 kg leave 0.0003 m of it.
@@ -66,7 +66,7 @@ def test_report_load() -> None:
 
 
 def test_weight_of_a_load_by_virtual_work(rng: np.random.Generator) -> None:
-    """A point mass in the hand adds its weight times the height of the hand to the potential energy."""
+    """A point mass at the tool adds its weight times the height of the tool to the potential energy."""
     arm = load_arm("puma560")
     q = rng.normal(size=(5, 6))
 

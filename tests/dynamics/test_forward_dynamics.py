@@ -109,7 +109,7 @@ def test_two_joints_about_one_axis(solve: object) -> None:
 
 
 def test_slide_without_mass() -> None:
-    """A slide that carries nothing is told to take on a mass."""
+    """For a slide that carries nothing the message asks for a mass."""
     arm = Arm(name="rail", joints=[Joint(kind="prismatic")])
 
     with pytest.raises(UnsupportedArmError, match=r"joint 1: .* along its axis .* Give its link a mass or"):

@@ -47,7 +47,7 @@ def test_inverse_dynamics_of_a_driven_and_pushed_arm() -> None:
 
 
 def test_inverse_dynamics_on_a_base_that_accelerates() -> None:
-    """Carried by three joints of its own, Pinocchio's base accelerates as ours is told to."""
+    """Carried by three joints of its own, Pinocchio's base has the commanded acceleration of ours."""
 
     def theirs(case: Case) -> Array:
         still = np.zeros(3)

@@ -88,7 +88,7 @@ def test_what_surfaces_miss_together(rng: np.random.Generator) -> None:
 
 
 def test_spread_of_single_runs_is_that_of_neighbours() -> None:
-    """Where runs that nobody can tell apart differ, a single one is known no better; far from there it is."""
+    """Where indistinguishable runs differ, a single run is predicted no better; far from there it is."""
     points = design(256)
     late = points[:, 0] > 3e-4
     spreads = np.where(late, 0.1, 0.0)[:, None] * [1.0, 0.0]
@@ -104,7 +104,7 @@ def test_spread_of_single_runs_is_that_of_neighbours() -> None:
 
 
 def test_inverse(known: Surrogate, rng: np.random.Generator) -> None:
-    """Features of a known function tell the parameters that they are of."""
+    """Features of a known function determine the parameters that they are of."""
     true = rng.uniform(*np.array(list(BOUNDS.values())).T, (20, 2))
 
     parameters = np.array([solve_features(known, features) for features in smooth(true)])
@@ -150,7 +150,7 @@ def test_failed_runs_are_left_out(known: Surrogate) -> None:
 
 
 def test_progress() -> None:
-    """Each feature is told before it is learnt."""
+    """Each feature is announced before it is learnt."""
     points, names = design(16), []
 
     learn(NAMES, points, ("f", "g"), smooth(points), progress=names.append)
@@ -180,13 +180,13 @@ class TestFiveBar:
 
     @pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
     def test_all_features(self, swept: Swept, clearances: Array) -> None:
-        """All features of the error curves together tell arms A and B to 99.99 % without noise."""
+        """All features of the error curves together determine arms A and B to 99.99 % without noise."""
         parameters = solve_features(swept.surrogate, swept.features(clearances)[0])
 
         assert accuracy(parameters, clearances) > 99.99 > WITHOUT_NOISE
 
     def test_held_out(self, swept: Swept, rng: np.random.Generator) -> None:
-        """Forty arms that nothing was learnt from are told to 99.99 % on average, the worst to 99.9 %."""
+        """Forty held-out arms are estimated to 99.99 % on average, the worst to 99.9 %."""
         true = rng.uniform(*RANGE, (40, 3))
 
         parameters = [solve_features(swept.surrogate, row) for row in swept.features(true)]
@@ -196,7 +196,7 @@ class TestFiveBar:
         assert right.min() > 99.9 > WITHOUT_NOISE
 
     def test_more_features_tell_more(self, swept: Swept, rng: np.random.Generator) -> None:
-        """The thesis' way, one feature of three paths, tells less than its three features together, and these 99 %."""
+        """One feature of three paths, as in the thesis, is less accurate than three features together, with 99 %."""
         true = rng.uniform(*RANGE, (20, 3))
         measured = swept.features(true)
         names = swept.surrogate.features
@@ -255,7 +255,7 @@ def test_without_scikit_learn(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_bad_tables(change: dict[str, Any], error: type[Exception], message: str) -> None:
-    """Tables that do not fit, too few runs, and parameters that do not vary are told."""
+    """Tables that do not fit, too few runs, and parameters that do not vary are named."""
     points = design(16)
     with pytest.raises(error, match=message):
         learn(**{"parameters": NAMES, "points": points, "features": ("f", "g"), "values": smooth(points), **change})

@@ -1,4 +1,4 @@
-"""Files of measurements: what was written is read, and whatever is wrong with a file is told with its line."""
+"""Files of measurements: what was written is read, and whatever is wrong with a file is reported with its line."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -34,7 +34,7 @@ def rest_file(path: Path, unit: str, scale: float, offsets: Array, order: Callab
 
 @pytest.mark.parametrize(("unit", "scale"), [("m", 1.0), ("mm", 1e3), ("um", 1e6)])
 def test_rest_in_any_unit(unit: str, scale: float, tmp_path: Path, five_bar: Linkage) -> None:
-    """Readings in metres, millimetres or micrometres, with the columns in any order, tell the same clearances."""
+    """Readings in metres, millimetres or micrometres, with the columns in any order, yield the same clearances."""
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     path = rest_file(tmp_path / "rest.csv", unit, scale, offsets[:, None], lambda cells: cells[::-1])
 
@@ -48,7 +48,7 @@ def test_rest_in_any_unit(unit: str, scale: float, tmp_path: Path, five_bar: Lin
 
 
 def test_repeated_readings(tmp_path: Path, five_bar: Linkage, rng: np.random.Generator) -> None:
-    """Of repeated readings the mean counts, and their scatter tells how sure it is."""
+    """Of repeated readings the mean counts, and their scatter is its noise."""
     sigma, count = 10e-6, 400
     noise = rng.normal(0.0, sigma, (3, count, 2))
     offsets = rest_offsets(five_bar, STARTS, ARM_A)[:, None] + noise
@@ -173,7 +173,7 @@ def changed(row: int, old: str, new: str) -> list[str]:
     ],
 )
 def test_mistakes_at_rest(rows: list[str], message: str, tmp_path: Path) -> None:
-    """Every mistake in a file of readings is told with its line and what is expected."""
+    """Every mistake in a file of readings is reported with its line and what is expected."""
     if message.startswith("is 509.9"):
         # Metres by their names, millimetres by their numbers: half a millimetre has become half a metre.
         message = "the tip is 509.9 mm from its commanded position; are the units right"
@@ -215,7 +215,7 @@ def path_slip(change: Callable[[list[str]], list[str]]) -> list[str]:
     ],
 )
 def test_mistakes_on_paths(rows: list[str], message: str, tmp_path: Path) -> None:
-    """Every mistake in a file of runs is told, too: gaps, repeats, wrong units, a part of a path, an unknown path."""
+    """Every mistake in a file of runs is reported: gaps, repeats, wrong units, a part of a path, an unknown path."""
     with pytest.raises(FileFormatError) as caught:
         read_measured(written(tmp_path / "paths.csv", rows))
     assert message in str(caught.value)
@@ -278,7 +278,7 @@ def test_few_readings_make_intervals_wider() -> None:
 
 
 def test_unknown_noise_is_what_is_left(rng: np.random.Generator) -> None:
-    """Of single readings without --noise-um what is left is the noise: intervals hold the truth."""
+    """Of single readings without --noise-um the residual is the noise: intervals hold the truth."""
     linkage, true = load_linkage("five-bar"), np.array((3e-4, 2e-4, 4e-4))
     poses = np.column_stack([rng.uniform(-0.18, 0.18, 12), rng.uniform(-0.7, -0.5, 12)])
     offsets = rest_offsets(linkage, poses, true) + rng.normal(0.0, 2e-5, poses.shape)

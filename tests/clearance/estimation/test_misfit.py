@@ -1,4 +1,4 @@
-"""Data that contradict the model: what is refused, what is widened, and whether what is told holds the truth."""
+"""Data that contradict the model: what is refused, what is widened, and whether the intervals contain the truth."""
 
 import attrs
 import numpy as np
@@ -70,7 +70,7 @@ def test_bound_at_rest(five_bar: Linkage) -> None:
 @pytest.mark.parametrize("fault", ["none", "noise understated", "sign", "swapped"])
 @pytest.mark.drawn(0.34)
 def test_attacked_at_rest(five_bar: Linkage, fault: str, sample: Sample) -> None:
-    """Resting tips with a fault are refused, or their intervals grow; nothing is told of columns that are swapped."""
+    """Resting tips with a fault are refused, or their intervals grow; swapped columns yield no clearances."""
     identified = covered = refused = 0
     count = sample.count(300)
     for rng in sample.cases(300):
@@ -115,10 +115,10 @@ def measured_on_paths(linkage: Linkage, c: Array, noise: float, rng: np.random.G
 @pytest.mark.parametrize("fault", ["payload", "sign", "swapped"])
 @pytest.mark.drawn(0.25)
 def test_attacked_on_paths(swept: Swept, five_bar: Linkage, fault: str, sample: Sample) -> None:
-    """An arm whose columns are turned about is refused, one with twice the payload nearly always.
+    """An arm whose columns are reversed is refused, one with twice the payload nearly always.
 
-    Where chance lets it fit, no clearance at the end of the sweep is told. Clearances that are fitted all the same lie
-    there with no deviation at all.
+    Where chance lets it fit, no clearance at the end of the sweep is identified. Clearances that are fitted all the
+    same lie there with no deviation at all.
     """
     count, refused = sample.count(20), 0
     for rng in sample.cases(20):

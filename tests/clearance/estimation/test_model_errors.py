@@ -38,7 +38,7 @@ def is_refused(linkage: Linkage, poses: Array, offsets: Array, noise: float) -> 
 
 @pytest.mark.share(0.014)
 def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -> None:
-    """Readings of an arm whose model is wrong by what is told are refused nine times of ten, and hardly by a fifth."""
+    """Readings of an arm whose model has the detectable error are refused nine times of ten, a fifth of it hardly."""
     count, refused, little = 0, 0, 0
     for rng in sample.cases(300):
         c, k = rng.uniform(*RANGE, 3), int(rng.integers(4, 9))
@@ -67,7 +67,7 @@ def test_what_is_said_to_be_seen_is_refused(five_bar: Linkage, sample: Sample) -
 
 
 def test_shifts_of_clearances(five_bar: Linkage) -> None:
-    """A model that is wrong by a little shifts the clearances by what is told."""
+    """A model that is wrong by a little shifts the clearances by the reported amount."""
     estimate = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
     usual = {"1": 0.05, "m": 5e-5, "rad": 2e-4}
 
@@ -79,7 +79,7 @@ def test_shifts_of_clearances(five_bar: Linkage) -> None:
 
 
 def test_play_and_length_look_alike(five_bar: Linkage) -> None:
-    """A rod that is longer than in the model looks like play in its pin: it is hardly seen, and shifts J2 as much."""
+    """A rod that is too long has the effect of clearance in its pin: it is hardly detectable, and shifts J2 as much."""
     estimate = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, ARM_A), NOISE)
     by_name = {error.name: error for error in model_errors(five_bar, STARTS, estimate)}
 

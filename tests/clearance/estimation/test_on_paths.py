@@ -49,7 +49,7 @@ def test_chance_is_left_out_and_named(folder: Path, five_bar: Linkage) -> None:
 
 
 def test_nothing_but_chance(folder: Path, five_bar: Linkage) -> None:
-    """Where all features that were measured are chance they tell nothing, and other paths are asked for."""
+    """Where all features that were measured are chance they determine nothing, and other paths are asked for."""
     with pytest.raises(InvalidValueError, match="on y13 all features are chance: they vary more between"):
         surrogate_from_sweep(folder, five_bar, ("y13",), STRAIGHT)
 
@@ -98,7 +98,7 @@ def test_foreign_results(
 
 
 def test_results_that_are_a_pipe(five_bar: Linkage, tmp_path: Path) -> None:
-    """Nobody waits for a pipe in the place of results."""
+    """Nobody waits for a pipe instead of results."""
     os.mkfifo(tmp_path / "results.nc")
 
     with pytest.raises(FileFormatError, match=r"results\.nc: expected a file, got a pipe"):

@@ -80,7 +80,7 @@ class TestLinear:
         np.testing.assert_allclose((high - low) / (2 * 1.645), np.sqrt(np.diag(covariance)), rtol=SPREAD)
 
     def test_correlated_noise(self) -> None:
-        """Noise that all features share is a whole matrix: a common shift tells nothing against it."""
+        """Noise that all features share is a whole matrix: a common shift does not contradict it."""
         common = 0.01**2 * np.eye(5) + 0.1**2
         covariance = np.linalg.inv(J.T @ np.linalg.inv(common) @ J)
         measured = J @ TRUE
@@ -107,7 +107,7 @@ class TestLinear:
         np.testing.assert_allclose(distribution.interval(0.9)[2], (0.05, 0.95), rtol=0, atol=0.06)
 
     def test_only_a_sum_is_told(self) -> None:
-        """Of two parameters that only their sum is seen of neither is told, and they lean against one another."""
+        """Of two parameters that only their sum is seen of neither is identified, and they lean against one another."""
         sums = np.array([[1.0, 1.0], [2.0, 2.0]])
 
         distribution = posterior(planes(sums), sums @ [0.5, 0.5], np.full(2, 0.01))
@@ -154,7 +154,7 @@ class TestLinear:
         np.testing.assert_allclose((first.mean - other.mean) / first.deviations, 0.0, rtol=0, atol=2 * MEAN)
 
     def test_bad_input(self) -> None:
-        """Features and noise that do not fit are told, and impossible probabilities."""
+        """Features and noise that do not fit are refused, and impossible probabilities."""
         with pytest.raises(ShapeError, match=r"expected 5 features and their noise, got shapes \(4,\) and \(5,\)"):
             posterior(planes(J), np.zeros(4), np.ones(5))
         with pytest.raises(ShapeError, match=r"got shapes \(5,\) and \(4, 5\)"):

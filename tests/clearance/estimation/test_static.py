@@ -28,7 +28,7 @@ def triples(rng: np.random.Generator, count: int) -> Array:
 
 @pytest.mark.parametrize("clearances", [ARM_A, ARM_B], ids=["A", "B"])
 def test_without_noise(five_bar: Linkage, clearances: Array) -> None:
-    """Where the tip rests at three poses tells the clearances of arms A and B to the last digit."""
+    """The resting tip at three poses determines the clearances of arms A and B to the last digit."""
     estimate = estimate_at_rest(five_bar, STARTS, rest_offsets(five_bar, STARTS, clearances))
 
     assert accuracy(estimate.values, clearances) > WITHOUT_NOISE
@@ -38,7 +38,7 @@ def test_without_noise(five_bar: Linkage, clearances: Array) -> None:
 
 
 def test_held_out(five_bar: Linkage, rng: np.random.Generator) -> None:
-    """A hundred other arms are told just as well, each of them; the linear map alone misses by 0.3 % on average."""
+    """Each of a hundred other arms is estimated just as well; the linear map alone has an error of 0.3 % on average."""
     true = triples(rng, 100)
     offsets = rest_offsets(five_bar, STARTS, true)
 
@@ -79,7 +79,7 @@ def test_intervals_cover(five_bar: Linkage, rng: np.random.Generator) -> None:
 
 
 def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) -> None:
-    """Six numbers for three clearances: what is left of the noise is the root of a half, on average."""
+    """Six numbers for three clearances: the residual of the noise is the root of a half, on average."""
     offsets = rest_offsets(five_bar, STARTS, triples(rng, 400))
 
     estimate = estimate_at_rest(five_bar, STARTS, offsets + rng.normal(0.0, 1e-6, offsets.shape))
@@ -93,7 +93,7 @@ def test_what_is_left_is_the_noise(five_bar: Linkage, rng: np.random.Generator) 
     ids=["y1, y3 and y7", "y1", "all paths"],
 )
 def test_singular_values(five_bar: Linkage, poses: Array, singular: tuple[float, ...]) -> None:
-    """Three poses tell the worst mixture of clearances with 0.42, one pose not at all, 24 poses with 1.32."""
+    """Three poses determine the worst combination of clearances with 0.42, one pose not at all, 24 poses with 1.32."""
     result = np.linalg.svd(rest_matrix(five_bar, poses).reshape(-1, 3), compute_uv=False)
 
     np.testing.assert_allclose(result, singular, rtol=0, atol=PRINTED)
@@ -133,7 +133,7 @@ def test_map_is_the_derivative(five_bar: Linkage) -> None:
 
 
 def test_best_poses(five_bar: Linkage, rng: np.random.Generator) -> None:
-    """Four poses that are chosen tell all clearances together better than any of a hundred random fours."""
+    """Four poses that are chosen determine all clearances together better than any of a hundred random fours."""
     x, y = np.meshgrid(np.linspace(-0.18, 0.18, 7), np.linspace(-0.7, -0.45, 6))
     positions = np.stack([x.ravel(), y.ravel()], axis=-1)
     B = rest_matrix(five_bar, positions)
@@ -156,7 +156,7 @@ def test_all_poses_can_be_taken(five_bar: Linkage) -> None:
 
 
 def test_told_or_not(five_bar: Linkage) -> None:
-    """Poses 10 µm apart tell no clearance with a noise of 1 µm; good ones tell all three."""
+    """Poses 10 µm apart identify no clearance with a noise of 1 µm; good ones identify all three."""
     near = STARTS[:1] + np.array([(0.0, 0.0), (1e-5, 0.0), (0.0, 1e-5)])
 
     def estimated(poses: Array) -> Estimate:
@@ -174,7 +174,7 @@ def test_too_few_poses(five_bar: Linkage) -> None:
 
 
 def test_bad_input(five_bar: Linkage) -> None:
-    """Shapes that do not fit, noise of nothing, poses out of reach, and impossible probabilities are told."""
+    """Shapes that do not fit, noise of nothing, poses out of reach, and impossible probabilities are refused."""
     offsets = rest_offsets(five_bar, STARTS, ARM_A)
     with pytest.raises(
         ShapeError, match=r"expected \(k, 2\) poses and as many offsets, got shapes \(3, 2\) and \(2, 2"
@@ -231,7 +231,7 @@ def test_poses_are_closed_once(five_bar: Linkage, monkeypatch: pytest.MonkeyPatc
 
 
 def test_nothing_is_told_from_none(five_bar: Linkage, rng: np.random.Generator) -> None:
-    """No interval reaches below nothing, and a clearance less than its deviation is told to be none, not identified."""
+    """No interval reaches below 0, and a clearance less than its deviation is indistinguishable from 0."""
     true = np.array((0.328e-3, 0.171e-3, 0.0))
     exact = rest_offsets(five_bar, STARTS, np.maximum(true, 1e-9))
     identified = []
