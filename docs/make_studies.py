@@ -11,26 +11,26 @@ PAGE = Path(__file__).parent / "studies.md"
 HEAD = """\
 # Studies
 
-What the sources print beside what armwright computes. `armwright study NAME` runs one of them and prints more than \
-stands here; `-o DIR` draws its figures, `--json` gives its tables as data. `make studies` makes this page. Where the \
-two differ for a reason, the reason stands in the [errata](errata.md).
+Published numbers of the sources beside those that armwright computes. `armwright study NAME` runs a study and prints \
+more tables than this page; `-o DIR` draws its figures, `--json` prints its tables as data. `make studies` makes this \
+page. Known reasons for differences are in the [errata](errata.md).
 
 | study | source | takes |
 |---|---|---|
 | [`stanford-torque`](#stanford-torque) | report TR-83-008, appendices II and III, figures 3 to 11 | a second |
 | [`puma-moves`](#puma-moves) | project on the trajectories of a PUMA, figures 5 to 25 | some seconds |
-| [`five-bar-clearance`](#five-bar-clearance) | thesis on play in a five-bar, tables 5.3 to 5.12 | a minute |
+| [`five-bar-clearance`](#five-bar-clearance) | thesis on clearance in a five-bar, tables 5.3 to 5.12 | a minute |
 | [`dh-calibration`](#dh-calibration) | the same thesis, section 2.3, table 2.4 | some seconds |
 
-The robot language of the report has no numbers but programs: eight of them run with the trace, the stages and the \
-frames that the reading of the report foresees, and four wrong ones get the messages it foresees \
+The robot language of the report is tested by programs: eight of them run with the trace, the stages and the frames \
+that the report specifies, and four wrong ones get the messages that it specifies \
 (`tests/program/test_corpus.py`, `test_interpret.py`, `test_corpus_runs.py`).
 """
 Row = Sequence[str]
 
 
 def table(head: Row, rows: Iterable[Row]) -> Iterator[str]:
-    """Give the lines of a table."""
+    """Yield the lines of a table."""
     yield f"| {' | '.join(head)} |"
     yield "|" + "---|" * len(head)
     for row in rows:
@@ -39,7 +39,7 @@ def table(head: Row, rows: Iterable[Row]) -> Iterator[str]:
 
 
 def percent(printed: float, computed: float) -> str:
-    """Return how far a computed number is from the printed one, as a part of the printed; far off, as a factor."""
+    """Return the relative difference of a computed number from the printed one; a large one as a factor."""
     if not 0.2 < computed / printed < 5:
         return f"{computed / printed:.2g} times"
     return f"{100 * (computed / printed - 1):+.1f} %"
@@ -51,11 +51,11 @@ def triple(values: Iterable[float] | None, digits: int = 3) -> str:
 
 
 def stanford() -> Iterator[str]:
-    """Give the section on the efforts of the Stanford arm."""
+    """Yield the section on the efforts of the Stanford arm."""
     yield "## stanford-torque\n"
-    yield "Constants of Bejczy's model, appendix III: fitted to the arm of appendix II over 2000 postures.\n"
+    yield "Constants of Bejczy's model, appendix III: fitted to the arm of appendix II over 2000 joint configurations.\n"
     rows = [*stanford_torque.coefficient_table(), *stanford_torque.load_table()]
-    head = ("number", "unit", "printed", "computed", "apart", "verdict", "remark")
+    head = ("number", "unit", "printed", "computed", "difference", "verdict", "remark")
     yield from table(
         head,
         (
@@ -73,12 +73,12 @@ def stanford() -> Iterator[str]:
     )
     forms = stanford_torque.form_table()
     yield (
-        f"D11 in the printed form leaves {100 * forms[0].share:.0f} % of its spread unexplained whatever its "
-        f"constants, with the factor s2² {100 * forms[1].share:.0f} %.\n"
+        f"The printed form of D11 leaves {100 * forms[0].share:.0f} % of its standard deviation unexplained with "
+        f"any constants, the form with the factor s2² {100 * forms[1].share:.0f} %.\n"
     )
     yield "Efforts over the motion of figures 3 to 5, which the report draws and does not print:\n"
     yield from table(
-        ("joint", "unit", "peak", "peak with the load", "of the motor", "Bejczy's model is off by", "the load changes"),
+        ("joint", "unit", "peak", "peak with the load", "motor", "error of Bejczy's model", "effect of the load"),
         (
             (
                 str(row.joint),
@@ -95,33 +95,33 @@ def stanford() -> Iterator[str]:
 
 
 def puma() -> Iterator[str]:
-    """Give the section on the moves of the PUMA."""
+    """Yield the section on the moves of the PUMA."""
     yield "## puma-moves\n"
     yield "Joint angles of the three poses in degrees, printed, and computed from the printed poses.\n"
     rows = []
-    for one in puma_moves.configuration_table():
-        rows.append((one.pose, "printed", *(f"{q:.2f}" for q in one.printed), ""))
-        rows.append(("", "computed", *(f"{q:.2f}" for q in one.computed), f"{one.farthest:.2f}"))
-    yield from table(("pose", "", *(f"joint {i}" for i in range(1, 7)), "apart"), rows)
+    for row in puma_moves.configuration_table():
+        rows.append((row.pose, "printed", *(f"{q:.2f}" for q in row.printed), ""))
+        rows.append(("", "computed", *(f"{q:.2f}" for q in row.computed), f"{row.farthest:.2f}"))
+    yield from table(("pose", "", *(f"joint {i}" for i in range(1, 7)), "difference"), rows)
     yield (
-        "Rotations are printed with two digits, and B stands near the singularity of the wrist, where two digits are "
-        "worth a degree. The moves, which the project draws:\n"
+        "Rotations are printed with two digits, and B is near the singularity of the wrist, where an error of two "
+        "digits changes angles by a degree. The moves, which the project draws:\n"
     )
     yield from table(
         (
             "move",
-            "postures solved",
-            "off the straight ways, mm",
-            "hand turns, deg",
+            "configurations solved",
+            "deviation from the lines, mm",
+            "tool rotates, deg",
             "speed of limit",
-            "must run slower",
+            "must be slowed",
         ),
         (
             (
-                row.way,
+                row.name,
                 str(row.inverse),
-                f"{row.off * 1e3:.0f}",
-                f"{math.degrees(row.turn):.0f}",
+                f"{row.deviation * 1e3:.0f}",
+                f"{math.degrees(row.rotation):.0f}",
                 f"{row.speed.part:.1f}, joint {row.speed.joint}",
                 f"{row.slower:.1f} times",
             )
@@ -131,12 +131,12 @@ def puma() -> Iterator[str]:
 
 
 def board() -> Iterator[str]:
-    """Give the section on the arm calibrated on a board."""
+    """Yield the section on the arm calibrated on a board."""
     yield "## dh-calibration\n"
     yield (
         "Mean error at the six verification points. The thesis measured its own arm; ours is simulated, with errors "
-        f"like those it found, {dh_calibration.NOISE * 1e3:g} mm of noise of the cameras and a base that stands a "
-        "little beside where it should. So the rows are to be compared in how much better a fit makes the arm.\n"
+        f"like those of the thesis, {dh_calibration.NOISE * 1e3:g} mm of noise of the cameras and a displaced base. So "
+        "the rows compare by the improvement of each fit.\n"
     )
     rows = dh_calibration.verification_table()
     printed = {row.points: sum(row.printed) / len(row.printed) for row in rows if row.printed is not None}
@@ -149,18 +149,18 @@ def board() -> Iterator[str]:
             cells.append("-" if mean is None or row is rows[0] else f"{100 * (1 - mean / first):.0f} %")
         return cells
 
-    head = ("fit", "printed, mm", "ours, mm", "printed, better by", "ours, better by")
+    head = ("fit", "printed, mm", "ours, mm", "printed, improvement", "ours, improvement")
     yield from table(head, map(shown, rows))
 
 
 @cache
-def learnt() -> five_bar_clearance.Learnt:
-    """Return the 729 linkages of the thesis, simulated; this is what takes a minute."""
-    return five_bar_clearance.learnt()
+def swept() -> five_bar_clearance.SweepResult:
+    """Return the simulations of the 729 linkages of the thesis, which take a minute."""
+    return five_bar_clearance.run_sweep()
 
 
 def five_bar() -> Iterator[str]:
-    """Give the section on play in the five-bar."""
+    """Yield the section on clearance in the five-bar."""
     study = five_bar_clearance
     yield "## five-bar-clearance\n"
     yield "Table 5.3, repeatability of 30 cycles in mm, and table 5.4, features of the error curves of arm A.\n"
@@ -180,17 +180,17 @@ def five_bar() -> Iterator[str]:
         for row in study.feature_table()
         for i, name in enumerate(("slope, mm/s", "intercept, mm", "amplitude, mm"))
     )
-    head = ("path", "feature", "printed", "ours", "apart", "ours, friction by the speed of surfaces")
+    head = ("path", "feature", "printed", "ours", "difference", "ours, friction by the speed of surfaces")
     yield from table(head, features)
-    yield "Tables 5.5 to 5.8, clearances told from the curves, in mm, and how near they come to the given ones.\n"
-    estimates = study.estimate_table(learnt())
+    yield "Tables 5.5 to 5.8, clearances in mm estimated from the curves, and their accuracy.\n"
+    estimates = study.estimate_table(swept())
     yield from table(
-        ("arm", "by", "given", "printed", "mean accuracy", "ours", "mean accuracy"),
+        ("arm", "method", "true", "printed", "mean accuracy", "ours", "mean accuracy"),
         (
             (
                 row.arm,
-                {"amp_dc": "amplitude"}.get(row.way, row.way),
-                triple(row.given),
+                {"amp_dc": "amplitude"}.get(row.method, row.method),
+                triple(row.true),
                 triple(row.printed),
                 "-" if row.printed_mean is None else f"{row.printed_mean:.2f} %",
                 triple(row.ours),
@@ -215,13 +215,13 @@ def five_bar() -> Iterator[str]:
         ),
     )
     yield (
-        "The error at the first target, where the arm rests, comes out to the last digit. At the others it depends on "
-        "the profile between the nodes, which the thesis shows in a figure only, and after the first hard stop on "
+        "The error at the first target, where the arm rests, agrees to the last digit. At the others it depends on "
+        "the profile between the nodes, which the thesis shows only in a figure, and after the first hard stop on "
         "chance.\n"
     )
 
 
-# In the order of the page; the last but one is not quick.
+# In the order of the page; all but five-bar-clearance are quick.
 SECTIONS = {
     "stanford-torque": stanford,
     "puma-moves": puma,

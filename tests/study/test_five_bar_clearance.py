@@ -9,7 +9,7 @@ from armwright.clearance.feature_sweep import FeatureSweep
 from armwright.clearance.paths import PickAndPlace
 from armwright.errors import MissingExtraError
 from armwright.study import five_bar_clearance as study
-from armwright.study.five_bar_clearance import EstimateRow, Learnt
+from armwright.study.five_bar_clearance import EstimateRow, SweepResult
 
 pytest.importorskip("sklearn")
 
@@ -18,18 +18,18 @@ PRINTED = 5.1e-4
 
 
 @pytest.fixture(scope="module")
-def learnt() -> Learnt:
+def swept() -> SweepResult:
     """125 linkages, five levels of each clearance instead of nine."""
     told: list[tuple[str, float]] = []
-    found = study.learnt(lambda what, part: told.append((what, part)), levels=study.LEVELS[::2])
+    found = study.run_sweep(lambda what, part: told.append((what, part)), levels=study.LEVELS[::2])
     assert told[-1] == ("learning nine features", 1.0)
     assert ("simulating 125 linkages on 3 paths", 1.0) in told
     return found
 
 
 @pytest.fixture(scope="module")
-def estimates(learnt: Learnt) -> list[EstimateRow]:
-    return study.estimate_table(learnt)
+def estimates(swept: SweepResult) -> list[EstimateRow]:
+    return study.estimate_table(swept)
 
 
 def test_features_of_arm_a() -> None:
@@ -54,28 +54,28 @@ def test_missing_library(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FeatureSweep, "__call__", lambda *_: pytest.fail("simulated"))
 
     with pytest.raises(MissingExtraError, match=r'install it by: pip install "armwright\[clearance\]"'):
-        study.learnt()
+        study.run_sweep()
 
 
-def test_sweep(learnt: Learnt) -> None:
-    """Every combination of levels is simulated, and all nine features of them are learnt."""
-    assert learnt.points.shape == (125, 3)
-    assert np.unique(learnt.points).tolist() == pytest.approx([1e-4, 2e-4, 3e-4, 4e-4, 5e-4])
-    assert len(learnt.surrogate.features) == 9
-    assert all(np.isfinite(values).all() for values in learnt.values.values())
+def test_sweep(swept: SweepResult) -> None:
+    """Every combination of levels is simulated, and all nine features of them are swept."""
+    assert swept.points.shape == (125, 3)
+    assert np.unique(swept.points).tolist() == pytest.approx([1e-4, 2e-4, 3e-4, 4e-4, 5e-4])
+    assert len(swept.surrogate.features) == 9
+    assert all(np.isfinite(values).all() for values in swept.values.values())
     assert len(study.LEVELS) ** 3 == 729
 
 
 def test_estimates(estimates: list[EstimateRow]) -> None:
     """Five ways tell the clearances of two arms: one feature at a time some 90 %, nine at a time and rest 99.5 %."""
     ways = ["slope", "intercept", "amp_dc", "all nine", "at rest"]
-    assert [(row.arm, row.way) for row in estimates] == [(arm, way) for arm in "AB" for way in ways]
+    assert [(row.arm, row.method) for row in estimates] == [(arm, way) for arm in "AB" for way in ways]
     for row in estimates:
-        assert row.given == pytest.approx([c * 1e3 for c in study.ARMS[row.arm]])
-        if row.way in ("all nine", "at rest"):
+        assert row.true == pytest.approx([c * 1e3 for c in study.ARMS[row.arm]])
+        if row.method in ("all nine", "at rest"):
             assert row.mean > 99.5
             assert row.printed is None
-        if row.way in ("intercept", "amp_dc"):
+        if row.method in ("intercept", "amp_dc"):
             assert row.mean > 85
             assert row.printed is not None
             assert row.printed_mean is not None
@@ -96,14 +96,14 @@ def test_targets(estimates: list[EstimateRow]) -> None:
     """At the first target, where it rests, arm A is 0.562 and arm B 0.915 mm off, as printed; A is the better arm."""
     rows = {(row.arm, row.case): row for row in study.target_table(estimates)}
 
-    assert list(rows) == [("A", "given"), ("A", "estimated"), ("B", "given"), ("B", "estimated")]
+    assert list(rows) == [("A", "true"), ("A", "estimated"), ("B", "true"), ("B", "estimated")]
     for arm in "AB":
-        found = rows[arm, "given"]
+        found = rows[arm, "true"]
         assert found.printed is not None
         assert found.ours[0] == pytest.approx(found.printed[0], abs=PRINTED)
         # The second within 10 %; what comes after the impacts is chance, and the thesis' way there not known.
         assert found.ours[1] == pytest.approx(found.printed[1], rel=0.1)
-    assert np.mean(rows["A", "given"].ours) < np.mean(rows["B", "given"].ours)
+    assert np.mean(rows["A", "true"].ours) < np.mean(rows["B", "true"].ours)
     assert np.mean(rows["A", "estimated"].ours) < np.mean(rows["B", "estimated"].ours)
 
 

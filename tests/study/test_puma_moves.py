@@ -12,7 +12,7 @@ from armwright.study import puma_moves
 from armwright.study.puma_moves import (
     BLEND,
     CURVES,
-    PRINTED_PLACES_CM,
+    PRINTED_POSITIONS_CM,
     PRINTED_Q,
     PRINTED_ROTATIONS,
     SAMPLES,
@@ -23,13 +23,13 @@ from armwright.study.puma_moves import (
     angle_table,
     configuration_table,
     courses,
+    detour_table,
+    deviation_at_b,
     joints_along,
-    missed_at_b,
     move_table,
     path_of,
     sample_times,
     study_poses,
-    way_round_table,
 )
 
 ROUNDING = 1e-12
@@ -47,7 +47,7 @@ def angles() -> dict[str, AngleRow]:
 
 @pytest.fixture(scope="module")
 def moves() -> dict[str, MoveRow]:
-    return {row.way: row for row in move_table()}
+    return {row.name: row for row in move_table()}
 
 
 def of_the_project(A: Array, B: Array, C: Array, t: float) -> tuple[Array, Array, Array]:
@@ -71,7 +71,7 @@ def of_the_project(A: Array, B: Array, C: Array, t: float) -> tuple[Array, Array
 
 def test_the_projects_formulas() -> None:
     """Every sample of figures 5 to 7 and 16 to 18 is what the project's own formulas give."""
-    q, places = np.array(PRINTED_Q), np.array(PRINTED_PLACES_CM, dtype=np.float64)
+    q, places = np.array(PRINTED_Q), np.array(PRINTED_POSITIONS_CM, dtype=np.float64)
     turns = np.array([row.matlab for row in angle_table()])
     for number, (way, order) in CURVES.items():
         shown = [curve for course in courses(number) for curve in course.curves.values()]
@@ -101,7 +101,7 @@ def test_printed_configurations(configurations: dict[str, ConfigurationRow]) -> 
     assert configurations["A"].farthest < 0.5e-4
     assert configurations["B"].farthest < 1.0
     assert configurations["C"].farthest < 0.3
-    for printed, R, place in zip(PRINTED_Q, PRINTED_ROTATIONS, PRINTED_PLACES_CM, strict=True):
+    for printed, R, place in zip(PRINTED_Q, PRINTED_ROTATIONS, PRINTED_POSITIONS_CM, strict=True):
         X = forward(load_arm("puma560"), np.radians(printed))
         np.testing.assert_allclose(X[:3, 3] * 100, place, atol=5e-4)
         # Rounded to two digits, as the project prints them; one of C's is off by two units of the last one.
@@ -128,7 +128,7 @@ def test_missed_by_the_formula() -> None:
     """At B the joint move is off by 3/16 · blend · (change of the rate), which is where its curve is."""
     B = puma_moves.joint_trajectory()(0.5) - np.radians(PRINTED_Q[1])
 
-    np.testing.assert_allclose(missed_at_b(), B, atol=ROUNDING)
+    np.testing.assert_allclose(deviation_at_b(), B, atol=ROUNDING)
 
 
 def test_the_two_kinds_of_move(moves: dict[str, MoveRow]) -> None:
@@ -139,10 +139,10 @@ def test_the_two_kinds_of_move(moves: dict[str, MoveRow]) -> None:
     # The hand of a Cartesian move leaves the straight ways by its blend alone, and no more than it misses B.
     miss = via_distances(TIMES, study_poses()[:, :3, 3], BLEND, ends="running")[1]
     for row in (seed, nearest, geodesic):
-        assert 0 < row.off <= miss
+        assert 0 < row.deviation <= miss
         assert row.length < joint.length
-        assert joint.off > 3 * row.off
-    assert geodesic.turn <= nearest.turn < seed.turn / 2
+        assert joint.deviation > 3 * row.deviation
+    assert geodesic.rotation <= nearest.rotation < seed.rotation / 2
     assert joint.joints < geodesic.joints < nearest.joints < seed.joints
 
 
@@ -171,8 +171,8 @@ def test_joints_follow_the_hand(way: str) -> None:
 
 def test_ways_round() -> None:
     """From B to C the wrist is turned over: a via pose near the joint move does it, and damped rates, at a price."""
-    via, damped = way_round_table()
+    via, damped = detour_table()
 
-    for way in (via, damped):
-        assert way.found
-        assert "mm off the line" in way.said
+    for row in (via, damped):
+        assert row.exists
+        assert "mm off the line" in row.summary

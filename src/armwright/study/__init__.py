@@ -1,1 +1,1 @@
-"""Experiments of the seeds, each reproducible: inputs, run, printed beside computed."""
+"""Reproducible experiments of the sources: inputs, run, published numbers beside computed ones."""

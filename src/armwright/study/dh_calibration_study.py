@@ -12,7 +12,7 @@ from armwright.study.dh_calibration import NOISE, PRINTED_POINTS, ParameterRow, 
 
 @attrs.frozen(kw_only=True, eq=False)
 class DhCalibration:
-    """A three-joint arm that touches a board of 33 points in three attitudes.
+    """A three-joint arm that touches a board of 33 points in three orientations.
 
     Attributes:
         verification: errors at the verification points, printed and simulated.
@@ -42,7 +42,7 @@ class DhCalibration:
         }
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give the tables, printed beside simulated."""
+        """Yield the tables, printed beside simulated."""
         nominal = self.verification[0]
         yield ResultTable(
             title=f"Table 2.4: errors at six verification points [mm]; ours simulated, cameras with {NOISE * 1e3:g} mm",
@@ -70,7 +70,7 @@ class DhCalibration:
 
 
 def _verification(row: Row, nominal: Row) -> Iterator[tuple[str, ...]]:
-    """Give the lines of a fit: what the thesis prints, and ours."""
+    """Yield the rows of a fit: the numbers of the thesis, and ours."""
     name = row.model if row is nominal else f"{row.model}, {row.points}"
     for label, values, before in (("printed", row.printed, nominal.printed), ("ours", row.ours, nominal.ours)):
         if values is None or before is None:

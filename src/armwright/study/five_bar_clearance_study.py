@@ -15,7 +15,7 @@ class FiveBarClearance:
     """A parallel arm with clearance in three pins: error curves, their features, clearances estimated from them.
 
     Attributes:
-        learnt: the features of 729 linkages, and what was learnt of them.
+        swept: the features of 729 linkages, and a model of them.
         repeatability: table 5.3.
         features: table 5.4.
         estimates: tables 5.5 to 5.8.
@@ -24,7 +24,7 @@ class FiveBarClearance:
         corrections: table 5.12.
     """
 
-    learnt: study.Learnt
+    swept: study.SweepResult
     repeatability: list[study.RepeatRow]
     features: list[study.FeatureRow]
     estimates: list[study.EstimateRow]
@@ -42,10 +42,10 @@ class FiveBarClearance:
     @classmethod
     def run(cls, progress: Callable[[str, float], None] | None = None) -> "FiveBarClearance":
         """Run the study, which takes a minute."""
-        learnt = study.learnt(progress)
-        estimates = study.estimate_table(learnt)
+        swept = study.run_sweep(progress)
+        estimates = study.estimate_table(swept)
         return cls(
-            learnt=learnt,
+            swept=swept,
             repeatability=study.repeat_table(),
             features=study.feature_table(),
             estimates=estimates,
@@ -66,7 +66,7 @@ class FiveBarClearance:
         }
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give the tables, printed beside computed."""
+        """Yield the tables, printed beside computed."""
         yield ResultTable(
             title="Table 5.3: repeatability of 30 cycles [mm]; ours leaning in the friction cone and encoder noise",
             heads=("arm", "c2", "c3", "c4", "printed", "ours"),
@@ -90,7 +90,7 @@ class FiveBarClearance:
         )
         yield ResultTable(
             title="Tables 5.5 to 5.8: estimated clearances [mm] and their accuracy",
-            heads=("arm", "by", "", "c2", "c3", "c4", "mean"),
+            heads=("arm", "method", "", "c2", "c3", "c4", "mean"),
             rows=[line for row in self.estimates for line in _estimate(row)],
         )
         for title, rows in (
@@ -114,9 +114,9 @@ class FiveBarClearance:
 
     def figures(self) -> dict[str, str | bytes]:
         """Return the thesis' figures by the name of their file."""
-        from armwright.study.five_bar_figures import drawn  # noqa: PLC0415 - matplotlib is slow to import
+        from armwright.study.five_bar_figures import figures  # noqa: PLC0415 - matplotlib is slow to import
 
-        return drawn(self.learnt, self.corrected)
+        return figures(self.swept, self.corrected)
 
 
 def _fixed(values: Iterable[float], digits: int) -> Iterator[str]:
@@ -124,7 +124,7 @@ def _fixed(values: Iterable[float], digits: int) -> Iterator[str]:
 
 
 def _estimate(row: study.EstimateRow) -> Iterator[tuple[str, ...]]:
-    names = row.arm, "amplitude" if row.way == "amp_dc" else row.way
+    names = row.arm, "amplitude" if row.method == "amp_dc" else row.method
     if row.printed is not None:
         yield *names, "printed", *_fixed(row.printed, 3), f"{row.printed_mean:.2f} %"
         names = "", ""

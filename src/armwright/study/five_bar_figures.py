@@ -1,4 +1,4 @@
-"""The figures of the study of the five-bar with play."""
+"""The figures of the study of the five-bar with joint clearance."""
 
 import numpy as np
 
@@ -19,24 +19,24 @@ _TIME, _ERROR = "time, s", "error, mm"
 _SHOWN = {"slope": "slope, mm/s", "intercept": "intercept, mm", "amp_dc": "amplitude, mm"}
 
 
-def drawn(learnt: study.Learnt, correction: Correction) -> dict[str, str | bytes]:
+def figures(swept: study.SweepResult, correction: Correction) -> dict[str, str | bytes]:
     """Return all figures by the name of their file."""
-    return {**_single_run(), **_curves(), **_surfaces(learnt), **_arm_a(), **_corrected(correction)}
+    return {**_single_run(), **_curves(), **_surfaces(swept), **_arm_a(), **_corrected(correction)}
 
 
 def _single_run() -> dict[str, str | bytes]:
-    """Figures 4.6 to 4.9: path y1 with half a millimetre of play in every pin."""
+    """Draw figures 4.6 to 4.9: path y1 with a clearance of half a millimetre in every joint."""
     run = _half("y1")
     files: dict[str, str | bytes] = {"figure4.06.svg": _torques("Figure 4.6: drives on path y1", named_path("y1"))}
-    wanted = {"path": "4.07", "bearings": "4.08", "error": "4.09"}
-    for one in clearance_run_figures(ClearanceRun.of(run)):
-        if one.name in wanted:
-            files[f"figure{wanted[one.name]}.svg"] = one.svg
+    numbers = {"path": "4.07", "bearings": "4.08", "error": "4.09"}
+    for drawing in clearance_run_figures(ClearanceRun.of(run)):
+        if drawing.name in numbers:
+            files[f"figure{numbers[drawing.name]}.svg"] = drawing.svg
     return files
 
 
 def _curves() -> dict[str, str | bytes]:
-    """Figures 4.10 to 4.13: error curves of paths along y and x, and their spectra."""
+    """Draw figures 4.10 to 4.13: error curves of paths along y and x, and their spectra."""
     files: dict[str, str | bytes] = {}
     y = {name: _half(name) for name in ("y1", "y3")}
     files["figure4.10.svg"] = marked_curves(
@@ -62,19 +62,19 @@ def _curves() -> dict[str, str | bytes]:
         ("4.12", "Figure 4.12: spectra of the error along x; the constant part counts twice", 500.0),
         ("4.13", "Figure 4.13: spectra of the error along x, 0 to 20 Hz", 20.0),
     ):
-        kept = frequencies <= highest
-        shown = {name: values[kept] for name, values in spectra.items()}
-        files[f"figure{number}.svg"] = lines_of_spectrum(title, frequencies[kept], shown, "mm")
+        low = frequencies <= highest
+        shown = {name: values[low] for name, values in spectra.items()}
+        files[f"figure{number}.svg"] = lines_of_spectrum(title, frequencies[low], shown, "mm")
     return files
 
 
-def _surfaces(learnt: study.Learnt) -> dict[str, str | bytes]:
-    """Figures 4.14 to 4.22: each feature of path y1 over the play of J2 and J4, for three of J3."""
+def _surfaces(swept: study.SweepResult) -> dict[str, str | bytes]:
+    """Draw figures 4.14 to 4.22: each feature of path y1 over the play of J2 and J4, for three of J3."""
     files: dict[str, str | bytes] = {}
     levels = np.array(study.LEVELS)
     number = 14
     for feature, label in _SHOWN.items():
-        table = learnt.values[f"y1_{feature}"].reshape(9, 9, 9) * 1e3
+        table = swept.values[f"y1_{feature}"].reshape(9, 9, 9) * 1e3
         for c3 in (0.1e-3, 0.25e-3, 0.5e-3):
             k = int(np.abs(levels - c3).argmin())
             files[f"figure4.{number}.svg"] = surface(
@@ -89,7 +89,7 @@ def _surfaces(learnt: study.Learnt) -> dict[str, str | bytes]:
 
 
 def _arm_a() -> dict[str, str | bytes]:
-    """Figures 5.4 to 5.6: error curves of arm A on its three paths."""
+    """Draw figures 5.4 to 5.6: error curves of arm A on its three paths."""
     files: dict[str, str | bytes] = {}
     for number, path in zip((4, 5, 6), study.PATHS, strict=True):
         both = {
@@ -107,7 +107,7 @@ def _arm_a() -> dict[str, str | bytes]:
 
 
 def _corrected(correction: Correction) -> dict[str, str | bytes]:
-    """Figures 5.10 to 5.13: the path as it is and corrected, what arm A makes of it, drives, speeds."""
+    """Draw figures 5.10 to 5.13: the path as it is and corrected, what arm A makes of it, drives, speeds."""
     both = {"path as it is": PickAndPlace().path(), "path corrected": correction.path}
     targets = np.array(PickAndPlace().nodes) * 1e3
     runs = {name: _simulated(path, study.ARMS["A"]) for name, path in both.items()}

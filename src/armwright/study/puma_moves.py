@@ -1,8 +1,8 @@
 """Joint move and Cartesian move of the PUMA through three poses: the trajectory project, figures 5 to 25.
 
 Half a second from A to B, half a second from B to C, with a blend of 0.2 s on either side of B, at full speed from the
-start to the end. The joint move takes the joint angles as the project prints them; the Cartesian move takes place and
-ZYZ angles, those of MATLAB's ``rotm2eul``, and never asks what the joints do meanwhile. Here they are asked.
+start to the end. The joint move uses the joint angles as the project prints them; the Cartesian move uses positions and
+ZYZ angles, those of MATLAB's ``rotm2eul``, and does not consider the motion of the joints. Here it is computed.
 """
 
 from typing import Literal, NamedTuple, TypeAlias
@@ -31,9 +31,9 @@ from armwright.spatial.euler import matlab_zyz
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import angle_between, nearest_rotation
 
-Way: TypeAlias = Literal["joint", "seed", "zyz", "geodesic"]
-# What each way is called, in the order of the tables.
-WAYS: dict[Way, str] = {
+MoveKind: TypeAlias = Literal["joint", "seed", "zyz", "geodesic"]
+# The kinds of move with their names, in the order of the tables.
+MOVES: dict[MoveKind, str] = {
     "joint": "joint move",
     "seed": "Cartesian, MATLAB's ZYZ angles",
     "zyz": "Cartesian, nearest ZYZ angles",
@@ -51,7 +51,7 @@ PRINTED_ROTATIONS = (
     ((0.87, -0.1, 0.48), (0.29, 0.9, -0.34), (-0.4, 0.43, 0.81)),
     ((0.41, -0.29, 0.87), (0.69, 0.71, -0.09), (-0.6, 0.64, 0.49)),
 )
-PRINTED_PLACES_CM = ((5, -55, -60), (50, -40, 40), (60, 15, -30))
+PRINTED_POSITIONS_CM = ((5, -55, -60), (50, -40, 40), (60, 15, -30))
 TIMES = (0.0, 0.5, 1.0)  # s
 BLEND = 0.2  # s
 PERIOD = 0.002  # s
@@ -59,55 +59,55 @@ SAMPLES = 501
 
 
 def study_poses() -> Array:
-    """Return the poses A, B, C (3, 4, 4), their printed rotations made exact."""
-    return homogeneous(nearest_rotation(PRINTED_ROTATIONS), np.array(PRINTED_PLACES_CM, dtype=np.float64) / 100)
+    """Return the poses A, B, C (3, 4, 4), with the nearest rotations to the printed ones."""
+    return homogeneous(nearest_rotation(PRINTED_ROTATIONS), np.array(PRINTED_POSITIONS_CM, dtype=np.float64) / 100)
 
 
 def sample_times() -> Array:
-    """Return the 501 moments of the project [s]."""
+    """Return the 501 sample times of the project [s]."""
     return np.linspace(0.0, PERIOD * (SAMPLES - 1), SAMPLES)
 
 
 def joint_trajectory() -> Trajectory:
-    """Return the joint move: the printed angles, straight ways with blends."""
+    """Return the joint move: straight segments between the printed angles, with blends."""
     return blended(TIMES, np.radians(PRINTED_Q), BLEND, ends="running")
 
 
-def path_of(way: Way) -> HandPath:
-    """Return the planned path of the hand of one of the three Cartesian moves."""
+def path_of(kind: MoveKind) -> HandPath:
+    """Return the planned path of the tool of a Cartesian move."""
     X = study_poses()
-    if way == "seed":
-        place = blended(TIMES, X[:, :3, 3], BLEND, ends="running")
+    if kind == "seed":
+        position = blended(TIMES, X[:, :3, 3], BLEND, ends="running")
         angles = blended(TIMES, matlab_zyz(PRINTED_ROTATIONS), BLEND, ends="running")
-        return HandPath(place=place, turns=None, angles=angles, times=np.array(TIMES))
-    if way == "joint":
-        raise UnknownNameError("Cartesian move", way, [known for known in WAYS if known != "joint"])
-    return hand_path(X, TIMES, BLEND, ends="running", orientation=way)
+        return HandPath(place=position, turns=None, angles=angles, times=np.array(TIMES))
+    if kind == "joint":
+        raise UnknownNameError("Cartesian move", kind, [known for known in MOVES if known != "joint"])
+    return hand_path(X, TIMES, BLEND, ends="running", orientation=kind)
 
 
-def poses_along(way: Way, t: Array) -> Array:
-    """Return where the hand is planned to be (k, 4, 4) at times (k,)."""
-    if way == "joint":
+def poses_along(kind: MoveKind, t: Array) -> Array:
+    """Return the planned poses of the tool (k, 4, 4) at times (k,)."""
+    if kind == "joint":
         return forward(load_arm("puma560-seed"), joint_trajectory()(t))
-    return path_of(way)(t)
+    return path_of(kind)(t)
 
 
-def joints_along(way: Way) -> Trajectory:
-    """Return what the joints do, through the configurations at the 501 moments, whatever their limits."""
-    if way == "joint":
+def joints_along(kind: MoveKind) -> Trajectory:
+    """Return the trajectory of the joints through the configurations at the sample times, without regard to limits."""
+    if kind == "joint":
         return joint_trajectory()
     t = sample_times()
-    X = path_of(way)(t)
+    X = path_of(kind)(t)
     solver = solver_of(_wide(load_arm("puma560-seed")))
     start = inverse(load_arm("puma560-seed"), X[0], np.radians(PRINTED_Q[0])).best.q
     q, _ = chain(solver, X, start)
-    # The rates at both ends are those of the parabola through three samples.
+    # The velocities at both ends are those of the parabola through three samples.
     first, last = (sign * (-3 * p[0] + 4 * p[1] - p[2]) / (2 * PERIOD) for sign, p in ((1, q[:3]), (-1, q[:-4:-1])))
     return xspline(t, q, first, last)
 
 
 def _wide(arm: Arm) -> Arm:
-    """Return an arm whose joints may turn as far as they like."""
+    """Return the arm without position limits."""
     free = {"lower": -np.inf, "upper": np.inf}
     joints = [attrs.evolve(joint, limits=attrs.evolve(joint.limits, **free)) for joint in arm.joints]
     return attrs.evolve(arm, joints=joints)
@@ -115,15 +115,15 @@ def _wide(arm: Arm) -> Arm:
 
 @attrs.frozen(kw_only=True)
 class ConfigurationRow:
-    """A printed configuration beside the one that its printed pose gives.
+    """A printed configuration beside the one computed from its printed pose.
 
     Attributes:
         pose: A, B or C.
         printed: (6) joint positions as printed [deg].
-        computed: (6) of the nearest configuration that the pose allows [deg].
-        branch: that it belongs to.
+        computed: (6) joint positions of the nearest solution [deg].
+        branch: branch of that solution.
         farthest: largest difference [deg].
-        allowed: all branches inside the limits there.
+        allowed: all branches within the limits.
     """
 
     pose: str
@@ -135,19 +135,19 @@ class ConfigurationRow:
 
 
 def configuration_table() -> list[ConfigurationRow]:
-    """Return printed and computed configurations: two printed digits of a rotation are a degree near the wrist."""
+    """Return printed and computed configurations; rotations with two digits make a difference of a degree."""
     arm, rows = load_arm("puma560-seed"), []
     for name, printed, X in zip(NAMES, PRINTED_Q, study_poses(), strict=True):
-        found = inverse(arm, X, np.radians(printed))
-        computed = np.degrees(found.best.q)
+        solution = inverse(arm, X, np.radians(printed))
+        computed = np.degrees(solution.best.q)
         rows.append(
             ConfigurationRow(
                 pose=name,
                 printed=printed,
                 computed=tuple(computed.tolist()),
-                branch=found.best.label,
+                branch=solution.best.label,
                 farthest=float(np.abs(computed - printed).max()),
-                allowed=tuple(branch.label for branch in found.allowed),
+                allowed=tuple(branch.label for branch in solution.allowed),
             )
         )
     return rows
@@ -159,8 +159,8 @@ class AngleRow:
 
     Attributes:
         pose: A, B or C.
-        matlab: (3) phi, theta, psi as MATLAB has them of the printed rotation [deg].
-        nearest: (3) those next to the ones of the other poses, of the exact rotation [deg].
+        matlab: (3) phi, theta, psi by MATLAB of the printed rotation [deg].
+        nearest: (3) those nearest to the angles of the other poses, of the exact rotation [deg].
     """
 
     pose: str
@@ -179,7 +179,7 @@ def angle_table() -> list[AngleRow]:
 
 
 class Largest(NamedTuple):
-    """The largest part of a limit that is used, and the joint, from 1."""
+    """The largest utilization of a limit, and its joint, from 1."""
 
     part: float
     joint: int
@@ -187,27 +187,27 @@ class Largest(NamedTuple):
 
 @attrs.frozen(kw_only=True)
 class MoveRow:
-    """One way to run through the three poses in a second.
+    """A move through the three poses in a second.
 
     Attributes:
-        way: what it is.
+        name: name of the move.
         inverse: number of configurations that are solved for.
-        length: way of the hand [m].
-        off: farthest that the hand is from the straight ways A B C [m].
-        turn: by how much the hand turns altogether [rad].
-        joints: by how much all six joints turn altogether [rad].
-        speed: largest part of a speed limit.
-        acceleration: largest part of an acceleration limit.
-        effort: largest part of an effort limit.
-        slower: how many times slower it must run to keep all of these.
-        stopped: what keeps it from being run with the joints' limits; empty where nothing does.
+        length: length of the path of the tool [m].
+        deviation: largest distance of the tool from the line segments A B C [m].
+        rotation: total rotation of the tool [rad].
+        joints: total rotation of all six joints [rad].
+        speed: largest utilization of a speed limit.
+        acceleration: largest utilization of an acceleration limit.
+        effort: largest utilization of an effort limit.
+        slower: factor by which it must be slowed down to satisfy these limits.
+        stopped: the obstacle if the position limits are respected; empty without an obstacle.
     """
 
-    way: str
+    name: str
     inverse: int
     length: float
-    off: float
-    turn: float
+    deviation: float
+    rotation: float
     joints: float
     speed: Largest
     acceleration: Largest
@@ -217,82 +217,84 @@ class MoveRow:
 
 
 def move_table() -> list[MoveRow]:
-    """Return the two kinds of move as measured numbers, the Cartesian one in three ways to turn."""
+    """Return the joint move and the Cartesian moves with three interpolations of orientation, as numbers."""
     arm, t = load_arm("puma560-seed"), sample_times()
     rows = []
-    for way, name in WAYS.items():
-        X, joints = poses_along(way, t), joints_along(way)
+    for kind, name in MOVES.items():
+        X, joints = poses_along(kind, t), joints_along(kind)
         uses = {
             limit: Largest(float(use.max()), int(use.argmax()) + 1) for limit, use in limit_use(arm, joints).items()
         }
         rows.append(
             MoveRow(
-                way=name,
-                inverse=len(NAMES) if way == "joint" else SAMPLES,
+                name=name,
+                inverse=len(NAMES) if kind == "joint" else SAMPLES,
                 length=float(np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=-1).sum()),
-                off=_off(X[:, :3, 3]),
-                turn=float(angle_between(X[:-1, :3, :3], X[1:, :3, :3]).sum()),
+                deviation=_deviation(X[:, :3, 3]),
+                rotation=float(angle_between(X[:-1, :3, :3], X[1:, :3, :3]).sum()),
                 joints=float(np.abs(np.diff(joints(t), axis=0)).sum()),
                 speed=uses["speed"],
                 acceleration=uses["acceleration"],
                 effort=uses["effort"],
                 slower=slowing_for_limits(arm, joints)[0],
-                stopped=_stopped(arm, way),
+                stopped=_stopped(arm, kind),
             )
         )
     return rows
 
 
-def _off(p: Array) -> float:
-    """Return the largest distance of places (k, 3) from the straight ways A B C."""
+def _deviation(p: Array) -> float:
+    """Return the largest distance of positions (k, 3) from the line segments A B C."""
     stops = study_poses()[:, :3, 3]
-    ways = np.diff(stops, axis=0)
-    parts = np.clip(((p[:, None] - stops[:-1]) * ways).sum(-1) / (ways * ways).sum(-1), 0, 1)
-    nearest = stops[:-1] + parts[..., None] * ways
+    segments = np.diff(stops, axis=0)
+    parts = np.clip(((p[:, None] - stops[:-1]) * segments).sum(-1) / (segments * segments).sum(-1), 0, 1)
+    nearest = stops[:-1] + parts[..., None] * segments
     return float(np.linalg.norm(p[:, None] - nearest, axis=-1).min(axis=1).max())
 
 
-def _stopped(arm: Arm, way: Way) -> str:
-    if way == "joint":
+def _stopped(arm: Arm, kind: MoveKind) -> str:
+    if kind == "joint":
         return ""
     try:
-        along(arm, study_poses(), path_of(way), np.array(TIMES), BLEND, near=mid_range(arm), ends="running")
+        along(arm, study_poses(), path_of(kind), np.array(TIMES), BLEND, near=mid_range(arm), ends="running")
     except PathError as error:
         return str(error)
     return ""
 
 
 @attrs.frozen(kw_only=True)
-class WayRoundRow:
-    """A way round what stops the Cartesian move from B to C.
+class DetourRow:
+    """A detour of straight lines A B C.
 
     Attributes:
-        by: via poses or damped rates.
-        found: whether there is one.
-        said: its price; or what stopped the line, where there is none.
+        method: by a via pose or damped least squares.
+        exists: whether there is such a detour.
+        summary: its cost, or the obstacle without a detour.
     """
 
-    by: By
-    found: bool
-    said: str
+    method: By
+    exists: bool
+    summary: str
 
 
-def way_round_table() -> list[WayRoundRow]:
-    """Return what becomes of straight lines A B C with stops, where ways round are looked for."""
-    rows: list[WayRoundRow] = []
-    ways: tuple[By, ...] = ("via", "damped")
-    for by in ways:
+def detour_table() -> list[DetourRow]:
+    """Return the results of both searches for detours of straight lines A B C with stops."""
+    rows: list[DetourRow] = []
+    methods: tuple[By, ...] = ("via", "damped")
+    for method in methods:
         try:
-            move = stopping_move(load_arm("puma560-seed"), study_poses(), by=by)
+            move = stopping_move(load_arm("puma560-seed"), study_poses(), by=method)
         except PathError as error:
-            rows.append(WayRoundRow(by=by, found=False, said=str(error)))
+            rows.append(DetourRow(method=method, exists=False, summary=str(error)))
         else:
-            rows.append(WayRoundRow(by=by, found=True, said=f"{move.times[-1]:.1f} s; {move.detours[-1].price}"))
+            rows.append(
+                DetourRow(method=method, exists=True, summary=f"{move.times[-1]:.1f} s; {move.detours[-1].price}")
+            )
     return rows
 
 
-def missed_at_b() -> Array:
-    """Return by how much the joint move misses the configuration B when it is passed (6,) [rad], by the formula."""
+def deviation_at_b() -> Array:
+    """Return the deviation of the joint move from configuration B when it is passed (6,) [rad], by the formula."""
     return np.asarray(via_deviations(TIMES, np.radians(PRINTED_Q), BLEND, ends="running")[1])
 
 
@@ -301,8 +303,8 @@ class Course:
     """Curves of one of the project's figures.
 
     Attributes:
-        title: what they show.
-        unit: of the curves.
+        title: the quantity.
+        unit: unit of the curves.
         curves: (501,) numbers by the name of the curve.
     """
 
@@ -311,8 +313,8 @@ class Course:
     curves: dict[str, Array]
 
 
-# Figures of the project: curves over time, the path in space, all together, and the film.
-CURVES: dict[int, tuple[Way, int]] = {
+# Figures of the project: curves over time, the path in space, overviews, and the film.
+CURVES: dict[int, tuple[MoveKind, int]] = {
     5: ("joint", 0),
     6: ("joint", 1),
     7: ("joint", 2),
@@ -320,37 +322,37 @@ CURVES: dict[int, tuple[Way, int]] = {
     17: ("seed", 1),
     18: ("seed", 2),
 }
-PATHS: dict[int, Way] = {10: "joint", 19: "seed"}
-OVERVIEWS: dict[int, Way] = {22: "joint", 23: "seed"}
+PATHS: dict[int, MoveKind] = {10: "joint", 19: "seed"}
+OVERVIEWS: dict[int, MoveKind] = {22: "joint", 23: "seed"}
 FILM = 25
 
 
 def courses(number: int) -> list[Course]:
-    """Return the curves of a figure over ``sample_times``: joints, or place and ZYZ angles of the hand.
+    """Return the curves of a figure over ``sample_times``: joints, or position and ZYZ angles of the tool.
 
     Args:
         number: 5 to 7 for angle, speed, acceleration of the joint move; 16 to 18 for those of the Cartesian move.
 
     Raises:
-        UnknownNameError: there is no such figure with curves.
+        UnknownNameError: the figure does not exist, or has no curves.
     """
     if number not in CURVES:
         raise UnknownNameError("figure", str(number), [str(known) for known in CURVES])
-    way, order = CURVES[number]
+    kind, order = CURVES[number]
     per = ("", "/s", "/s²")[order]
     t = sample_times()
-    if way == "joint":
+    if kind == "joint":
         q = np.degrees(joint_trajectory()(t, order))
         title = ("joint angles", "joint speeds", "joint accelerations")[order]
         return [Course(title=title, unit=f"deg{per}", curves={f"joint {i + 1}": q[:, i] for i in range(6)})]
-    hand = path_of(way)
-    assert hand.angles is not None  # noqa: S101 - the project's way has them
-    place, angles = hand.place(t, order) * 100, np.degrees(hand.angles(t, order))
-    what = ("", "speed of the ", "acceleration of the ")[order]
+    hand = path_of(kind)
+    assert hand.angles is not None  # noqa: S101 - this path has them
+    position, angles = hand.place(t, order) * 100, np.degrees(hand.angles(t, order))
+    derivative = ("", "speed of the ", "acceleration of the ")[order]
     return [
-        Course(title=f"{what}place", unit=f"cm{per}", curves=dict(zip("xyz", place.T, strict=True))),
+        Course(title=f"{derivative}position", unit=f"cm{per}", curves=dict(zip("xyz", position.T, strict=True))),
         Course(
-            title=f"{what}ZYZ angles",
+            title=f"{derivative}ZYZ angles",
             unit=f"deg{per}",
             curves=dict(zip(("phi", "theta", "psi"), angles.T, strict=True)),
         ),

@@ -20,14 +20,14 @@ class PumaMoves:
     Attributes:
         configurations: the joint positions of the poses, printed and computed.
         angles: their ZYZ angles.
-        moves: what each move asks of the joints.
+        moves: utilization of the limits and further numbers of each move.
         detours: straight lines with stops, and detours around the singularity.
     """
 
     configurations: list[puma_moves.ConfigurationRow]
     angles: list[puma_moves.AngleRow]
     moves: list[puma_moves.MoveRow]
-    detours: list[puma_moves.WayRoundRow]
+    detours: list[puma_moves.DetourRow]
 
     inputs: ClassVar[Mapping[str, str]] = {
         "source": "project on the trajectories of a PUMA",
@@ -43,7 +43,7 @@ class PumaMoves:
             configurations=puma_moves.configuration_table(),
             angles=puma_moves.angle_table(),
             moves=puma_moves.move_table(),
-            detours=puma_moves.way_round_table(),
+            detours=puma_moves.detour_table(),
         )
 
     def as_data(self) -> dict[str, Any]:
@@ -59,7 +59,7 @@ class PumaMoves:
         }
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give the tables, printed beside computed."""
+        """Yield the tables, printed beside computed."""
         yield ResultTable(
             title="Joint configurations: printed, and computed from the printed poses",
             heads=("pose", "", *(f"j{i + 1} deg" for i in range(6)), "branch"),
@@ -84,7 +84,7 @@ class PumaMoves:
                 "move",
                 "inverse solved",
                 "path mm",
-                "off A B C mm",
+                "deviation from A B C mm",
                 "tool rotates deg",
                 "joints rotate deg",
                 "speed, of limit",
@@ -95,14 +95,14 @@ class PumaMoves:
             rows=map(_move, self.moves),
         )
         yield ResultTable(
-            title="What stops the Cartesian moves inside the joints' limits",
-            heads=("move", "where and why"),
-            rows=[(row.way, row.stopped) for row in self.moves if row.stopped],
+            title="Obstacles of the Cartesian moves within the joints' limits",
+            heads=("move", "obstacle"),
+            rows=[(row.name, row.stopped) for row in self.moves if row.stopped],
         )
         yield ResultTable(
             title="Straight lines with stops, and detours",
-            heads=("by", "path", "price, or what stops it"),
-            rows=[(row.by, "found" if row.found else "none", row.said) for row in self.detours],
+            heads=("method", "detour", "cost, or obstacle"),
+            rows=[(row.method, "yes" if row.exists else "no", row.summary) for row in self.detours],
         )
 
     def figures(self) -> dict[str, str | bytes]:
@@ -111,22 +111,22 @@ class PumaMoves:
 
         t = puma_moves.sample_times()
         positions = {name: X[:3, 3] for name, X in zip(puma_moves.NAMES, puma_moves.study_poses(), strict=True)}
-        moments = dict(zip(puma_moves.NAMES, puma_moves.TIMES, strict=True))
+        pose_times = dict(zip(puma_moves.NAMES, puma_moves.TIMES, strict=True))
 
         def shown(number: int) -> list[Panel]:
             return [Panel(course.title, course.unit, course.curves) for course in puma_moves.courses(number)]
 
         files: dict[str, str | bytes] = {}
-        for number, (way, _) in puma_moves.CURVES.items():
-            files[_name(number)] = panels(f"Figure {number}: {_kind(way)}", t, shown(number), marks=moments)
-        for number, way in puma_moves.PATHS.items():
-            X = puma_moves.poses_along(way, t)
-            title = f"Figure {number}: {_kind(way)}, path and approach vectors"
+        for number, (kind, _) in puma_moves.CURVES.items():
+            files[_name(number)] = panels(f"Figure {number}: {_title(kind)}", t, shown(number), marks=pose_times)
+        for number, kind in puma_moves.PATHS.items():
+            X = puma_moves.poses_along(kind, t)
+            title = f"Figure {number}: {_title(kind)}, path and approach vectors"
             files[_name(number)] = path_in_space(title, X, positions)
-        for number, way in puma_moves.OVERVIEWS.items():
-            X = puma_moves.poses_along(way, t)
-            three = [shown(curve)[0] for curve, (of, _) in puma_moves.CURVES.items() if of == way]
-            files[_name(number)] = overview(f"Figure {number}: {_kind(way)}", t, three, X, positions)
+        for number, kind in puma_moves.OVERVIEWS.items():
+            X = puma_moves.poses_along(kind, t)
+            three = [shown(curve)[0] for curve, (shown_kind, _) in puma_moves.CURVES.items() if shown_kind == kind]
+            files[_name(number)] = overview(f"Figure {number}: {_title(kind)}", t, three, X, positions)
         return {**files, **_films()}
 
 
@@ -147,11 +147,11 @@ def _films() -> dict[str, bytes]:
 
 def _move(row: puma_moves.MoveRow) -> tuple[str, ...]:
     return (
-        row.way,
+        row.name,
         str(row.inverse),
         f"{row.length * 1e3:.0f}",
-        f"{row.off * 1e3:.0f}",
-        f"{math.degrees(row.turn):.0f}",
+        f"{row.deviation * 1e3:.0f}",
+        f"{math.degrees(row.rotation):.0f}",
         f"{math.degrees(row.joints):.0f}",
         *(f"{part:.2f} j{joint}" for part, joint in (row.speed, row.acceleration, row.effort)),
         f"{row.slower:.1f} x",
@@ -162,5 +162,5 @@ def _name(number: int) -> str:
     return f"figure{number:02d}.svg"
 
 
-def _kind(way: puma_moves.Way) -> str:
-    return "joint move" if way == "joint" else "Cartesian move"
+def _title(kind: puma_moves.MoveKind) -> str:
+    return "joint move" if kind == "joint" else "Cartesian move"

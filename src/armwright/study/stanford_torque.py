@@ -1,8 +1,8 @@
 """The torques of the Stanford arm in a fast move: report TR-83-008, section 4, figures 3 to 11, and appendix III.
 
-The hand runs from (0, 0, 0.2, 0, 0, 0) to (1.57, 2.36, 1.0, 1.57, 1.57, 1.57) in one second by a quintic. The efforts
-come three ways: Newton-Euler with an empty hand, Bejczy's model, Newton-Euler with the largest load. Rotors count in
-all of them, as Bejczy's constants have them. Gravity points up as in the report, so its curves and ours have one sign.
+The joints move from (0, 0, 0.2, 0, 0, 0) to (1.57, 2.36, 1.0, 1.57, 1.57, 1.57) in one second by a quintic. The
+efforts are computed in three cases: Newton-Euler without a payload, Bejczy's model, Newton-Euler with the largest
+payload. All include the rotors, as Bejczy's constants do. Gravity points up as in the report, so that the signs agree.
 """
 
 import math
@@ -24,19 +24,19 @@ from armwright.motion.quintic_polynomials import quintic
 
 Verdict: TypeAlias = Literal["agrees", "near", "wrong"]
 
-# The report's gravity: this much, and upward [m/s²].
+# The report's gravity, which points upward [m/s²].
 GRAVITY = 9.80621
 START = (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)
 GOAL = (1.57, 2.36, 1.0, 1.57, 1.57, 1.57)
 DURATION = 1.0  # s
-# The largest load: a cube with its centre in the origin of the hand frame.
+# The largest payload: a cube with its centre in the origin of the tool frame.
 LOAD_MASS = 1.8  # kg
 LOAD_VOLUME = 422e-6  # m³
 # Seed and number of the configurations that constants are fitted to.
 SEED = 83008
 CONFIGURATIONS = 2000
-# A printed number that agrees is this near, or to half a unit of its last digit; one that is near may have been
-# rounded on the way.
+# Relative errors up to which printed numbers agree, or are near; half a unit of the last digit agrees too, and a near
+# number may result from rounded intermediate results.
 AGREES = 0.01
 NEAR = 0.05
 
@@ -47,23 +47,23 @@ def study_arm() -> Arm:
 
 
 def loaded_arm() -> Arm:
-    """Return the arm with the largest load in its hand."""
+    """Return the arm with the largest payload."""
     cube = LOAD_MASS * LOAD_VOLUME ** (2 / 3) / 6 * np.eye(3)
     return payload(study_arm(), LOAD_MASS, inertia=cube)
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class Torques:
-    """The three cases of figures 6 to 11, and the motion of figures 3 to 5, at m moments.
+    """The three cases of figures 6 to 11, and the motion of figures 3 to 5, at m times.
 
     Attributes:
         t: (m,) times [s].
         q: (m, 6) joint positions [rad], the third [m].
         qd: (m, 6) joint speeds.
         qdd: (m, 6) joint accelerations.
-        empty: (m, 6) case 1: Newton-Euler, nothing in the hand [N m], the third [N].
+        empty: (m, 6) case 1: Newton-Euler without a payload [N m], the third [N].
         bejczy: (m, 6) case 2: Bejczy's model with the constants of the arm.
-        loaded: (m, 6) case 3: Newton-Euler with the largest load.
+        loaded: (m, 6) case 3: Newton-Euler with the largest payload.
         bejczy_printed: (m, 6) Bejczy's model with the constants as the report prints them.
     """
 
@@ -78,10 +78,10 @@ class Torques:
 
 
 def torques(samples: int = 201) -> Torques:
-    """Run the motion and find the efforts of all cases.
+    """Compute the motion and the efforts of all cases.
 
     Args:
-        samples: number of moments, the ends included.
+        samples: number of times, the ends included.
 
     Source:
         TR-83-008, section 4, figures 3 to 11.
@@ -103,12 +103,12 @@ def torques(samples: int = 201) -> Torques:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Figure:
-    """The curves of one figure of the report.
+    """The curves of a figure of the report.
 
     Attributes:
-        number: of the figure in the report.
-        title: what it shows.
-        unit: of the curves.
+        number: number of the figure in the report.
+        title: the quantity.
+        unit: unit of the curves.
         t: (m,) times [s].
         curves: (m,) numbers by the name of the curve.
     """
@@ -121,7 +121,7 @@ class Figure:
 
 
 def figure(study: Torques, number: int) -> Figure:
-    """Return the data of one of the report's figures 3 to 11.
+    """Return the data of a figure of the report, 3 to 11.
 
     Args:
         study: the torques.
@@ -156,16 +156,16 @@ def figure(study: Torques, number: int) -> Figure:
 
 @attrs.frozen(kw_only=True)
 class JointRow:
-    """How far the cases are apart at one joint.
+    """The differences of the cases at a joint.
 
     Attributes:
-        joint: from 1.
-        unit: of its efforts.
-        peak: largest effort with an empty hand.
-        peak_loaded: largest effort with the largest load.
+        joint: number of the joint, from 1.
+        unit: unit of its efforts.
+        peak: largest effort without a payload.
+        peak_loaded: largest effort with the largest payload.
         limit: largest effort of the motor, appendix II.
-        bejczy: root of the mean square by which Bejczy's model is off, as a part of that of the empty hand.
-        load: the same for what the load changes.
+        bejczy: root mean square error of Bejczy's model, relative to the root mean square effort without a payload.
+        load: root mean square effect of the payload, relative to the same.
     """
 
     joint: int
@@ -178,7 +178,7 @@ class JointRow:
 
 
 def joint_table(study: Torques) -> list[JointRow]:
-    """Return how far the cases are apart, joint by joint: the report says the wrist suffers most."""
+    """Return the differences of the cases for every joint; by the report they are largest at the wrist."""
     empty = _mean(study.empty)
     bejczy, load = _mean(study.bejczy - study.empty) / empty, _mean(study.loaded - study.empty) / empty
     limits = study_arm().limits.effort
@@ -201,28 +201,28 @@ def _mean(course: Array) -> Array:
 
 
 def fit_configurations() -> Array:
-    """Return the configurations that constants are fitted to, (m, 6), spread over the joint limits."""
+    """Return random configurations within the joint limits, to which constants are fitted, (m, 6)."""
     arm = study_arm()
     rng = np.random.default_rng(SEED)
     return rng.uniform(arm.limits.lower, arm.limits.upper, size=(CONFIGURATIONS, arm.n))
 
 
 def fitted_coefficients() -> Coefficients:
-    """Return the constants of Bejczy's model that fit the arm best."""
+    """Return the constants of Bejczy's model that are fitted to the arm."""
     return fitted(study_arm(), fit_configurations())
 
 
 @attrs.frozen(kw_only=True)
 class PrintedRow:
-    """A number of the report beside the one that the arm has.
+    """A number of the report beside that of the arm.
 
     Attributes:
-        name: as in the report.
-        unit: of both.
-        printed: in the report.
-        computed: of the arm.
+        name: name in the report.
+        unit: unit of both numbers.
+        printed: number in the report.
+        computed: number of the arm.
         verdict: ``agrees`` to 1 % or half a unit of the last printed digit, ``near`` to 5 %, else ``wrong``.
-        note: what is wrong, or where the number stands; empty where there is nothing to say.
+        note: remark on the error or the source; may be empty.
     """
 
     name: str
@@ -255,7 +255,7 @@ _PRINTED_CONSTANTS = (
 
 
 def coefficient_table() -> list[PrintedRow]:
-    """Return every constant of Bejczy's model as printed and as it fits the arm.
+    """Return every constant of Bejczy's model as printed and as fitted to the arm.
 
     Source:
         TR-83-008, appendix III.
@@ -269,17 +269,17 @@ def coefficient_table() -> list[PrintedRow]:
 def _row(name: str, unit: str, printed: str, computed: float, note: str) -> PrintedRow:
     value = float(printed)
     half_digit = 0.5 * 10.0 ** -len(printed.partition(".")[2])
-    off = abs(computed - value)
+    error = abs(computed - value)
     verdict: Verdict = "wrong"
-    if off <= max(AGREES * abs(computed), half_digit):
+    if error <= max(AGREES * abs(computed), half_digit):
         verdict = "agrees"
-    elif off <= NEAR * abs(computed):
+    elif error <= NEAR * abs(computed):
         verdict = "near"
     return PrintedRow(name=name, unit=unit, printed=value, computed=computed, verdict=verdict, note=note)
 
 
 def load_table() -> list[PrintedRow]:
-    """Return link 6 with the largest load, as printed and as the load makes it.
+    """Return the parameters of link 6 with the largest payload, as printed and as computed.
 
     Source:
         TR-83-008, appendix II (4).
@@ -298,12 +298,12 @@ def load_table() -> list[PrintedRow]:
 
 @attrs.frozen(kw_only=True)
 class FormRow:
-    """How well a form of D11 can fit the arm at all, with the best constants.
+    """The residual of a form of D11 that is fitted to the arm.
 
     Attributes:
-        form: in letters.
-        residual: root of the mean square [kg m²].
-        share: of the spread of D11 over the configurations that stays unexplained.
+        form: the formula.
+        residual: root mean square residual [kg m²].
+        share: residual relative to the standard deviation of D11 over the configurations.
     """
 
     form: str
@@ -312,7 +312,7 @@ class FormRow:
 
 
 def form_table() -> list[FormRow]:
-    """Return how well D11 is told with and without the square of sin q2, which the report lacks.
+    """Return the residuals of D11 with and without the square of sin q2, which the report omits.
 
     Source:
         TR-83-008, appendix III.
@@ -327,7 +327,7 @@ def form_table() -> list[FormRow]:
     }
     rows = []
     for form, columns in forms.items():
-        rest = D11 - columns @ np.linalg.lstsq(columns, D11, rcond=None)[0]
-        residual = math.sqrt(float(np.mean(rest**2)))
+        residuals = D11 - columns @ np.linalg.lstsq(columns, D11, rcond=None)[0]
+        residual = math.sqrt(float(np.mean(residuals**2)))
         rows.append(FormRow(form=form, residual=residual, share=residual / float(np.std(D11))))
     return rows

@@ -25,10 +25,10 @@ class StanfordTorque:
     """Efforts of the Stanford arm over the report's motion, and every printed constant with a verdict.
 
     Attributes:
-        constants: of Bejczy's model, printed and fitted.
-        load: numbers of link 6 with the largest load, printed and computed.
-        forms: how well forms of D11 fit.
-        efforts: over the motion.
+        constants: constants of Bejczy's model, printed and fitted.
+        load: parameters of link 6 with the largest payload, printed and computed.
+        forms: residuals of forms of D11.
+        efforts: efforts over the motion.
         joints: the largest efforts of each joint.
     """
 
@@ -68,7 +68,7 @@ class StanfordTorque:
         return {name: [attrs.asdict(row) for row in rows] for name, rows in tables.items()}
 
     def tables(self) -> Iterator[ResultTable]:
-        """Give the tables, printed beside computed."""
+        """Yield the tables, printed beside computed."""
         heads = ("constant", "printed", "computed", "unit", "verdict", "remark")
         for title, rows in (
             ("Bejczy's model, appendix III", self.constants),

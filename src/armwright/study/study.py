@@ -1,4 +1,4 @@
-"""The experiments of the sources behind one protocol, by name."""
+"""The experiments of the sources behind a protocol, by name."""
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -18,13 +18,13 @@ class Study(Result, Protocol):
 
     @property
     def inputs(self) -> Mapping[str, str]:
-        """What the experiment is made with, in words: source, arm, motion."""
+        """The inputs of the experiment in words, such as source, arm and motion."""
 
     def figures(self) -> dict[str, str | bytes]:
         """Return the figures by the name of their file."""
 
 
-# By name: module and class.
+# Module and class of each study, by name.
 _STUDIES = {
     "stanford-torque": ("stanford_torque_study", "StanfordTorque"),
     "puma-moves": ("puma_moves_study", "PumaMoves"),
@@ -38,13 +38,13 @@ def run_study(name: str, progress: Progress | None = None) -> Study:
     """Run an experiment.
 
     Args:
-        name: of ``STUDIES``.
-        progress: called with what is being done, and how much of it, 0 to 1.
+        name: a name of ``STUDIES``.
+        progress: called with the current task and the finished part of it, 0 to 1.
 
     Raises:
-        UnknownNameError: there is no such study.
+        UnknownNameError: the name is unknown.
         MissingExtraError: the study needs a package that is not installed.
     """
     module, study = _STUDIES[one_of("study", name, _STUDIES)]
-    found: Study = getattr(import_module(f"armwright.study.{module}"), study).run(progress)
-    return found
+    result: Study = getattr(import_module(f"armwright.study.{module}"), study).run(progress)
+    return result
