@@ -53,7 +53,7 @@ def triple(values: Iterable[float] | None, digits: int = 3) -> str:
 def stanford() -> Iterator[str]:
     """Yield the section on the efforts of the Stanford arm."""
     yield "## stanford-torque\n"
-    yield "Constants of Bejczy's model, appendix III: fitted to the arm of appendix II over 2000 joint configurations.\n"
+    yield "Constants of Bejczy's model, appendix III: fitted to the arm of appendix II at 2000 configurations.\n"
     rows = [*stanford_torque.coefficient_table(), *stanford_torque.load_table()]
     head = ("number", "unit", "printed", "computed", "difference", "verdict", "remark")
     yield from table(
