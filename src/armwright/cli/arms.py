@@ -1,13 +1,10 @@
 """``armwright arms``: the catalogue of arms."""
 
-from typing import Annotated
-
-import typer
-
+from armwright.cli.options import Json
 from armwright.cli.output import print_json
 
 
-def arms(as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False) -> None:
+def arms(as_json: Json = False) -> None:
     """List the arms of the catalogue.
 
     **Example:** `armwright arms`

@@ -8,8 +8,8 @@ import typer
 from armwright.cli.failures import outcome
 from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
-from armwright.cli.options import ArmName, Json, Quiet
-from armwright.cli.output import command_line, print_json, print_result
+from armwright.cli.options import ArmName, Json, OutputFolder, Quiet
+from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
@@ -35,12 +35,7 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
         float | None,
         typer.Option(help="Standard deviation of a measured coordinate; larger residuals are then reported."),
     ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="Folder for the corrected arm (TOML, URDF, tables), its errors, report and figures."
-        ),
-    ] = None,
+    output: OutputFolder = None,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -49,7 +44,8 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
     The measurements may be points, poses, touched planes and distances, alone or together. The command prints the
     identified errors with their standard errors, which errors are not identifiable and why, and the errors at held-out
     configurations before and after. Measurements that contradict the arm end the command with status 3: those of
-    another arm at once, doubtful results with the reasons after everything is printed and written.
+    another arm at once, doubtful results with the reasons after everything is printed and written. With -o the command
+    writes the corrected arm (TOML, URDF, tables), its errors, a report and figures.
 
     **Example:** `armwright calibrate puma560-seed examples/puma_points.csv -o out/calibrated`
     """
@@ -74,11 +70,6 @@ def calibrate(  # noqa: PLR0917 - Typer reads one parameter per option
         write_results(output, calibration_files(assessment, title=title, command=command_line()))
     reasons = assessment.contradictions
     doubtful = DoubtfulError(f"the measurements contradict the arm: {'; '.join(reasons)}") if reasons else None
-    if as_json:
-        print_json({**outcome(doubtful), **assessment.as_data()})
-    elif not quiet:
-        print_result(assessment)
-        if output is not None:
-            print(f"report: {output / 'report.html'}")
+    print_result(assessment, as_json=as_json, quiet=quiet, output=output, head=outcome(doubtful))
     if doubtful is not None:
         raise doubtful

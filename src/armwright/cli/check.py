@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armwright.cli.options import Json
 from armwright.cli.output import print_json
 from armwright.cli.programs import Std, Strict
 from armwright.errors import ExitStatus, FileFormatError
@@ -53,7 +54,7 @@ def check(  # noqa: PLR0917 - Typer reads one parameter per option
     std: Std = Standard.RLO_2,
     strict: Strict = False,
     output_format: Annotated[Format, typer.Option("--format", help="How to print diagnostics.")] = Format.TEXT,
-    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Check RLO programs without running them.
 

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
-from armwright.cli.options import JsonSummary, Quiet
-from armwright.cli.output import print_json, print_result
+from armwright.cli.options import Json, OutputFolder, Quiet
+from armwright.cli.output import print_result
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.shell_completion import paths
 
@@ -30,17 +30,16 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     rounds: Annotated[int, typer.Option(help="How often the path is moved, at most 100 times.")] = 3,
     friction_velocity: FrictionVelocity = "surface",
     threshold_mm_s: Threshold = 1.0,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for path.csv, summary.json and paths.svg.")
-    ] = None,
-    as_json: JsonSummary = False,
+    output: OutputFolder = None,
+    as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Move a path against the error that joint clearance causes, until the tip reaches its goals.
 
     Of pick-and-place the three nodes are moved; any other path is moved as one smooth curve. Each round simulates
     sixteen indistinguishable runs, or 32 linkages drawn from an estimate, and subtracts their mean error; printed are
-    the path of the best round, and the remaining error with its spread over the runs.
+    the path of the best round, and the remaining error with its spread over the runs. With -o the command writes
+    path.csv, summary.json and paths.svg.
 
     **Example:** `armwright clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483`
     """
@@ -68,9 +67,4 @@ def correct(  # noqa: PLR0917 - Typer reads one parameter per option
     assessment = assess_correction(model, path, clearances, settings, knots=knots, rounds=rounds, progress=print_error)
     if output is not None:
         write_results(output, correction_files(assessment))
-    if as_json:
-        print_json(assessment.as_data())
-    elif not quiet:
-        print_result(assessment)
-        if output is not None:
-            print(f"path: {output / 'path.csv'}")
+    print_result(assessment, as_json=as_json, quiet=quiet, output=output, file="path.csv")

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armwright.cli.linkages import LinkageName
-from armwright.cli.output import print_json, print_result
+from armwright.cli.options import Json
+from armwright.cli.output import print_result
 from armwright.cli.progress import waiting
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
@@ -28,7 +29,7 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
     ] = None,
     columns: ColumnMap = None,
     skip_incomplete: SkipIncomplete = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the estimate as JSON, in SI units.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Estimate the clearances of a linkage from readings of its tip at rest, or from its motion on paths.
 
@@ -51,10 +52,7 @@ def estimate(  # noqa: PLR0917 - Typer reads one parameter per option
         assessment = assess_rest(model, measurement, noise)
     else:
         assessment = _assess_paths(model, measurement, sweep, noise)
-    if as_json:
-        print_json(assessment.as_data())
-    else:
-        print_result(assessment)
+    print_result(assessment, as_json=as_json)
 
 
 def _assess_paths(

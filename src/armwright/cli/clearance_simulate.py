@@ -1,14 +1,13 @@
 """``armwright clearance simulate``: simulate a linkage with joint clearance along a path."""
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of, with_clearances
-from armwright.cli.options import JsonSummary, Quiet
-from armwright.cli.output import command_line, print_json, print_result
+from armwright.cli.options import Json, OutputFolder, Quiet
+from armwright.cli.output import command_line, print_result
 from armwright.cli.progress import waiting
 from armwright.cli.results import write_results
 from armwright.cli.shell_completion import paths, setting
@@ -81,11 +80,8 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
             autocompletion=setting("STARTS"),
         ),
     ] = "rest",
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="Folder for report.html, samples.csv, summary.json and figures (SVG)."),
-    ] = None,
-    as_json: JsonSummary = False,
+    output: OutputFolder = None,
+    as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Simulate a linkage with joint clearance whose drives are commanded as if it had none.
@@ -120,18 +116,14 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         from armwright.report.clearance_run_files import clearance_run_files
 
         write_results(output, clearance_run_files(run, command=command_line()))
-    if as_json:
-        print_json({"command": command_line(), **run.as_data()})
-    elif not quiet:
+    if not (as_json or quiet):
         data = run.as_data()
         used = data["settings"]
         print(
             f"{data['linkage']}, {data['path']}: {data['status']} after {data['sound_until']:.4g} s; "
             f"{used['integrator']}, steps of {used['step']:.3g} s, friction {used['friction']:g}"
         )
-        print_result(run)
-        if output is not None:
-            print(f"report: {output / 'report.html'}")
+    print_result(run, as_json=as_json, quiet=quiet, output=output, head={"command": command_line()})
 
 
 def _path(model: "Linkage", path: str | None, speed_rpm: float | None, revolutions: float) -> "TipPath":

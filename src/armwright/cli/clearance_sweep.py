@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.linkages import FrictionVelocity, LinkageName, Threshold, settings_of
-from armwright.cli.options import Quiet
+from armwright.cli.options import Json, Quiet
 from armwright.cli.output import print_json
 from armwright.cli.progress import sweep_bar, waiting
 from armwright.cli.shell_completion import one_of
@@ -57,7 +57,7 @@ def sweep(  # noqa: PLR0917 - Typer reads one parameter per option
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler, as in tcp://10.0.0.1:8786.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Simulate a linkage with many clearances on several paths and store the features of its error curves.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armwright.cli.options import ArmName
+from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
 from armwright.errors import counted
 
@@ -23,7 +23,7 @@ def convert(  # noqa: PLR0917 - Typer reads one parameter per option
         str | None,
         typer.Option(help="Joints of a URDF file to lock, at 0 or a position in degrees or mm, as in J1,J2=30."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was written as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Write an arm as URDF or as an arm file, and report what the format cannot represent.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from armwright.cli.options import Json
 from armwright.cli.output import print_json
 from armwright.cli.shell_completion import codes
 
@@ -29,7 +30,7 @@ def explain(
         str | None,
         typer.Argument(help="Code of a diagnostic, as in E206; without it all codes are listed.", autocompletion=codes),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Explain the code of a diagnostic: what it means, what to do, a wrong program and a correct one.
 

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.failures import failure_data
+from armwright.cli.options import Json
 from armwright.cli.output import print_json
-from armwright.cli.programs import Std
+from armwright.cli.programs import ProgramFiles, Std
 from armwright.errors import ArmwrightError, ExitStatus, counted
 from armwright.program.language.words import Standard
 
@@ -19,9 +20,7 @@ if TYPE_CHECKING:
 
 
 def fix(
-    programs: Annotated[
-        list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
-    ],
+    programs: ProgramFiles,
     cell: Annotated[
         Path | None,
         typer.Option("--cell", help="Cell in which the programs will run; remaining errors are checked against it."),
@@ -30,7 +29,7 @@ def fix(
         bool, typer.Option("--diff", "--dry-run", help="Write nothing; print the changes and the remaining errors.")
     ] = False,
     std: Std = Standard.RLO_2,
-    as_json: Annotated[bool, typer.Option("--json", help="Print corrections and remaining errors as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Correct the mistakes in RLO programs that have a certain correction, such as a missing `;` or `=`.
 

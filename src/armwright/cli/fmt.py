@@ -1,14 +1,14 @@
 """``armwright fmt``: format programs in place."""
 
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from armwright.cli.failures import failure_data
+from armwright.cli.options import Json
 from armwright.cli.output import print_json
-from armwright.cli.programs import Std
+from armwright.cli.programs import ProgramFiles, Std
 from armwright.errors import ArmwrightError, ExitStatus
 from armwright.program.language.words import Standard
 
@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
 
 def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
-    programs: Annotated[
-        list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
-    ],
+    programs: ProgramFiles,
     check: Annotated[
         bool, typer.Option("--check", help="Write nothing; end with exit status 5 if a program would change.")
     ] = False,
@@ -31,7 +29,7 @@ def fmt(  # noqa: C901, PLR0917 - Typer reads one parameter per option
         int | None, typer.Option(min=1, help="Step of the line numbers; without it lines are not numbered.")
     ] = None,
     std: Std = Standard.RLO_2,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result for each program as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Format RLO programs: one statement per line, indented, keywords in upper case, comments preserved.
 

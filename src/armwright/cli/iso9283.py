@@ -7,8 +7,8 @@ import typer
 
 from armwright.cli.failures import outcome
 from armwright.cli.numbers import Named, named_numbers
-from armwright.cli.options import Json, Quiet
-from armwright.cli.output import command_line, json_text, print_json, print_result
+from armwright.cli.options import Json, OutputFolder, Quiet
+from armwright.cli.output import command_line, json_text, print_result
 from armwright.cli.results import warn_of_stray, write_results
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 from armwright.errors import CheckFailedError, TooFewError
@@ -25,9 +25,7 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     files: Annotated[
         list[Path], typer.Argument(help="Measurements as CSV (docs/iso9283.md), in one or several files.")
     ],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for report.html, measures.json and the figures (SVG).")
-    ] = None,
+    output: OutputFolder = None,
     few: Annotated[
         bool, typer.Option("--few", help="Accept fewer cycles than the standard requires, and state it.")
     ] = False,
@@ -51,7 +49,8 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     Accuracy and repeatability of poses (AP, RP, vAP), of distances (AD, RD) and of paths (AT, RT, AV, RV, FV),
     stabilization and overshoot (t, OV, TP), corners (CR, CO), drift, exchangeability, compliance and weaving, each with
     its number of cycles. A test with fewer cycles than the standard requires is refused without --few. A characteristic
-    that exceeds its --limit ends the command with exit status 5 after everything is printed and written.
+    that exceeds its --limit ends the command with exit status 5 after everything is printed and written. With -o the
+    command writes report.html, measures.json and figures (SVG).
 
     **Example:** `armwright iso9283 examples/measured_poses.csv -o out/iso9283`
     """
@@ -66,12 +65,7 @@ def iso9283(  # noqa: PLR0917 - Typer reads one parameter per option
     if output is not None:
         write_results(output, _files(assessment, files))
     exceeded = CheckFailedError(_exceeded(assessment.exceeded)) if assessment.exceeded else None
-    if as_json:
-        print_json({**outcome(exceeded), **assessment.as_data()})
-    elif not quiet:
-        print_result(assessment)
-        if output is not None:
-            print(f"report: {output / 'report.html'}")
+    print_result(assessment, as_json=as_json, quiet=quiet, output=output, head=outcome(exceeded))
     if exceeded is not None:
         raise exceeded
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from armwright.cli.options import ArmName
+from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
 from armwright.cli.shell_completion import quantities
 
@@ -22,7 +22,7 @@ def kernel(
     single: Annotated[
         bool, typer.Option("--single", help="Print the function of a single configuration, not of many.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print source and operation count as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Print the compiled kernel of a quantity for an arm, and its operation count.
 

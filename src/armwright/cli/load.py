@@ -9,10 +9,7 @@ if TYPE_CHECKING:
 
 Load = Annotated[
     str | None,
-    typer.Option(
-        "--load",
-        help="Payload in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia.",
-    ),
+    typer.Option("--load", help="Payload in the tool frame: MASS,X,Y,Z in kg and mm, or a TOML file with its inertia."),
 ]
 
 

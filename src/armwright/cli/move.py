@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from armwright.cli.numbers import within
-from armwright.cli.options import ArmName, Json, QuietButWarnings
+from armwright.cli.options import ArmName, Json, OutputFolder, QuietButWarnings
 from armwright.cli.output import command_line, json_text, plain_console, print_json, print_table, table
 from armwright.cli.progress import counting
 from armwright.cli.results import warn_of_stray, write_results
@@ -61,9 +61,7 @@ def move(  # noqa: PLR0917 - Typer reads one parameter per option
     ],
     arm: ArmName,
     poses: Annotated[Path, typer.Argument(help="File of poses, TOML or JSON (docs/poses.md).")],
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the results; without it none are written.")
-    ] = None,
+    output: OutputFolder = None,
     near: Annotated[
         str | None,
         typer.Option(help="Initial joint positions in degrees and mm, as in 10,20,30; they select the branch."),

@@ -17,8 +17,10 @@ Rows: TypeAlias = Annotated[
     Path | None,
     typer.Option("--csv", help="Table of q1 ... qn, such as motion.csv, in SI units or the units in its headings."),
 ]
+OutputFolder: TypeAlias = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Folder for the results; without it none are written.")
+]
 Json: TypeAlias = Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")]
-JsonSummary: TypeAlias = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, in SI units.")]
 Quiet: TypeAlias = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
 QuietButWarnings: TypeAlias = Annotated[
     bool, typer.Option("-q", "--quiet", help="Print nothing but warnings and errors.")

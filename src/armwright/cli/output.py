@@ -2,12 +2,14 @@
 
 import json
 import sys
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from armwright.cli.terminal import console
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -41,25 +43,46 @@ def plain_console() -> "Console":
     return console(highlight=False)
 
 
-def print_result(result: "Result") -> None:
-    """Print the tables of a result, and its notes below."""
-    console = plain_console()
-    print_result_tables(console, result.tables())
-    for note in result.notes:
-        console.print(note)
+def print_result(
+    result: "Result",
+    *,
+    as_json: bool,
+    quiet: bool = False,
+    output: "Path | None" = None,
+    file: str = "report.html",
+    head: Mapping[str, Any] | None = None,
+) -> None:
+    """Print a result as JSON, or its tables, without empty ones, with its notes and the path of its report.
+
+    Args:
+        result: the result.
+        as_json: whether it is printed as JSON.
+        quiet: print nothing, unless as JSON.
+        output: folder of its files; None if they are not written.
+        file: name of the file whose path is printed.
+        head: data that precede those of the result in JSON.
+    """
+    if as_json:
+        print_json({**(head or {}), **result.as_data()})
+    elif not quiet:
+        console = plain_console()
+        for shown in result.tables():
+            if shown.rows:
+                _print_result_table(console, shown)
+        for note in result.notes:
+            console.print(note)
+        if output is not None:
+            print(f"{file.partition('.')[0]}: {output / file}")
 
 
-def print_result_tables(console: "Console", tables: "Iterable[ResultTable]") -> None:
-    """Print tables of results, without empty ones."""
-    for result in tables:
-        if result.rows:
-            words = [i for i in range(len(result.heads)) if i not in result.numbers]
-            shown = table(result.heads, result.rows, title=result.title or None, words=words)
-            for row, mark in zip(shown.rows, result.marks, strict=False):
-                row.style = "bold red" if mark == "over" else None
-            print_table(console, shown)
-            if result.remark:
-                console.print(result.remark)
+def _print_result_table(console: "Console", result: "ResultTable") -> None:
+    words = [i for i in range(len(result.heads)) if i not in result.numbers]
+    shown = table(result.heads, result.rows, title=result.title or None, words=words)
+    for row, mark in zip(shown.rows, result.marks, strict=False):
+        row.style = "bold red" if mark == "over" else None
+    print_table(console, shown)
+    if result.remark:
+        console.print(result.remark)
 
 
 def print_table(console: "Console", shown: "Table") -> None:

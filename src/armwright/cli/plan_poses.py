@@ -8,7 +8,7 @@ import typer
 from armwright.cli.measured_point import MeasuredPoint, with_tool
 from armwright.cli.numbers import units_of
 from armwright.cli.options import ArmName, Json
-from armwright.cli.output import print_json, print_result
+from armwright.cli.output import print_result
 from armwright.cli.shell_completion import one_of
 from armwright.cli.tables import ColumnMap, SkipIncomplete, columns_of
 
@@ -67,12 +67,9 @@ def plan_poses(  # noqa: PLR0917 - Typer reads one parameter per option
     plan = planned(model, count, index=index, seed=seed, rotations=orientations, measured=measured)  # type: ignore[arg-type]
     if output is not None:
         write_file(output, _csv(model, plan))
-    if as_json:
-        print_json(plan.as_data())
-    else:
-        print_result(plan)
-        if output is not None:
-            print(f"poses: {output}")
+    print_result(plan, as_json=as_json)
+    if output is not None and not as_json:
+        print(f"poses: {output}")
 
 
 def _columns(model: "Arm") -> list[tuple[str, float]]:

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 # Suffix of a file of intermediate code.
 CODE_SUFFIX = ".rlc"
 
+ProgramFiles: TypeAlias = Annotated[
+    list[Path], typer.Argument(metavar="PROGRAM", help="Programs in RLO; `-` reads from the standard input.")
+]
 ProgramFile: TypeAlias = Annotated[Path, typer.Argument(help="Program in RLO.")]
 CellFile: TypeAlias = Annotated[
     Path | None,

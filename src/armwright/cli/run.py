@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from armwright.cli.numbers import within
-from armwright.cli.options import JsonSummary, QuietButWarnings
+from armwright.cli.options import Json, OutputFolder, QuietButWarnings
 from armwright.cli.output import command_line, plain_console, print_json, print_table, table
 from armwright.cli.programs import CODE_SUFFIX, CellFile, ProgramFile, Std, Strict, read_cell_option
 from armwright.cli.progress import waiting
@@ -41,9 +41,7 @@ class Around(enum.StrEnum):
 def run(  # noqa: PLR0917 - Typer reads one parameter per option
     program: ProgramFile,
     cell: CellFile = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Folder for the results; without it none are written.")
-    ] = None,
+    output: OutputFolder = None,
     servo_ms: Annotated[
         float | None, typer.Option(help="Servo period in ms; the default is that of the cell file, or 1.")
     ] = None,
@@ -66,7 +64,7 @@ def run(  # noqa: PLR0917 - Typer reads one parameter per option
     most_rows: Annotated[
         int, typer.Option("--motion-rows", min=2, help="Limit of the rows of motion.csv; omitted rows are reported.")
     ] = 1_000_000,
-    as_json: JsonSummary = False,
+    as_json: Json = False,
     quiet: QuietButWarnings = False,
 ) -> None:
     """Run an RLO program in a simulated cell.

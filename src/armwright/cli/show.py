@@ -1,11 +1,9 @@
 """``armwright show``: the tables of an arm."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from armwright.cli.options import ArmName
+from armwright.cli.options import ArmName, Json
 from armwright.cli.output import print_json
 
 if TYPE_CHECKING:
@@ -28,10 +26,7 @@ _GRAVITY_FROM = {
 _DRIVE = ("inertia", "viscous", "coulomb_forward", "coulomb_backward")
 
 
-def show(
-    arm: ArmName,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON, in SI units.")] = False,
-) -> None:
+def show(arm: ArmName, as_json: Json = False) -> None:
     """Print the Denavit-Hartenberg, limit, inertia and drive tables of an arm.
 
     The tables are in degrees and millimetres; --json prints SI units and radians.

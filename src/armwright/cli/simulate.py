@@ -1,15 +1,14 @@
 """``armwright simulate``: simulate the motion of an arm with its drives off or holding its weight."""
 
 import enum
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from armwright.cli.load import Load
 from armwright.cli.numbers import within
-from armwright.cli.options import ArmName, Json
-from armwright.cli.output import print_json, print_result
+from armwright.cli.options import ArmName, Json, OutputFolder
+from armwright.cli.output import print_result
 from armwright.cli.results import write_results
 
 
@@ -38,10 +37,12 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
     method: Annotated[Method, typer.Option(help="Runge-Kutta-Gill in fixed steps, or adaptive.")] = Method.ADAPTIVE,
     step_ms: Annotated[float, typer.Option(help="Step of Runge-Kutta-Gill, and period of the rows.")] = 1.0,
     load: Load = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for motion.csv.")] = None,
+    output: OutputFolder = None,
     as_json: Json = False,
 ) -> None:
     """Simulate the free response of an arm with friction, stops and gravity, and print its energy balance.
+
+    With -o the command writes motion.csv.
 
     **Example:** `armwright simulate puma560 -q 0,0,90,0,0,0 --duration 2`
     """
@@ -69,11 +70,6 @@ def simulate(  # noqa: PLR0917 - Typer reads one parameter per option
         period=step_ms * 1e-3,
     )
     if output is not None:
-        write_results(
-            output,
-            {"motion.csv": motion_csv(simulation.t, simulation.q, simulation.qd, simulation.qdd, simulation.tau)},
-        )
-    if as_json:
-        print_json(simulation.as_data())
-    else:
-        print_result(simulation)
+        s = simulation
+        write_results(output, {"motion.csv": motion_csv(s.t, s.q, s.qd, s.qdd, s.tau)})
+    print_result(simulation, as_json=as_json)

@@ -1,11 +1,11 @@
 """``armwright study``: repeat experiments of the sources, published numbers beside computed ones."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from armwright.cli.output import json_text, print_json, print_result
+from armwright.cli.options import Json, OutputFolder
+from armwright.cli.output import json_text, print_result
 from armwright.cli.progress import parts, waiting
 from armwright.cli.results import write_results
 from armwright.cli.shell_completion import studies
@@ -22,13 +22,12 @@ def study(
             autocompletion=studies,
         ),
     ],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", help="Folder for the figures (SVG) and the tables (JSON).", file_okay=False),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the tables as JSON.")] = False,
+    output: OutputFolder = None,
+    as_json: Json = False,
 ) -> None:
     """Repeat an experiment of the sources and print its published numbers beside the computed ones.
+
+    With -o the command writes the figures (SVG) and the tables (JSON).
 
     stanford-torque: the efforts of the Stanford arm during the report's motion by Newton-Euler, by Bejczy's model and
     with the largest payload (figures 3 to 11), and a verdict on every published constant.
@@ -51,9 +50,4 @@ def study(
         result = run_study(name, progress)
     if output is not None:
         write_results(output, {"tables.json": json_text(result.as_data()) + "\n", **result.figures()})
-    if as_json:
-        print_json(result.as_data())
-        return
-    print_result(result)
-    if output is not None:
-        print(f"figures: {output}")
+    print_result(result, as_json=as_json, output=output, file="tables.json")

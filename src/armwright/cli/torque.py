@@ -31,10 +31,7 @@ def torque(  # noqa: PLR0917 - Typer reads one parameter per option
     load: Load = None,
     wrench: Annotated[
         str | None,
-        typer.Option(
-            "--wrench",
-            help="External wrench on the tool along base axes: FX,FY,FZ,MX,MY,MZ in N and N m.",
-        ),
+        typer.Option("--wrench", help="External wrench on the tool along base axes: FX,FY,FZ,MX,MY,MZ in N and N m."),
     ] = None,
     as_json: Json = False,
 ) -> None:
