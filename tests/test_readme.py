@@ -27,7 +27,7 @@ def test_python_examples_run() -> None:
 
     assert abs(scope["solution"].best.q - scope["q"]).max() < 1e-9
     assert scope["line"].certificate.holds
-    assert scope["detour"].by == "line"
+    assert scope["detour"].method == "line"
     assert scope["move"].certificate.deviation <= 1e-4
     assert scope["quick"].trajectory.duration < scope["move"].trajectory.duration
     assert armwright.motion.continuity(scope["other"]).order >= 2

@@ -7,6 +7,9 @@ import lazy_loader
 
 from armwright.errors import closest
 
+LONGEST_SIGNATURE = 200
+LONGEST_DEFAULT = 40
+
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
     """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package whose public names stand in a stub.
@@ -22,6 +25,37 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
             near = closest(name, names)
             hint = f"; did you mean {near!r}?" if near else ""
             raise AttributeError(f"module {package!r} has no attribute {name!r}{hint}", name=name)
-        return load(name)
+        return readable(load(name))
 
     return get, list_names, names
+
+
+class _LongDefault:
+    def __repr__(self) -> str:
+        return "..."
+
+
+def readable(value: Any) -> Any:
+    """Return a function or class whose signature ``help()`` prints in at most 200 characters.
+
+    A longer signature loses its annotations, as in the help of NumPy and SciPy, where the docstring names the types;
+    defaults whose text is long or computed are printed as ``...``. ``__annotations__`` and calls are untouched.
+    """
+    import inspect  # noqa: PLC0415 - not needed to import the package
+
+    if not inspect.isfunction(value) and not (inspect.isclass(value) and "__init__" in vars(value)):
+        return value
+    shown_as: Any = value
+    signature = inspect.signature(value.__init__ if inspect.isclass(value) else value)
+    parameters = list(signature.parameters.values())[inspect.isclass(value) :]
+    if len(str(signature.replace(parameters=parameters))) > LONGEST_SIGNATURE:
+        shown = [
+            p.replace(annotation=p.empty, default=_LongDefault() if _is_long(p.default, p.empty) else p.default)
+            for p in parameters
+        ]
+        shown_as.__signature__ = inspect.Signature(shown)
+    return value
+
+
+def _is_long(default: Any, empty: Any) -> bool:
+    return default is not empty and (len(repr(default)) > LONGEST_DEFAULT or repr(default) == "NOTHING")

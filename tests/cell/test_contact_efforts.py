@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from armwright.arm.load import load_arm
 from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arrays import Array
-from armwright.cell.model import Cell, CellArm
+from armwright.cell.model import Cell, CellArm, ContactPlane
 from armwright.cell.simulator import Simulator
 from armwright.dynamics.newton_euler import inverse_dynamics
 from armwright.kinematics.forward_kinematics import forward
@@ -43,8 +43,7 @@ def pressing(arm: Arm, rest: str = "") -> tuple[Recording, Cell]:
     cell = Cell(
         name="bench",
         arms={"ARM_1": CellArm(arm=arm, base=TILTED, start=start)},
-        contact_height=float(tip[2, 3]) - 0.02,
-        contact_stiffness=STIFFNESS,
+        contact=ContactPlane(height=float(tip[2, 3]) - 0.02, stiffness=STIFFNESS),
     )
     x, y, z = (tip[:3, :3].T @ (0.0, 0.0, -0.06)).tolist()
     text = DOWN.replace("TRANS_OR_XYZ", f"XYZ({x:.9f}, {y:.9f}, {z:.9f})").replace("REST", rest)
@@ -57,8 +56,8 @@ def pushes(recording: Recording, cell: Cell) -> Array:
     """The force of the plane on every tick, upwards, by how deep the part is in it [N]."""
     (stream,) = recording.streams
     heights = (TILTED @ forward(cell.arms["ARM_1"].arm, stream.q) @ PART)[:, 2, 3]
-    assert cell.contact_height is not None
-    return STIFFNESS * np.maximum(cell.contact_height - heights, 0.0)
+    assert cell.contact.height is not None
+    return STIFFNESS * np.maximum(cell.contact.height - heights, 0.0)
 
 
 def by_pinocchio(arm: Arm, recording: Recording, force: Array, k: int) -> Array:

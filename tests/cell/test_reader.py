@@ -56,7 +56,7 @@ def assert_same(a: Cell, b: Cell) -> None:
     assert a.visions.keys() == b.visions.keys()
     for name, answers in a.visions.items():
         np.testing.assert_array_equal(answers, b.visions[name])
-    assert (a.contact_height, a.devices, a.period, a.deviation) == (b.contact_height, b.devices, b.period, b.deviation)
+    assert (a.contact.height, a.devices, a.period, a.deviation) == (b.contact.height, b.devices, b.period, b.deviation)
 
 
 @pytest.mark.parametrize("name", ["cell1", "cell2", "jam", "seat"])
@@ -80,7 +80,7 @@ def test_one_stanford_arm() -> None:
     assert place.name == "cell1.json"
     assert place.arms["ARM_1"].arm.name == "stanford"
     assert {name: len(answers) for name, answers in place.visions.items()} == {"OBJ1": 1, "OBJ2": 1}
-    assert (place.contact_height, place.devices) == (None, None)
+    assert (place.contact.height, place.devices) == (None, None)
 
 
 def test_two_arms_face_each_other() -> None:
@@ -97,7 +97,7 @@ def test_two_arms_face_each_other() -> None:
 @pytest.mark.parametrize(("name", "height"), [("jam", 0.045), ("seat", 0.022)])
 def test_contact(name: str, height: float) -> None:
     """The plane that stops the peg stands at the height that the cell file tells."""
-    assert read_cell(CORPUS / f"{name}.json").contact_height == height
+    assert read_cell(CORPUS / f"{name}.json").contact.height == height
 
 
 @pytest.mark.parametrize("name", ["puma_cell.toml", "stanford_cell.toml"])
@@ -154,7 +154,7 @@ around = "via"
     assert place.around == "via"
     assert (arm.arm.name, arm.open_time, arm.grasp_time, arm.arm.tool[2, 3]) == ("puma560", 0.25, 0.5, 0.12)
     assert place.devices == {"PRESS", "LAMP"}
-    assert place.contact_height == -0.1
+    assert place.contact.height == -0.1
     assert place.camera[2, 3] == 2
     np.testing.assert_allclose(place.tree().world("ARM_2"), forward(arm.arm, arm.start))
     np.testing.assert_array_equal(place.tree().world("TABLE"), np.eye(4))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armwright.cell.hardware import DeviceError, Hardware
-from armwright.cell.model import Cell, CellArm
+from armwright.cell.model import Cell, CellArm, ContactPlane
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.errors import ShapeError
@@ -155,7 +155,7 @@ def test_the_plane_stops_what_comes_down(tmp_path: Path) -> None:
     down = heights[2] < heights[0]
     motion = motion if down else quintic(start, start - np.array([0, 0, 0.1, 0, 0, 0]), 2.0)
     plane = (X_WB @ forward(arm, motion(1.0)))[2, 3]
-    hardware = Simulator(attrs.evolve(cell, contact_height=plane, contact_stiffness=1000.0))
+    hardware = Simulator(attrs.evolve(cell, contact=ContactPlane(height=plane, stiffness=1000.0)))
 
     hardware.begin("ARM_1", motion, 3.0, np.eye(4))
 
@@ -189,7 +189,7 @@ def test_what_is_let_go_does_not_press(tmp_path: Path) -> None:
     motion = quintic(*ends, 1.0)
     plane = float((X_WB @ forward(arm, motion(0.9)) @ X_HP)[2, 3])
     low = attrs.evolve(cell.arms["ARM_1"], start=ends[0])
-    hardware = Simulator(attrs.evolve(cell, arms={"ARM_1": low}, contact_height=plane))
+    hardware = Simulator(attrs.evolve(cell, arms={"ARM_1": low}, contact=ContactPlane(height=plane)))
     hardware.begin("ARM_1", motion, 0.0, X_HP)
     pressed = hardware.force("ARM_1", 1.0)[2]
     assert pressed > 1

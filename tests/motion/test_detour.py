@@ -53,9 +53,9 @@ def test_a_way_round(through_the_wrist: tuple[Array, Array], by: str) -> None:
     arm = load_arm("puma560-seed")
     q, X = through_the_wrist
 
-    way = line_or_detour(arm, q, X, by=by)  # type: ignore[arg-type]
+    way = line_or_detour(arm, q, X, method=by)  # type: ignore[arg-type]
 
-    assert way.by == by
+    assert way.method == by
     assert way.obstacle is not None
     motion = way.trajectory
     np.testing.assert_allclose(motion(0.0), q, atol=1e-12)
@@ -86,9 +86,9 @@ def test_a_way_round_near_the_joint_move() -> None:
     B, C = study_poses()[1:]
     q = next(branch.q for branch in inverse(fast.arm, B).allowed if branch.label == "left, down, no-flip")
 
-    way = line_or_detour(fast, q, C, by="via")
+    way = line_or_detour(fast, q, C, method="via")
 
-    assert way.by == "via"
+    assert way.method == "via"
     assert [leg.certificate.holds for leg in way.legs] == [True, True]
     np.testing.assert_allclose(fast.forward(way.trajectory(way.trajectory.duration)), C, atol=1e-6)
     lowest, highest = way.trajectory.extremes(0)
@@ -105,7 +105,7 @@ def test_damped_rates_keep_efforts(through_the_wrist: tuple[Array, Array]) -> No
     joints = [attrs.evolve(j, limits=limit) for j, limit in zip(strong.joints, limits, strict=True)]
     weak = attrs.evolve(strong, joints=joints)
 
-    motion = line_or_detour(weak, q, X, by="damped").trajectory
+    motion = line_or_detour(weak, q, X, method="damped").trajectory
 
     t = np.linspace(0, motion.duration, 20_000)
     parts = np.abs(inverse_dynamics(weak, motion(t), motion(t, 1), motion(t, 2))) / weak.limit("effort")
@@ -121,7 +121,7 @@ def test_a_line_that_needs_none() -> None:
 
     way = line_or_detour(arm, q, X)
 
-    assert way.by == "line"
+    assert way.method == "line"
     assert way.obstacle is None
     assert way.price.time == 0
     assert way.price.distance <= 1e-3
@@ -136,13 +136,13 @@ def test_no_way_round() -> None:
 
     for by in ("via", "damped"):
         with pytest.raises(PathError, match="out of reach"):
-            line_or_detour(arm, q, far, by=by)  # type: ignore[arg-type]
+            line_or_detour(arm, q, far, method=by)  # type: ignore[arg-type]
 
 
 def test_unknown_way() -> None:
     """A misspelt way gets the nearest one."""
     with pytest.raises(UnknownNameError, match="Did you mean 'damped'"):
-        line_or_detour(load_arm("puma560-seed"), np.zeros(6), np.eye(4), by="dampd")  # type: ignore[arg-type]
+        line_or_detour(load_arm("puma560-seed"), np.zeros(6), np.eye(4), method="dampd")  # type: ignore[arg-type]
 
 
 def test_no_crawling() -> None:
@@ -167,6 +167,6 @@ def test_no_crawling() -> None:
         crawls = line.trajectory.duration * way.max() / way[1000:-1000].min() > 60
         run += bool(crawls)
         for by in ("via", "damped"):
-            motion = line_or_detour(arm, q, Y, by=by, deviation=2e-3).trajectory  # type: ignore[arg-type]
+            motion = line_or_detour(arm, q, Y, method=by, deviation=2e-3).trajectory  # type: ignore[arg-type]
             assert motion.duration < 10
     assert run > 0

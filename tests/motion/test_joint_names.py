@@ -79,7 +79,7 @@ def test_detour() -> None:
     """What stopped a line that is gone round."""
     beyond = forward(PUMA, [2.9, 0.3, 0.2, 0.0, 0.8, 0.0])
     with pytest.raises(PathError) as error:
-        line_or_detour(PUMA, [2.7, 0.3, 0.2, 0.0, 0.8, 0.0], beyond, by="damped")
+        line_or_detour(PUMA, [2.7, 0.3, 0.2, 0.0, 0.8, 0.0], beyond, method="damped")
 
     assert all_called(str(error.value))
 

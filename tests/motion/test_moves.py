@@ -238,13 +238,13 @@ def test_stops_and_ways_round(puma: CompiledArm, by: str) -> None:
     """Where the blended move has no branch, stops and a way round lead to the last pose, inside the limits."""
     X = forward(puma.arm, SEED_Q[1:])
 
-    move = stopping_move(puma, X, by=by)  # type: ignore[arg-type]
+    move = stopping_move(puma, X, method=by)  # type: ignore[arg-type]
 
     np.testing.assert_allclose(forward(puma.arm, move.trajectory(move.times)), X, atol=1e-5)
     uses = limit_use(puma, move.trajectory)
     assert max(use.max() for use in uses.values()) <= 1 + 1e-6
     assert len(move.detours) == 1
-    assert move.detours[0].by == by
+    assert move.detours[0].method == by
 
 
 @pytest.mark.filterwarnings("ignore::armwright.errors.RotationWarning")

@@ -98,7 +98,7 @@ def test_trapezoid_nowhere() -> None:
 
 def test_durations_that_no_joint_can_keep() -> None:
     """A duration too short is refused with the joint, its way, the time asked and the time needed."""
-    with pytest.raises(InvalidValueError, match=r"1\.5 s is too short for joint 2, whose way of 2 takes 3 s"):
+    with pytest.raises(InvalidValueError, match=r"1\.5 s is too short for joint 2, whose travel of 2 takes 3 s"):
         trapezoid([0.0, 0.0], [0.1, -2.0], 1.0, 1.0, 1.5)
     with pytest.raises(InvalidValueError, match="no joint that moves has a limit, so the speed would jump"):
         trapezoid([0.0, 0.0], [1.0, 0.0], 1.0, [np.inf, 1.0])

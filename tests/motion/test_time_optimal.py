@@ -97,7 +97,7 @@ def test_full_acceleration_and_full_braking(by: Any) -> None:
     """Over 3 m at 2 m/s², half of the way faster and half of it slower: the root of 4 · 3 / 2 seconds."""
     if by == "toppra":
         pytest.importorskip("toppra")
-    found = time_optimal(slide(np.inf, 2.0), [[0.0], [3.0]], by=by)
+    found = time_optimal(slide(np.inf, 2.0), [[0.0], [3.0]], method=by)
 
     assert found.trajectory.duration == pytest.approx(np.sqrt(4 * 3 / 2), rel=1e-5)
     assert found.share("acceleration") == pytest.approx(1)
@@ -253,7 +253,7 @@ def test_toppra_solves_the_same_problem(rng: np.random.Generator) -> None:
     pytest.importorskip("toppra")
     for _ in range(4):
         goal = rng.uniform(-0.8, 0.8, 6)
-        ours, theirs = (time_optimal(PUMA, [np.zeros(6), goal], by=by) for by in ("armwright", "toppra"))
+        ours, theirs = (time_optimal(PUMA, [np.zeros(6), goal], method=by) for by in ("armwright", "toppra"))
 
         assert ours.trajectory.duration == pytest.approx(theirs.trajectory.duration, rel=1e-4)
 
@@ -301,7 +301,7 @@ FAST = Arm(name="fast", joints=[Joint(kind="revolute", limits=Limits(speed=1.0))
         (PUMA, [np.zeros(6), np.full(6, 2.5)], {}, InvalidValueError, r"path: joint 2 would stand at 143\.2 deg"),
         (PUMA, [np.zeros(6), np.ones(6)], {"intervals": 3}, InvalidValueError, "intervals: expected 10 to 20000"),
         (PUMA, [np.zeros(6), np.ones(6)], {"intervals": 30.5}, KindError, "intervals: expected a whole number"),
-        (PUMA, [np.zeros(6), np.ones(6)], {"by": "topra"}, UnknownNameError, "Did you mean 'toppra'"),
+        (PUMA, [np.zeros(6), np.ones(6)], {"method": "topra"}, UnknownNameError, "Did you mean 'toppra'"),
         (FAST, [[0.0], [1.0]], {}, InvalidValueError, "joint 1 moves and has no limit of acceleration or effort"),
         (WEAK, [[DOWN], [ALOFT]], {}, InvalidValueError,
          r"between knots 1 and 2 gravity and dry friction alone ask joint 1 for 4\.9\d* N m, 4 N m are allowed"),
@@ -322,6 +322,6 @@ def test_without_toppra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "toppra", None)
     monkeypatch.setitem(sys.modules, "toppra.algorithm", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'armwright\[optimal\]'"):
-        time_optimal(slide(1.0, 1.0), [[0.0], [1.0]], by="toppra")
+        time_optimal(slide(1.0, 1.0), [[0.0], [1.0]], method="toppra")
 
     assert time_optimal(slide(1.0, 1.0), [[0.0], [1.0]]).trajectory.duration == pytest.approx(2, rel=1e-3)

@@ -5,7 +5,7 @@ from pathlib import Path
 import attrs
 import pytest
 
-from armwright.cell.model import Cell
+from armwright.cell.model import Cell, ContactPlane
 from armwright.cell.reader import read_cell
 from armwright.cell.simulator import Simulator
 from armwright.program.vm.interpreter import RunError, interpret
@@ -116,7 +116,7 @@ def test_a_recovery_begins_when_all_arms_are_at_rest() -> None:
 
 def cells(folder: Path) -> tuple[Cell, list[Cell]]:
     """Return a cell of two arms and some of one, all above a plane of contact."""
-    two = attrs.evolve(read_cell(EXAMPLES / "two_arms.toml"), contact_height=0.02, deviation=0.01)
+    two = attrs.evolve(read_cell(EXAMPLES / "two_arms.toml"), contact=ContactPlane(height=0.02), deviation=0.01)
     ones = []
     for model in ("stanford", "ur5", "puma560"):
         place = folder / f"{model}.toml"

@@ -61,6 +61,21 @@ class CellArm:
             raise ShapeError(f"start: expected {self.arm.n} numbers, one per joint, got shape {self.start.shape}")
 
 
+@attrs.frozen(kw_only=True)
+class ContactPlane:
+    """A horizontal plane that is pressed in by whatever comes down on it.
+
+    Attributes:
+        height: above the origin of the world [m]; None where there is no plane.
+        stiffness: force per depth [N/m].
+        deepest: depth to which an arm may press into it [m].
+    """
+
+    height: float | None = None
+    stiffness: float = 2e4
+    deepest: float = 5e-3
+
+
 @attrs.frozen(kw_only=True, eq=False)
 class Cell:
     """A cell. Its arms feel its gravity, whatever they feel outside of it.
@@ -75,9 +90,7 @@ class Cell:
             it finds nothing then.
         camera: (4, 4) pose of the camera in the world.
         devices: names of the tools that can be operated; None when the cell does not say, and any will do.
-        contact_height: height of a plane that gives way to whatever comes down on it [m]; None where there is none.
-        contact_stiffness: how the force of that plane grows with the depth to which it is pressed in [N/m].
-        contact_deepest: how deep an arm may press into it [m].
+        contact: plane on which arms and what they carry come down.
         vision_time: how long the camera takes for an answer [s].
         deviation: allowed distance from straight lines [m].
         corner: how far a path past several frames may be from the straight legs between them [m]; 20 deviations when
@@ -94,9 +107,7 @@ class Cell:
     camera: Array = attrs.field(factory=lambda: np.eye(4), converter=one_pose)
     camera_repeats: bool = False
     devices: frozenset[str] | None = None
-    contact_height: float | None = None
-    contact_stiffness: float = 2e4
-    contact_deepest: float = 5e-3
+    contact: ContactPlane = attrs.field(factory=ContactPlane)
     vision_time: float = 0.1
     deviation: float = 1e-3
     corner: float | None = None
@@ -106,8 +117,8 @@ class Cell:
     def __attrs_post_init__(self) -> None:
         """Let every arm feel the gravity of the cell, and warn of one that states another."""
         stand = {
-            name: attrs.evolve(one, arm=in_world(one.arm, one.base, self.gravity, name=f"cell '{self.name}', {name}"))
-            for name, one in self.arms.items()
+            name: attrs.evolve(arm, arm=in_world(arm.arm, arm.base, self.gravity, name=f"cell '{self.name}', {name}"))
+            for name, arm in self.arms.items()
         }
         object.__setattr__(self, "arms", stand)
 

@@ -15,7 +15,7 @@ from armwright.arm.model import UPRIGHT_GRAVITY, Arm
 from armwright.arm.positions import degrees_by_mistake
 from armwright.arrays import Array
 from armwright.cell.frames import WORLD, Node
-from armwright.cell.model import Around, Cell, CellArm
+from armwright.cell.model import Around, Cell, CellArm, ContactPlane
 from armwright.cell.names import arm_name
 from armwright.dynamics.arguments import weighed
 from armwright.errors import ArmwrightError, closest
@@ -78,9 +78,11 @@ def read_cell(path: Path | str, *, arms_needed: bool = True) -> Cell:
         camera_repeats=camera.choice("after_last", _AFTER_LAST, default="nothing") == "same",
         vision_time=camera.number("time_s", default=0.1, lower=0.0, upper=_LONGEST_WAIT),
         devices=_devices(top.table("devices")) if "devices" in top else None,
-        contact_height=None if math.isnan(height) else height,
-        contact_stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
-        contact_deepest=contact.number("deepest_mm", default=5.0, lower=1e-3, upper=1e3) * 1e-3,
+        contact=ContactPlane(
+            height=None if math.isnan(height) else height,
+            stiffness=contact.number("stiffness_N_per_mm", default=20.0, lower=1e-3, upper=1e6) * 1e3,
+            deepest=contact.number("deepest_mm", default=5.0, lower=1e-3, upper=1e3) * 1e-3,
+        ),
         period=motion.number("servo_ms", default=1.0, lower=SERVO_MS[0], upper=SERVO_MS[1]) * 1e-3,
         deviation=motion.number("deviation_mm", default=1.0, lower=DEVIATION_MM[0], upper=DEVIATION_MM[1]) * 1e-3,
         corner=_corner(motion),

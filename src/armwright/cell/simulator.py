@@ -93,7 +93,7 @@ class Simulator:
         """Let an arm follow a trajectory that begins at its configuration."""
         gap = np.abs(trajectory(0.0) - self.configuration(arm, now)).max()
         assert gap <= _SAME_CONFIGURATION, f"{arm} stands {gap:.3g} away from where its trajectory begins"  # noqa: S101
-        pressing = [one.pose for one in self._runs[arm].tips if self._depth(arm, one, now) > _TOUCHES]
+        pressing = [tip.pose for tip in self._runs[arm].tips if self._depth(arm, tip, now) > _TOUCHES]
         self._runs[arm] = _Run(t0=now, trajectory=trajectory, tips=self._tips(arm, trajectory, tip, pressing))
 
     def touches_at(self, arm: str) -> float | None:
@@ -110,7 +110,7 @@ class Simulator:
         """
         run = self._runs[arm]
         depths = run.depths()
-        deep = depths > max(self._cell.contact_deepest, depths[0]) + _TOUCHES
+        deep = depths > max(self._cell.contact.deepest, depths[0]) + _TOUCHES
         return run.t0 + int(deep.argmax()) * self._cell.period if deep.any() else None
 
     def pressed(self, arm: str, now: float) -> Press:
@@ -118,12 +118,12 @@ class Simulator:
         run = self._runs[arm]
         passed = round(run.local(now) / self._cell.period) + 1
         depth = float(run.depths()[:passed].max())
-        return Press(depth, depth * self._cell.contact_stiffness)
+        return Press(depth, depth * self._cell.contact.stiffness)
 
     def force(self, arm: str, now: float) -> Array:
         """Return the force of the plane on what an arm moves or stands pressed with [N]: upwards, by its depth."""
         depth = max((self._depth(arm, tip, now) for tip in self._runs[arm].tips), default=0.0)
-        return np.array([0.0, 0.0, depth * self._cell.contact_stiffness])
+        return np.array([0.0, 0.0, depth * self._cell.contact.stiffness])
 
     def wrenches(self, arm: str, now: float) -> Array:
         """Return what the plane does to the tool of an arm, (k, 6), on this servo tick and those after it.
@@ -140,13 +140,13 @@ class Simulator:
             t = np.minimum(run.local(now) + ticks * period, run.trajectory.duration)
             levers = np.stack([tip.pose[:3, 3] for tip in run.tips])[deepest[ticks]]
             arms = (forward(place.arm, run.trajectory(t))[:, :3, :3] @ levers[..., None])[..., 0]
-            up = place.base[2, :3] * (depths.max(axis=0)[ticks] * self._cell.contact_stiffness)[:, None]
+            up = place.base[2, :3] * (depths.max(axis=0)[ticks] * self._cell.contact.stiffness)[:, None]
             found[ticks] = np.concatenate([up, np.cross(arms, up)], axis=1)
         return found
 
     def _depth(self, arm: str, tip: _Tip, now: float) -> float:
         """Return how deep one tip presses on the plane [m]."""
-        local, period, plane = self._runs[arm].local(now), self._cell.period, self._cell.contact_height
+        local, period, plane = self._runs[arm].local(now), self._cell.period, self._cell.contact.height
         if plane is None or local < tip.since * period - _TOUCHES:
             return 0.0
         tick = round(local / period)
@@ -157,7 +157,7 @@ class Simulator:
 
     def _tips(self, arm: str, trajectory: Trajectory, tip: Array, pressing: Sequence[Array]) -> tuple[_Tip, ...]:
         """Return what may press on the plane: what the arm shall bring to the goal, and what it is pressed with now."""
-        plane = self._cell.contact_height
+        plane = self._cell.contact.height
         if plane is None:
             return ()
         ticks = np.arange(round(trajectory.duration / self._cell.period) + 1)
@@ -174,7 +174,7 @@ class Simulator:
     def _touch(self, arm: str, trajectory: Trajectory, tip: Array, tick: int) -> float:
         """Return when a tip that is below the plane on the next tick comes to it."""
         begin, end = tick * self._cell.period, min((tick + 1) * self._cell.period, trajectory.duration)
-        plane = self._cell.contact_height
+        plane = self._cell.contact.height
         assert plane is not None  # noqa: S101 - nothing else is touched
 
         def above(t: float) -> float:
@@ -188,7 +188,7 @@ class Simulator:
 
     def _heights(self, arm: str, trajectory: Trajectory, tip: Array, t: Array) -> Array:
         place = self._cell.arms[arm]
-        heights = [(place.base @ forward(place.arm, trajectory(one)) @ tip)[:, 2, 3] for one in _pieces(t)]
+        heights = [(place.base @ forward(place.arm, trajectory(piece)) @ tip)[:, 2, 3] for piece in _pieces(t)]
         return np.concatenate(heights)
 
     def fingers(self, arm: str, *, closed: bool, width: float | None = None) -> float:  # noqa: ARG002 - see below

@@ -170,7 +170,7 @@ def _planned(
         return joint_move(arm, file.poses, **timed), file
     if around is not None:
         try:
-            return stopping_move(arm, file.poses, by=around.value, near=start, deviation=deviation), file
+            return stopping_move(arm, file.poses, method=around.value, near=start, deviation=deviation), file
         except PathError as error:
             other = Around.VIA if around is Around.DAMPED else Around.DAMPED
             hint = "" if error.cause == "reach" else f"; `--around {other}` searches for another detour"
@@ -247,7 +247,7 @@ def _summary(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -
         "of_limits": {name: use.tolist() for name, use in uses.items()},
         "segments": [
             {
-                "method": detour.by,
+                "method": detour.method,
                 "obstacle": None if detour.obstacle is None else str(detour.obstacle),
                 "position_deviation": detour.price.distance,
                 "rotation_deviation": detour.price.turn,
@@ -281,5 +281,5 @@ def _print(planned: "Move", file: "PosesFile", uses: "dict[LimitName, Any]") -> 
     if planned.certificate:
         console.print(f"certificate {planned.certificate}")
     for i, detour in enumerate(planned.detours):
-        method = "a line" if detour.by == "line" else f"no line, {detour.obstacle}; detour by {detour.by}"
+        method = "a line" if detour.method == "line" else f"no line, {detour.obstacle}; detour by {detour.method}"
         console.print(f"{file.names[i]} to {file.names[i + 1]}: {method}: {detour.price}")

@@ -119,7 +119,7 @@ def _converse(session: "Session", commands: "Commands", lines: "Lines", printer:
             begun = ""
             printer.interrupted()
     if begun:
-        printer.answer(session.enter(begun, whole=True))
+        printer.answer(session.enter(begun, complete=True))
 
 
 def _execute_line(session: "Session", commands: "Commands", begun: str, line: str, printer: "_Printer") -> str:

@@ -84,9 +84,9 @@ def blended(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends: Ends
     ways[:, 0], ways[:, 1] = (plan.points + plan.after * b)[:-1], plan.after[:-1]
     begins = np.ravel(np.stack([plan.centres - plan.blend, plan.centres + plan.blend], axis=1))
     begins = np.clip(np.maximum.accumulate(begins), 0.0, plan.end)
-    kept = np.diff(begins) > _ROUNDING * plan.end
-    inner = begins[:-1][kept][1:]  # what comes first begins at 0, whatever of no length was left out before it
-    return Trajectory(times=np.concatenate([[0.0], inner, [plan.end]]), coefficients=coefficients[kept])
+    distinct = np.diff(begins) > _ROUNDING * plan.end
+    inner = begins[:-1][distinct][1:]  # what comes first begins at 0, whatever of no length was left out before it
+    return Trajectory(times=np.concatenate([[0.0], inner, [plan.end]]), coefficients=coefficients[distinct])
 
 
 def via_deviations(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends: Ends = "rest") -> Array:

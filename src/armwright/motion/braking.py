@@ -169,9 +169,11 @@ class _Clock:
 
     def _state(self, tau: float) -> tuple[Array, Array]:
         """Return the first and second derivative of the motion; beyond its segment the polynomial goes on."""
-        at = self._segment
-        local = np.array([[tau - self._times[at]]])
-        return evaluate(self._first[at : at + 1], local)[0], evaluate(self._second[at : at + 1], local)[0]
+        segment = self._segment
+        local = np.array([[tau - self._times[segment]]])
+        return evaluate(self._first[segment : segment + 1], local)[0], evaluate(
+            self._second[segment : segment + 1], local
+        )[0]
 
     def _skip(self) -> None:
         """Go to the segment that begins or goes on at the present time."""
@@ -182,8 +184,8 @@ class _Clock:
 def _to_its_end(running: Trajectory, t: float) -> list[_Cell]:
     """Return the clock that does not slow down, from ``t`` on."""
     times = running.times.tolist()
-    parts = ((at, max(t, start), end) for at, (start, end) in enumerate(pairwise(times)))
-    return [_Cell(end - start, at, start, 1.0, 0.0, 0.0) for at, start, end in parts if end > start]
+    parts = ((segment, max(t, start), end) for segment, (start, end) in enumerate(pairwise(times)))
+    return [_Cell(end - start, segment, start, 1.0, 0.0, 0.0) for segment, start, end in parts if end > start]
 
 
 def _run_by(running: Trajectory, cells: list[_Cell]) -> Trajectory:
@@ -207,9 +209,9 @@ def _run_by(running: Trajectory, cells: list[_Cell]) -> Trajectory:
 def _peaks(motion: Trajectory) -> Array:
     """Return the largest accelerations (n,) at places close to one another."""
     steps = np.diff(motion.times)
-    looks = motion.coefficients[:, None].repeat(len(_LOOKS), axis=1).reshape(-1, *motion.coefficients.shape[1:])
-    places = (steps[:, None] * _LOOKS).reshape(-1, 1)
-    return np.asarray(np.abs(evaluate(derivative(looks, 2), places)).max(axis=0))
+    states = motion.coefficients[:, None].repeat(len(_LOOKS), axis=1).reshape(-1, *motion.coefficients.shape[1:])
+    fractions = (steps[:, None] * _LOOKS).reshape(-1, 1)
+    return np.asarray(np.abs(evaluate(derivative(states, 2), fractions)).max(axis=0))
 
 
 def _until_a_tick(stop: Trajectory, period: float | None) -> Trajectory:
@@ -217,7 +219,7 @@ def _until_a_tick(stop: Trajectory, period: float | None) -> Trajectory:
     if period is None:
         return stop
     end = math.ceil(stop.duration / period - _HAIR) * period
-    rest = np.zeros_like(stop.coefficients[:1])
-    rest[0, 0] = stop(stop.duration)
+    standstill = np.zeros_like(stop.coefficients[:1])
+    standstill[0, 0] = stop(stop.duration)
     times = np.append(stop.times, max(end, stop.duration))
-    return Trajectory(times=times, coefficients=np.concatenate([stop.coefficients, rest]))
+    return Trajectory(times=times, coefficients=np.concatenate([stop.coefficients, standstill]))

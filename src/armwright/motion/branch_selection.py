@@ -62,10 +62,10 @@ def configurations_through(arm: Arm, X: Array, near: Array) -> list[LabelledConf
         PathError: a pose has no posture inside the limits.
     """
     layers = configurations_at(arm, X, near)
-    kept = set.intersection(*({configuration.label for configuration in layer} for layer in layers))
-    if kept:
-        one = [[[p for p in layer if p.label == label] for layer in layers] for label in sorted(kept)]
-        ways = [_shortest(arm, near, same) for same in one]
+    common = set.intersection(*({configuration.label for configuration in layer} for layer in layers))
+    if common:
+        by_branch = [[[p for p in layer if p.label == label] for layer in layers] for label in sorted(common)]
+        ways = [_shortest(arm, near, same) for same in by_branch]
         return min(ways, key=lambda way: way[0])[1]
     return _shortest(arm, near, layers)[1]
 
@@ -76,12 +76,12 @@ def _shortest(
     """Return the shortest way through one posture of every layer, and its length."""
     speed = arm.limit("speed")
     weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
-    places, lengths, came = near[None], np.zeros(1), []
+    previous, lengths, came = near[None], np.zeros(1), []
     for layer in layers:
         here = np.array([configuration.q for configuration in layer])
-        ways = lengths[:, None] + np.linalg.norm((here - places[:, None]) * weight, axis=-1)
+        ways = lengths[:, None] + np.linalg.norm((here - previous[:, None]) * weight, axis=-1)
         came.append(ways.argmin(axis=0))
-        places, lengths = here, ways.min(axis=0)
+        previous, lengths = here, ways.min(axis=0)
     last = int(lengths.argmin())
     length, chosen = float(lengths[last]), []
     for layer, best in zip(reversed(layers), reversed(came), strict=True):

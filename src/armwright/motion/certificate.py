@@ -147,11 +147,11 @@ class Certificate:
             f"{self.deviation_asked * 1e3:g} mm), within {self.turn * 1e3:.3f} mrad of its orientation (asked "
             f"{self.turn_asked * 1e3:g} mrad)"
         )
-        seen = (
+        sampled = (
             f"largest distance sampled {self.deviation_seen * 1e3:.4f} mm, at {self.worst_time:.3f} s, "
             f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base; {self.knots} knots, {self.samples} samples"
         )
-        lines = [within, seen]
+        lines = [within, sampled]
         uses = [(name, *self.use(name)) for name in LIMITS if np.isfinite(self.arm.limit(name)).any()]
         if uses:
             lines.append("; ".join(f"{self.arm.called(j)} uses {part:.0%} of its {name}" for name, j, part in uses))

@@ -148,7 +148,7 @@ def fastest(
     """
     path, error = tracking.trajectory, tracking.error
     run = timed(solver_of(arm).arm, path, np.ones(len(path.times) - 1))
-    at = run.when(float(error.times[error.sampled_position.argmax()]))
+    time = run.when(float(error.times[error.sampled_position.argmax()]))
     trajectory, efforts, slower = _inside_efforts(arm, run.trajectory, weak=weak)
     stretch, factor = trajectory.duration / run.trajectory.duration, trajectory.duration / nominal
     peaks: dict[LimitName, Array] = {
@@ -157,7 +157,7 @@ def fastest(
         "effort": efforts,
     }
     certificate = attrs.evolve(
-        certificate_of(arm, trajectory, error, allowed, time=at * trajectory.duration, peaks=peaks),
+        certificate_of(arm, trajectory, error, allowed, time=time * trajectory.duration, peaks=peaks),
         factor=max(1.0, factor),
         because=None if factor <= 1 else run.because if slower is None else ("effort", slower),
     )

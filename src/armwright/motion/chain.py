@@ -72,13 +72,13 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
             if missed(solver, q[k], X[k]):
                 break
     else:
-        found, singular = solver.inverse_branches(X, q_start)
-        if _along_one_branch(solver, found, singular, q) and not missed(solver, q, X).any():
+        branches, singular = solver.inverse_branches(X, q_start)
+        if _along_one_branch(solver, branches, singular, q) and not missed(solver, q, X).any():
             return q, None
         for k in range(1, len(X)):
-            q[k] = _nearest(solver, X[k], q[k - 1], None if singular[k].any() else found[k])
-    off = np.flatnonzero(missed(solver, q, X))
-    return q, int(off[0]) if len(off) else None
+            q[k] = _nearest(solver, X[k], q[k - 1], None if singular[k].any() else branches[k])
+    failed = np.flatnonzero(missed(solver, q, X))
+    return q, int(failed[0]) if len(failed) else None
 
 
 def _several_at_once(solver: Solver, X: Array, q_start: Array) -> Array | None:
@@ -95,9 +95,9 @@ def _several_at_once(solver: Solver, X: Array, q_start: Array) -> Array | None:
             return None
     steps = np.abs(np.diff(q, axis=0)).max(axis=1)
     straight = np.stack([np.interp(np.arange(len(X)), some, joint) for joint in np.transpose(q)], axis=-1)
-    found, off = beside(solver, X, straight)
+    branches, failed = beside(solver, X, straight)
     room = np.append(np.repeat(np.maximum(_STRAIGHT * steps, _CLOSE), np.diff(some)), _CLOSE)
-    return found if off is None and (np.abs(found - straight).max(axis=1) <= room).all() else None
+    return branches if failed is None and (np.abs(branches - straight).max(axis=1) <= room).all() else None
 
 
 def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
@@ -106,8 +106,8 @@ def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
         return False
     q = np.empty((len(X), solver.arm.n))
     q[:] = q_start
-    found, singular = solver.inverse_branches(X, q_start)
-    return _along_one_branch(solver, found, singular, q) and not missed(solver, q, X).any()
+    branches, singular = solver.inverse_branches(X, q_start)
+    return _along_one_branch(solver, branches, singular, q) and not missed(solver, q, X).any()
 
 
 def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
@@ -116,8 +116,8 @@ def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
         q = descend_from(solver.arm, X, guide)
     else:
         q = _nearest_of(solver.arm, solver.inverse_branches(X, guide)[0], guide)
-    off = np.flatnonzero(missed(solver, q, X))
-    return q, int(off[0]) if len(off) else None
+    failed = np.flatnonzero(missed(solver, q, X))
+    return q, int(failed[0]) if len(failed) else None
 
 
 def step_by_step(solver: Solver, X: Array, q_start: Array, allowed: Tolerance) -> Iterator[Step]:
@@ -156,9 +156,9 @@ def _between(solver: Solver, first: Step, goal: Step, allowed: Tolerance, halvin
 
 def _astray(X: Array, X_asked: Array, allowed: Tolerance) -> bool:
     """Whether a hand is off its way."""
-    off = float(np.linalg.norm(X[:3, 3] - X_asked[:3, 3]))
+    distance = float(np.linalg.norm(X[:3, 3] - X_asked[:3, 3]))
     turned = float(angle_between(X_asked[:3, :3], X[:3, :3]))
-    return off > max(allowed.position, _CLOSEST[0]) or turned > max(allowed.orientation, _CLOSEST[1])
+    return distance > max(allowed.position, _CLOSEST[0]) or turned > max(allowed.orientation, _CLOSEST[1])
 
 
 def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None) -> Array:
@@ -177,13 +177,13 @@ def _nearest_of(arm: Arm, candidates: Array, q: Array) -> Array:
     return np.asarray(np.take_along_axis(turned, nearest[..., None, None], axis=-2)[..., 0, :])
 
 
-def _along_one_branch(solver: Solver, found: Array, singular: Array, q: Array) -> bool:
+def _along_one_branch(solver: Solver, branches: Array, singular: Array, q: Array) -> bool:
     """Fill in the branch that the first posture belongs to, where it goes on to the end without a jump."""
-    branch = int(np.abs(found[0] - q[0]).max(axis=-1).argmin())
-    steps = np.diff(found[:, branch], axis=0)
+    branch = int(np.abs(branches[0] - q[0]).max(axis=-1).argmin())
+    steps = np.diff(branches[:, branch], axis=0)
     turns = np.array([joint.revolute for joint in solver.arm.joints])
     steps -= np.where(turns, 2 * np.pi * np.round(steps / (2 * np.pi)), 0.0)
-    if singular[:, branch].any() or np.abs(found[0, branch] - q[0]).max() > _OTHER or np.abs(steps).max() > _JUMP:
+    if singular[:, branch].any() or np.abs(branches[0, branch] - q[0]).max() > _OTHER or np.abs(steps).max() > _JUMP:
         return False
     q[1:] = q[0] + np.cumsum(steps, axis=0)
     return True
@@ -191,5 +191,7 @@ def _along_one_branch(solver: Solver, found: Array, singular: Array, q: Array) -
 
 def missed(solver: Solver, q: Array, X: Array) -> Flags:
     """Return which postures (..., n) do not meet their poses (..., 4, 4): an arm of few joints may turn otherwise."""
-    off = np.abs(solver.forward(q) - X)
-    return np.asarray((off[..., :3, 3].max(axis=-1) > MET) | (off[..., :3, :3].max(axis=(-2, -1)) > _TURN_MET))
+    difference = np.abs(solver.forward(q) - X)
+    return np.asarray(
+        (difference[..., :3, 3].max(axis=-1) > MET) | (difference[..., :3, :3].max(axis=(-2, -1)) > _TURN_MET)
+    )

@@ -65,10 +65,10 @@ class Continuity:
                 f"  {NAMES[order]} jumps at {count} of them, most at {self.times[k + 1]:.6g} s: joint {j + 1} by "
                 f"{jumps[k, j]:.6g}"
             )
-        for name, order, place in zip(("start, from rest", "end, to rest"), self.order_at_ends, (0, -1), strict=True):
+        for name, order, index in zip(("start, from rest", "end, to rest"), self.order_at_ends, (0, -1), strict=True):
             line = f"at the {name}: {_smooth(order)}"
             if order < 3:
-                jumps = np.abs(self.jumps[order + 1, place])
+                jumps = np.abs(self.jumps[order + 1, index])
                 line += f"; {NAMES[order + 1]} jumps, most in joint {jumps.argmax() + 1} by {jumps.max():.6g}"
             lines.append(line)
         return "\n".join(lines)
@@ -123,5 +123,5 @@ def _smooth(order: int) -> str:
     if order < 0:
         return "not even position is continuous"
     names = NAMES[: order + 1]
-    said = " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
-    return f"{said} {'are' if len(names) > 1 else 'is'} continuous"
+    text = " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+    return f"{text} {'are' if len(names) > 1 else 'is'} continuous"

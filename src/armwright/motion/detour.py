@@ -30,7 +30,7 @@ from armwright.motion.trajectory import Trajectory, join
 from armwright.motion.xspline_path import xspline
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
-By: TypeAlias = Literal["via", "damped"]
+DetourMethod: TypeAlias = Literal["via", "damped"]
 
 # Via poses that are tried: distances beside the line [m], directions at each, and turns of the hand [rad].
 _BESIDE = (0.02, 0.05, 0.1, 0.2, 0.4)
@@ -87,7 +87,7 @@ class Detour:
 
     Attributes:
         trajectory: of the joints, at rest at both ends.
-        by: ``line`` where the straight line itself can be run, ``via`` or ``damped`` otherwise.
+        method: ``line`` where the straight line itself can be run, ``via`` or ``damped`` otherwise.
         obstacle: what stopped the line, or made it a crawl; None where the line is run.
         via: (4, 4) the pose that it stops at on the way; None unless by ``via``.
         price: what it costs.
@@ -95,7 +95,7 @@ class Detour:
     """
 
     trajectory: Trajectory
-    by: Literal["line", "via", "damped"]
+    method: Literal["line", "via", "damped"]
     obstacle: PathError | None
     via: Array | None
     price: Price
@@ -107,7 +107,7 @@ def line_or_detour(
     q_start: ArrayLike,
     X_goal: ArrayLike,
     *,
-    by: By = "via",
+    method: DetourMethod = "via",
     deviation: float = 1e-3,
     speed: float = 100.0,
     damping: float = 0.05,
@@ -124,7 +124,7 @@ def line_or_detour(
         arm: an arm, or a compiled one, which plans faster.
         q_start: (n,) present joint positions [rad] or [m].
         X_goal: (4, 4) pose at the end of the line.
-        by: ``via`` or ``damped``.
+        method: ``via`` or ``damped``.
         deviation: allowed distance of the hand from a line [m].
         speed: 1 to 120, 100 is normal.
         damping: singular value at which damping begins [m]; see ``damped_rates``.
@@ -134,50 +134,50 @@ def line_or_detour(
         InvalidValueError: ``by``, deviation, speed or damping are none.
         IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
     """
-    one_of("way round", by, ("via", "damped"))
+    one_of("way round", method, ("via", "damped"))
     solver = solver_of(arm)
     q, B = single_configuration(solver.arm, q_start, "q_start"), exact_pose(X_goal)
     allowed = tolerance(deviation)
-    asked = asked_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
+    requested = asked_line(solver.arm, np.asarray(solver.forward(q)), B, speed)
     straight: Detour | None = None
     try:
         line = certified_line(arm, q, B, allowed, speed=speed)
     except PathError as error:
         obstacle = error
     else:
-        slower = 0.0 if asked is None else line.trajectory.duration - asked.duration
-        crawls = asked is not None and slower > max((_CRAWL - 1) * asked.duration, _WAIT)
+        slower = 0.0 if requested is None else line.trajectory.duration - requested.duration
+        crawls = requested is not None and slower > max((_CRAWL - 1) * requested.duration, _WAIT)
         straight = _straight(line, slower if crawls else 0.0)
-        if asked is None or not crawls:
+        if requested is None or not crawls:
             return straight
-        obstacle = _crawl(asked, line)
-    if asked is None or (by == "damped" and obstacle.cause == "reach"):
+        obstacle = _crawl(requested, line)
+    if requested is None or (method == "damped" and obstacle.cause == "reach"):
         raise obstacle
-    found = _damped(arm, asked, q, damping, obstacle) if by == "damped" else None
-    if by == "via":
-        found = _by_via(arm, asked, q, obstacle, allowed=allowed, speed=speed)
-    if straight is not None and (found is None or found.trajectory.duration > _BETTER * straight.trajectory.duration):
+    detour = _damped(arm, requested, q, damping, obstacle) if method == "damped" else None
+    if method == "via":
+        detour = _by_via(arm, requested, q, obstacle, allowed=allowed, speed=speed)
+    if straight is not None and (detour is None or detour.trajectory.duration > _BETTER * straight.trajectory.duration):
         return straight
-    if found is None:
+    if detour is None:
         raise obstacle
-    return found
+    return detour
 
 
 def _straight(line: CertifiedMotion, slower: float) -> Detour:
     """Return the line itself."""
     price = Price(distance=line.certificate.deviation, turn=line.certificate.turn, time=slower)
-    return Detour(trajectory=line.trajectory, by="line", obstacle=None, via=None, price=price, legs=(line,))
+    return Detour(trajectory=line.trajectory, method="line", obstacle=None, via=None, price=price, legs=(line,))
 
 
-def _crawl(asked: StraightPath, line: CertifiedMotion) -> PathError:
+def _crawl(requested: StraightPath, line: CertifiedMotion) -> PathError:
     """Return what makes a line a crawl: the joint for which it is slowed most, and where that is."""
     factor, because = line.certificate.factor, line.certificate.because
     assert because is not None  # noqa: S101 - nothing is slowed for nothing
     order = {"speed": 1}.get(because[0], 2)  # efforts rise where accelerations do
     worst = int(line.trajectory.segment_peaks(order)[:, because[1]].argmax())
     arm = line.certificate.arm
-    s = _nearest(asked, forward(arm, line.trajectory(line.trajectory.times[worst])))
-    x, y, z = asked.at(0, np.array([s]))[0, :3, 3] * 1e3
+    s = _nearest(requested, forward(arm, line.trajectory(line.trajectory.times[worst])))
+    x, y, z = requested.at(0, np.array([s]))[0, :3, 3] * 1e3
     joint = arm.called(because[1])
     reason = f"for the {because[0]} of {joint} the line would have to be run {factor:.0f} times slower"
     message = f"near ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base {reason}"
@@ -199,10 +199,10 @@ def _by_via(
             except (PathError, IncapableArmError):
                 continue
             motion = join([there.trajectory, back.trajectory])
-            place, turn = _apart(line, via)
-            price = Price(distance=place, turn=turn, time=motion.duration - line.duration)
+            distance, turn = _apart(line, via)
+            price = Price(distance=distance, turn=turn, time=motion.duration - line.duration)
             ways.append(
-                Detour(trajectory=motion, by="via", obstacle=obstacle, via=via, price=price, legs=(there, back))
+                Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=(there, back))
             )
         best = min(ways, key=lambda way: way.price.time, default=None)
         # Near the obstacle a way round may still be slow; farther off it is looked for only then.
@@ -246,8 +246,8 @@ def _on_joint_moves(solver: Solver, q: Array, X_goal: Array) -> Iterator[list[Ar
     chance = np.random.default_rng(2)
     for scatter in _SCATTER:
         parts = chance.uniform(*_PARTS, size=(_SCATTERED, 1))
-        off = scatter * chance.standard_normal((_SCATTERED, arm.n))
-        yield list(solver.forward(q + parts * (ends[0] - q) + np.where(_turning(arm), off, 0.0)))
+        offsets = scatter * chance.standard_normal((_SCATTERED, arm.n))
+        yield list(solver.forward(q + parts * (ends[0] - q) + np.where(_turning(arm), offsets, 0.0)))
 
 
 def _turning(arm: Arm) -> Flags:
@@ -293,16 +293,18 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
     eased = attrs.evolve(line, corners=times[[0, -1]], progress=xspline(times, fractions), near=np.inf)
     c, h = trajectory.coefficients, np.diff(times)
     hand = hand_bounds(solver.arm, c, h, *cubic_peaks(c, h))
-    off = tracking_error(solver, eased, trajectory, hand, tolerance(_LOOKED_AT))
+    error = tracking_error(solver, eased, trajectory, hand, tolerance(_LOOKED_AT))
     try:
         factor, _ = slowing_for_limits(arm, trajectory)
     except IncapableArmError:  # where gravity alone takes more than a joint may give there is no way either
         return None
     trajectory = trajectory.slowed(factor)
     price = Price(
-        distance=float(off.position.max()), turn=float(off.orientation.max()), time=trajectory.duration - line.duration
+        distance=float(error.position.max()),
+        turn=float(error.orientation.max()),
+        time=trajectory.duration - line.duration,
     )
-    return Detour(trajectory=trajectory, by="damped", obstacle=obstacle, via=None, price=price, legs=())
+    return Detour(trajectory=trajectory, method="damped", obstacle=obstacle, via=None, price=price, legs=())
 
 
 def _easing(arm: Arm, trajectory: Trajectory) -> Array:

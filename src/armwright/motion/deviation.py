@@ -132,28 +132,28 @@ def tracking_error(
 
 
 def error_of(
-    samples: HandSamples, off: Array, half: Array, *, orientation: Array | None = None, backward: float | None = None
+    samples: HandSamples, errors: Array, half: Array, *, orientation: Array | None = None, backward: float | None = None
 ) -> TrackingError:
     """Return the error from what is measured at the samples.
 
     Args:
         samples: of the hand, (m, k + 1).
-        off: (m, k + 1) distances from the path [m].
+        errors: (m, k + 1) distances from the path [m].
         half: (m,) the largest sines of half the angles from its orientation.
         orientation: (m,) upper bound of the sine of half the angle; by the bounds of the samples when left out.
         backward: how far the hand runs backwards [m].
     """
     between = samples.step**2 / 8
-    seen = off.max(axis=1)
+    largest = errors.max(axis=1)
     bound = half + between * samples.bounds.orientation if orientation is None else orientation
     rounding = ROUNDINGS * (1.0 + float(np.abs(samples.poses[..., :3, 3]).max()))
     return TrackingError(
-        position=seen + between * samples.bounds.position + rounding,
+        position=largest + between * samples.bounds.position + rounding,
         orientation=2 * np.arcsin(np.minimum(bound, 1.0)) + ROUNDINGS,
-        sampled_position=seen,
+        sampled_position=largest,
         sampled_orientation=2 * np.arcsin(np.minimum(half, 1.0)),
-        times=samples.times[np.arange(len(seen)), off.argmax(axis=1)],
-        samples=off.shape[1] - 1,
+        times=samples.times[np.arange(len(largest)), errors.argmax(axis=1)],
+        samples=errors.shape[1] - 1,
         backward=backward,
     )
 

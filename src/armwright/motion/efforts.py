@@ -23,7 +23,7 @@ from armwright.motion.trajectory import Trajectory
 
 # Looks at a segment at least, and at a whole motion at least.
 _LOOKS_OF_SEGMENT = 9
-_LOOKS = 600
+_SAMPLES = 600
 # Looks at the ends of a segment are inside it by this part of it: there a joint that starts has its dry friction.
 _INSIDE = 1e-8
 # Where a joint turns back is found by so many halvings of the space between two looks.
@@ -65,7 +65,7 @@ class EffortSlowing(NamedTuple):
     time: float
 
 
-class _Looks(NamedTuple):
+class _Samples(NamedTuple):
     """Places of a motion that are looked at: which segments, and which parts of them, (k,) each."""
 
     segments: npt.NDArray[np.intp]
@@ -105,10 +105,10 @@ def effort_peaks(arm: AnyArm, trajectory: Trajectory) -> EffortPeaks:
     """
     solver = solver_of(arm)
     checked(solver.arm, trajectory)
-    looks = _spread(solver.arm, trajectory)
-    tau = _efforts(solver, trajectory, looks)
-    peaks, at = _peaks(solver, trajectory, looks, tau)
-    return EffortPeaks(peaks, at.times(trajectory))
+    samples = _spread(solver.arm, trajectory)
+    tau = _efforts(solver, trajectory, samples)
+    peaks, indices = _peaks(solver, trajectory, samples, tau)
+    return EffortPeaks(peaks, indices.times(trajectory))
 
 
 def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
@@ -130,19 +130,19 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     limits = solver.arm.limit("effort")
     if not np.isfinite(limits).any():
         return EffortSlowing(1.0, None, 0.0)
-    looks = _spread(solver.arm, trajectory)
+    samples = _spread(solver.arm, trajectory)
     u, joint, time = 1.0, None, 0.0
     for _ in range(_ROUNDS):
-        shares = _shares(solver, trajectory, looks)
-        _check_lasting(solver.arm, shares.lasting, looks.times(trajectory))
+        shares = _shares(solver, trajectory, samples)
+        _check_lasting(solver.arm, shares.lasting, samples.times(trajectory))
         part, binding = _largest_part(solver.arm, shares, limits)
         if binding is not None and part < u:
-            u, joint, time = part, binding[1], float(looks.times(trajectory)[binding[0]])
+            u, joint, time = part, binding[1], float(samples.times(trajectory)[binding[0]])
         # What lies between the looks is looked at as well, where the efforts are largest: places stay when slowed.
-        peaks, near = _peaks(solver, trajectory.slowed(1 / u), looks, shares.at(u))
+        peaks, near = _peaks(solver, trajectory.slowed(1 / u), samples, shares.at(u))
         if (peaks <= limits * (1 + _ROUNDING)).all():
             break
-        looks = _Looks(np.append(looks.segments, near.segments), np.append(looks.parts, near.parts))
+        samples = _Samples(np.append(samples.segments, near.segments), np.append(samples.parts, near.parts))
     return EffortSlowing(1 / u, joint, time)
 
 
@@ -160,11 +160,11 @@ def checked(arm: Arm, trajectory: Trajectory, what: str = "trajectory") -> None:
         raise ShapeError(f"{what}: expected one of {arm.n} joints, as '{arm.name}' has, got one of {joints}")
 
 
-def refuse_lasting(arm: Arm, joint: int, effort: float, place: str) -> IncapableArmError:
+def refuse_lasting(arm: Arm, joint: int, effort: float, location: str) -> IncapableArmError:
     """Return the error for a place where holding the arm takes more than a joint, from 0, may give."""
     unit = "N m" if arm.joints[joint].revolute else "N"
     return IncapableArmError(
-        f"{place} gravity and dry friction alone ask {arm.called(joint)} for {abs(effort):.4g} {unit}, "
+        f"{location} gravity and dry friction alone ask {arm.called(joint)} for {abs(effort):.4g} {unit}, "
         f"{arm.joints[joint].limits.effort:.4g} {unit} are allowed: no slowing helps"
     )
 
@@ -182,35 +182,35 @@ def dry_frictions(arm: Arm, qd: Array) -> Array:
     return np.where(qd > 0, forward, np.where(qd < 0, -backward, 0.0))
 
 
-def _spread(arm: Arm, trajectory: Trajectory) -> _Looks:
+def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
     """Return looks at all segments, at both ends of each among them, and where joints turn back.
 
     There their dry friction jumps, so that they are looked at just before and just after.
     """
     m, each = len(trajectory.coefficients), _each(trajectory)
     parts = np.linspace(_INSIDE, 1 - _INSIDE, each)
-    looks = _Looks(np.repeat(np.arange(m), each), np.tile(parts, m))
+    samples = _Samples(np.repeat(np.arange(m), each), np.tile(parts, m))
     rubs = np.array([motor.coulomb_forward + motor.coulomb_backward > 0 for motor in arm.motors])
-    speeds = _states(trajectory, looks)[1].reshape(m, each, -1)
+    speeds = _states(trajectory, samples)[1].reshape(m, each, -1)
     segment, before, joint = np.nonzero((speeds[:, 1:] * speeds[:, :-1] < 0) & rubs)
     low, high, sign = parts[before], parts[before + 1], np.sign(speeds[segment, before, joint])
     for _ in range(_HALVINGS if len(joint) else 0):
         middle = (low + high) / 2
-        speed = _states(trajectory, _Looks(segment, middle))[1][np.arange(len(joint)), joint]
+        speed = _states(trajectory, _Samples(segment, middle))[1][np.arange(len(joint)), joint]
         early = speed * sign > 0
         low, high = np.where(early, middle, low), np.where(early, high, middle)
-    return _Looks(np.concatenate([looks.segments, segment, segment]), np.concatenate([looks.parts, low, high]))
+    return _Samples(np.concatenate([samples.segments, segment, segment]), np.concatenate([samples.parts, low, high]))
 
 
 def _each(trajectory: Trajectory) -> int:
     """Return how often a segment is looked at."""
-    return max(_LOOKS_OF_SEGMENT, -(-_LOOKS // len(trajectory.coefficients)) + 1)
+    return max(_LOOKS_OF_SEGMENT, -(-_SAMPLES // len(trajectory.coefficients)) + 1)
 
 
-def _states(trajectory: Trajectory, looks: _Looks) -> tuple[Array, Array, Array]:
+def _states(trajectory: Trajectory, samples: _Samples) -> tuple[Array, Array, Array]:
     """Return positions, speeds and accelerations (k, n) at looks: of the segment looked at, at its ends too."""
-    terms = trajectory.coefficients[looks.segments]
-    local = (looks.parts * np.diff(trajectory.times)[looks.segments])[:, None]
+    terms = trajectory.coefficients[samples.segments]
+    local = (samples.parts * np.diff(trajectory.times)[samples.segments])[:, None]
     q, qd, qdd = (evaluate(derivative(terms, order), local) for order in range(3))
     # No joint is faster than this, and few are many times slower.
     h = np.diff(trajectory.times)[:, None]
@@ -218,18 +218,18 @@ def _states(trajectory: Trajectory, looks: _Looks) -> tuple[Array, Array, Array]
     return q, np.where(np.abs(qd) > _STANDS * fastest, qd, 0.0), qdd
 
 
-def _efforts(solver: Solver, trajectory: Trajectory, looks: _Looks) -> Array:
-    return np.asarray(solver.inverse_dynamics(*_states(trajectory, looks)))
+def _efforts(solver: Solver, trajectory: Trajectory, samples: _Samples) -> Array:
+    return np.asarray(solver.inverse_dynamics(*_states(trajectory, samples)))
 
 
-def _shares(solver: Solver, trajectory: Trajectory, looks: _Looks) -> _Shares:
-    q, qd, qdd = _states(trajectory, looks)
+def _shares(solver: Solver, trajectory: Trajectory, samples: _Samples) -> _Shares:
+    q, qd, qdd = _states(trajectory, samples)
     lasting = lasting_efforts(solver, q, qd)
     viscous = qd * np.array([motor.viscous for motor in solver.arm.motors])
     return _Shares(lasting, viscous, solver.inverse_dynamics(q, qd, qdd) - lasting - viscous)
 
 
-def _peaks(solver: Solver, trajectory: Trajectory, looks: _Looks, tau: Array) -> tuple[Array, _Looks]:
+def _peaks(solver: Solver, trajectory: Trajectory, samples: _Samples, tau: Array) -> tuple[Array, _Samples]:
     """Return the largest efforts (n,), and where, from the efforts (k, n) at looks."""
     n = tau.shape[1]
     size = np.abs(tau)
@@ -238,20 +238,20 @@ def _peaks(solver: Solver, trajectory: Trajectory, looks: _Looks, tau: Array) ->
     best = np.argsort(np.where(tops, -size, 0.0), axis=0, kind="stable")[:_TOPS]
     joints = np.broadcast_to(np.arange(n), best.shape).ravel()
     best = best.ravel()
-    peaks, segments, parts = size[best, joints], looks.segments[best], looks.parts[best]
+    peaks, segments, parts = size[best, joints], samples.segments[best], samples.parts[best]
     rows = np.arange(len(joints))
     width = 1.0 / (_each(trajectory) - 1)
     for _ in range(_ZOOMS):
         near = np.clip(parts[:, None] + np.linspace(-width, width, _CLOSER), _INSIDE, 1 - _INSIDE)
-        found = np.abs(_efforts(solver, trajectory, _Looks(np.repeat(segments, _CLOSER), near.ravel())))
-        of_joint = found.reshape(len(rows), _CLOSER, n)[rows, :, joints]
+        sizes = np.abs(_efforts(solver, trajectory, _Samples(np.repeat(segments, _CLOSER), near.ravel())))
+        of_joint = sizes.reshape(len(rows), _CLOSER, n)[rows, :, joints]
         best = of_joint.argmax(axis=1)
         better = of_joint[rows, best] > peaks
         peaks = np.where(better, of_joint[rows, best], peaks)
         parts = np.where(better, near[rows, best], parts)
         width *= 2.0 / (_CLOSER - 1)
     largest = peaks.reshape(-1, n).argmax(axis=0) * n + np.arange(n)
-    return peaks[largest], _Looks(segments[largest], parts[largest])
+    return peaks[largest], _Samples(segments[largest], parts[largest])
 
 
 def _check_lasting(arm: Arm, lasting: Array, times: Array) -> None:

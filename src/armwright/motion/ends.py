@@ -18,9 +18,9 @@ def check_ends(solver: Solver, path: Path, q_start: Array) -> None:
         PathError: a pose is out of reach, or has no configuration inside the joint limits.
     """
     arm = solver.arm
-    q, off = chain(solver, path.poses, q_start)
+    q, failed = chain(solver, path.poses, q_start)
     for segment, X in enumerate(path.poses[1:]):
-        if (off is None or segment + 1 < off) and not violations(arm, q[segment + 1]):
+        if (failed is None or segment + 1 < failed) and not violations(arm, q[segment + 1]):
             continue
         solution = inverse(arm, X)
         if not solution.allowed:

@@ -127,7 +127,9 @@ def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array
     try:
         algorithm, constraint = (importlib.import_module(f"toppra.{name}") for name in ("algorithm", "constraint"))
     except ImportError as error:
-        raise MissingExtraError("by='toppra' needs toppra; install it by: pip install 'armwright[optimal]'") from error
+        raise MissingExtraError(
+            "method='toppra' needs toppra; install it by: pip install 'armwright[optimal]'"
+        ) from error
     logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what goes wrong is told by errors
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     rows = bounds.a.shape[1]
@@ -150,6 +152,6 @@ def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array
     if sd is None or np.isnan(sd).any():
         raise ArmwrightError(
             "toppra's solver of linear programs gave up, as it does for some problems that have a solution: leave "
-            "by= out, or ask for another number of intervals"
+            "method= out, or ask for another number of intervals"
         )
     return np.asarray(sd**2, dtype=np.float64)

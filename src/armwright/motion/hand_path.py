@@ -84,8 +84,8 @@ class HandPath:
     def error(self, samples: HandSamples) -> TrackingError:
         """Return how far a sampled hand is from where it should be at the time."""
         planned = self(samples.times)
-        off = np.linalg.norm(samples.poses[..., :3, 3] - planned[..., :3, 3], axis=-1)
-        return error_of(samples, off, half_sines(planned[..., :3, :3], samples.poses[..., :3, :3]).max(axis=1))
+        distances = np.linalg.norm(samples.poses[..., :3, 3] - planned[..., :3, 3], axis=-1)
+        return error_of(samples, distances, half_sines(planned[..., :3, :3], samples.poses[..., :3, :3]).max(axis=1))
 
     def where(self, t: float) -> tuple[int, float, str]:
         """Return on which way between poses a time is, at which fraction of it, and that in words."""
@@ -184,17 +184,17 @@ def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, o
     Source:
         Paul, "Manipulator Cartesian path control" (1979); for ``zyz`` the project on the PUMA's trajectories, 3.2.
     """
-    place = blended(times, poses[:, :3, 3], blend, ends=ends)
+    position = blended(times, poses[:, :3, 3], blend, ends=ends)
     R, t = poses[:, :3, :3], floats(times, "times")
     if orientation == "zyz":
-        return HandPath(place=place, turns=None, angles=blended(times, zyz_angles(R), blend, ends=ends), times=t)
+        return HandPath(place=position, turns=None, angles=blended(times, zyz_angles(R), blend, ends=ends), times=t)
     plan = blend_plan(times, poses[:, :3, 3], blend, ends)
     # A turn is the same vector in the axes of the pose before it and of that after it.
     ways = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
     still = np.zeros((1, 3))
     first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
     plan = plan._replace(before=np.concatenate([first, ways]), after=np.concatenate([ways, last]))
-    return HandPath(place=place, turns=Turns(R=R, plan=plan), angles=None, times=t)
+    return HandPath(place=position, turns=Turns(R=R, plan=plan), angles=None, times=t)
 
 
 def zyz_angles(R: Array) -> Array:

@@ -79,10 +79,10 @@ def through_knots(arm: Arm, knots: Array) -> Trajectory:
     return xspline(times, knots, slopes[0] - steps[0] * curves[0], slopes[-1] + steps[-1] * curves[-1])
 
 
-def natural_speeds(arm: Arm, places: Array) -> Array:
+def natural_speeds(arm: Arm, points: Array) -> Array:
     """Return for every joint (n,) what is fast for it on a way through places (k, n), by its limits."""
     with np.errstate(invalid="ignore"):
-        by_acceleration = np.sqrt(arm.limit("acceleration") * np.ptp(places, axis=0))
+        by_acceleration = np.sqrt(arm.limit("acceleration") * np.ptp(points, axis=0))
     fast = np.fmin(arm.limit("speed"), np.where(by_acceleration > 0, by_acceleration, np.inf))
     return np.where(np.isfinite(fast), fast, 1.0)
 
@@ -125,10 +125,10 @@ def gridded(arm: Arm, piece: Piece, intervals: int) -> Grid:
     """
     path = piece.path
     lengths = np.diff(path.times)
-    whole = Grid(lengths, path.coefficients, piece.origins)
+    full = Grid(lengths, path.coefficients, piece.origins)
     speeds = natural_speeds(arm, path(path.times))
     parts = np.linspace(0.0, 1.0, _SAMPLES)
-    rates = np.stack([np.abs(whole.at(part, 1) / speeds).max(axis=1) for part in parts], axis=1)
+    rates = np.stack([np.abs(full.at(part, 1) / speeds).max(axis=1) for part in parts], axis=1)
     rates += _EVEN * rates.mean()
     ways = (rates[:, 1:] + rates[:, :-1]) / 2 * (lengths / (_SAMPLES - 1))[:, None]
     done = np.concatenate([[0.0], np.cumsum(ways)])

@@ -85,10 +85,10 @@ def limit_per_joint(value: ArrayLike, joints: int, what: str) -> Array:
         ShapeError: it is neither one number nor (n,).
         InvalidValueError: a limit is NaN, 0 or below.
     """
-    given = floats(value, what, np.inf)
-    limits = np.full(joints, given) if given.ndim == 0 else given
+    values = floats(value, what, np.inf)
+    limits = np.full(joints, values) if values.ndim == 0 else values
     if limits.shape != (joints,):
-        raise ShapeError(f"{what}: expected one number, or {joints}, one per joint, got shape {given.shape}")
+        raise ShapeError(f"{what}: expected one number, or {joints}, one per joint, got shape {values.shape}")
     for j in np.flatnonzero(~(limits > 0)):
         raise InvalidValueError(f"{what}: expected more than 0, got {limits[j]:g} for joint {j + 1}")
     return limits

@@ -19,7 +19,7 @@ from armwright.motion.blends import Ends, blend_timing, blended, via_distances
 from armwright.motion.branch_selection import configurations_at, configurations_through
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified import certificate_of, limit_peaks
-from armwright.motion.detour import By, Detour, line_or_detour
+from armwright.motion.detour import Detour, DetourMethod, line_or_detour
 from armwright.motion.hand_path import HandPath, Orientation, hand_path
 from armwright.motion.limit_utilization import slowing_for_limits
 from armwright.motion.obstruction import PathError, cause_of
@@ -199,15 +199,15 @@ def along(
 ) -> Move:
     """Return the move along a path of the hand, with its certificate; arguments and errors as of ``cartesian_move``."""
     solver, allowed = solver_of(arm), tolerance(deviation)
-    label, found = _followed(solver, hand, _near(solver.arm, near), allowed, rest=ends == "rest")
-    certificate = certificate_of(arm, found.trajectory, found.error, allowed)
+    label, tracked = _followed(solver, hand, _near(solver.arm, near), allowed, from_rest=ends == "rest")
+    certificate = certificate_of(arm, tracked.trajectory, tracked.error, allowed)
     return Move(
         arm=solver.arm,
         poses=X,
         times=times,
-        configurations=found.trajectory(times),
+        configurations=tracked.trajectory(times),
         label=label,
-        trajectory=found.trajectory,
+        trajectory=tracked.trajectory,
         misses=via_distances(times, X[:, :3, 3], blend, ends=ends),
         hand=hand,
         certificate=attrs.evolve(certificate, worst_place=hand(certificate.worst_time)[:3, 3]),
@@ -218,7 +218,7 @@ def stopping_move(
     arm: AnyArm,
     poses: ArrayLike,
     *,
-    by: By = "via",
+    method: DetourMethod = "via",
     near: ArrayLike | None = None,
     deviation: float = 1e-3,
     speed: float = 100.0,
@@ -228,7 +228,7 @@ def stopping_move(
     Args:
         arm: the arm, or a compiled one, which plans faster.
         poses: (k, 4, 4) two or more tool poses; rotations typed with a few digits are made exact, with a warning.
-        by: ``via`` or ``damped``, as for ``line_or_detour``.
+        method: ``via`` or ``damped``, as for ``line_or_detour``.
         near: (n,) present joint positions, for the choice of the first posture; the middle of the limits when left out.
         deviation: allowed distance of the hand from a line [m].
         speed: 1 to 120, 100 is normal.
@@ -246,7 +246,7 @@ def stopping_move(
     first: PathError | None = None
     for start in configurations_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
         try:
-            legs = _legs(arm, start.q, X, by=by, deviation=deviation, speed=speed)
+            legs = _legs(arm, start.q, X, method=method, deviation=deviation, speed=speed)
         except PathError as error:
             first = first or error
         else:
@@ -269,9 +269,9 @@ def exact_poses(poses: ArrayLike) -> Array:
     try:
         typed_poses(X)
     except InvalidValueError:
-        for i, one in enumerate(X, 1):
+        for i, pose in enumerate(X, 1):
             try:
-                typed_poses(one)
+                typed_poses(pose)
             except InvalidValueError as refused:
                 raise InvalidValueError(f"pose {i}: {str(refused).removeprefix('pose: ')}") from None
     R = nearest_rotation(X[:, :3, :3])
@@ -331,7 +331,9 @@ def _inside_limits(arm: AnyArm, move: Move) -> Move:
     )
 
 
-def _followed(solver: Solver, hand: HandPath, near: Array, allowed: Tolerance, *, rest: bool) -> tuple[str, Tracking]:
+def _followed(
+    solver: Solver, hand: HandPath, near: Array, allowed: Tolerance, *, from_rest: bool
+) -> tuple[str, Tracking]:
     """Return a branch, and the joints that follow a path of the hand on it.
 
     The branch is chosen once and kept: of the postures inside the limits at the start the nearest that leads to the
@@ -347,23 +349,23 @@ def _followed(solver: Solver, hand: HandPath, near: Array, allowed: Tolerance, *
     knots = hand.first_knots(_STEP, _FEWEST)
     errors: dict[str, PathError] = {}
     for branch in sorted(solution.allowed, key=lambda branch: joint_distance(arm, near, branch.q)):
-        task = Task(solver, hand, branch.q, allowed, allowed, rest=rest, whole_turns=True, most_knots=_MOST)
-        found = track(task, knots)
-        if isinstance(found, Tracking):
-            return branch.label, found
-        errors[branch.label] = path_error(hand, found)
+        task = Task(solver, hand, branch.q, allowed, allowed, rest=from_rest, whole_turns=True, most_knots=_MOST)
+        tracked = track(task, knots)
+        if isinstance(tracked, Tracking):
+            return branch.label, tracked
+        errors[branch.label] = path_error(hand, tracked)
     first = next(iter(errors.values()))
     reasons = "; ".join(f"{label}: {error}" for label, error in errors.items())
     message = f"no branch carries the hand to its last pose. {reasons}"
     raise PathError(first.cause, first.segment, first.fraction, message, joint=first.joint, reason=first.reason)
 
 
-def _legs(arm: AnyArm, q: Array, X: Array, *, by: By, deviation: float, speed: float) -> list[Detour]:
+def _legs(arm: AnyArm, q: Array, X: Array, *, method: DetourMethod, deviation: float, speed: float) -> list[Detour]:
     """Return a way from every pose to the next, from rest to rest."""
     legs: list[Detour] = []
     for i, goal in enumerate(X[1:]):
         try:
-            legs.append(line_or_detour(arm, q, goal, by=by, deviation=deviation, speed=speed))
+            legs.append(line_or_detour(arm, q, goal, method=method, deviation=deviation, speed=speed))
         except PathError as error:
             message = f"from pose {i + 1} to pose {i + 2}: {error}"
             raise PathError(error.cause, i, error.fraction, message, joint=error.joint, reason=error.reason) from error

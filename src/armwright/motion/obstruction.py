@@ -85,10 +85,10 @@ class Obstruction(NamedTuple):
         """Whether one that was found less closely is this one, and names a joint that is to blame."""
         if other.cause != self.cause:
             return False
-        off = abs(other.time - self.time) / duration
+        apart = abs(other.time - self.time) / duration
         if self.velocity_ratio is not None:
-            return other.joint in self.blamed and f"({self.near})" in other.reason and off < _SAME_VELOCITY
-        return other.joint == self.joint and off < _SAME
+            return other.joint in self.blamed and f"({self.near})" in other.reason and apart < _SAME_VELOCITY
+        return other.joint == self.joint and apart < _SAME
 
 
 class Diagnosis(NamedTuple):
@@ -134,11 +134,11 @@ def singular(arm: Arm, q: Array, times: Array, ratios: Array) -> Obstruction:
         times: (2,) when they are passed [s].
         ratios: (n,) how many times as fast as it may each joint would have to move from one to the other.
     """
-    at = int(np.argmin([singularities(arm, each).singular_values[-1] for each in q]))
-    joint, ratio, near = int(ratios.argmax()) + 1, float(ratios.max()), nearest_singularity(arm, q[at])
+    index = int(np.argmin([singularities(arm, each).singular_values[-1] for each in q]))
+    joint, ratio, near = int(ratios.argmax()) + 1, float(ratios.max()), nearest_singularity(arm, q[index])
     reason = f"the arm is singular there ({near}), {too_fast(arm, joint, ratio)}"
     blamed = tuple((np.flatnonzero(ratios > _BLAMED * ratio) + 1).tolist())
-    return Obstruction("singular", float(times[at]), joint, reason, ratio, near, blamed)
+    return Obstruction("singular", float(times[index]), joint, reason, ratio, near, blamed)
 
 
 def unmet(arm: Arm, X: Array, before: Array, time: float, time_before: float) -> Obstruction:
@@ -192,8 +192,8 @@ def diagnose_obstruction(
         steps.append(step)
         if obstruction is not None:
             break
-    at = np.interp([step.place for step in steps], np.arange(len(times)), times)
-    return Diagnosis(obstruction, at, np.array([step.q for step in steps]))
+    index = np.interp([step.place for step in steps], np.arange(len(times)), times)
+    return Diagnosis(obstruction, index, np.array([step.q for step in steps]))
 
 
 def _on_step(

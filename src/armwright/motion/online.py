@@ -202,14 +202,14 @@ def _check_goal(arm: Arm, task: _Task) -> None:
         )
 
 
-def _jerk(arm: Arm, task: _Task, asked: ArrayLike | None, *, brake: bool) -> Array:
+def _jerk(arm: Arm, task: _Task, jerk_limits: ArrayLike | None, *, brake: bool) -> Array:
     """Return the jerks (n,) to plan with; refuse a state that they cannot keep inside the limits."""
     n = len(task.q)
-    if asked is None:
+    if jerk_limits is None:
         jerk = task.acceleration / JERK_TIME
     else:
-        given = floats(asked, "jerk", LARGEST)
-        jerk = np.full(n, given) if given.ndim == 0 else np.array(one_per_joint(given, n, "jerk"))
+        jerks = floats(jerk_limits, "jerk", LARGEST)
+        jerk = np.full(n, jerks) if jerks.ndim == 0 else np.array(one_per_joint(jerks, n, "jerk"))
         if not (jerk > 0).all():
             raise InvalidValueError(f"jerk: expected more than 0, got {jerk.min():g}")
         for j in np.flatnonzero(jerk * _SHORTEST_RISE > task.acceleration).tolist():
@@ -222,7 +222,7 @@ def _jerk(arm: Arm, task: _Task, asked: ArrayLike | None, *, brake: bool) -> Arr
     room = speed - task.qd * np.sign(task.qdd)
     with np.errstate(divide="ignore", invalid="ignore"):
         least = np.where(task.qdd != 0, task.qdd**2 / (2 * np.maximum(room, 0.0)), 0.0)
-    if asked is None:
+    if jerk_limits is None:
         jerk = np.clip(least, jerk, jerk * _MOST_JERK)
     if brake:
         return jerk
@@ -279,17 +279,17 @@ def _phases(task: _Task, *, synchronised: bool, period: float | None) -> _Phases
     request.synchronization = ruckig.Synchronization.Time if synchronised else ruckig.Synchronization.No
     if period is not None:
         request.duration_discretization = ruckig.DurationDiscretization.Discrete
-    found = ruckig.Trajectory(n)
+    result = ruckig.Trajectory(n)
     generator = ruckig.Ruckig(n) if period is None else ruckig.Ruckig(n, period)
     try:
-        answer = generator.calculate(request, found)
+        answer = generator.calculate(request, result)
     except ruckig.RuckigError as error:
         raise OnlineError(_GAVE_UP) from error
-    if answer != ruckig.Result.Working or not math.isfinite(found.duration):
+    if answer != ruckig.Result.Working or not math.isfinite(result.duration):
         raise OnlineError(_GAVE_UP)
-    profiles = found.profiles[0]
-    lengths = np.array([[*one.brake.t, *one.t] for one in profiles])
-    jerk = np.array([[*one.brake.j, *one.j, 0.0] for one in profiles])
+    profiles = result.profiles[0]
+    lengths = np.array([[*profile.brake.t, *profile.t] for profile in profiles])
+    jerk = np.array([[*profile.brake.j, *profile.j, 0.0] for profile in profiles])
     starts = np.concatenate([np.zeros((n, 1)), np.cumsum(lengths, axis=1)], axis=1)
     q, qd, qdd = (np.empty_like(jerk) for _ in range(3))
     q[:, 0], qd[:, 0], qdd[:, 0] = task.q, task.qd, task.qdd
@@ -300,7 +300,7 @@ def _phases(task: _Task, *, synchronised: bool, period: float | None) -> _Phases
         q[:, k + 1] = q[:, k] + h * (qd[:, k] + h * (qdd[:, k] / 2 + h * jerk[:, k] / 6))
     # What is left there of speed and acceleration is rounding.
     qd[:, -1], qdd[:, -1] = task.qd_goal, 0.0
-    return _Phases(starts, jerk, q, qd, qdd, float(found.duration))
+    return _Phases(starts, jerk, q, qd, qdd, float(result.duration))
 
 
 def _check_range(arm: Arm, task: _Task, phases: _Phases) -> None:
@@ -314,8 +314,8 @@ def _check_range(arm: Arm, task: _Task, phases: _Phases) -> None:
         divisor = qdd + side * root
         t = np.clip(np.where(divisor != 0, -2 * qd / np.where(divisor != 0, divisor, 1.0), 0.0), 0.0, lengths)
         candidates.append(q + t * (qd + t * (qdd / 2 + t * jerk / 6)))
-    places = np.concatenate(candidates, axis=1)
-    lowest, highest = places.min(axis=1), places.max(axis=1)
+    positions = np.concatenate(candidates, axis=1)
+    lowest, highest = positions.min(axis=1), positions.max(axis=1)
     if (lowest >= arm.limit("lower")).all() and (highest <= arm.limit("upper")).all():
         return
     for extreme, worse in ((lowest, np.less), (highest, np.greater)):

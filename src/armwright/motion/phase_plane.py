@@ -77,10 +77,10 @@ def fastest(
     solver: Solver,
     grid: Grid,
     rests: tuple[bool, bool],
-    place: Callable[[float], str],
+    locate: Callable[[float], str],
     *,
     efforts: bool,
-    by: SolverName,
+    method: SolverName,
 ) -> Array:
     """Return s' at the ends of the N intervals of a grid, (N + 1,), for the fastest run from rest to rest.
 
@@ -88,20 +88,20 @@ def fastest(
         solver: the arm.
         grid: of the path.
         rests: whether the joints stand at the start and at the end whatever s' is, so that it need not be 0.
-        place: says where a parameter, as it was given, is on the path.
+        locate: says where a parameter, as it was given, is on the path.
         efforts: whether the efforts count.
-        by: who solves it.
+        method: who solves it.
 
     Raises:
         IncapableArmError: no run however slow keeps the efforts, or any run however fast.
         MissingExtraError: toppra is not installed.
     """
-    solve = by_toppra if by == "toppra" else largest_squares
-    rows = _rows(solver, grid, place, efforts=efforts)
+    solve = by_toppra if method == "toppra" else largest_squares
+    rows = _rows(solver, grid, locate, efforts=efforts)
     bounds = rows.without_viscous()
     x = solve(bounds, grid.lengths, rests)
     for k in np.flatnonzero(x[1:-1] > MOST / 2):
-        raise IncapableArmError(f"{place(float(grid.origins[k + 1]))} nothing limits how fast the joints may be")
+        raise IncapableArmError(f"{locate(float(grid.origins[k + 1]))} nothing limits how fast the joints may be")
     before = 0.0
     for _ in range(_ROUNDS if rows.viscous.any() else 0):
         bounds = rows.by_tangent(x, grid.lengths)
@@ -137,19 +137,19 @@ def _use(solver: Solver, grid: Grid, x: Array, *, efforts: bool) -> Array:
     return use
 
 
-def _rows(solver: Solver, grid: Grid, place: Callable[[float], str], *, efforts: bool) -> _Rows:
+def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts: bool) -> _Rows:
     """Write down the bounds of all limits that there are."""
     arm = solver.arm
     speed, acceleration, effort = (arm.limit(name) for name in ("speed", "acceleration", "effort"))
     viscous = np.array([motor.viscous for motor in arm.motors])
     least, most = _dry_frictions(solver, grid)
-    found: list[_Rows] = []
+    limits: list[_Rows] = []
     for part in _PARTS:
         rate, bend = grid.at(part, 1), grid.at(part, 2)
         ahead = np.broadcast_to((2 * part * grid.lengths)[:, None], rate.shape)
         none = np.zeros_like(rate)
-        found.append(_limited(speed**2, _Rows(none, rate**2, none, none, ahead)))
-        found.append(_limited(acceleration, _Rows(rate, bend, none, none, ahead)))
+        limits.append(_limited(speed**2, _Rows(none, rate**2, none, none, ahead)))
+        limits.append(_limited(acceleration, _Rows(rate, bend, none, none, ahead)))
         if efforts and np.isfinite(effort).any():
             q = grid.at(part, 0)
             gravity = np.asarray(solver.inverse_dynamics(q, none, none))
@@ -159,17 +159,17 @@ def _rows(solver: Solver, grid: Grid, place: Callable[[float], str], *, efforts:
             use = np.abs(lasting) / effort
             if use.max() > _ALL:
                 k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
-                raise refuse_lasting(arm, joint, float(lasting[k, joint]), place(float(grid.origins[k])))
+                raise refuse_lasting(arm, joint, float(lasting[k, joint]), locate(float(grid.origins[k])))
             # Where a joint turns back on an interval, its dry friction is either; so much less is left on both sides.
-            left = effort - (most - least) / 2
-            found.append(_limited(left, _Rows(a, b, gravity + (most + least) / 2, viscous * rate, ahead)))
-    return _Rows(*(np.concatenate(arrays, axis=1) for arrays in zip(*found, strict=True)))
+            margin = effort - (most - least) / 2
+            limits.append(_limited(margin, _Rows(a, b, gravity + (most + least) / 2, viscous * rate, ahead)))
+    return _Rows(*(np.concatenate(arrays, axis=1) for arrays in zip(*limits, strict=True)))
 
 
 def _dry_frictions(solver: Solver, grid: Grid) -> tuple[Array, Array]:
     """Return the least and the most that dry friction takes of the joints on the intervals (N, n)."""
-    seen = np.stack([dry_frictions(solver.arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
-    return seen.min(axis=0), seen.max(axis=0)
+    frictions = np.stack([dry_frictions(solver.arm, grid.at(part, 1)) for part in (_EDGE, 0.5, 1 - _EDGE)])
+    return frictions.min(axis=0), frictions.max(axis=0)
 
 
 def _limited(limits: Array, rows: _Rows) -> _Rows:

@@ -14,7 +14,7 @@ from armwright.kinematics.inverse_kinematics.revolutions import equivalent_confi
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.certificate import Certificate
 from armwright.motion.certified import joined
-from armwright.motion.detour import By, Detour, line_or_detour
+from armwright.motion.detour import Detour, DetourMethod, line_or_detour
 from armwright.motion.ends import check_ends
 from armwright.motion.obstruction import Cause, PathError, cause_of
 from armwright.motion.path import Path
@@ -49,7 +49,7 @@ class Manner:
     speed: float = 100.0
     deviation: float = 1e-3
     period: float = 1e-3
-    around: By | None = None
+    around: DetourMethod | None = None
 
 
 @attrs.frozen(kw_only=True, eq=False)
@@ -276,22 +276,22 @@ def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle:
         return None
     X, Y = solver_of(arm).forward(q), goal.poses[0]
     try:
-        detour = line_or_detour(arm, q, Y, by=manner.around, deviation=manner.deviation, speed=manner.speed)
+        detour = line_or_detour(arm, q, Y, method=manner.around, deviation=manner.deviation, speed=manner.speed)
     except (PathError, IncapableArmError):
         # No way was found, or none on which the joints could hold the arm up.
         return None
     legs = joined(detour.legs).on_ticks(manner.period) if detour.legs else None
     trajectory = whole_ticks(detour.trajectory, manner.period)
-    taken = detour.by != "line"
+    taken = detour.method != "line"
     corners = [X, Y] if detour.via is None else [X, detour.via, Y]
-    off = 0.0 if legs is None else legs.certificate.deviation
+    deviation = 0.0 if legs is None else legs.certificate.deviation
     return Stage(
         kind="LINE",
         trajectory=trajectory,
         length=_length(np.stack(corners)) if legs else hand_length(arm, trajectory),
         certificate=None if legs is None else legs.certificate,
         # The via pose is as far from the line as any position of the legs that meet in it.
-        deviation=detour.price.distance + (off if taken else 0.0),
+        deviation=detour.price.distance + (deviation if taken else 0.0),
         slowed="" if legs is None else legs.certificate.slowed,
         obstacle=obstacle if taken else None,
         detour=detour if taken else None,

@@ -36,13 +36,13 @@ def derivative(terms: Array, order: int) -> Array:
     return terms
 
 
-def shifted(terms: Array, by: Array) -> Array:
+def shifted(terms: Array, shift: Array) -> Array:
     """Return the coefficients of the same polynomials around places ``by`` (m,)."""
     count = terms.shape[1]
     moved = np.zeros_like(terms)
     for power in range(count):
         for higher in reversed(range(power, count)):
-            moved[:, power] = moved[:, power] * by[:, None] + math.comb(higher, power) * terms[:, higher]
+            moved[:, power] = moved[:, power] * shift[:, None] + math.comb(higher, power) * terms[:, higher]
     return moved
 
 
@@ -141,19 +141,19 @@ def _bernstein(degree: int) -> Array:
 
 def _roots(rows: Array) -> Array:
     """Return points (r, d) of [0, 1] among which are all roots there of the polynomials (r, d + 1) of degree d."""
-    found = np.zeros((len(rows), rows.shape[1] - 1))
-    kept = np.abs(rows) > _FADED
-    degrees = rows.shape[1] - 1 - kept[:, ::-1].argmax(axis=1)
+    roots = np.zeros((len(rows), rows.shape[1] - 1))
+    significant = np.abs(rows) > _FADED
+    degrees = rows.shape[1] - 1 - significant[:, ::-1].argmax(axis=1)
     for degree in np.unique(degrees):
         of = np.flatnonzero(degrees == degree)
         if degree <= 2:
-            found[of, : min(2, found.shape[1])] = _of_parabola(rows[of])[:, : found.shape[1]]
+            roots[of, : min(2, roots.shape[1])] = _of_parabola(rows[of])[:, : roots.shape[1]]
         else:
-            found[of, :degree] = _eigenvalues(rows[of, : degree + 1])
-    found = np.clip(found, 0.0, 1.0)
+            roots[of, :degree] = _eigenvalues(rows[of, : degree + 1])
+    roots = np.clip(roots, 0.0, 1.0)
     for _ in range(_POLISHES if rows.shape[1] > 3 else 0):
-        found = _newton(rows, found)
-    return found
+        roots = _newton(rows, roots)
+    return roots
 
 
 def _of_parabola(rows: Array) -> Array:

@@ -180,22 +180,26 @@ def rounded_move(
             raise InvalidValueError(f"{what}: expected more than 0 m, got {value:g}")
     solver = solver_of(arm)
     together = NEGLIGIBLE if corner is None else max(min(_TOGETHER * corner, _MIDDLE / 2), NEGLIGIBLE)
-    kept = _apart(path.poses, together)
-    if Path(poses=path.poses[kept]).lengths().max() <= NEGLIGIBLE:
+    corners = _apart(path.poses, together)
+    if Path(poses=path.poses[corners]).lengths().max() <= NEGLIGIBLE:
         return Rounded(motion=standstill(solver, q_start, tolerance(deviation if corner is None else corner)))
     check_ends(solver, path, q_start)
     deviation = min(deviation, COARSE[-1])
-    legs = _legs(solver.arm, path, kept, speed)
+    legs = _legs(solver.arm, path, corners, speed)
     allowed = deviation if corner is None else corner
     closer = max(min(deviation, allowed), min(_CLOSER * _NEAREST, allowed)) / _CLOSER
-    off = closer + (together if len(kept) < 1 + (path.lengths() > NEGLIGIBLE).sum() else 0.0)
+    line_deviation = closer + (together if len(corners) < 1 + (path.lengths() > NEGLIGIBLE).sum() else 0.0)
     half = np.minimum(legs.lengths[:-1], legs.lengths[1:]) / 2
     widths = np.minimum(half, np.inf if blend is None else blend)
     if corner is not None:
-        widths = _widths(legs, half, corner, off)
+        widths = _widths(legs, half, corner, line_deviation)
     miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (legs.bend, legs.twist))
-    bound = Tolerance(off + miss, ROTATION_PER_METRE * off + twist) if corner is None else tolerance(corner)
-    task = _Task(arm, path, legs, widths, q_start, deviation, speed, closer, off, bound)
+    bound = (
+        Tolerance(line_deviation + miss, ROTATION_PER_METRE * line_deviation + twist)
+        if corner is None
+        else tolerance(corner)
+    )
+    task = _Task(arm, path, legs, widths, q_start, deviation, speed, closer, line_deviation, bound)
     return _without_stop(task) if corner is None else _never_slower(task)
 
 
@@ -236,38 +240,38 @@ def _apart(poses: Array, together: float) -> list[int]:
     def near(i: int, j: int) -> bool:
         return float(Path(poses=poses[[i, j]]).lengths()[0]) <= together
 
-    kept, last = [0], len(poses) - 1
+    corners, last = [0], len(poses) - 1
     for i in range(1, last):
-        if not near(kept[-1], i):
-            kept.append(i)
-    while len(kept) > 1 and near(kept[-1], last):
-        kept.pop()
-    return [*kept, last]
+        if not near(corners[-1], i):
+            corners.append(i)
+    while len(corners) > 1 and near(corners[-1], last):
+        corners.pop()
+    return [*corners, last]
 
 
-def _legs(arm: Arm, path: Path, kept: list[int], speed: float) -> _Legs:
-    X = path.poses[kept]
+def _legs(arm: Arm, path: Path, corners: list[int], speed: float) -> _Legs:
+    X = path.poses[corners]
     lengths = Path(poses=X).lengths()
     R = X[:, :3, :3]
     rates = np.diff(X[:, :3, 3], axis=0) / lengths[:, None]
     turns = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / lengths[:, None]
     speeds = np.array([report_speed(arm, A[:3, 3], B[:3, 3], speed) for A, B in pairwise(X)])
     bend, twist = (np.linalg.norm(np.diff(each, axis=0), axis=-1) for each in (rates, turns))
-    return _Legs(X, kept, lengths, speeds, bend, twist)
+    return _Legs(X, corners, lengths, speeds, bend, twist)
 
 
-def _widths(legs: _Legs, half: Array, corner: float, off: float) -> Array:
+def _widths(legs: _Legs, half: Array, corner: float, line_deviation: float) -> Array:
     """Return the half-widths (k - 2,) of the widest blends that keep what is asked of corners and of middle thirds.
 
     Args:
         legs: the legs.
         half: (k - 2,) of the shorter leg at each corner.
         corner: how far the hand may be from the legs [m].
-        off: which part of that is spent otherwise [m].
+        line_deviation: which part of that is spent otherwise [m].
     """
     change = np.maximum(legs.bend, legs.twist / ROTATION_PER_METRE)
     with np.errstate(divide="ignore"):
-        widths = np.minimum(half, (1 - _HAIR) * max(corner - off, corner / 2) / (MISS * change))
+        widths = np.minimum(half, (1 - _HAIR) * max(corner - line_deviation, corner / 2) / (MISS * change))
     # From the beginning of a blend of half-width r on, the path leaves its leg as u³ / 4 r² - u⁴ / 16 r³.
     allowed = min(_MIDDLE, _MIDDLE_PART * corner) / 2
     thirds = np.stack([legs.lengths[:-1], legs.lengths[1:]]) / 3
@@ -302,12 +306,14 @@ def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
 def _certificate(task: _Task, widths: Array, tracking: Tracking, run: Timed) -> Certificate:
     """Return what a run keeps of its straight legs."""
     legs = farthest_from_legs(solver_of(task.arm), tracking.trajectory, task.legs.poses[:, :3, 3], task.legs.times)
-    miss, twist = (float((MISS * widths * change).max(initial=0.0)) for change in (task.legs.bend, task.legs.twist))
+    deviation, twist = (
+        float((MISS * widths * change).max(initial=0.0)) for change in (task.legs.bend, task.legs.twist)
+    )
     time = run.when(legs.time) * run.trajectory.duration
     return attrs.evolve(
         certificate_of(task.arm, run.trajectory, tracking.error, task.allowed, time=time),
         # Poses that are passed with others are as near to them.
-        deviation=min(task.off + miss, legs.bound + task.off - task.closer),
+        deviation=min(task.off + deviation, legs.bound + task.off - task.closer),
         deviation_seen=legs.sampled,
         turn=ROTATION_PER_METRE * task.off + twist,
         turn_seen=None,
@@ -323,15 +329,15 @@ def _run(task: _Task, widths: Array, most: float) -> tuple[Tracking, Timed]:
     blends = np.concatenate([[_NO_BLEND], widths / top, [_NO_BLEND]])
     hand = hand_path(legs.poses, times, blends, ends="running", orientation="geodesic")
     close, wide = tolerance(task.closer), tolerance(_CLOSER * task.closer)
-    found = track(
+    tracked = track(
         Task(solver, hand, task.q_start, close, wide, rest=False, max_slowdown=most), hand.first_knots(_STEP, _FEWEST)
     )
-    if isinstance(found, Obstruction):
-        error = path_error(hand, found)
+    if isinstance(tracked, Obstruction):
+        error = path_error(hand, tracked)
         segment = legs.numbers[error.segment + 1] - 1
         raise PathError(error.cause, segment, error.fraction, str(error), joint=error.joint, reason=error.reason)
-    caps = _caps(found.trajectory.times, times, widths / top, legs.speeds / top)
-    return found, timed(solver.arm, found.trajectory, caps)
+    caps = _caps(tracked.trajectory.times, times, widths / top, legs.speeds / top)
+    return tracked, timed(solver.arm, tracked.trajectory, caps)
 
 
 def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
@@ -341,8 +347,8 @@ def _caps(knots: Array, times: Array, widths: Array, speeds: Array) -> Array:
     """
     middles = (knots[1:] + knots[:-1]) / 2
     caps = np.full(len(middles), speeds[0])
-    for at, width, change in zip(times[1:-1], widths, np.diff(speeds), strict=True):
-        h = np.clip((middles - at + width) / (2 * width), 0.0, 1.0)
+    for time, width, change in zip(times[1:-1], widths, np.diff(speeds), strict=True):
+        h = np.clip((middles - time + width) / (2 * width), 0.0, 1.0)
         caps += change * h**2 * (3 - 2 * h)
     return caps
 
@@ -353,10 +359,10 @@ def _inside_efforts(task: _Task, motion: CertifiedMotion) -> CertifiedMotion:
     Raises:
         IncapableArmError: weight alone asks for more than a joint may give.
     """
-    found = slowing_for_efforts(task.arm, motion.trajectory)
-    if found.joint is None:
+    slowdown = slowing_for_efforts(task.arm, motion.trajectory)
+    if slowdown.joint is None:
         return motion
-    return motion.slowed(task.arm, found.factor, ("effort", found.joint))
+    return motion.slowed(task.arm, slowdown.factor, ("effort", slowdown.joint))
 
 
 class _Stops:
@@ -372,8 +378,8 @@ class _Stops:
         task = self._task
         arm = solver_of(task.arm).arm
         limits = arm.limit("speed"), arm.limit("acceleration")
-        q, missed = chain(solver_of(task.arm), task.legs.poses, task.q_start)
-        if missed is not None or not np.isfinite(limits[1]).all():
+        q, failed = chain(solver_of(task.arm), task.legs.poses, task.q_start)
+        if failed is not None or not np.isfinite(limits[1]).all():
             return 0.0
         by_joints = [shortest_trapezoid(way, *limits) for way in np.diff(q, axis=0)]
         return float(np.maximum(task.legs.lengths / task.legs.speeds, by_joints).sum())

@@ -104,12 +104,12 @@ def certified_line(
         return standstill(solver, q, allowed)
     motion = line(A, B, even, near=allowed.position)
     task = Task(solver, motion, q, allowed, allowed, rest=False, clock=partial(_asked_time, even))
-    found = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
-    if isinstance(found, Obstruction):
-        raise path_error(motion, found)
-    check_velocities(task, found)
+    tracked = track(task, _knots(solver.arm, motion, allowed), diagnose=diagnose)
+    if isinstance(tracked, Obstruction):
+        raise path_error(motion, tracked)
+    check_velocities(task, tracked)
     nominal = even / (1 - _RAMP)
-    return fastest(arm, found, allowed, nominal=nominal, period=period, weak=weak)
+    return fastest(arm, tracked, allowed, nominal=nominal, period=period, weak=weak)
 
 
 def coarse_line(

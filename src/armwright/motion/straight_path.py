@@ -115,7 +115,7 @@ class StraightPath:
         come = samples.poses[..., :3, 3] - p_A[:, None]
         square = np.einsum("mi,mi->m", shift, shift)
         along = (come @ shift[:, :, None])[..., 0] / np.where(square > 0, square, 1.0)[:, None]
-        off = np.linalg.norm(come - np.clip(along, 0.0, 1.0)[..., None] * shift[:, None], axis=-1)
+        distance = np.linalg.norm(come - np.clip(along, 0.0, 1.0)[..., None] * shift[:, None], axis=-1)
         planned = self.progress(samples.times)[..., 0] - way[:, None]
         R = samples.poses[..., :3, :3]
         half = half_sines(R_A @ rotated(self.rotations[way], planned), R).max(axis=1)
@@ -123,7 +123,7 @@ class StraightPath:
         between, hand = samples.step**2 / 8, samples.hand
         orientation = half + between * spin_bound(hand, angle * change, angle * rate)
         if not self._by_position:
-            return error_of(samples, off, half, orientation=orientation)
+            return error_of(samples, distance, half, orientation=orientation)
         # Of the position on the line: how fast it can change, from where it is seen, and how far beyond the ends it is.
         hurry = hand.pull / self._length
         rate = np.abs(np.diff(along, axis=1)).max(axis=1) / samples.step + samples.step * hurry
@@ -132,7 +132,7 @@ class StraightPath:
         bound = by_position + between * spin_bound(hand, angle * hurry, angle * rate) + angle * beyond / 2
         return error_of(
             samples,
-            off,
+            distance,
             np.maximum(half, by_position),
             orientation=np.maximum(orientation, bound),
             backward=_backward(along * self._length, between * hand.pull),

@@ -77,7 +77,10 @@ class TimeOptimal:
         before = "" if self.duration_before is None else f" instead of {self.duration_before:.3f} s"
         stops = f", with {self.stops} stops on the way" if self.stops else ""
         lines = [f"{self.trajectory.duration:.3f} s{before}{stops}"]
-        lines += [f"{one.share:.0%} of the time: {one.limit} of {self.arm.called(one.joint)}" for one in self.bindings]
+        lines += [
+            f"{binding.share:.0%} of the time: {binding.limit} of {self.arm.called(binding.joint)}"
+            for binding in self.bindings
+        ]
         return "\n".join(lines)
 
 
@@ -87,7 +90,7 @@ def time_optimal(
     *,
     efforts: bool = True,
     intervals: int = 300,
-    by: SolverName = "armwright",
+    method: SolverName = "armwright",
 ) -> TimeOptimal:
     """Return the fastest run along a path of the joints, from rest to rest, inside all limits.
 
@@ -101,7 +104,7 @@ def time_optimal(
         path: a motion of its n joints; or (k, n) knots to pass through on an X-spline, two at least.
         efforts: whether the limits of the efforts count.
         intervals: of the grid, on all of the path; twice as many come half as near to the shortest time there is.
-        by: who finds the largest s' on the grid: ``armwright``, or ``toppra``, which gives up on some paths.
+        method: who finds the largest s' on the grid: ``armwright``, or ``toppra``, which gives up on some paths.
 
     Returns:
         The motion, what binds it, and its durations. Where the path has a corner, or a given motion jumps in its
@@ -122,17 +125,17 @@ def time_optimal(
         reachability analysis" (2018).
     """
     solver = solver_of(arm)
-    geometry, place = _geometry(solver.arm, path)
+    geometry, locate = _geometry(solver.arm, path)
     intervals = _whole(intervals)
-    one_of("solver", by, get_args(SolverName))
+    one_of("solver", method, get_args(SolverName))
     pieces = pieces_of(solver.arm, geometry)
     _check_path(solver.arm, geometry, efforts=efforts)
     before = path.duration if isinstance(path, Trajectory) else None
-    whole = sum(piece.path.duration for piece in pieces)
+    total = sum(piece.path.duration for piece in pieces)
     runs = []
     for piece in pieces:
-        grid = gridded(solver.arm, piece, math.ceil(intervals * piece.path.duration / whole))
-        runs.append(_composed(grid, fastest(solver, grid, piece.rests, place, efforts=efforts, by=by)))
+        grid = gridded(solver.arm, piece, math.ceil(intervals * piece.path.duration / total))
+        runs.append(_composed(grid, fastest(solver, grid, piece.rests, locate, efforts=efforts, method=method)))
     run = join(runs) if runs else hold(geometry(0.0), 0.0)
     speeds, accelerations = run.peaks(1), run.peaks(2)
     by_acceleration = math.sqrt(float((accelerations / solver.arm.limit("acceleration")).max()))
@@ -208,9 +211,9 @@ def _bindings(solver: Solver, run: Trajectory, *, efforts: bool) -> tuple[Bindin
     uses = np.stack([np.abs(values[name]) / solver.arm.limit(name) for name in values], axis=1)
     flat = uses.reshape(_LOOKS, -1)
     counts = np.bincount(flat.argmax(axis=1)[flat.max(axis=1) >= _BINDS], minlength=flat.shape[1])
-    found = [
+    runs_ = [
         Binding(limit=LIMITS[k // solver.arm.n], joint=int(k % solver.arm.n), share=float(counts[k] / _LOOKS))
         for k in np.argsort(-counts, kind="stable")
         if counts[k]
     ]
-    return tuple(found)
+    return tuple(runs_)

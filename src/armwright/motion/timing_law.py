@@ -193,15 +193,15 @@ def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
     a, b = [np.full((len(lengths), 1), ramp)], [np.zeros((len(lengths), 1))]
     rates, bends = derivative(terms, 1), derivative(terms, 2)
     for part in _PARTS:
-        at = (part * lengths)[:, None]
-        rate, bend = evaluate(rates, at), evaluate(bends, at)
+        length = (part * lengths)[:, None]
+        rate, bend = evaluate(rates, length), evaluate(bends, length)
         # At this part of the segment x has grown by 2 u times the way.
         for on_u, on_x in (
             (0.0, 1 / caps[:, None] ** 2),
             (0.0, (rate / speed) ** 2),
             (rate / acceleration, bend / acceleration),
         ):
-            a.append(on_u + on_x * 2 * at)
+            a.append(on_u + on_x * 2 * length)
             b.append(on_x)
     on_u, on_x = np.concatenate(a, axis=1), np.concatenate(b, axis=1)
     return Bounds(on_u, on_x, np.zeros_like(on_u))
@@ -261,9 +261,9 @@ def _averaged(lengths: Array, speeds: Array, window: float) -> tuple[Array, Arra
     breaks = _apart(np.concatenate([t, t + window]))
     middles = (breaks[1:] + breaks[:-1]) / 2
 
-    def around(at: Array, within: Array) -> Array:
+    def around(length: Array, within: Array) -> Array:
         piece = np.clip(np.searchsorted(begins, within, side="right") - 1, 0, len(integral) - 1)
-        return shifted(integral[piece][..., None], at - begins[piece])[..., 0]
+        return shifted(integral[piece][..., None], length - begins[piece])[..., 0]
 
     ahead, behind = around(breaks[:-1], middles), around(breaks[:-1] - window, middles - window)
     return breaks, (ahead - behind) / window
@@ -289,8 +289,8 @@ def _looked_at(grid: _Grid, breaks: Array, law: Array) -> _Run:
     slopes, curves = derivative(outer, 1), derivative(outer, 2)
     along, speed, acceleration = np.zeros((len(steps), 1)), *np.zeros((2, len(steps), arm.n))
     for part in _SEEN:
-        at = (part * steps)[:, None]
-        s, sd, sdd = evaluate(inner, at), evaluate(rates, at), evaluate(bends, at)
+        length = (part * steps)[:, None]
+        s, sd, sdd = evaluate(inner, length), evaluate(rates, length), evaluate(bends, length)
         slope = evaluate(slopes, s)
         np.maximum(along, sd, out=along)
         np.maximum(speed, np.abs(slope * sd), out=speed)
@@ -308,11 +308,11 @@ def _when(law: Array, steps: Array, knots: Array) -> Array:
     slow, bend, jerk = law[:, 1], law[:, 2], law[:, 3]
     low, high, t = np.zeros(len(knots)), steps, steps / 2
     for _ in range(_HALVINGS):
-        off = ((jerk * t + bend) * t + slow) * t + law[:, 0] - knots
-        low, high = np.where(off < 0, t, low), np.where(off < 0, high, t)
+        residual = ((jerk * t + bend) * t + slow) * t + law[:, 0] - knots
+        low, high = np.where(residual < 0, t, low), np.where(residual < 0, high, t)
         rate = (3 * jerk * t + 2 * bend) * t + slow
         # Newton's step where it stays between the bounds, else a halving.
-        ahead = t - off / np.where(rate > 0, rate, np.inf)
+        ahead = t - residual / np.where(rate > 0, rate, np.inf)
         last, t = t, np.where((ahead >= low) & (ahead <= high) & (rate > 0), ahead, (low + high) / 2)
         if (np.abs(t - last) <= _CONVERGED * steps).all():
             break
@@ -332,8 +332,8 @@ def _binding(joints: int, run: _Run) -> tuple[LimitName, int]:
 def _apart(times: Array) -> Array:
     """Return times in order, without those that follow the one before at no distance; the last one stays."""
     times = np.sort(times)
-    kept = np.diff(times) > _SAME * times[-1]
-    inner = times[1:-1][kept[:-1]]
+    distinct = np.diff(times) > _SAME * times[-1]
+    inner = times[1:-1][distinct[:-1]]
     if len(inner) and times[-1] - inner[-1] <= _SAME * times[-1]:
         inner = inner[:-1]
     return np.concatenate([times[:1], inner, times[-1:]])

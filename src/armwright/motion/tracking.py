@@ -110,19 +110,19 @@ def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking | Obst
         knots: (k,) times to begin with, those at which the motion changes its form among them [s].
         diagnose: whether it is searched for what really stops the arm; not needed where no reason is asked for.
     """
-    found = _refined(task, knots, None)
+    refined = _refined(task, knots, None)
     # A pose that is out of reach is so for every configuration.
-    if isinstance(found, Tracking) or found.cause == "reach" or not diagnose:
-        return found
+    if isinstance(refined, Tracking) or refined.cause == "reach" or not diagnose:
+        return refined
     diagnosis = diagnose_obstruction(
         task.solver, task.motion(knots), knots, task.q_start, task.diagnosis, clock=task.clock
     )
     if diagnosis is None:
-        return found
+        return refined
     obstruction = _diagnosed(task, diagnosis)
     if obstruction is None:
         return _refined(task, knots, diagnosis)
-    return found if obstruction.agrees(found, float(knots[-1])) else obstruction
+    return refined if obstruction.agrees(refined, float(knots[-1])) else obstruction
 
 
 def excess(error: TrackingError, allowed: Tolerance) -> Array:
@@ -187,15 +187,15 @@ def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Ob
     arm, configurations = task.solver.arm, None if guide is None else guide.guide
     for _ in range(_ROUNDS):
         X = task.motion(knots)
-        q, missed = (
+        q, failed = (
             chain(task.solver, X, task.q_start)
             if configurations is None
             else beside(task.solver, X, configurations(knots))
         )
-        q = _whole_turns(arm, q, missed) if task.whole_turns else q
-        obstruction = beyond_limits(arm, q[:missed], knots)
-        if obstruction is None and missed is not None:
-            obstruction = unmet(arm, X[missed], q[missed - 1], float(knots[missed]), float(knots[missed]))
+        q = _whole_turns(arm, q, failed) if task.whole_turns else q
+        obstruction = beyond_limits(arm, q[:failed], knots)
+        if obstruction is None and failed is not None:
+            obstruction = unmet(arm, X[failed], q[failed - 1], float(knots[failed]), float(knots[failed]))
         if obstruction is not None:
             return obstruction
         trajectory = _spline(task, knots, q)
@@ -241,9 +241,9 @@ def _diagnosed(task: Task, diagnosis: Diagnosis) -> Obstruction | None:
     return beyond or diagnosis.obstruction
 
 
-def _whole_turns(arm: Arm, q: Array, missed: int | None) -> Array:
+def _whole_turns(arm: Arm, q: Array, failed: int | None) -> Array:
     """Turn joints by as few whole turns as bring all of their way inside the limits, where any do."""
-    lowest, highest = q[:missed].min(axis=0), q[:missed].max(axis=0)
+    lowest, highest = q[:failed].min(axis=0), q[:failed].max(axis=0)
     least, most = (arm.limit("lower") - lowest) / _TURN, (arm.limit("upper") - highest) / _TURN
     turns = np.where(least > _NONE, np.ceil(least), np.where(most < -_NONE, np.floor(most), 0.0))
     fits = (turns >= least - _NONE) & (turns <= most + _NONE) & [joint.revolute for joint in arm.joints]

@@ -343,9 +343,9 @@ def slowed_together(trajectories: Sequence[Trajectory], duration: float, period:
     least = int(ends[-1])
     if least == 0:
         return list(trajectories)
-    wanted = max(least, _ticks(duration, period))
+    ticks = max(least, _ticks(duration, period))
     # In whole numbers, so that nobody gets less than it has.
-    slow_ends = [(2 * int(end) * wanted + least) // (2 * least) for end in ends]
+    slow_ends = [(2 * int(end) * ticks + least) // (2 * least) for end in ends]
     counts = np.diff([0, *slow_ends])
     return [
         each.retimed(count * period) if count else each

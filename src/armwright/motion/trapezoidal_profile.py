@@ -51,27 +51,27 @@ def trapezoid(
     start, goal = two_ends(q_start, q_goal)
     way = goal - start
     limits = _limits(way, speed, acceleration)
-    asked = None if duration is None else check_duration(duration)
+    requested = None if duration is None else check_duration(duration)
     if limits is None:
-        return hold(start, asked or 0.0)
+        return hold(start, requested or 0.0)
     shortest = _shortest(limits)
-    if asked is None:
-        asked = check_duration(shortest)
-    elif asked < shortest * (1 - _ROUNDING):
-        raise InvalidValueError(_too_short(way, limits, asked, shortest))
+    if requested is None:
+        requested = check_duration(shortest)
+    elif requested < shortest * (1 - _ROUNDING):
+        raise InvalidValueError(_too_short(way, limits, requested, shortest))
     a = limits.acceleration
     # The speed v at which 1 = v (T - v / a), without loss of digits, and the time to reach it.
-    square = asked**2 - 4 / a
-    root = math.sqrt(square) if square > _TRIANGLE * asked**2 else 0.0
-    v = min(2 / (asked + root), limits.speed)
-    rise = min(v / a, asked / 2)
-    times = (0.0, rise, asked - rise, asked)
+    square = requested**2 - 4 / a
+    root = math.sqrt(square) if square > _TRIANGLE * requested**2 else 0.0
+    v = min(2 / (requested + root), limits.speed)
+    rise = min(v / a, requested / 2)
+    times = (0.0, rise, requested - rise, requested)
     risen = a * rise**2 / 2
     profile = np.array([[0, 0, a / 2], [risen, v, 0], [1 - risen, v, -a / 2]])
     coefficients = profile[:, :, None] * way
     coefficients[:, 0] += start
-    if times[2] - times[1] <= _ROUNDING * asked:
-        return Trajectory(times=(0.0, rise, asked), coefficients=coefficients[[0, 2]])
+    if times[2] - times[1] <= _ROUNDING * requested:
+        return Trajectory(times=(0.0, rise, requested), coefficients=coefficients[[0, 2]])
     return Trajectory(times=times, coefficients=coefficients)
 
 
@@ -112,10 +112,10 @@ def _shortest(limits: _Limits) -> float:
     return 1 / v + v / a if v * v < a else 2 / math.sqrt(a)
 
 
-def _too_short(way: Array, limits: _Limits, asked: float, shortest: float) -> str:
+def _too_short(way: Array, limits: _Limits, requested: float, shortest: float) -> str:
     v, a, (fastest, hardest) = limits
     j = fastest if v * v < a else hardest
     return (
-        f"duration: {asked:g} s is too short for joint {j + 1}, whose way of {abs(way[j]):.6g} takes {shortest:.6g} s "
-        f"inside the limits"
+        f"duration: {requested:g} s is too short for joint {j + 1}, whose travel of {abs(way[j]):.6g} takes "
+        f"{shortest:.6g} s inside the limits"
     )

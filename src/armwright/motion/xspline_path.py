@@ -57,8 +57,8 @@ def right_side(slopes: Pair, steps: Pair, a: Scalar, b: Scalar) -> Scalar:
     """Return a P'(t_last) + P'(t) + b P'(t_next) of the parabola with these mean slopes before and after a knot."""
     (slope_last, slope_next), (h_last, h_next) = slopes, steps
     curve = (slope_next - slope_last) / (h_last + h_next)
-    before, at, after = slope_last - h_last * curve, slope_last + h_last * curve, slope_next + h_next * curve
-    return a * before + at + b * after
+    before, middle, after = slope_last - h_last * curve, slope_last + h_last * curve, slope_next + h_next * curve
+    return a * before + middle + b * after
 
 
 def rate_of_knot(knots: Triple, m_last: Scalar, steps: Pair) -> Scalar:
@@ -184,13 +184,13 @@ def xspline_along(
         if not (excess > 1).any():
             return spline
         # A knot asks for more of both steps beside it.
-        asked = np.maximum(np.append(excess, 0.0), np.append(0.0, excess))
-        parts = np.where(asked > 1, np.clip(np.ceil(_CLOSER * np.sqrt(asked)), 2, _PARTS), 1).astype(int)
+        reduction = np.maximum(np.append(excess, 0.0), np.append(0.0, excess))
+        parts = np.where(reduction > 1, np.clip(np.ceil(_CLOSER * np.sqrt(reduction)), 2, _PARTS), 1).astype(int)
         if parts.sum() > _MOST:
             break
         h = np.repeat(np.diff(spline.times) / parts, parts)
-        place = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
-        finer = np.append(np.repeat(spline.times[:-1], parts) + place * h, spline.duration)
+        rank = np.arange(parts.sum()) - np.repeat(np.cumsum(parts) - parts, parts)
+        finer = np.append(np.repeat(spline.times[:-1], parts) + rank * h, spline.duration)
         if not (np.diff(finer) > 0).all():
             break
         spline = xspline(finer, curve(finer), start, end)

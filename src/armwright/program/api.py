@@ -78,7 +78,7 @@ class ProgramError(ArmwrightError, ValueError):
     def __init__(self, compilation: Compilation) -> None:
         """Say the first error, and how many there are."""
         self.compilation = compilation
-        errors = [one for one in compilation.diagnostics if one.is_error]
+        errors = [diagnostic for diagnostic in compilation.diagnostics if diagnostic.is_error]
         first, source = errors[0], compilation.source
         more = f" (and {counted(len(errors) - 1, 'more error')})" if len(errors) > 1 else ""
         super().__init__(f"{source.name}:{source.line(first.span.start)}: {first.code}: {first.message}{more}")

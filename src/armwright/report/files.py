@@ -173,7 +173,7 @@ def _detour(stage: Stage) -> dict[str, Any] | None:
     if obstacle is None or detour is None:
         return None
     return {
-        "method": detour.by,
+        "method": detour.method,
         "via": None if detour.via is None else _numbers(to_noap(detour.via)),
         "obstacle": obstacle.reason,
         "cause": obstacle.cause,

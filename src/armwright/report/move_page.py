@@ -105,7 +105,7 @@ def _stages(planned: PlannedMove) -> Iterator[Stage]:
             peak_effort=np.abs(planned.tau[during]).max(axis=0).tolist(),
             hand_length=float(np.linalg.norm(np.diff(hand, axis=0), axis=-1).sum()),
             deviation=detour.price.distance if detour else move.certificate.deviation if move.certificate else None,
-            note=f"by {detour.by}: {detour.price}" if detour and detour.by != "line" else "",
+            note=f"by {detour.method}: {detour.price}" if detour and detour.method != "line" else "",
         )
 
 

@@ -19,7 +19,7 @@ from armwright.kinematics.inverse_kinematics.revolutions import mid_range
 from armwright.kinematics.inverse_kinematics.solve import inverse
 from armwright.motion.blends import blended, via_deviations
 from armwright.motion.chain import chain
-from armwright.motion.detour import By
+from armwright.motion.detour import DetourMethod
 from armwright.motion.hand_path import HandPath, hand_path, zyz_angles
 from armwright.motion.limit_utilization import limit_use, slowing_for_limits
 from armwright.motion.moves import along, stopping_move
@@ -272,7 +272,7 @@ class DetourRow:
         summary: its cost, or the obstacle without a detour.
     """
 
-    method: By
+    method: DetourMethod
     exists: bool
     summary: str
 
@@ -280,10 +280,10 @@ class DetourRow:
 def detour_table() -> list[DetourRow]:
     """Return the results of both searches for detours of straight lines A B C with stops."""
     rows: list[DetourRow] = []
-    methods: tuple[By, ...] = ("via", "damped")
+    methods: tuple[DetourMethod, ...] = ("via", "damped")
     for method in methods:
         try:
-            move = stopping_move(load_arm("puma560-seed"), study_poses(), by=method)
+            move = stopping_move(load_arm("puma560-seed"), study_poses(), method=method)
         except PathError as error:
             rows.append(DetourRow(method=method, exists=False, summary=str(error)))
         else:

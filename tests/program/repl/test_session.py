@@ -230,7 +230,7 @@ def test_more_must_come(text: str) -> None:
     assert not answer.complete
     assert not answer.diagnostics
     assert everything(talk) == before
-    assert talk.enter(text, whole=True).is_wrong
+    assert talk.enter(text, complete=True).is_wrong
     assert everything(talk) == before
 
 

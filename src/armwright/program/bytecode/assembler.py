@@ -276,8 +276,8 @@ class _Reader:
                 self._fail(f"the program has no {length} characters from {line}:{column} on")
             instructions.append(Instruction(op=op, operands=operands, span=Span(start, start + length), begins=begins))
         procedures = {
-            name: ProcedureCode(start=one.start, parameters=tuple(one.parameters), types=one.types)
-            for name, one in self._procedures.items()
+            name: ProcedureCode(start=procedure.start, parameters=tuple(procedure.parameters), types=procedure.types)
+            for name, procedure in self._procedures.items()
         }
         code = Code(
             instructions=tuple(instructions),

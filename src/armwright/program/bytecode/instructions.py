@@ -260,7 +260,7 @@ class Code:
 def listing(code: Code) -> str:
     """Return the code for people: number, line, operation, operands, remarks; then the constants."""
     width = max(3, *(len(str(code.line(step))) for step in code.instructions))
-    starts = {one.start: name for name, one in code.procedures.items()}
+    starts = {procedure.start: name for name, procedure in code.procedures.items()}
     rows = [f"{'line':>{width + 7}}  op     operands"]
     for at, step in enumerate(code.instructions):
         if at in starts:

@@ -139,7 +139,9 @@ class Verifier:
         self.code, self._rule = code, rule
         self.at, self.entry = 0, Entry(0, Routine.PROGRAM, {})
         self._entries = [self.entry]
-        self._entries += [Entry(one.start, Routine.PROCEDURE, one.types) for one in code.procedures.values()]
+        self._entries += [
+            Entry(procedure.start, Routine.PROCEDURE, procedure.types) for procedure in code.procedures.values()
+        ]
         self._owners: dict[int, Entry] = {}
         self._known: dict[int, State] = {}
         self._types: dict[str, ValueType] = {}

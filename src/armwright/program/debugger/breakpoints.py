@@ -117,15 +117,15 @@ class Watch:
             return f"{name} begins to move with {process.motion.arm}"
         return f"{name} has moved" if before is not None else f"{name} has a value"
 
-    def start(self, view: Machine, *, told: bool) -> None:
+    def start(self, view: Machine, *, reported: bool) -> None:
         """Take what is now for what was.
 
         Args:
             view: the machine as it is seen now.
-            told: whether of the motion that moves it now has been spoken.
+            reported: whether of the motion that moves it now has been spoken.
         """
         self.last = _value(view, self.kept)
-        process = mover(view, self.kept) if told else None
+        process = mover(view, self.kept) if reported else None
         self.told = None if process is None or process.motion is None else (process.path, process.motion.begun.tick)
 
     def rides(self, view: Machine) -> bool:
@@ -136,16 +136,16 @@ class Watch:
         return self.told != (process.path, process.motion.begun.tick)
 
 
-def _value(view: Machine, kept: str) -> "Array | float | None":
-    kind = view.type_of(kept).kind
+def _value(view: Machine, slot: str) -> "Array | float | None":
+    kind = view.type_of(slot).kind
     if kind is VariableKind.FRAME:
-        return view.state.tree.world(kept) if view.has_place(kept) else None
+        return view.state.tree.world(slot) if view.has_place(slot) else None
     if kind is VariableKind.EVENT:
-        return float(view.state.events.get(kept, 0))
-    return view.state.values.get(kept)
+        return float(view.state.events.get(slot, 0))
+    return view.state.values.get(slot)
 
 
-def _same(one: "Array | float | None", other: "Array | float | None") -> bool:
-    if one is None or other is None:
-        return one is other
-    return bool(np.allclose(one, other, rtol=0, atol=_MOVED if isinstance(one, np.ndarray) else 0))
+def _same(value: "Array | float | None", other: "Array | float | None") -> bool:
+    if value is None or other is None:
+        return value is other
+    return bool(np.allclose(value, other, rtol=0, atol=_MOVED if isinstance(value, np.ndarray) else 0))

@@ -12,16 +12,16 @@ from armwright.program.debugger.dap_session import LISTED, EditorSession
 def set_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setBreakpoints``: those of a file, in place of all it had."""
     source = arguments.part("source")
-    asked = arguments.parts("breakpoints")
-    for one in asked:
-        one.whole("line")
+    requests = arguments.parts("breakpoints")
+    for request in requests:
+        request.whole("line")
     if session.launch is not None and not _is_debugged(session, source):
         message = "this is not the program that is debugged"
-        return {"breakpoints": [{"id": session.number(), "verified": False, "message": message} for _ in asked]}
+        return {"breakpoints": [{"id": session.number(), "verified": False, "message": message} for _ in requests]}
     if session.debugger is not None:
         session.debugger.clear(breakpoints=True)
-    session.wanted = [(session.number(), one) for one in asked]
-    return {"breakpoints": [session.bound(*one) for one in session.wanted]}
+    session.wanted = [(session.number(), request) for request in requests]
+    return {"breakpoints": [session.bound(*request) for request in session.wanted]}
 
 
 def _is_debugged(session: EditorSession, source: Arguments) -> bool:
@@ -43,8 +43,8 @@ def breakpoint_locations(session: EditorSession, arguments: Arguments) -> dict[s
     """Answer ``breakpointLocations``: where statements begin."""
     first = arguments.whole("line")
     offset = 1 - session.first_line
-    places = session.live.places(first + offset, arguments.whole("endLine", first) + offset)
-    return {"breakpoints": [session.place(one.span) for one in places]}
+    starts = session.live.places(first + offset, arguments.whole("endLine", first) + offset)
+    return {"breakpoints": [session.place(location.span) for location in starts]}
 
 
 def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -54,18 +54,18 @@ def data_breakpoint_info(session: EditorSession, arguments: Arguments) -> dict[s
     reference = arguments.whole("variablesReference", 0)
     try:
         if reference:
-            shown = next((one for one in _inside(session, reference) if one.name == name), None)
-            kept = None if shown is None else shown.kept
+            shown = next((request for request in _inside(session, reference) if request.name == name), None)
+            slot = None if shown is None else shown.kept
         else:
             frame = arguments.whole("frameId", 0)
             path, level = session.frames[frame - 1] if 0 < frame <= len(session.frames) else ((), 0)
-            kept = debugger.evaluate(name, path, level).kept
+            slot = debugger.evaluate(name, path, level).kept
     except ArmwrightError as error:
         return {"dataId": None, "description": str(error)}
-    if kept is None or debugger.machine.type_of(kept).sizes:
+    if slot is None or debugger.machine.type_of(slot).sizes:
         return {"dataId": None, "description": f"{name} is no frame and no variable"}
-    spelled = debugger.code.spelled(kept)
-    return {"dataId": kept, "description": spelled, "accessTypes": ["write"], "canPersist": "'" not in kept}
+    spelled = debugger.code.spelled(slot)
+    return {"dataId": slot, "description": spelled, "accessTypes": ["write"], "canPersist": "'" not in slot}
 
 
 def _inside(session: EditorSession, reference: int) -> Any:
@@ -78,13 +78,13 @@ def _inside(session: EditorSession, reference: int) -> Any:
 def set_data_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setDataBreakpoints``: all frames and variables that are watched, in place of those before."""
     debugger = session.live
-    asked = [
-        (session.number(), one.text("dataId"), one.text("condition", ""), one.text("hitCondition", ""))
-        for one in arguments.parts("breakpoints")
+    requests = [
+        (session.number(), part.text("dataId"), part.text("condition", ""), part.text("hitCondition", ""))
+        for part in arguments.parts("breakpoints")
     ]
     debugger.clear(watches=True)
-    session.watched = asked
-    return {"breakpoints": [session.watch(*one) for one in asked]}
+    session.watched = requests
+    return {"breakpoints": [session.watch(*request) for request in requests]}
 
 
 def set_exception_breakpoints(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -92,6 +92,6 @@ def set_exception_breakpoints(session: EditorSession, arguments: Arguments) -> d
     filters = arguments.given.get("filters", [])
     if not isinstance(filters, list):
         raise RequestError("filters: expected a list")
-    session.catches = frozenset(str(one) for one in filters)
+    session.catches = frozenset(str(request) for request in filters)
     session.catch()
     return {}

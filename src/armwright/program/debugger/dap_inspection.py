@@ -43,8 +43,8 @@ def stack_trace(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     for level, frame in enumerate(frames):
         if first <= level < first + count:
             session.frames.append((path, level))
-            place = session.place(frame.span)
-            answers.append({"id": len(session.frames), "name": frame.title, "source": session.source(), **place})
+            position = session.place(frame.span)
+            answers.append({"id": len(session.frames), "name": frame.title, "source": session.source(), **position})
     return {"stackFrames": answers, "totalFrames": len(frames)}
 
 
@@ -71,7 +71,7 @@ def variables(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
         inside = ()
     first, count = arguments.whole("start", 0), arguments.whole("count", 0) or _MOST_ELEMENTS
     listed = islice(inside, first, first + count) if not shown.elements else inside[first : first + count]
-    return {"variables": [{"name": one.name, **_variable(session, one, path, level)} for one in listed]}
+    return {"variables": [{"name": variable.name, **_variable(session, variable, path, level)} for variable in listed]}
 
 
 def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
@@ -82,14 +82,14 @@ def evaluate(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     debugger = session.standing
     path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
     text = arguments.text("expression").strip().rstrip(";")
-    given = _ASSIGNMENT.fullmatch(text) if arguments.text("context", "") == "repl" else None
-    if given is None:
+    assignment = _ASSIGNMENT.fullmatch(text) if arguments.text("context", "") == "repl" else None
+    if assignment is None:
         shown = debugger.evaluate(text, path, level)
     else:
-        kept = debugger.evaluate(given[1], path, level).kept
-        if kept is None:
-            raise RequestError(f"`{given[1]}` cannot be given a value; for a comparison write `({text})`")
-        shown = debugger.assign(kept, given[2], path, level)
+        slot = debugger.evaluate(assignment[1], path, level).kept
+        if slot is None:
+            raise RequestError(f"`{assignment[1]}` cannot be given a value; for a comparison write `({text})`")
+        shown = debugger.assign(slot, assignment[2], path, level)
     answer = _variable(session, shown, path, level)
     return {"result": answer.pop("value"), **answer}
 
@@ -102,20 +102,20 @@ def set_variable(session: EditorSession, arguments: Arguments) -> dict[str, Any]
         raise RequestError(f"there is nothing to open under {reference}")
     shown, path, level = session.opened[reference - 1]
     inside: Sequence[Shown] = () if shown.inside is None else shown.inside()
-    found = next((one for one in inside if one.name == name), None)
-    if found is None or found.kept is None:
+    variable = next((row for row in inside if row.name == name), None)
+    if variable is None or variable.kept is None:
         raise RequestError(f"{name} cannot be given a value")
-    return _variable(session, debugger.assign(found.kept, arguments.text("value"), path, level), path, level)
+    return _variable(session, debugger.assign(variable.kept, arguments.text("value"), path, level), path, level)
 
 
 def set_expression(session: EditorSession, arguments: Arguments) -> dict[str, Any]:
     """Answer ``setExpression``: the same for what an expression names."""
     debugger = session.standing
     path, level = _frame(session, arguments) if "frameId" in arguments else ((), 0)
-    kept = debugger.evaluate(arguments.text("expression"), path, level).kept
-    if kept is None:
+    slot = debugger.evaluate(arguments.text("expression"), path, level).kept
+    if slot is None:
         raise RequestError("only variables, frames and elements can be given a value")
-    return _variable(session, debugger.assign(kept, arguments.text("value"), path, level), path, level)
+    return _variable(session, debugger.assign(slot, arguments.text("value"), path, level), path, level)
 
 
 def completions(session: EditorSession, arguments: Arguments) -> dict[str, Any]:

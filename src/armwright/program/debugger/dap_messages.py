@@ -81,13 +81,13 @@ def framed(message: Mapping[str, Any]) -> bytes:
 class Arguments:
     """What a request brings with it."""
 
-    def __init__(self, given: object) -> None:
+    def __init__(self, body: object) -> None:
         """Take the arguments of a request.
 
         Raises:
             RequestError: they are no object.
         """
-        self.given: dict[str, Any] = {} if given is None else _as(given, dict, "arguments", "an object")
+        self.given: dict[str, Any] = {} if body is None else _as(body, dict, "arguments", "an object")
 
     def __contains__(self, key: str) -> bool:
         """Whether something is given, and not null."""
@@ -126,7 +126,7 @@ class Arguments:
         Raises:
             RequestError: it is no list of objects.
         """
-        return [Arguments(one) for one in self._one(key, list, "a list", [])]
+        return [Arguments(item) for item in self._one(key, list, "a list", [])]
 
     def part(self, key: str) -> "Arguments":
         """Return an object.

@@ -124,14 +124,14 @@ class Adapter:
         else:
             self._answer(number, command, body=body)
         after, self._after = self._after, []
-        for one in after:
-            one()
+        for event in after:
+            event()
 
-    def _body(self, command: str, given: object) -> Mapping[str, Any] | None:
+    def _body(self, command: str, arguments: object) -> Mapping[str, Any] | None:
         if command in _LOOKS:
-            return _LOOKS[command](self._session, Arguments(given))
+            return _LOOKS[command](self._session, Arguments(arguments))
         if command in _STEPS:
-            return self._step(command, Arguments(given))
+            return self._step(command, Arguments(arguments))
         own: Mapping[str, Callable[[Arguments], Mapping[str, Any] | None]] = {
             "initialize": self._initialize,
             "launch": self._launch,
@@ -143,7 +143,7 @@ class Adapter:
         }
         if command not in own:
             raise RequestError(f"this debugger knows no request `{command}`")
-        return own[command](Arguments(given))
+        return own[command](Arguments(arguments))
 
     def _initialize(self, arguments: Arguments) -> Mapping[str, Any]:
         self._session.first_line = int(arguments.flag("linesStartAt1", default=True))
@@ -225,7 +225,7 @@ def _unformatted(text: str) -> str:
 
 def _launched(arguments: Arguments) -> Launch:
     standard = str(arguments.given.get("std", Standard.RLO_2.value))
-    if standard not in {one.value for one in Standard}:
+    if standard not in {message.value for message in Standard}:
         raise RequestError(f"std: expected 2 or 83, got {standard!r}")
     return Launch(
         program=regular(Path(arguments.text("program"))),

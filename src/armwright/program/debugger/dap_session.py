@@ -227,7 +227,7 @@ class EditorSession:
                 "threadId": self.thread(stop.path),
                 "allThreadsStopped": True,
                 **({"text": stop.text} if stop.text else {}),
-                **({"hitBreakpointIds": [self.numbers[one] for one in stop.numbers]} if stop.numbers else {}),
+                **({"hitBreakpointIds": [self.numbers[number] for number in stop.numbers]} if stop.numbers else {}),
             },
         )
 
@@ -263,11 +263,11 @@ class EditorSession:
 
     def say(self, text: str, category: str, span: Span | None = None) -> None:
         """Show a text to the user, with the place in the program that it comes from."""
-        place = {} if span is None else {"source": self.source(), **self.place(span, whole=False)}
-        self.send("output", {"category": category, "output": text, **place})
+        position = {} if span is None else {"source": self.source(), **self.place(span, full=False)}
+        self.send("output", {"category": category, "output": text, **position})
 
     def _tell_news(self, debugger: Debugger) -> None:
-        news = excerpt([one for one in debugger.news() if one.kind in {"PRINT", "ERROR"}], ON_A_TERMINAL)
+        news = excerpt([new for new in debugger.news() if new.kind in {"PRINT", "ERROR"}], ON_A_TERMINAL)
         for effect in news.first:
             self._tell(effect)
         if news.left_out:
@@ -284,7 +284,7 @@ class EditorSession:
             self.say(f"recovered: {effect.text}\n", "stderr", effect.span)
 
     def _tell_threads(self, debugger: Debugger) -> None:
-        alive = {self.thread(one.path) for one in debugger.processes}
+        alive = {self.thread(process.path) for process in debugger.processes}
         for number in sorted(alive - self._alive):
             self.send("thread", {"reason": "started", "threadId": number})
         for number in sorted(self._alive - alive):
@@ -304,7 +304,7 @@ class EditorSession:
             RequestError: there is none.
         """
         for path, known in self._threads.items():
-            if known == number and any(one.path == path for one in self.live.processes):
+            if known == number and any(process.path == path for process in self.live.processes):
                 return path
         raise RequestError(f"there is no thread {number}")
 
@@ -320,22 +320,22 @@ class EditorSession:
             return {"name": self.loaded.code.source.name, "sourceReference": LISTED}
         return {"name": self.launch.program.name, "path": str(self.launch.program)}
 
-    def place(self, span: Span, *, whole: bool = True) -> dict[str, int]:
+    def place(self, span: Span, *, full: bool = True) -> dict[str, int]:
         """Return where a stretch of the text is, in the numbers of the editor."""
         assert self.loaded is not None  # noqa: S101 - asked for only with a program
         source = self.loaded.code.source
 
-        def place(offset: int) -> tuple[int, int]:
+        def position(offset: int) -> tuple[int, int]:
             line = source.line(offset)
             # Editors count halves of words, as JavaScript does.
             before = columns(source.text[source.line_starts[line - 1] : offset], UTF_16)
             return line - 1 + self.first_line, before + self.first_column
 
-        line, column = place(span.start)
+        line, column = position(span.start)
         start = {"line": line, "column": column}
-        if not whole:
+        if not full:
             return start
-        line, column = place(span.end)
+        line, column = position(span.end)
         return {**start, "endLine": line, "endColumn": column}
 
     def number(self) -> int:
@@ -348,8 +348,8 @@ class EditorSession:
         if self.debugger is None:
             return
         self.debugger.clear(breakpoints=True)
-        for number, wanted in self.wanted:
-            self.send("breakpoint", {"reason": "changed", "breakpoint": self.bound(number, wanted)})
+        for number, request in self.wanted:
+            self.send("breakpoint", {"reason": "changed", "breakpoint": self.bound(number, request)})
         for watched in self.watched:
             self.watch(*watched)
 
@@ -362,23 +362,23 @@ class EditorSession:
         self.numbers[watch.number] = number
         return {"id": number, "verified": True}
 
-    def bound(self, number: int, wanted: Arguments) -> dict[str, Any]:
+    def bound(self, number: int, request: Arguments) -> dict[str, Any]:
         """Set a breakpoint; return what the editor has to know of it."""
         if self.debugger is None:
             return {"id": number, "verified": False, "message": "no program has been launched"}
-        line, column = wanted.whole("line") - self.first_line + 1, None
-        if "column" in wanted:
+        line, column = request.whole("line") - self.first_line + 1, None
+        if "column" in request:
             source = self.debugger.code.source
             text = source.line_text(line) if 0 < line <= len(source.line_starts) else ""
-            column = PositionCodec(text, UTF_16).offset(0, wanted.whole("column") - self.first_column) + 1
-        found: Breakpoint = self.debugger.break_at(
+            column = PositionCodec(text, UTF_16).offset(0, request.whole("column") - self.first_column) + 1
+        breakpoint_: Breakpoint = self.debugger.break_at(
             line,
             column,
-            condition=wanted.text("condition", "").strip(),
-            hits=wanted.text("hitCondition", "").strip(),
-            log=wanted.text("logMessage", ""),
+            condition=request.text("condition", "").strip(),
+            hits=request.text("hitCondition", "").strip(),
+            log=request.text("logMessage", ""),
         )
-        self.numbers[found.number] = number
-        if found.start is None:
-            return {"id": number, "verified": False, "message": found.message}
-        return {"id": number, "verified": True, "source": self.source(), **self.place(found.start.span)}
+        self.numbers[breakpoint_.number] = number
+        if breakpoint_.start is None:
+            return {"id": number, "verified": False, "message": breakpoint_.message}
+        return {"id": number, "verified": True, "source": self.source(), **self.place(breakpoint_.start.span)}

@@ -13,7 +13,7 @@ from armwright.errors import ArmwrightError
 from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger import variables
 from armwright.program.debugger.breakpoints import Breakpoint, CountError, Watch, counts
-from armwright.program.debugger.execution import Going, Position, Way
+from armwright.program.debugger.execution import Execution, Position, Way
 from armwright.program.debugger.expressions import (
     ExpressionError,
     compute,
@@ -63,7 +63,7 @@ class Debugger:
         """
         self.code = code
         self.stop: Stop | None = None
-        self._going = Going(code, cell, limits)
+        self._going = Execution(code, cell, limits)
         self._way: Way | None = None
         # Where a way back was begun, to return to when it is given up.
         self._origin: Position | None = None
@@ -99,21 +99,21 @@ class Debugger:
         self._standing()
         if self.over and command not in _BACK:
             raise DebuggerError("the program is over")
-        going = self._going
-        self._origin = going.position if command in _BACK else None
+        execution = self._going
+        self._origin = execution.position if command in _BACK else None
         match command:
             case "continue":
-                self._way = going.forward()
+                self._way = execution.forward()
             case "tick":
-                self._way = going.forward(tick=True)
+                self._way = execution.forward(tick=True)
             case "next" | "in" | "out" | "stage":
-                self._way = going.forward(step_of(going.machine, command, path))
+                self._way = execution.forward(step_of(execution.machine, command, path))
             case "back":
-                self._way = going.back(path)
+                self._way = execution.back(path)
             case "tick back":
-                self._way = going.back_one_tick(path)
+                self._way = execution.back_one_tick(path)
             case "reverse":
-                self._way = going.reverse()
+                self._way = execution.reverse()
 
     def work(self, seconds: float = math.inf) -> Stop | None:
         """Do what the run has to do on its way to the next stop.
@@ -174,8 +174,8 @@ class Debugger:
 
     def said(self) -> list[tuple[str, Breakpoint]]:
         """Return what breakpoints have said since this was last asked for."""
-        said, self._going.said = self._going.said, []
-        return said
+        logged, self._going.said = self._going.said, []
+        return logged
 
     def recording(self) -> Recording:
         """Return all that has happened."""
@@ -209,15 +209,17 @@ class Debugger:
                 self._check(condition, hits, self._going.statements.procedure(start.index))
             except (ExpressionError, CountError) as error:
                 start, message = None, str(error)
-        found = Breakpoint(number=self._number(), start=start, condition=condition, hits=hits, log=log, message=message)
-        self._going.breakpoints.append(found)
-        return found
+        result = Breakpoint(
+            number=self._number(), start=start, condition=condition, hits=hits, log=log, message=message
+        )
+        self._going.breakpoints.append(result)
+        return result
 
-    def watch(self, kept: str, *, condition: str = "", hits: str = "") -> Watch:
+    def watch(self, slot: str, *, condition: str = "", hits: str = "") -> Watch:
         """Stop the run when a frame moves or a variable changes.
 
         Args:
-            kept: where it is kept, as ``Shown.kept`` says.
+            slot: where it is kept, as ``Shown.kept`` says.
             condition: an expression that must be true then.
             hits: how often it must have changed.
 
@@ -225,14 +227,14 @@ class Debugger:
             ExpressionError: nothing is kept there, or the condition makes no sense.
             CountError: the count makes no sense.
         """
-        kind = self.machine.type_of(kept)
-        known = kept.partition("[")[0] in {*self.machine.state.types, *self.machine.state.tree}
+        kind = self.machine.type_of(slot)
+        known = slot.partition("[")[0] in {*self.machine.state.types, *self.machine.state.tree}
         if kind.sizes or not known:
-            raise ExpressionError(f"`{kept}` cannot be watched: it is no frame, variable or element")
+            raise ExpressionError(f"`{slot}` cannot be watched: it is no frame, variable or element")
         self._check(condition, hits, None)
-        found = Watch(number=self._number(), kept=kept, condition=condition, hits=hits)
-        self._going.watches.append(found)
-        return found
+        result = Watch(number=self._number(), kept=slot, condition=condition, hits=hits)
+        self._going.watches.append(result)
+        return result
 
     def clear(self, *, breakpoints: bool = False, watches: bool = False) -> None:
         """Forget breakpoints at lines, or watches, or both."""
@@ -243,11 +245,11 @@ class Debugger:
 
     def forget(self, number: int) -> bool:
         """Forget one breakpoint or watch; return whether there was one of that number."""
-        going = self._going
-        before = len(going.breakpoints) + len(going.watches)
-        going.breakpoints = [one for one in going.breakpoints if one.number != number]
-        going.watches = [one for one in going.watches if one.number != number]
-        return len(going.breakpoints) + len(going.watches) < before
+        execution = self._going
+        before = len(execution.breakpoints) + len(execution.watches)
+        execution.breakpoints = [breakpoint_ for breakpoint_ in execution.breakpoints if breakpoint_.number != number]
+        execution.watches = [watch for watch in execution.watches if watch.number != number]
+        return len(execution.breakpoints) + len(execution.watches) < before
 
     @property
     def breakpoints(self) -> Sequence[Breakpoint]:
@@ -262,7 +264,7 @@ class Debugger:
     def catch(self, *, uncaught: bool, caught: bool) -> None:
         """Stop in front of errors: those that end the program, those after which it goes on in a RECOVER."""
         chosen = (("uncaught", uncaught), ("caught", caught))
-        self._going.catches = frozenset(name for name, wanted in chosen if wanted)
+        self._going.catches = frozenset(name for name, chosen_ in chosen if chosen_)
 
     def places(self, first: int, last: int) -> list[Start]:
         """Return the statements that begin in some lines."""
@@ -298,7 +300,7 @@ class Debugger:
     @property
     def processes(self) -> list[Process]:
         """The processes of the program, in the order of the text."""
-        return sorted(self.machine.state.processes, key=lambda one: one.path)
+        return sorted(self.machine.state.processes, key=lambda process: process.path)
 
     def stack(self, path: Path = ()) -> list[Frame]:
         """Return where a process is, the innermost first.
@@ -335,17 +337,17 @@ class Debugger:
             return Shown(name="frames", value="\n".join(variables.frames_text(view)))
         parsed = parse(text, types, self.code)
         process = self._process(path)
-        kept = kept_name(view, process, frame, parsed)
-        if kept is not None:
-            return attrs.evolve(variables.variable(view, kept, name=text), expression=text)
+        slot = kept_name(view, process, frame, parsed)
+        if slot is not None:
+            return attrs.evolve(variables.variable(view, slot, name=text), expression=text)
         kind = "" if parsed.sort is None else parsed.sort.word
         return variables.result(view, text, compute(view, process, frame, parsed), kind)
 
-    def assign(self, kept: str, text: str, path: Path = (), level: int = 0) -> Shown:
+    def assign(self, slot: str, text: str, path: Path = (), level: int = 0) -> Shown:
         """Give a variable or a frame another value; the run goes on with it.
 
         Args:
-            kept: where it is kept.
+            slot: where it is kept.
             text: an expression.
             path: of the process that sees the names in the expression.
             level: of its stack.
@@ -356,26 +358,26 @@ class Debugger:
         """
         self._standing()
         frame, view = self._frame(path, level), self.view
-        kind = view.type_of(kept)
+        kind = view.type_of(slot)
         if kind.sizes or kind.kind is VariableKind.EVENT or self.over:
-            raise ExpressionError(f"`{view.spelled(kept)}` cannot be given a value here")
-        moving = mover(view, kept) if kind.kind is VariableKind.FRAME else None
-        if moving is not None and not is_arm(kept):
-            raise ExpressionError(f"`{view.spelled(kept)}` is being moved; it can be placed when the MOVE is over")
+            raise ExpressionError(f"`{view.spelled(slot)}` cannot be given a value here")
+        moving = mover(view, slot) if kind.kind is VariableKind.FRAME else None
+        if moving is not None and not is_arm(slot):
+            raise ExpressionError(f"`{view.spelled(slot)}` is being moved; it can be placed when the MOVE is over")
         value = value_for(view, self._process(path), frame, text, kind.kind)
 
         def change(machine: Machine) -> None:
             assert not isinstance(value, Element)  # noqa: S101 - elements have been read
             if isinstance(value, np.ndarray) and kind.kind is VariableKind.FRAME:
-                machine.place(process_of(machine, path) or machine.state.program, kept, value, frame.span)
+                machine.place(process_of(machine, path) or machine.state.program, slot, value, frame.span)
             else:
-                machine.state.values[kept] = value
+                machine.state.values[slot] = value
 
         try:
             self._going.timeline.change(change)
         except RunError as error:
             raise ExpressionError(str(error)) from None
-        return variables.variable(self.view, kept)
+        return variables.variable(self.view, slot)
 
     def _process(self, path: Path) -> Process:
         process = process_of(self.machine, path)

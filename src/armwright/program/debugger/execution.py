@@ -11,7 +11,7 @@ from armwright.program.bytecode.instructions import Code
 from armwright.program.debugger.breakpoints import Breakpoint, Watch, counts
 from armwright.program.debugger.expressions import ExpressionError, Parsed, compute, names_at, parse
 from armwright.program.debugger.history import Path, Timeline
-from armwright.program.debugger.snapshot import mover, process_of, seen, stack
+from armwright.program.debugger.snapshot import mover, process_of, sampled, stack
 from armwright.program.debugger.statements import Statements
 from armwright.program.debugger.step_rules import Step
 from armwright.program.debugger.stop_reason import Stop
@@ -28,7 +28,7 @@ Position: TypeAlias = tuple[int, int]
 _IN_BRACES = re.compile(r"\{([^{}]*)\}")
 
 
-class Going:
+class Execution:
     """A run between its stops.
 
     Attributes:
@@ -68,26 +68,26 @@ class Going:
     @property
     def view(self) -> Machine:
         """The machine as it is seen now."""
-        return seen(self.machine, max(self.ticks, self.machine.state.ticks))
+        return sampled(self.machine, max(self.ticks, self.machine.state.ticks))
 
-    def land(self, position: Position, *, passed: bool = True, told: frozenset[int] = frozenset()) -> None:
+    def land(self, position: Position, *, passed: bool = True, reported: frozenset[int] = frozenset()) -> None:
         """Come to a moment that the run has been at.
 
         Args:
             position: the moment.
             passed: whether it is in front of a statement at which the run now stands.
-            told: numbers of the watches that have spoken of the motion of this moment.
+            reported: numbers of the watches that have spoken of the motion of this moment.
         """
         done, self.ticks = position
         self._silent = False
         self.timeline.seek(done)
         self._passed, self._raised = done if passed else -1, -1
-        self._start_watches(told)
+        self._start_watches(reported)
 
-    def _start_watches(self, told: frozenset[int]) -> None:
+    def _start_watches(self, reported: frozenset[int]) -> None:
         view = self.view if self.watches else self.machine
         for watch in self.watches:
-            watch.start(view, told=watch.number in told)
+            watch.start(view, reported=watch.number in reported)
 
     # ---- forwards --------------------------------------------------------------------------------------------------
 
@@ -147,17 +147,21 @@ class Going:
 
     def _arrived(self, process: Process, step: Step | None) -> Stop | None:
         """Return why the run stops in front of a statement; None where it does not."""
-        here = [one for one in self.breakpoints if one.start is not None and one.start.index == process.at]
+        here = [
+            breakpoint_
+            for breakpoint_ in self.breakpoints
+            if breakpoint_.start is not None and breakpoint_.start.index == process.at
+        ]
         numbers, text = [], ""
-        for one in here:
+        for breakpoint_ in here:
             try:
-                met = self._met(one, process)
+                is_due = self._met(breakpoint_, process)
             except ExpressionError as error:
-                met, text = True, f"the condition of this breakpoint has no value: {error}"
-            if met and one.log and not text:
-                self._log(one, process)
-            elif met:
-                numbers.append(one.number)
+                is_due, text = True, f"the condition of this breakpoint has no value: {error}"
+            if is_due and breakpoint_.log and not text:
+                self._log(breakpoint_, process)
+            elif is_due:
+                numbers.append(breakpoint_.number)
         if numbers:
             return Stop(reason="breakpoint", path=process.path, numbers=tuple(numbers), text=text)
         return Stop(reason="step", path=process.path) if step is not None and step.ends(process) else None
@@ -171,10 +175,10 @@ class Going:
     def _holds(self, condition: str, process: Process) -> bool:
         view = self.view
         frame = stack(view, process, self.statements)[0]
-        asked = condition, frame.procedure
-        if asked not in self._conditions:
-            self._conditions[asked] = parse(condition, names_at(view, frame.procedure), view.code)
-        return bool(compute(view, process, frame, self._conditions[asked]))
+        key = condition, frame.procedure
+        if key not in self._conditions:
+            self._conditions[key] = parse(condition, names_at(view, frame.procedure), view.code)
+        return bool(compute(view, process, frame, self._conditions[key]))
 
     def _log(self, breakpoint_: Breakpoint, process: Process) -> None:
         if self._silent:
@@ -214,7 +218,7 @@ class Going:
                 done, path, Stop(reason="exception", text=str(error), diagnostic=error.diagnostic)
             )
         if "caught" in self.catches and self._raised != done:
-            caught = next((one for one in machine.state.effects[effects:] if one.kind == "ERROR"), None)
+            caught = next((effect for effect in machine.state.effects[effects:] if effect.kind == "ERROR"), None)
             if caught is not None:
                 return self._before_error(done, path, Stop(reason="exception", text=caught.text, caught=True))
         self.ticks = max(self.ticks, machine.state.ticks)
@@ -232,8 +236,12 @@ class Going:
         self.timeline.seek(done)
         self._raised = done
         if self.timeline.ready is None:
-            stuck = (one for one in self.machine.state.processes if one.waiting and one.waiting.what != "branches")
-            path = min(one.path for one in stuck)
+            stuck = (
+                process
+                for process in self.machine.state.processes
+                if process.waiting and process.waiting.what != "branches"
+            )
+            path = min(breakpoint_.path for breakpoint_ in stuck)
         return attrs.evolve(stop, path=path)
 
     def _changed(self, path: Path | None) -> Stop | None:
@@ -241,7 +249,7 @@ class Going:
         if not self.watches:
             return None
         # With all arms at rest the table is what one sees.
-        view = self.view if any(mover(self.machine, one.kept) for one in self.watches) else self.machine
+        view = self.view if any(mover(self.machine, watch.kept) for watch in self.watches) else self.machine
         texts, numbers = [], []
         for watch in self.watches:
             text = watch.look(view)
@@ -278,7 +286,7 @@ class Going:
             if done >= limit:
                 continue
             self.timeline.seek(done)
-            found: tuple[Position, Path] | None = None
+            nearest: tuple[Position, Path] | None = None
             while self.timeline.done < limit:
                 yield
                 process = self.timeline.ready
@@ -286,11 +294,11 @@ class Going:
                     own = process.path == path and (len(process.stack) <= depth or now is None)
                     # A branch comes out of the process that began it.
                     if own or (len(process.path) < len(path) and path[: len(process.path)] == process.path):
-                        at = max(process.due or 0, self.machine.state.ticks)
-                        found = (self.timeline.done, at), process.path
+                        due = max(process.due or 0, self.machine.state.ticks)
+                        nearest = (self.timeline.done, due), process.path
                 self.timeline.advance()
-            if found is not None:
-                return self._landed(found[0], Stop(reason="step", path=found[1]))
+            if nearest is not None:
+                return self._landed(nearest[0], Stop(reason="step", path=nearest[1]))
             limit = done
         return self._landed((0, 0), Stop(reason="start"))
 
@@ -324,17 +332,17 @@ class Going:
                 continue
             self.land((done, 0), passed=False)
             self.ticks, self._silent = self.machine.state.ticks, True
-            begun, found = self.position, None
+            begun, nearest = self.position, None
             while self.position < limit:
                 stop = yield from self.forward(until=limit)
                 if self.position < limit:
-                    found = self.position, stop
-            if found is not None:
-                return self._landed(found[0], found[1], passed=found[1].reason != "data breakpoint")
+                    nearest = self.position, stop
+            if nearest is not None:
+                return self._landed(nearest[0], nearest[1], passed=nearest[1].reason != "data breakpoint")
             limit = begun
         return self._landed((0, 0), Stop(reason="start"))
 
     def _landed(self, position: Position, stop: Stop, *, passed: bool = True) -> Stop:
-        self.land(position, passed=passed, told=frozenset(stop.numbers))
+        self.land(position, passed=passed, reported=frozenset(stop.numbers))
         self.timeline.forget()
         return stop

@@ -67,7 +67,7 @@ def parse(text: str, types: Mapping[str, VariableType], code: Code) -> Parsed:
     source = Source("expression", text)
     scanned = scan(source, text)
     _refuse(scanned.found)
-    named = [attrs.evolve(one, kind=TokenKind.NAME) if one.key in types else one for one in scanned.tokens]
+    named = [attrs.evolve(token, kind=TokenKind.NAME) if token.key in types else token for token in scanned.tokens]
     tokens = Tokens(source, named, {})
     try:
         node = expression(tokens)
@@ -136,10 +136,10 @@ def value_for(machine: Machine, process: Process, frame: Frame, text: str, kind:
         ExpressionError: it makes no sense, has no value, or is of another kind.
     """
     parsed = parse(text, names_at(machine, frame.procedure), machine.code)
-    wanted = OF_KIND[kind]
-    if parsed.sort not in FITTING[wanted]:
-        found = "an array" if parsed.sort is None else is_what(parsed.node, parsed.sort)
-        raise ExpressionError(f"expected {wanted.value}, but `{text}` is {found}")
+    expected = OF_KIND[kind]
+    if parsed.sort not in FITTING[expected]:
+        actual = "an array" if parsed.sort is None else is_what(parsed.node, parsed.sort)
+        raise ExpressionError(f"expected {expected.value}, but `{text}` is {actual}")
     return compute(machine, process, frame, parsed)
 
 
@@ -169,13 +169,15 @@ def _worked_out(machine: Machine, process: Process, frame: Frame, parsed: Parsed
     steps = tuple(emitter.instructions)
     here, asking = copy.copy(machine), copy.copy(process)
     here.code = attrs.evolve(machine.code, instructions=steps, constants=tuple(emitter.constants), source=parsed.source)
-    here.constants = [from_noap(one) if isinstance(one, tuple) else float(one) for one in emitter.constants]
+    here.constants = [
+        from_noap(constant) if isinstance(constant, tuple) else float(constant) for constant in emitter.constants
+    ]
     asking.stack = [Activation(kind="condition", bindings=frame.activation.bindings)]
     evaluate_instructions(here, asking, steps)
     return here, asking, operand
 
 
-def _refuse(found: Sequence[Diagnostic]) -> None:
-    for one in found:
-        if one.is_error:
-            raise ExpressionError("; ".join((one.message, *one.helps[:1])))
+def _refuse(actual: Sequence[Diagnostic]) -> None:
+    for diagnostic in actual:
+        if diagnostic.is_error:
+            raise ExpressionError("; ".join((diagnostic.message, *diagnostic.helps[:1])))

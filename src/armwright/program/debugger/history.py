@@ -106,13 +106,13 @@ class Timeline:
         machine, marks = self.machine, self.marks
         self._broken = True
         process = due(machine)
-        at = process.at
+        index = process.at
         if self.arrives(process):
-            marks.visits[at] = marks.visits.get(at, 0) + 1
+            marks.visits[index] = marks.visits.get(index, 0) + 1
         instruction = process.pending is None and process.follows is None
         advance(machine, process)
         if instruction:
-            marks.came[process.path] = at
+            marks.came[process.path] = index
         if process.waiting is not None and process.waiting.what != "branches":
             marks.blocked.add(process.path)
         else:
@@ -126,7 +126,7 @@ class Timeline:
     def seek(self, done: int) -> None:
         """Come to the moment after so many steps, which were done before without an error."""
         if self._broken or not self._moments[-1].done <= self.done <= done:
-            self._restore(next(one for one in reversed(self._moments) if one.done <= done))
+            self._restore(next(moment for moment in reversed(self._moments) if moment.done <= done))
         while self.done < done:
             self.advance()
 
@@ -137,20 +137,20 @@ class Timeline:
             RunError: it cannot be changed so, and is as it was.
         """
         change(self.machine)
-        self._moments = [one for one in self._moments if one.done <= self.done]
-        self._changes = [one for one in self._changes if one[0] <= self.done]
+        self._moments = [moment for moment in self._moments if moment.done <= self.done]
+        self._changes = [change for change in self._changes if change[0] <= self.done]
         self._changes.append((self.done, change))
 
     def forget(self) -> None:
         """Forget changes that were made later than now, and moments that come after one of them."""
-        later = [at for at, _ in self._changes if at > self.done]
-        self._changes = [one for one in self._changes if one[0] <= self.done]
+        later = [index for index, _ in self._changes if index > self.done]
+        self._changes = [change for change in self._changes if change[0] <= self.done]
         if later:
-            self._moments = [one for one in self._moments if one.done <= min(later)]
+            self._moments = [moment for moment in self._moments if moment.done <= min(later)]
 
     def _change(self) -> None:
-        for at, change in self._changes:
-            if at == self.done:
+        for index, change in self._changes:
+            if index == self.done:
                 change(self.machine)
 
     # ---- moments ---------------------------------------------------------------------------------------------------

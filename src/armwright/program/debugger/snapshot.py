@@ -14,7 +14,7 @@ from armwright.program.vm.machine import Machine
 from armwright.program.vm.process import Activation, Process
 
 
-def seen(machine: Machine, ticks: int) -> Machine:
+def sampled(machine: Machine, ticks: int) -> Machine:
     """Return a machine to look at, as things are at a tick; the machine itself stays as it is.
 
     Between the steps of a program its frame table says where an arm was last known to be. What one sees is where
@@ -27,7 +27,7 @@ def seen(machine: Machine, ticks: int) -> Machine:
     view = copy.copy(machine)
     view.state = copy.copy(machine.state)
     view.state.ticks = ticks
-    moving = {one.motion.arm for one in machine.state.processes if one.motion is not None}
+    moving = {process.motion.arm for process in machine.state.processes if process.motion is not None}
     for name, arm in machine.cell.arms.items():
         last = machine.state.runs[name][-1] if machine.state.runs[name] else None
         if name not in moving and (last is None or view.now > last.t0 + last.duration):
@@ -40,7 +40,7 @@ def seen(machine: Machine, ticks: int) -> Machine:
 
 def process_of(machine: Machine, path: Path) -> Process | None:
     """Return a process by its place among the branches; None where it has ended or not begun."""
-    return next((one for one in machine.state.processes if one.path == path), None)
+    return next((process for process in machine.state.processes if process.path == path), None)
 
 
 def mover(machine: Machine, frame: str) -> Process | None:
@@ -49,7 +49,10 @@ def mover(machine: Machine, frame: str) -> Process | None:
         return None
     above = (frame, *machine.state.tree.ancestors(frame))
     arm = next((name for name in above if is_arm(name)), None)
-    return next((one for one in machine.state.processes if one.motion is not None and one.motion.arm == arm), None)
+    return next(
+        (process for process in machine.state.processes if process.motion is not None and process.motion.arm == arm),
+        None,
+    )
 
 
 @attrs.frozen(kw_only=True)

@@ -33,12 +33,12 @@ class Statements:
     def __init__(self, code: Code) -> None:
         """Look at every instruction once."""
         self._code = code
-        self._begins = [at for at, step in enumerate(code.instructions) if step.begins]
-        self._procedures = sorted((one.start, name) for name, one in code.procedures.items())
+        self._begins = [index for index, step in enumerate(code.instructions) if step.begins]
+        self._procedures = sorted((procedure.start, name) for name, procedure in code.procedures.items())
         self.starts = tuple(self._starts())
-        self._by_index = {one.index: one for one in self.starts}
+        self._by_index = {start.index: start for start in self.starts}
         # A line is entered by the first statement in it; a FOR has a second beginning for each further pass.
-        self._by_place = sorted(self.starts, key=lambda one: (one.line, one.span.start, one.index))
+        self._by_place = sorted(self.starts, key=lambda start: (start.line, start.span.start, start.index))
 
     def at(self, index: int) -> Start:
         """Return the statement that an instruction belongs to; behind the last one, the last."""
@@ -56,7 +56,7 @@ class Statements:
 
     def procedure(self, index: int) -> str | None:
         """Return the procedure that an instruction stands in; None for the main program."""
-        at = bisect_right(self._procedures, index, key=lambda one: one[0]) - 1
+        at = bisect_right(self._procedures, index, key=lambda procedure: procedure[0]) - 1
         return self._procedures[at][1] if at >= 0 else None
 
     def find(self, line: int, column: int | None = None) -> Start | None:
@@ -71,19 +71,19 @@ class Statements:
             statement follows.
         """
         source = self._code.source
-        for one in self._by_place:
-            early = column is not None and one.line == line and source.column(one.span.start) < column
-            if one.line >= line and not early:
-                return one
+        for start in self._by_place:
+            early = column is not None and start.line == line and source.column(start.span.start) < column
+            if start.line >= line and not early:
+                return start
         return None
 
     def between(self, first: int, last: int) -> Iterator[Start]:
         """Give the statements that begin in some lines, in the order of the text, each once."""
-        seen = set()
-        for one in self._by_place:
-            if first <= one.line <= last and one.span.start not in seen:
-                seen.add(one.span.start)
-                yield one
+        lines = set()
+        for start in self._by_place:
+            if first <= start.line <= last and start.span.start not in lines:
+                lines.add(start.span.start)
+                yield start
 
     def _starts(self) -> Iterator[Start]:
         instructions, source = self._code.instructions, self._code.source
@@ -91,7 +91,7 @@ class Statements:
         for first, end in zip(self._begins, ends, strict=True):
             group = instructions[first:end]
             own = [group[0], *(step for step in group[1:] if step.op not in _TRAILING)]
-            at = min(step.span.start for step in own)
+            index = min(step.span.start for step in own)
             # A condition or an action of a MOVE lies inside of its statement, and never begins before it.
-            span = Span(at, max(step.span.end for step in own if step.span.start == at))
-            yield Start(index=first, span=span, line=source.line(at))
+            span = Span(index, max(step.span.end for step in own if step.span.start == index))
+            yield Start(index=first, span=span, line=source.line(index))

@@ -58,8 +58,8 @@ def scopes(machine: Machine, process: Process, frame: Frame) -> list[Shown]:
     local = {key: frame.activation.bindings.get(key, key) for key in own if key in frame.activation.bindings}
     values = {key: key for key, kind in machine.code.types.items() if kind.sizes or kind.kind is not VariableKind.FRAME}
     parts: list[tuple[str, Callable[[], Sequence[Shown]]]] = [
-        ("Locals", lambda: [variable(machine, kept, name=machine.spelled(key)) for key, kept in local.items()]),
-        ("Variables", lambda: [variable(machine, kept) for kept in values]),
+        ("Locals", lambda: [variable(machine, slot, name=machine.spelled(key)) for key, slot in local.items()]),
+        ("Variables", lambda: [variable(machine, value) for value in values]),
         ("Frames", lambda: [variable(machine, name) for name in frames(machine)]),
         ("Arms", lambda: [_arm(machine, name) for name in machine.cell.arms]),
         ("Run", lambda: list(_run(machine, process))),
@@ -73,27 +73,27 @@ def frames(machine: Machine) -> list[str]:
     return [name for name in machine.state.tree if name != WORLD and not set(name) & set(".'[")]
 
 
-def variable(machine: Machine, kept: str, *, name: str = "") -> Shown:
+def variable(machine: Machine, slot: str, *, name: str = "") -> Shown:
     """Return a variable, an element, an array or the hand of an arm.
 
     Args:
         machine: as it is seen now.
-        kept: where it is kept.
+        slot: where it is kept.
         name: what to call it; as the program spells it when left out.
     """
-    kind = machine.type_of(kept)
-    called = name or machine.spelled(kept)
+    kind = machine.type_of(slot)
+    called = name or machine.spelled(slot)
     if kind.sizes:
-        return _array(machine, kept, called, kind)
+        return _array(machine, slot, called, kind)
     if kind.kind is VariableKind.EVENT:
-        count = str(machine.state.events.get(kept, 0))
-        return Shown(name=called, value=count, type="EVENT", expression=called, kept=kept)
+        count = str(machine.state.events.get(slot, 0))
+        return Shown(name=called, value=count, type="EVENT", expression=called, kept=slot)
     if kind.kind is VariableKind.FRAME:
-        return _frame(machine, kept, called)
-    value = machine.state.values.get(kept)
+        return _frame(machine, slot, called)
+    value = machine.state.values.get(slot)
     if value is None:
-        return Shown(name=called, value=_NOTHING, type=str(kind), expression=called, kept=kept)
-    return attrs.evolve(result(machine, called, value, str(kind)), expression=called, kept=kept)
+        return Shown(name=called, value=_NOTHING, type=str(kind), expression=called, kept=slot)
+    return attrs.evolve(result(machine, called, value, str(kind)), expression=called, kept=slot)
 
 
 def result(machine: Machine, name: str, value: Value, kind: str) -> Shown:
@@ -123,36 +123,36 @@ def frames_text(machine: Machine) -> list[str]:
 # ---- frames, steps, arrays -----------------------------------------------------------------------------------------
 
 
-def _frame(machine: Machine, kept: str, called: str) -> Shown:
-    if not machine.has_place(kept):
-        return Shown(name=called, value=_NOTHING, type="FRAME", expression=called, kept=kept)
-    parent = machine.state.tree.parent(kept)
+def _frame(machine: Machine, slot: str, called: str) -> Shown:
+    if not machine.has_place(slot):
+        return Shown(name=called, value=_NOTHING, type="FRAME", expression=called, kept=slot)
+    parent = machine.state.tree.parent(slot)
     hangs = "" if parent is None else f" on {_above(machine, parent)}"
     return Shown(
         name=called,
-        value=_matrix(machine, machine.state.tree.world(kept)),
+        value=_matrix(machine, machine.state.tree.world(slot)),
         type=f"FRAME{hangs}",
-        inside=lambda: _inside(machine, kept),
+        inside=lambda: _inside(machine, slot),
         expression=called,
-        kept=kept,
+        kept=slot,
     )
 
 
-def _inside(machine: Machine, kept: str) -> list[Shown]:
-    lines = _columns(machine, machine.state.tree.world(kept))
-    parent = machine.state.tree.parent(kept)
+def _inside(machine: Machine, slot: str) -> list[Shown]:
+    lines = _columns(machine, machine.state.tree.world(slot))
+    parent = machine.state.tree.parent(slot)
     if parent is not None:
         above = _above(machine, parent)
-        X = machine.state.tree.relation(kept, parent)
-        place = variable(machine, parent) if parent != WORLD else None
+        X = machine.state.tree.relation(slot, parent)
+        frame = variable(machine, parent) if parent != WORLD else None
         lines += [
-            Shown(name="parent", value=above, type="FRAME", inside=place.inside if place else None, expression=above),
+            Shown(name="parent", value=above, type="FRAME", inside=frame.inside if frame else None, expression=above),
             attrs.evolve(result(machine, "relation", X, "TRANS"), name="relation"),
         ]
-        if machine.state.tree.nodes[kept].rigid:
+        if machine.state.tree.nodes[slot].rigid:
             lines.append(Shown(name="rigid", value="true"))
-    if kept in machine.state.written:
-        lines.append(Shown(name="set in line", value=str(machine.code.source.line(machine.state.written[kept].start))))
+    if slot in machine.state.written:
+        lines.append(Shown(name="set in line", value=str(machine.code.source.line(machine.state.written[slot].start))))
     return lines
 
 
@@ -164,15 +164,17 @@ def _columns(machine: Machine, X: Array) -> list[Shown]:
     numbers = _numbers(machine, X)
     unit = machine.code.units.length.lower()
     return [
-        Shown(name=column, value=f"({', '.join(numbers[3 * at : 3 * at + 3])})", type=unit if column == "p" else "")
-        for at, column in enumerate(_COLUMNS)
+        Shown(
+            name=column, value=f"({', '.join(numbers[3 * index : 3 * index + 3])})", type=unit if column == "p" else ""
+        )
+        for index, column in enumerate(_COLUMNS)
     ]
 
 
 def _matrix(machine: Machine, X: Array) -> str:
     """Return a place or a step as the program would write it."""
     numbers = _numbers(machine, X)
-    return "(" + ", ".join(",".join(numbers[at : at + 3]) for at in range(0, 12, 3)) + ")"
+    return "(" + ", ".join(",".join(numbers[index : index + 3]) for index in range(0, 12, 3)) + ")"
 
 
 def _numbers(machine: Machine, X: Array) -> list[str]:
@@ -187,32 +189,32 @@ def _place(machine: Machine, name: str) -> str:
     return f"({', '.join(_numbers(machine, machine.state.tree.world(name))[9:])}) {machine.code.units.length.lower()}"
 
 
-def _array(machine: Machine, kept: str, called: str, kind: VariableType) -> Shown:
+def _array(machine: Machine, slot: str, called: str, kind: VariableType) -> Shown:
     count = math.prod(kind.sizes)
     return Shown(
         name=called,
         value=f"{count} elements",
         type=str(kind),
-        inside=lambda: _Elements(machine, kept, called, kind),
+        inside=lambda: _Elements(machine, slot, called, kind),
         elements=count,
         expression=called,
-        kept=kept,
+        kept=slot,
     )
 
 
 class _Elements(Sequence[Shown]):
     """The elements of an array, made when they are looked at: there may be a million."""
 
-    def __init__(self, machine: Machine, kept: str, called: str, kind: VariableType) -> None:
-        self._machine, self._kept, self._called, self._sizes = machine, kept, called, kind.sizes
+    def __init__(self, machine: Machine, slot: str, called: str, kind: VariableType) -> None:
+        self._machine, self._kept, self._called, self._sizes = machine, slot, called, kind.sizes
 
     def __len__(self) -> int:
         return math.prod(self._sizes)
 
-    def __getitem__(self, at: "int | slice") -> "Shown | list[Shown]":  # type: ignore[override]
-        if isinstance(at, slice):
-            return [self._one(one) for one in range(*at.indices(len(self)))]
-        return self._one(range(len(self))[at])
+    def __getitem__(self, index: "int | slice") -> "Shown | list[Shown]":  # type: ignore[override]
+        if isinstance(index, slice):
+            return [self._one(value) for value in range(*index.indices(len(self)))]
+        return self._one(range(len(self))[index])
 
     def _one(self, number: int) -> Shown:
         indices = []
@@ -241,7 +243,7 @@ def _arm(machine: Machine, name: str) -> Shown:
     def inside() -> list[Shown]:
         X_WH = machine.state.tree.world(base_name(name)) @ forward(arm, q)
         holds = machine.state.hands[name].holds
-        force = ", ".join(f"{one:.6g}" for one in machine.hardware.force(name, machine.now).tolist())
+        force = ", ".join(f"{index:.6g}" for index in machine.hardware.force(name, machine.now).tolist())
         return [
             *joints,
             attrs.evolve(result(machine, "hand", X_WH, "FRAME"), name="hand", expression=name, kept=name),
@@ -250,12 +252,14 @@ def _arm(machine: Machine, name: str) -> Shown:
             Shown(name="force", value=f"({force}) N"),
         ]
 
-    return Shown(name=name, value=", ".join(one.value for one in joints), type=arm.name, inside=inside)
+    return Shown(name=name, value=", ".join(joint.value for joint in joints), type=arm.name, inside=inside)
 
 
 def _motion(machine: Machine, arm: str) -> str:
     """Return which stage of which MOVE an arm is in."""
-    motion = next((one.motion for one in machine.state.processes if one.motion and one.motion.arm == arm), None)
+    motion = next(
+        (process.motion for process in machine.state.processes if process.motion and process.motion.arm == arm), None
+    )
     if motion is None:
         return "nothing"
     stage = machine.state.stages[motion.record]

@@ -87,14 +87,14 @@ def _weaker(placed: CellArm, joint: int, effort: float) -> CellArm:
 
 def _known(text: str) -> KnownCell | None:
     """Return the cell that a program is checked against."""
-    told: Mapping[str, list[str]] = {what: names.split(", ") for what, names in _KNOWN.findall(text)}
-    if not told:
+    known: Mapping[str, list[str]] = {what: names.split(", ") for what, names in _KNOWN.findall(text)}
+    if not known:
         return None
     return KnownCell(
-        arms=frozenset(told["arms"]),
-        frames=_hanging(told.get("frames", [])),
-        devices=frozenset(told["devices"]) if "devices" in told else None,
-        visions=frozenset(told["visions"]) if "visions" in told else None,
+        arms=frozenset(known["arms"]),
+        frames=_hanging(known.get("frames", [])),
+        devices=frozenset(known["devices"]) if "devices" in known else None,
+        visions=frozenset(known["visions"]) if "visions" in known else None,
     )
 
 

@@ -37,7 +37,7 @@ class Cure:
     @property
     def what(self) -> str:
         """What was done, such as ``put in `;```."""
-        return " and ".join(dict.fromkeys(_said(fix, self.source) for fix in self.diagnostic.fixes))
+        return " and ".join(dict.fromkeys(_description(fix, self.source) for fix in self.diagnostic.fixes))
 
 
 @attrs.frozen(kw_only=True)
@@ -73,60 +73,71 @@ def fixed(source: Source, translate: Translate, *, rounds: int = ROUNDS) -> Fixe
     cures: list[Cure] = []
     vain: set[tuple[str, str]] = set()
     for _ in range(rounds if "\0" not in source.text else 0):
-        offered = [one for one in now.diagnostics if one.fixes and _line_of(one, now.source) not in vain]
-        wanted = apart(offered)
-        if not wanted:
+        offered = [
+            diagnostic
+            for diagnostic in now.diagnostics
+            if diagnostic.fixes and _line_of(diagnostic, now.source) not in vain
+        ]
+        selected = apart(offered)
+        if not selected:
             break
-        after = translate(_with(now.source, wanted))
-        if not _helps(wanted, now, after):
-            wanted, after = _that_help(wanted, now, translate)
-            vain |= {_line_of(one, now.source) for one in offered if one not in wanted}
-        cures += [Cure(now.source, one) for one in wanted]
+        after = translate(_with(now.source, selected))
+        if not _helps(selected, now, after):
+            selected, after = _that_help(selected, now, translate)
+            vain |= {_line_of(one, now.source) for one in offered if one not in selected}
+        cures += [Cure(now.source, one) for one in selected]
         now = after
     return Fixed(cures=tuple(cures), compilation=now)
 
 
 def apart(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     """Return those whose changes can be made at once: of two that touch, the first."""
-    found: list[Diagnostic] = []
+    diagnostics_: list[Diagnostic] = []
     taken: list[tuple[int, int]] = []
-    for one in sorted(diagnostics, key=lambda one: min(fix.span.start for fix in one.fixes)):
-        own = [(fix.span.start, fix.span.end) for fix in one.fixes]
+    for diagnostic in sorted(diagnostics, key=lambda diagnostic: min(fix.span.start for fix in diagnostic.fixes)):
+        own = [(fix.span.start, fix.span.end) for fix in diagnostic.fixes]
         if not any(_touches(span, taken) for span in own):
-            found.append(one)
+            diagnostics_.append(diagnostic)
             for span in own:
                 insort(taken, span)
-    return found
+    return diagnostics_
 
 
 def _touches(span: tuple[int, int], taken: Sequence[tuple[int, int]]) -> bool:
     """Whether a span touches one of some, which are in order and do not touch one another."""
-    at = bisect_right(taken, span)
-    return (at > 0 and taken[at - 1][1] >= span[0]) or (at < len(taken) and taken[at][0] <= span[1])
+    index = bisect_right(taken, span)
+    return (index > 0 and taken[index - 1][1] >= span[0]) or (index < len(taken) and taken[index][0] <= span[1])
 
 
 def _with(source: Source, diagnostics: Iterable[Diagnostic]) -> Source:
     """Return a program with the changes made that diagnostics offer."""
-    edits = tuple(Edit(fix.span, fix.replacement) for one in diagnostics for fix in one.fixes)
+    edits = tuple(Edit(fix.span, fix.replacement) for diagnostic in diagnostics for fix in diagnostic.fixes)
     return Source(source.name, apply_edits(source.text, edits))
 
 
-def _helps(wanted: Sequence[Diagnostic], before: Compilation, after: Compilation) -> bool:
+def _helps(selected: Sequence[Diagnostic], before: Compilation, after: Compilation) -> bool:
     """Whether changes have made their messages go away, and have brought no other slip of syntax.
 
     What else is said afterwards was hidden by them: what a program does is looked at when its syntax is right, and
     of two slips at one place that can be cured one is told at a time.
     """
-    changes = _Changes(wanted)
-    again = {(one.code, one.message, at) for one in wanted for at in changes.moved(one.span.start)}
-    known = {(one.code, at) for one in before.diagnostics if one.is_syntax for at in changes.moved(one.span.start)} - {
-        (code, at) for code, _, at in again
-    }
-    for one in after.diagnostics:
-        at = one.span.start
-        if (one.code, one.message, at) in again:
+    changes = _Changes(selected)
+    again = {(one.code, one.message, index) for one in selected for index in changes.moved(one.span.start)}
+    known = {
+        (diagnostic.code, index)
+        for diagnostic in before.diagnostics
+        if diagnostic.is_syntax
+        for index in changes.moved(diagnostic.span.start)
+    } - {(code, index) for code, _, index in again}
+    for diagnostic in after.diagnostics:
+        index = diagnostic.span.start
+        if (diagnostic.code, diagnostic.message, index) in again:
             return False
-        if one.is_syntax and (one.code, at) not in known and not (one.fixes and at in changes.ends):
+        if (
+            diagnostic.is_syntax
+            and (diagnostic.code, index) not in known
+            and not (diagnostic.fixes and index in changes.ends)
+        ):
             return False
     return True
 
@@ -134,8 +145,10 @@ def _helps(wanted: Sequence[Diagnostic], before: Compilation, after: Compilation
 class _Changes:
     """How places move when changes are made."""
 
-    def __init__(self, wanted: Iterable[Diagnostic]) -> None:
-        spans = sorted((fix.span.start, fix.span.end, len(fix.replacement)) for one in wanted for fix in one.fixes)
+    def __init__(self, selected: Iterable[Diagnostic]) -> None:
+        spans = sorted(
+            (fix.span.start, fix.span.end, len(fix.replacement)) for diagnostic in selected for fix in diagnostic.fixes
+        )
         self._starts = [start for start, _, _ in spans]
         self._longer = [0, *accumulate(longer - (end - start) for start, end, longer in spans)]
         self.ends = {end + longer for (_, end, _), longer in zip(spans, self._longer[1:], strict=True)}
@@ -147,34 +160,34 @@ class _Changes:
 
 
 def _that_help(
-    wanted: Sequence[Diagnostic], before: Compilation, translate: Translate
+    selected: Sequence[Diagnostic], before: Compilation, translate: Translate
 ) -> tuple[list[Diagnostic], Compilation]:
     """Return the changes that help together, and what becomes of the program.
 
     Few do not as a rule, so that changes are tried many at a time, and half of them where those are too many.
     """
-    found: list[Diagnostic] = []
+    diagnostics_: list[Diagnostic] = []
     after = before
-    waiting = [list(wanted)]
+    waiting = [list(selected)]
     for _ in range(_MOST_TRIALS):
         if not waiting:
             break
         several = waiting.pop()
-        tried = translate(_with(before.source, [*found, *several]))
-        if _helps([*found, *several], before, tried):
-            found, after = [*found, *several], tried
+        tried = translate(_with(before.source, [*diagnostics_, *several]))
+        if _helps([*diagnostics_, *several], before, tried):
+            diagnostics_, after = [*diagnostics_, *several], tried
         elif len(several) > 1:
             half = len(several) // 2
             waiting += [several[half:], several[:half]]
-    return found, after
+    return diagnostics_, after
 
 
-def _line_of(one: Diagnostic, source: Source) -> tuple[str, str]:
+def _line_of(diagnostic: Diagnostic, source: Source) -> tuple[str, str]:
     """Return what a message says and of which line, by which it is known again after other lines have changed."""
-    return one.message, source.line_text(source.line(one.span.start))
+    return diagnostic.message, source.line_text(source.line(diagnostic.span.start))
 
 
-def _said(fix: Fix, source: Source) -> str:
+def _description(fix: Fix, source: Source) -> str:
     old, new = (" ".join(text.split()) for text in (source.slice(fix.span), fix.replacement))
     old, new = (text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..." for text in (old, new))
     if not new:

@@ -29,11 +29,11 @@ def sarif_of(programs: Sequence[tuple[Sequence[Diagnostic], Source, str]]) -> di
     Args:
         programs: of each the diagnostics, the text, and the path as it shall stand in the log.
     """
-    codes = sorted({one.code for diagnostics, _, _ in programs for one in diagnostics})
+    codes = sorted({diagnostic.code for diagnostics, _, _ in programs for diagnostic in diagnostics})
     results = [
-        _result(one, source, PurePath(path).as_posix(), codes)
+        _result(diagnostic, source, PurePath(path).as_posix(), codes)
         for diagnostics, source, path in programs
-        for one in diagnostics
+        for diagnostic in diagnostics
     ]
     return {
         "$schema": "https://json.schemastore.org/sarif-2.1.0.json",

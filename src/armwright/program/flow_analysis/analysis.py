@@ -66,5 +66,5 @@ def check(
     context.follow(*program.statements)
     state.over = False
     context.follow_uncalled()
-    found = [*state.found, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
-    return Flow(arms=state.arms, implied=state.implied), found
+    findings = [*state.found, *concurrency.check(program, symbols, source), *data_races.check(program, symbols)]
+    return Flow(arms=state.arms, implied=state.implied), findings

@@ -43,12 +43,12 @@ class Calling:
         state = self._state
         procedure = state.symbols.procedures.get(node.name.key)
         if procedure is None:
-            need(state, *(one for one in node.arguments if not isinstance(one, tree.Name)))
+            need(state, *(argument for argument in node.arguments if not isinstance(argument, tree.Name)))
             return
         key = procedure.node.name.key
         self._needs(procedure, node)
         plausibility.lengths(state, *node.arguments)
-        deep = len(state.calls) >= _DEEPEST or self._left <= 0 or any(one.name == key for one in state.calls)
+        deep = len(state.calls) >= _DEEPEST or self._left <= 0 or any(call.name == key for call in state.calls)
         if deep or not follow or len(node.arguments) != len(procedure.parameters):
             self.pass_over(key)
             writes = state.writing.called(node, state.now.scope)
@@ -112,11 +112,11 @@ class Calling:
         """Return where a procedure keeps its names; None as the call stands for one that is not known."""
         state = self._state
         self._count += 1
-        given = dict(zip(procedure.parameters, node.arguments, strict=True)) if node else {}
+        arguments = dict(zip(procedure.parameters, node.arguments, strict=True)) if node else {}
         bindings: dict[str, str | None] = {}
         for key, kind in procedure.types.items():
             own = f"{procedure.node.name.key}.{key}'{self._count}"
-            argument = given.get(key)
+            argument = arguments.get(key)
             bindings[key] = own
             if key not in procedure.parameters:
                 state.table.lacks(own)
@@ -146,6 +146,6 @@ class Calling:
     def _leave(self, procedure: ProcedureSymbols, activation: Activation) -> None:
         """Take the procedure's own frames away."""
         for key, kind in procedure.types.items():
-            kept = activation.bindings[key]
-            if kept is not None and "'" in kept and kind is not None and kind.kind is VariableKind.FRAME:
-                self._state.table.drop(kept, array=bool(kind.sizes))
+            slot = activation.bindings[key]
+            if slot is not None and "'" in slot and kind is not None and kind.kind is VariableKind.FRAME:
+                self._state.table.drop(slot, array=bool(kind.sizes))

@@ -25,7 +25,7 @@ def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagn
         symbols: its names.
         source: its text.
     """
-    found = Findings()
+    findings = Findings()
     bodies = [_Body(symbols.scope(None), program.statements)]
     for node in program.procedures:
         procedure = symbols.procedures.get(node.name.key)
@@ -33,28 +33,28 @@ def check(program: tree.Program, symbols: Symbols, source: Source) -> list[Diagn
             bodies.append(_Body(symbols.scope(node.name.key), node.body.statements))
     events = _Events(bodies)
     for _, fork in events.forks:
-        _priorities(found, fork, source)
+        _priorities(findings, fork, source)
     if not events.waits or events.may_halt:
-        return found
-    _never_signalled(found, events)
+        return findings
+    _never_signalled(findings, events)
     groups = [(scope, [branch.body.statements for branch in fork.branches]) for scope, fork in events.forks]
     for scope, branches in [(bodies[0].scope, [program.statements]), *groups]:
-        _deadlock(found, events.sequences(scope, branches), source, main=branches[0] is program.statements)
-    return found
+        _deadlock(findings, events.sequences(scope, branches), source, main=branches[0] is program.statements)
+    return findings
 
 
 # ---- priorities and arms -------------------------------------------------------------------------------------------
 
 
-def _priorities(found: Findings, fork: tree.Cobegin, source: Source) -> None:
+def _priorities(findings: Findings, fork: tree.Cobegin, source: Source) -> None:
     """Warn of branches of equal priority, where it is written."""
-    seen: dict[float, tree.Branch] = {}
+    first_use: dict[float, tree.Branch] = {}
     for branch in fork.branches:
         if branch.priority is None:
             continue
-        first = seen.setdefault(branch.priority.value, branch)
+        first = first_use.setdefault(branch.priority.value, branch)
         if first is not branch:
-            found.say(
+            findings.say(
                 "W502",
                 f"{'both' if len(fork.branches) == 2 else 'two'} branches have priority {branch.priority.text}",
                 branch.head,
@@ -71,12 +71,12 @@ def shared_arms(state: FlowState, branches: Sequence[Uses]) -> None:
         state: for what is found.
         branches: what each branch of one COBEGIN uses.
     """
-    seen: dict[str, Use] = {}
+    first_use: dict[str, Use] = {}
     used = {arm for branch in branches for arm in branch.arms}
     for branch in branches:
         for arm, use in branch.arms.items():
             free = _other(state, used)
-            first = seen.setdefault(arm, use)
+            first = first_use.setdefault(arm, use)
             if first is use:
                 continue
             does = "moved" if first.moves and use.moves else "used"
@@ -129,9 +129,9 @@ class _Events:
         # Events that are given to procedures, so that one cannot see who signals them.
         self.given: set[str] = set()
         for body in bodies:
-            for one in every(body.statements):
-                if isinstance(one, _OF_PROCESSES):
-                    self._take(body.scope, one)
+            for step in every(body.statements):
+                if isinstance(step, _OF_PROCESSES):
+                    self._take(body.scope, step)
         self.may_halt = bool(self.waits) and any(beside for body in bodies for beside in _ends(body))
 
     def _take(self, scope: Scope, node: tree.Statement) -> None:
@@ -146,7 +146,7 @@ class _Events:
         elif isinstance(node, tree.Cobegin):
             self.forks.append((scope, node))
         elif isinstance(node, tree.Call):
-            self.given.update(head(name) for one in node.arguments if (name := written_name(one, scope)))
+            self.given.update(head(name) for argument in node.arguments if (name := written_name(argument, scope)))
 
     def is_signalled(self, name: str) -> bool:
         """Whether something may signal an event, or another element of its array."""
@@ -159,7 +159,9 @@ class _Events:
         waiting = [{step.event for step in several if isinstance(step.node, tree.Wait)} for several in steps]
         names = {step.event for several in steps for step in several}
         own = {
-            name for name in names if self._is_closed(name, scope, here) and sum(name in one for one in waiting) == 1
+            name
+            for name in names
+            if self._is_closed(name, scope, here) and sum(name in statement for statement in waiting) == 1
         }
         return [[step for step in several if step.event in own] for several in steps]
 
@@ -212,24 +214,24 @@ def _ends(body: _Body) -> Iterator[bool]:
             waiting += [(inner, beside or isinstance(node, tree.Cobegin)) for inner in parts(node)]
 
 
-def _never_signalled(found: Findings, events: _Events) -> None:
-    said: set[str] = set()
+def _never_signalled(findings: Findings, events: _Events) -> None:
+    reported: set[str] = set()
     for name, waits in events.waits.items():
         scope, node = waits[0]
         key = head(name).rpartition(".")[2]
         kind, procedure = scope.type(key), scope.procedure
-        given = procedure is not None and scope.is_local(key) and key in procedure.parameters
+        is_parameter = procedure is not None and scope.is_local(key) and key in procedure.parameters
         if (
             kind is None
             or kind.kind is not VariableKind.EVENT
-            or given
+            or is_parameter
             or events.is_signalled(name)
-            or head(name) in said
+            or head(name) in reported
         ):
             continue
-        said.add(head(name))
+        reported.add(head(name))
         declared, text = scope.declared(key), written(node.event)
-        found.say(
+        findings.say(
             "E501",
             f"nothing signals `{text}`, so this WAIT never ends",
             node.span,
@@ -242,10 +244,10 @@ def _never_signalled(found: Findings, events: _Events) -> None:
 # ---- waits that cannot end -----------------------------------------------------------------------------------------
 
 
-def _deadlock(found: Findings, branches: list[list[_Step]], source: Source, *, main: bool) -> None:
+def _deadlock(findings: Findings, branches: list[list[_Step]], source: Source, *, main: bool) -> None:
     """Say which branches wait for one another for ever."""
     reached = _run(branches)
-    stuck = {number: branches[number][at] for number, at in enumerate(reached) if at < len(branches[number])}
+    stuck = {number: branches[number][index] for number, index in enumerate(reached) if index < len(branches[number])}
     if not stuck:
         return
     # Who waits for a branch that is stuck itself: going from one to the next comes back in the end.
@@ -259,11 +261,13 @@ def _deadlock(found: Findings, branches: list[list[_Step]], source: Source, *, m
     while now not in way:
         way[now] = None
         if stuck[now].event not in signals:
-            _too_few(found, stuck[now], branches)
+            _too_few(findings, stuck[now], branches)
             return
         now, _ = signals[stuck[now].event]
     ring = list(way)[list(way).index(now) :]
-    _wait_for_each_other(found, [(stuck[one], signals[stuck[one].event][1]) for one in ring], source, main=main)
+    _wait_for_each_other(
+        findings, [(stuck[statement], signals[stuck[statement].event][1]) for statement in ring], source, main=main
+    )
 
 
 def _run(branches: list[list[_Step]]) -> list[int]:
@@ -290,12 +294,12 @@ def _run(branches: list[list[_Step]]) -> list[int]:
     return reached
 
 
-def _too_few(found: Findings, step: _Step, branches: list[list[_Step]]) -> None:
+def _too_few(findings: Findings, step: _Step, branches: list[list[_Step]]) -> None:
     text = written(step.node.event)
-    nodes = [one.node for several in branches for one in several if one.event == step.event]
+    nodes = [statement.node for several in branches for statement in several if statement.event == step.event]
     signals = [node.span for node in nodes if isinstance(node, tree.Signal)]
     plural = "s" * (len(signals) > 1)
-    found.say(
+    findings.say(
         "E501",
         f"`{text}` is waited for more often than it is signalled",
         step.node.span,
@@ -305,11 +309,11 @@ def _too_few(found: Findings, step: _Step, branches: list[list[_Step]]) -> None:
     )
 
 
-def _wait_for_each_other(found: Findings, ring: list[tuple[_Step, _Step]], source: Source, *, main: bool) -> None:
+def _wait_for_each_other(findings: Findings, ring: list[tuple[_Step, _Step]], source: Source, *, main: bool) -> None:
     """Speak of branches of which each waits for what the next would signal.
 
     Args:
-        found: for what is found.
+        findings: for what is found.
         ring: the WAIT at which each stands, and the SIGNAL that it waits for.
         source: of the program.
         main: whether it is the main program, waiting for itself.
@@ -324,4 +328,4 @@ def _wait_for_each_other(found: Findings, ring: list[tuple[_Step, _Step]], sourc
         1: f"{'the program' if main else 'this branch'} waits for itself for ever",
         2: "these two branches wait for each other for ever",
     }.get(count, f"these {count} branches wait for one another for ever")
-    found.say("E501", message, first.span, first.text, secondary=tuple(others))
+    findings.say("E501", message, first.span, first.text, secondary=tuple(others))

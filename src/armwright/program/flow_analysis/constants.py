@@ -23,16 +23,16 @@ def value(node: tree.Expression, known: Known) -> float | None:
     if not isinstance(node, tree.Binary):
         return known(node)
     first, operations = tree.chain(node)
-    found = value(first, known)
-    for one in operations:
-        calculate, right = _ARITHMETIC.get(one.operation), value(one.right, known)
-        if found is None or right is None or calculate is None:
+    result = value(first, known)
+    for operation in operations:
+        calculate, right = _ARITHMETIC.get(operation.operation), value(operation.right, known)
+        if result is None or right is None or calculate is None:
             return None
         try:
-            found = calculate(found, right)
+            result = calculate(result, right)
         except (ArithmeticError, ValueError):
             return None
-    return found if found is not None and math.isfinite(found) else None
+    return result if result is not None and math.isfinite(result) else None
 
 
 def holds(node: tree.Expression, known: Known) -> bool | None:
@@ -43,18 +43,18 @@ def holds(node: tree.Expression, known: Known) -> bool | None:
     if not isinstance(node, tree.Binary):
         return None
     if node.operation in _RELATIONS:
-        left, right = value(node.left, known), value(node.right, known)
-        return None if left is None or right is None else _RELATIONS[node.operation](left, right)
+        left_value, right = value(node.left, known), value(node.right, known)
+        return None if left_value is None or right is None else _RELATIONS[node.operation](left_value, right)
     first, operations = tree.chain(node)
-    found = holds(first, known)
-    for one in operations:
-        if one.operation not in ("AND", "OR"):
+    result = holds(first, known)
+    for operation in operations:
+        if operation.operation not in ("AND", "OR"):
             return None
         # The right side of AND matters where the left one holds, that of OR where it does not.
-        if found is None or found is (one.operation == "AND"):
-            right = holds(one.right, known)
-            found = right if found is not None or right is not (one.operation == "AND") else None
-    return found
+        if result is None or result is (operation.operation == "AND"):
+            right = holds(operation.right, known)
+            result = right if result is not None or right is not (operation.operation == "AND") else None
+    return result
 
 
 def passes(node: tree.For, known: Known) -> int | None:

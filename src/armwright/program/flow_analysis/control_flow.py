@@ -43,10 +43,10 @@ def if_(context: Context, node: tree.If) -> None:
     chain, otherwise = node.chain
     ways: list[Outcome | None] = []
     with state.perhaps():
-        for one in chain:
-            if one is not node:
-                need(state, one.condition)
-            ways.append(context.path(one.then))
+        for statement in chain:
+            if statement is not node:
+                need(state, statement.condition)
+            ways.append(context.path(statement.then))
         ways.append(context.path(*(() if otherwise is None else (otherwise,))))
     if len(ways) > _MOST_WAYS and any(way is not None for way in ways):
         state.forget(context.writes(node))
@@ -198,8 +198,8 @@ def try_(context: Context, node: tree.Try) -> None:
 
 def _given_at_once(context: Context, statements: Sequence[tree.Statement]) -> Iterator[str]:
     """Give the variables that have a value before anything can fail."""
-    for one in itertools.takewhile(lambda one: isinstance(one, tree.Assign | tree.Print), statements):
-        name = context.state.variable(one.target) if isinstance(one, tree.Assign) else None
+    for link in itertools.takewhile(lambda statement: isinstance(statement, tree.Assign | tree.Print), statements):
+        name = context.state.variable(link.target) if isinstance(link, tree.Assign) else None
         if name is not None and not is_any(name):
             yield name
 

@@ -19,13 +19,13 @@ _ANY = "?"
 
 
 @attrs.frozen
-class _Place:
+class _Location:
     """Where in a branch something is done: the number of the statement, and the outermost loop around it."""
 
     order: int
     loop: int | None
 
-    def may_precede(self, other: "_Place") -> bool:
+    def may_precede(self, other: "_Location") -> bool:
         """Whether it may be done before something else of its branch."""
         return self.order < other.order or (self.loop is not None and self.loop == other.loop)
 
@@ -46,7 +46,7 @@ class _Step:
     scope: Scope
     locked: frozenset[str]
     call: Span | None
-    place: _Place
+    place: _Location
 
 
 @attrs.frozen
@@ -67,7 +67,7 @@ class _Write:
     span: Span
     value: float | None
     locked: bool
-    place: _Place
+    place: _Location
 
 
 @attrs.frozen
@@ -75,27 +75,27 @@ class _Branch:
     """What a branch writes, by name, and the events by which it comes behind others and others behind it."""
 
     writes: dict[str, list[_Write]]
-    signals: list[tuple[str, _Place]]
-    waits: list[tuple[str, _Place]]
+    signals: list[tuple[str, _Location]]
+    waits: list[tuple[str, _Location]]
 
     def leads_to(self, other: "_Branch") -> bool:
         """Whether it signals an event that another waits for."""
-        return any(_alike(one, two) for one, two in self._met(other))
+        return any(_alike(branch, two) for branch, two in self._met(other))
 
     def settles(self, write: _Write, other: "_Branch", later: _Write) -> bool:
         """Whether it signals behind a write what another waits for before its own."""
         return any(
-            _alike(one, two) and write.place.may_precede(one[1]) and two[1].may_precede(later.place)
-            for one, two in self._met(other)
+            _alike(branch, two) and write.place.may_precede(branch[1]) and two[1].may_precede(later.place)
+            for branch, two in self._met(other)
         )
 
-    def _met(self, other: "_Branch") -> "Iterator[tuple[tuple[str, _Place], tuple[str, _Place]]]":
+    def _met(self, other: "_Branch") -> "Iterator[tuple[tuple[str, _Location], tuple[str, _Location]]]":
         return islice(product(self.signals, other.waits), _MOST_PAIRS)
 
 
-def _alike(one: tuple[str, _Place], other: tuple[str, _Place]) -> bool:
+def _alike(branch: tuple[str, _Location], other: tuple[str, _Location]) -> bool:
     """Whether two events may be the same."""
-    names = {one[0], other[0]}
+    names = {branch[0], other[0]}
     any_element = any(name.endswith("[]") for name in names) and len({name.partition("[")[0] for name in names}) == 1
     return _ANY in names or len(names) == 1 or any_element
 
@@ -105,25 +105,25 @@ def check(program: tree.Program, symbols: Symbols) -> list[Diagnostic]:
 
     Branches of which one waits, before its write, for what the other signals behind its own are no danger.
     """
-    found = Findings()
+    findings = Findings()
     bodies = [(symbols.scope(None), program.statements)]
     for node in program.procedures:
         procedure = symbols.procedures.get(node.name.key)
         if procedure is not None and procedure.node is node:
             bodies.append((symbols.scope(node.name.key), node.body.statements))
     for scope, statements in bodies:
-        forks = [one for one in every(statements) if isinstance(one, tree.Cobegin)]
-        inner = {id(one) for fork in forks for one in every(part.body for part in fork.branches)}
+        forks = [branch for branch in every(statements) if isinstance(branch, tree.Cobegin)]
+        inner = {id(branch) for fork in forks for branch in every(part.body for part in fork.branches)}
         for fork in forks:
             if len(fork.branches) <= _MOST_BRANCHES:
                 # Beside a COBEGIN that stands in a branch or a procedure others may be at work.
                 alone = id(fork) not in inner and scope.procedure is None
-                _branches(found, fork, scope, symbols, () if alone else bodies)
-    return found
+                _branches(findings, fork, scope, symbols, () if alone else bodies)
+    return findings
 
 
 def _branches(
-    found: Findings,
+    findings: Findings,
     fork: tree.Cobegin,
     scope: Scope,
     symbols: Symbols,
@@ -135,26 +135,26 @@ def _branches(
         _branch((step for step in _walk(body, own, symbols) if not _is_inside(step.node.span, fork.span)), own)
         for own, body in others
     ]
-    names = dict.fromkeys(name for one in branches for name in one.writes)
+    names = dict.fromkeys(name for branch in branches for name in branch.writes)
     for name in names:
-        writers = [one for one in branches if name in one.writes]
-        values = {write.value for one in writers for write in one.writes[name]}
+        writers = [branch for branch in branches if name in branch.writes]
+        values = {write.value for writer in writers for write in writer.writes[name]}
         if len(writers) < 2 or (len(values) == 1 and None not in values):
             continue
         for pair in combinations(writers, 2):
-            if (met := _unsettled(name, *pair, [*branches, *outside])) is not None:
-                _say(found, *met)
+            if (conflict := _unsettled(name, *pair, [*branches, *outside])) is not None:
+                _say(findings, *conflict)
                 break
 
 
-def _unsettled(name: str, one: _Branch, other: _Branch, all_branches: list[_Branch]) -> tuple[_Write, _Write] | None:
+def _unsettled(name: str, first: _Branch, other: _Branch, all_branches: list[_Branch]) -> tuple[_Write, _Write] | None:
     """Return two writes of two branches of which nobody knows which comes last; None where there are none."""
-    beside = [third for third in all_branches if third is not one and third is not other]
-    if _leads_round(one, other, beside) or _leads_round(other, one, beside):
+    beside = [third for third in all_branches if third is not first and third is not other]
+    if _leads_round(first, other, beside) or _leads_round(other, first, beside):
         return None
-    pairs = product(*(sorted(branch.writes[name], key=lambda write: write.locked) for branch in (one, other)))
+    pairs = product(*(sorted(branch.writes[name], key=lambda write: write.locked) for branch in (first, other)))
     for mine, its in islice(pairs, _MOST_PAIRS):
-        if not ((mine.locked and its.locked) or one.settles(mine, other, its) or other.settles(its, one, mine)):
+        if not ((mine.locked and its.locked) or first.settles(mine, other, its) or other.settles(its, first, mine)):
             return mine, its
     return None
 
@@ -167,9 +167,9 @@ def _leads_round(start: _Branch, end: _Branch, beside: list[_Branch]) -> bool:
     return any(third.leads_to(end) for third in reached)
 
 
-def _say(found: Findings, first: _Write, second: _Write) -> None:
+def _say(findings: Findings, first: _Write, second: _Write) -> None:
     unlocked = second if first.locked else first
-    found.say(
+    findings.say(
         "W503",
         f"`{unlocked.text}` is written in two branches of one COBEGIN without LOCK",
         second.span,
@@ -235,14 +235,14 @@ def _walk(body: Sequence[tree.Statement], scope: Scope, symbols: Symbols) -> Ite
     called: set[str] = set()
     order = 0
     waiting: list[tuple[tree.Statement, Scope, frozenset[str], Span | None, int | None]] = [
-        (one, scope, frozenset(), None, None) for one in reversed(body)
+        (branch, scope, frozenset(), None, None) for branch in reversed(body)
     ]
     while waiting:
         node, own, locked, call, loop = waiting.pop()
         order += 1
-        yield _Step(node, own, locked, call, _Place(order, loop))
+        yield _Step(node, own, locked, call, _Location(order, loop))
         if isinstance(node, tree.Lock):
-            locked |= {name for one in node.targets if (name := written_name(one, own)) is not None}
+            locked |= {name for target in node.targets if (name := written_name(target, own)) is not None}
         if loop is None and isinstance(node, tree.While | tree.Repeat | tree.For):
             loop = order
         # A COBEGIN inside has branches of its own, which are looked at there.
@@ -251,5 +251,5 @@ def _walk(body: Sequence[tree.Statement], scope: Scope, symbols: Symbols) -> Ite
             called.add(node.name.key)
             procedure = symbols.procedures.get(node.name.key)
             if procedure is not None:
-                seen, site = symbols.scope(node.name.key), call or node.span
-                waiting += [(inner, seen, locked, site, loop) for inner in reversed(procedure.node.body.statements)]
+                callee, site = symbols.scope(node.name.key), call or node.span
+                waiting += [(inner, callee, locked, site, loop) for inner in reversed(procedure.node.body.statements)]

@@ -56,13 +56,13 @@ def _need_variable(state: FlowState, node: tree.Name | tree.Index) -> None:
         return
     head = node.name if isinstance(node, tree.Index) else node
     scope, kind = state.now.scope, _kind(state, node)
-    kept = state.bound(head.key)
-    if kept is None or kind is None or scope.is_poisoned(head.key) or not state.settle(kept):
+    slot = state.bound(head.key)
+    if slot is None or kind is None or scope.is_poisoned(head.key) or not state.settle(slot):
         return
     declared = scope.declared(head.key)
     secondary = (Label(declared.span, "declared here"),) if declared else ()
     if kind is VariableKind.FRAME:
-        _no_place(state, node, secondary, from_cell=kept == head.key and head is node)
+        _no_place(state, node, secondary, from_cell=slot == head.key and head is node)
         return
     state.say(
         "E303",

@@ -6,7 +6,7 @@ from armwright.errors import closest
 from armwright.program.flow_analysis.context import Step, of_state
 from armwright.program.flow_analysis.definite_assignment import need, need_indices
 from armwright.program.flow_analysis.facts import UNKNOWN
-from armwright.program.flow_analysis.frames import place
+from armwright.program.flow_analysis.frames import set_pose
 from armwright.program.flow_analysis.state import LAST, FlowState
 from armwright.program.language.diagnostic import Label, Severity
 from armwright.program.language.names import is_arm
@@ -76,7 +76,7 @@ def read_system(state: FlowState, node: tree.ReadSystem) -> None:
         state.mention(node.arm)
         state.use(node.arm.key, node.span)
         # They may find the arm elsewhere, and with it what hangs on it.
-        state.table.displace(node.arm.key, by=node.arm.key)
+        state.table.displace(node.arm.key, mover=node.arm.key)
 
 
 def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
@@ -103,7 +103,7 @@ def read_visions(state: FlowState, node: tree.ReadVisions) -> None:
                 helps=(f"did you mean `{near}`?",) if near else (),
                 severity=Severity.WARNING,
             )
-        place(state, frame, target, node.span)
+        set_pose(state, frame, target, node.span)
 
 
 def operate(state: FlowState, node: tree.Operate) -> None:

@@ -88,28 +88,28 @@ ANY_HAND = GripperState(doubtful=True, at=UNKNOWN)
 ANY_GRIP = Grip(UNKNOWN)
 
 
-def joined_links(one: Link | None, other: Link | None) -> Link | None:
+def joined_links(link: Link | None, other: Link | None) -> Link | None:
     """Return what holds of an affixment where two ways meet."""
-    if one == other:
-        return one
-    if one is None or other is None or (one.parent, one.rigid) != (other.parent, other.rigid):
+    if link == other:
+        return link
+    if link is None or other is None or (link.parent, link.rigid) != (other.parent, other.rigid):
         return ANY_LINK
-    return one
+    return link
 
 
-def joined_hands(one: GripperState, other: GripperState) -> GripperState:
+def joined_hands(link: GripperState, other: GripperState) -> GripperState:
     """Return what holds of a hand where two ways meet."""
-    if one == other:
-        return one
+    if link == other:
+        return link
     return GripperState(
-        open=same(one.open, other.open),
-        doubtful=one.doubtful or other.doubtful or one.open != other.open,
-        at=one.at if one.at == other.at else UNKNOWN,
+        open=same(link.open, other.open),
+        doubtful=link.doubtful or other.doubtful or link.open != other.open,
+        at=link.at if link.at == other.at else UNKNOWN,
     )
 
 
-def joined_grips(one: Grip | None, other: Grip | None) -> Grip | None:
+def joined_grips(link: Grip | None, other: Grip | None) -> Grip | None:
     """Return what holds of what a hand holds where two ways meet."""
-    if one is None or other is None or one.frame != other.frame:
-        return one if one == other else ANY_GRIP
-    return one
+    if link is None or other is None or link.frame != other.frame:
+        return link if link == other else ANY_GRIP
+    return link

@@ -21,7 +21,7 @@ from armwright.program.flow_analysis.facts import (
     joined_links,
 )
 from armwright.program.flow_analysis.lattice import Facts, FactTable, either, same
-from armwright.program.flow_analysis.poses import HERE, Place, after, inverse
+from armwright.program.flow_analysis.poses import HERE, Pose, after, inverse
 from armwright.program.language.names import is_any, is_arm
 from armwright.program.language.source import Span
 from armwright.program.semantics.cell_symbols import STATION, WORLD, KnownCell
@@ -54,7 +54,7 @@ class FrameState:
         )
         self.parting: Divergence | None = None
         # Where frames stand, seen from what they hang on.
-        self._steps: FactTable[Place | None] = FactTable(facts, default=None, unknown=None, joined=same)
+        self._steps: FactTable[Pose | None] = FactTable(facts, default=None, unknown=None, joined=same)
         self.assigned: FactTable[Assignment | None] = FactTable(facts, default=None, unknown=None, joined=same)
         self.hands = FactTable(facts, default=GripperState(), unknown=ANY_HAND, joined=joined_hands, group=HANDS)
         self.grips: FactTable[Grip | None] = FactTable(
@@ -123,23 +123,23 @@ class FrameState:
             return UNKNOWN
         return next((arm for arm, frame in grips.items() if frame == name), None)
 
-    def where(self, name: str) -> Place | None:
+    def where(self, name: str) -> Pose | None:
         """Return where a frame stands in WORLD; None where that is not certain, or up a long way."""
-        found: Place | None = HERE
+        pose: Pose | None = HERE
         for _ in range(_LONGEST_WAY):
-            if name == WORLD or found is None:
-                return found
+            if name == WORLD or pose is None:
+                return pose
             if is_any(name) or is_arm(name) or (step := self._steps[name]) is None:
                 return None
-            found, link = after(step, found), self.links[name]
+            pose, link = after(step, pose), self.links[name]
             if link is None:
-                return found
+                return pose
             if link.parent is None:
                 return None
             name = link.parent
         return None
 
-    def step(self, child: str, parent: str) -> Place | None:
+    def step(self, child: str, parent: str) -> Pose | None:
         """Return the step from one frame to another; None where that is not certain."""
         there, here = self.where(child), self.where(parent)
         return None if there is None or here is None else after(inverse(here), there)
@@ -161,7 +161,7 @@ class FrameState:
         self.sure.put(name, False)
 
     def hang(
-        self, child: str, parent: str, span: Span | None, *, rigid: bool = False, step: Place | None = None
+        self, child: str, parent: str, span: Span | None, *, rigid: bool = False, step: Pose | None = None
     ) -> None:
         """Hang a frame on another, at a step from it where that is certain."""
         if is_any(child):
@@ -183,13 +183,13 @@ class FrameState:
             self.links.put(child, None)
             self._steps.put(child, stands)
 
-    def stand(self, name: str, place: Place | None) -> None:
+    def stand(self, name: str, pose: Pose | None) -> None:
         """Take note of where a frame has been put, in WORLD; not where putting one may move others."""
         link = None if is_any(name) else self.links[name]
-        if is_any(name) or place is None or self._rigid or (link is not None and link.parent is None):
+        if is_any(name) or pose is None or self._rigid or (link is not None and link.parent is None):
             return
         above = HERE if link is None or link.parent is None else self.where(link.parent)
-        self._steps.put(name, None if above is None else after(inverse(above), place))
+        self._steps.put(name, None if above is None else after(inverse(above), pose))
 
     def assign(self, name: str, span: Span) -> None:
         """Give a frame a value, and thereby another place."""
@@ -207,47 +207,49 @@ class FrameState:
         else:
             self.displace(leader)
 
-    def displace(self, name: str, by: str | None = None) -> None:
+    def displace(self, name: str, mover: str | None = None) -> None:
         """Put a frame elsewhere; what hangs on it follows, and no hand stands at it or holds it any more.
 
         Args:
             name: the frame, or the arm that carries what hangs on it.
-            by: the arm that did it, if one did: what it carries goes along with its own hand.
+            mover: the arm that did it, if one did: what it carries goes along with its own hand.
         """
         for arm, hand in self.hands.items():
-            if arm != by and (at := self._left(hand.at, name)) != hand.at:
-                self.hands.put(arm, attrs.evolve(hand, at=at, arrival=None))
+            if arm != mover and (frame := self._left(hand.at, name)) != hand.at:
+                self.hands.put(arm, attrs.evolve(hand, at=frame, arrival=None))
         for arm, grip in self.grips.items():
-            if arm != by and grip is not None:
+            if arm != mover and grip is not None:
                 self._hold(arm, grip, self._left(grip.frame, name))
 
-    def arrive(self, arm: str, at: str | None, by: Span | None) -> None:
+    def arrive(self, arm: str, frame: str | None, mover: Span | None) -> None:
         """Move a hand and all that it carries.
 
         Args:
             arm: the arm.
-            at: the frame to which it has come, or that it has taken there; UNKNOWN when one cannot know.
-            by: the MOVE if it moved the arm itself.
+            frame: the frame to which it has come, or that it has taken there; UNKNOWN when one cannot know.
+            mover: the MOVE if it moved the arm itself.
         """
-        self.displace(arm, by=arm)
+        self.displace(arm, mover=arm)
         hand, grip = self.hands[arm], self.grips[arm]
-        if grip is not None and grip.frame not in (UNKNOWN, at):
-            gone = UNKNOWN if at == UNKNOWN else None
+        if grip is not None and grip.frame not in (UNKNOWN, frame):
+            gone = UNKNOWN if frame == UNKNOWN else None
             self._hold(arm, grip, {True: grip.frame, False: gone, None: UNKNOWN}[self._on(grip.frame, arm)])
-        if by and at not in (None, UNKNOWN) and (along := self._on(at, arm)) is not False:
+        if mover and frame not in (None, UNKNOWN) and (along := self._on(frame, arm)) is not False:
             # The goal has gone along: the hand stands only at what it stood at before and has taken with it.
-            at, by = (self._taken(hand.at, arm) if along else UNKNOWN), None
-        elif at not in (None, UNKNOWN) and not self._steady(at):
-            at = UNKNOWN
-        arrival = None if hand.doubtful or at == UNKNOWN else by
-        self.hands.put(arm, attrs.evolve(hand, at=at, arrival=arrival, arrived_open=hand.open, opened=None))
+            frame, mover = (self._taken(hand.at, arm) if along else UNKNOWN), None
+        elif frame not in (None, UNKNOWN) and not self._steady(frame):
+            frame = UNKNOWN
+        arrival = None if hand.doubtful or frame == UNKNOWN else mover
+        self.hands.put(arm, attrs.evolve(hand, at=frame, arrival=arrival, arrived_open=hand.open, opened=None))
 
     def open(self, arm: str, span: Span) -> None:
         """Open the fingers."""
         grip = self.grips[arm]
-        held = None if grip is None or grip.frame == UNKNOWN else grip.frame
-        left = None if held is None or (link := self.links[held]) is None or link.parent != arm else (held, span)
-        self.hands.put(arm, attrs.evolve(self.hands[arm], open=True, doubtful=False, opened=span, left=left))
+        grasped = None if grip is None or grip.frame == UNKNOWN else grip.frame
+        released = (
+            None if grasped is None or (link := self.links[grasped]) is None or link.parent != arm else (grasped, span)
+        )
+        self.hands.put(arm, attrs.evolve(self.hands[arm], open=True, doubtful=False, opened=span, left=released))
         self.grips.put(arm, None)
 
     def close(self, arm: str, span: Span) -> None:
@@ -312,27 +314,27 @@ class FrameState:
 
     # ---- inside ----------------------------------------------------------------------------------------------------
 
-    def _joined_sure(self, one: Divergence | bool, other: Divergence | bool) -> Divergence | bool:  # noqa: FBT001 - two values
-        if one == other:
-            return one
-        return next((each for each in (one, other) if isinstance(each, Divergence)), self.parting or True)
+    def _joined_sure(self, first: Divergence | bool, other: Divergence | bool) -> Divergence | bool:  # noqa: FBT001 - two values
+        if first == other:
+            return first
+        return next((each for each in (first, other) if isinstance(each, Divergence)), self.parting or True)
 
     def _hold(self, arm: str, grip: Grip, frame: str | None) -> None:
         """Let a hand hold something else than before, or nothing, or nobody knows what."""
         if frame != grip.frame:
             self.grips.put(arm, attrs.evolve(grip, frame=frame) if frame is not None else None)
 
-    def _taken(self, at: str | None, arm: str) -> str | None:
+    def _taken(self, frame: str | None, arm: str) -> str | None:
         """Return where a hand stands that stood at ``at`` and has taken along what hangs on it."""
-        if at is None or at == UNKNOWN:
-            return at
-        return {True: at, False: None, None: UNKNOWN}[self._on(at, arm)]
+        if frame is None or frame == UNKNOWN:
+            return frame
+        return {True: frame, False: None, None: UNKNOWN}[self._on(frame, arm)]
 
-    def _left(self, held: str | None, moved: str) -> str | None:
+    def _left(self, grasped: str | None, moved: str) -> str | None:
         """Return where a hand stands, or what it holds, after ``moved`` was put elsewhere."""
-        if held is None or held == UNKNOWN:
-            return held
-        return {True: None, False: held, None: UNKNOWN}[self._on(held, moved)]
+        if grasped is None or grasped == UNKNOWN:
+            return grasped
+        return {True: None, False: grasped, None: UNKNOWN}[self._on(grasped, moved)]
 
     def _on(self, name: str, above: str) -> bool | None:
         """Whether a frame is another or hangs on it; None when one cannot know."""
@@ -345,9 +347,9 @@ class FrameState:
         facts = self._facts
         if not facts.shaky:
             return True
-        if any(one.places for one in facts.shaky) or self.unknown(name):
+        if any(first.places for first in facts.shaky) or self.unknown(name):
             return False
-        return not any(facts.is_shaky(one) for one in (name, *self.above(name)))
+        return not any(facts.is_shaky(first) for first in (name, *self.above(name)))
 
     def _watch(self, link: Link | None, change: int) -> None:
         if link is not None and link.parent is None:

@@ -24,7 +24,7 @@ def assign(state: FlowState, node: tree.Assign) -> None:
     if frame is not None:
         plausibility.lengths(state, node.value)
         stands = poses.certain(state, node.value)
-        place(state, frame, target, node.span)
+        set_pose(state, frame, target, node.span)
         state.table.stand(frame, stands)
         plausibility.placed(state, frame, node.value)
         return
@@ -38,7 +38,7 @@ def assign(state: FlowState, node: tree.Assign) -> None:
             state.steps.put(name, step)
 
 
-def place(state: FlowState, frame: str, node: tree.Expression, span: Span) -> None:
+def set_pose(state: FlowState, frame: str, node: tree.Expression, span: Span) -> None:
     """Give a frame another place; say that nothing can, where it hangs rigidly on what no value moves."""
     if is_arm(frame) or frame == WORLD:
         return
@@ -111,12 +111,12 @@ def leaves(state: FlowState, child: str, parent: str, span: Span) -> None:
     )
 
 
-def _may_be(state: FlowState, one: str, other: str) -> bool:
+def _may_be(state: FlowState, name: str, other: str) -> bool:
     """Whether two different names may be names of one frame: parameters of a call of which nothing is known."""
-    if is_any(one) or is_any(other):
+    if is_any(name) or is_any(other):
         return True
     alias = state.facts.may_be_another
-    return (alias(one) and not is_arm(one)) or (alias(other) and not is_arm(other))
+    return (alias(name) and not is_arm(name)) or (alias(other) and not is_arm(other))
 
 
 def _ring(state: FlowState, node: tree.Affix, child: str, parent: str) -> None:

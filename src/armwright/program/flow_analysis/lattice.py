@@ -73,11 +73,11 @@ class Facts:
 
     def is_shaky(self, name: str) -> bool:
         """Whether others may change something of a name at any time."""
-        return any(one.covers(name) for one in self.shaky)
+        return any(value.covers(name) for value in self.shaky)
 
     def may_be_another(self, name: str) -> bool:
         """Whether a name may be another name of something else."""
-        return any(one.aliases and one.covers(name) for one in self.shaky)
+        return any(value.aliases and value.covers(name) for value in self.shaky)
 
     # ---- ways that part and meet -----------------------------------------------------------------------------------
 
@@ -113,7 +113,7 @@ class Facts:
             together: whether all of them were gone, side by side, and not one of them.
         """
         joined: list[tuple[FactTable[Any], str, Any]] = []
-        for book, key in dict.fromkeys(place for outcome in outcomes for place in outcome.changed):
+        for book, key in dict.fromkeys(entry for outcome in outcomes for entry in outcome.changed):
             values = [
                 outcome.changed[book, key] if (book, key) in outcome.changed else book.under(key, outcome.wipes)
                 for outcome in outcomes
@@ -203,11 +203,11 @@ class FactTable(Generic[V]):
             self._entries[key] = new
 
 
-def same(one: V | None, other: V | None) -> V | None:
+def same(value: V | None, other: V | None) -> V | None:
     """Return what both ways agree on; None where they differ."""
-    return one if one == other else None
+    return value if value == other else None
 
 
-def either(one: bool, other: bool) -> bool:  # noqa: FBT001 - two values of one kind
+def either(value: bool, other: bool) -> bool:  # noqa: FBT001 - two values of one kind
     """Whether something may be so on one of two ways."""
-    return one or other
+    return value or other

@@ -52,8 +52,8 @@ def _begin(state: FlowState, node: tree.Move) -> str | None:
     else:
         arm, implied = _carrier(state, node, moved)
     state.record(node, arm, implied=implied)
-    need(state, *_places(node))
-    plausibility.lengths(state, *_places(node))
+    need(state, *_targets(node))
+    plausibility.lengths(state, *_targets(node))
     for clause in node.clauses:
         if isinstance(clause, tree.Speed):
             _speed(state, clause.value)
@@ -86,22 +86,22 @@ def _end(state: FlowState, node: tree.Move, arm: str | None, *, halted: bool) ->
             if moved is not None:
                 state.table.forget(moved)
         return
-    at: str | None = moved
+    frame: str | None = moved
     if moved == arm:
         goal = state.frame(node.goal)
-        at = UNKNOWN if halted or (goal is not None and is_any(goal)) else goal
+        frame = UNKNOWN if halted or (goal is not None and is_any(goal)) else goal
         if goal is None and not isinstance(node.goal, tree.Binary | tree.Matrix | tree.Function):
             # Something was reported of the goal, or it is given to a procedure in a way that is not followed.
-            at = UNKNOWN
-    state.table.arrive(arm, at, node.span if moved == arm else None)
+            frame = UNKNOWN
+    state.table.arrive(arm, frame, node.span if moved == arm else None)
 
 
 def _left_hanging(state: FlowState, node: tree.Move, arm: str) -> None:
     """Warn of a frame that the fingers have let go, and that follows the arm all the same."""
-    left = state.table.hands[arm].left
-    if left is None:
+    released = state.table.hands[arm].left
+    if released is None:
         return
-    frame, opened = left
+    frame, opened = released
     link, name = state.table.links[frame], state.name(frame)
     if link is None or link.parent != arm:
         return
@@ -193,10 +193,10 @@ def _speed(state: FlowState, node: tree.Expression) -> None:
     if isinstance(node, tree.Number) or known is None or not isinstance(node, tree.Name):
         return
     value, span = known
-    kept = state.bound(node.key)
-    if LOWEST_SPEED <= value <= HIGHEST_SPEED or kept is None or state.now.scope.is_poisoned(node.key):
+    slot = state.bound(node.key)
+    if LOWEST_SPEED <= value <= HIGHEST_SPEED or slot is None or state.now.scope.is_poisoned(node.key):
         return
-    if state.settle(kept):
+    if state.settle(slot):
         state.say(
             "E207",
             f"speed `{node.text}` = {value:.12g} is outside {LOWEST_SPEED:g}..{HIGHEST_SPEED:g}",
@@ -207,15 +207,15 @@ def _speed(state: FlowState, node: tree.Expression) -> None:
         )
 
 
-def _places(node: tree.Move) -> list[tree.Expression]:
+def _targets(node: tree.Move) -> list[tree.Expression]:
     """Return every frame that a MOVE comes to."""
-    places = [node.goal]
+    targets = [node.goal]
     for clause in node.clauses:
         if isinstance(clause, tree.Via):
-            places += clause.points
+            targets += clause.points
         elif isinstance(clause, tree.Approach | tree.Departure):
-            places.append(clause.point)
-    return places
+            targets.append(clause.point)
+    return targets
 
 
 STEPS: Mapping[type, Step] = {tree.Move: move}

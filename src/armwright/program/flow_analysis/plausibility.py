@@ -22,14 +22,14 @@ _AWAY = 0.2
 def placed(state: FlowState, frame: str, value: tree.Expression) -> None:
     """Warn of a frame that is given a place that cannot be meant, so near to WORLD."""
     reach = state.cell.reach if state.cell else None
-    place = None if is_any(frame) else state.table.where(frame)
+    pose = None if is_any(frame) else state.table.where(frame)
     units = state.symbols.units
-    if reach is None or place is None or units.length == "M":
+    if reach is None or pose is None or units.length == "M":
         return
-    away = math.hypot(*place[9:])
+    away = math.hypot(*pose[9:])
     for numbers in _typed(value):
-        size = math.hypot(*(one.value for one in numbers))
-        bare, broken = not any(one.unit for one in numbers), any(one.value % 1 for one in numbers)
+        size = math.hypot(*(number.value for number in numbers))
+        bare, broken = not any(number.unit for number in numbers), any(number.value % 1 for number in numbers)
         if bare and broken and 0 < away < _NEAR * reach and _LEAST * reach < size < _MOST * reach:
             unit = _UNITS[units.length]
             advice = f"write the lengths in {unit}, or with their unit: `{numbers[0].text}m`"
@@ -45,7 +45,7 @@ def lengths(state: FlowState, *nodes: tree.Expression | None) -> None:
         return
     for node in nodes:
         for numbers in () if node is None else _typed(node):
-            away = math.hypot(*(convert(one.value, one.unit, units) * units.metres for one in numbers))
+            away = math.hypot(*(convert(number.value, number.unit, units) * units.metres for number in numbers))
             if away > _FAR * reach:
                 what = "this place is {} from its origin" if isinstance(node, tree.Matrix) else "this step is {} long"
                 advice = f"write the lengths in {_UNITS[units.length]}"
@@ -58,16 +58,16 @@ def _typed(node: tree.Expression) -> Iterator[list[tree.Number]]:
     """Give every three lengths of an expression that are typed as numbers: of twelve the last, and those of XYZ."""
     waiting: list[tree.Expression] = [] if isinstance(node, tree.Name) else [node]
     while waiting:
-        one = waiting.pop()
+        frame = waiting.pop()
         three: tuple[tree.Expression, ...] = ()
-        if isinstance(one, tree.Binary):
-            waiting += [one.right, one.left]
-        elif isinstance(one, tree.Matrix) and len(one.items) == 12:
-            three = one.items[9:]
-        elif isinstance(one, tree.Function) and one.name.key == "XYZ":
-            three = one.arguments
-        elif isinstance(one, tree.Function):
-            waiting += reversed(one.arguments)
+        if isinstance(frame, tree.Binary):
+            waiting += [frame.right, frame.left]
+        elif isinstance(frame, tree.Matrix) and len(frame.items) == 12:
+            three = frame.items[9:]
+        elif isinstance(frame, tree.Function) and frame.name.key == "XYZ":
+            three = frame.arguments
+        elif isinstance(frame, tree.Function):
+            waiting += reversed(frame.arguments)
         numbers = [each for each in three if isinstance(each, tree.Number) and not math.isnan(each.value)]
         if len(numbers) == 3:
             yield numbers
@@ -95,10 +95,10 @@ def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
     table = state.table
     if not is_arm(arm) or is_any(child) or table.grips[arm] is None:
         return
-    at = table.hands[arm].at
-    if at is None or at in (UNKNOWN, child) or is_any(at) or is_arm(at):
+    frame = table.hands[arm].at
+    if frame is None or frame in (UNKNOWN, child) or is_any(frame) or is_arm(frame):
         return
-    here, there = table.where(at), table.where(child)
+    here, there = table.where(frame), table.where(child)
     if here is None or there is None:
         return
     away = math.dist(here[9:], there[9:])
@@ -109,8 +109,8 @@ def grasped(state: FlowState, node: tree.Affix, child: str, arm: str) -> None:
         "W210",
         f"`{name(child)}` is {_length(away)} away from the hand of {arm}",
         node.link,
-        f"the hand stands at {name(at)}",
-        secondary=(Label(hand.arrival, f"it came to {name(at)} here"),) if hand.arrival else (),
-        helps=(f"write `AFFIX {name(at)} TO {arm}`, or move the arm to {name(child)} first",),
+        f"the hand stands at {name(frame)}",
+        secondary=(Label(hand.arrival, f"it came to {name(frame)} here"),) if hand.arrival else (),
+        helps=(f"write `AFFIX {name(frame)} TO {arm}`, or move the arm to {name(child)} first",),
         severity=Severity.WARNING,
     )

@@ -15,13 +15,13 @@ from armwright.program.syntax import tree
 if TYPE_CHECKING:
     from armwright.program.flow_analysis.state import FlowState
 
-Place: TypeAlias = tuple[float, ...]
+Pose: TypeAlias = tuple[float, ...]
 
-HERE: Place = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+HERE: Pose = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _NUMBERS = 12
 
 
-def after(first: Place, step: Place) -> Place:
+def after(first: Pose, step: Pose) -> Pose:
     """Return the place at a step from another."""
     turned = [
         sum(first[3 * k + row] * step[3 * column + k] for k in range(3)) for column in range(4) for row in range(3)
@@ -29,14 +29,14 @@ def after(first: Place, step: Place) -> Place:
     return (*turned[:9], *(first[9 + row] + turned[9 + row] for row in range(3)))
 
 
-def inverse(place: Place) -> Place:
+def inverse(pose: Pose) -> Pose:
     """Return the step back."""
-    turned = [place[3 * column + row] for row in range(3) for column in range(3)]
-    back = [-sum(place[3 * row + k] * place[9 + k] for k in range(3)) for row in range(3)]
+    turned = [pose[3 * column + row] for row in range(3) for column in range(3)]
+    back = [-sum(pose[3 * row + k] * pose[9 + k] for k in range(3)) for row in range(3)]
     return (*turned, *back)
 
 
-def certain(state: "FlowState", node: tree.Expression) -> Place | None:
+def certain(state: "FlowState", node: tree.Expression) -> Pose | None:
     """Return the place or step that an expression gives; None where that is not certain."""
     if isinstance(node, tree.Binary):
         return _product(state, node)
@@ -52,25 +52,25 @@ def certain(state: "FlowState", node: tree.Expression) -> Place | None:
     return None if name is None else state.steps[name]
 
 
-def _product(state: "FlowState", node: tree.Binary) -> Place | None:
+def _product(state: "FlowState", node: tree.Binary) -> Pose | None:
     first, operations = tree.chain(node)
-    found = certain(state, first)
-    for one in operations:
-        step = certain(state, one.right) if one.operation == "*" else None
-        if found is None or step is None:
+    pose = certain(state, first)
+    for operation in operations:
+        step = certain(state, operation.right) if operation.operation == "*" else None
+        if pose is None or step is None:
             return None
-        found = after(found, step)
-    return found
+        pose = after(pose, step)
+    return pose
 
 
-def _matrix(state: "FlowState", node: tree.Matrix) -> Place | None:
+def _matrix(state: "FlowState", node: tree.Matrix) -> Pose | None:
     if len(node.items) != _NUMBERS:
         return None
     turn, shift = _amounts(state, node.items[:9]), _lengths(state, node.items[9:])
     return None if turn is None or shift is None else (*turn, *shift)
 
 
-def _function(state: "FlowState", node: tree.Function) -> Place | None:
+def _function(state: "FlowState", node: tree.Function) -> Pose | None:
     key, arguments = node.name.key, node.arguments
     if key == "XYZ" and len(arguments) == 3:
         shift = _lengths(state, arguments)
@@ -78,31 +78,31 @@ def _function(state: "FlowState", node: tree.Function) -> Place | None:
     if len(arguments) != 1:
         return None
     if key == "INV":
-        place = certain(state, arguments[0])
-        return None if place is None else inverse(place)
+        pose = certain(state, arguments[0])
+        return None if pose is None else inverse(pose)
     if key in ("ROTX", "ROTY", "ROTZ"):
         angle = _amounts(state, arguments)
         return None if angle is None else _turn("XYZ".index(key[-1]), angle[0] * state.symbols.units.radians)
     return None
 
 
-def _turn(axis: int, angle: float) -> Place:
+def _turn(axis: int, angle: float) -> Pose:
     """Return the turn about an axis by an angle [rad]."""
-    found = list(HERE)
-    one, other = (axis + 1) % 3, (axis + 2) % 3
-    found[3 * one + one] = found[3 * other + other] = math.cos(angle)
-    found[3 * one + other], found[3 * other + one] = math.sin(angle), -math.sin(angle)
-    return tuple(found)
+    pose = list(HERE)
+    u, other = (axis + 1) % 3, (axis + 2) % 3
+    pose[3 * u + u] = pose[3 * other + other] = math.cos(angle)
+    pose[3 * u + other], pose[3 * other + u] = math.sin(angle), -math.sin(angle)
+    return tuple(pose)
 
 
 def _lengths(state: "FlowState", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
     amounts = _amounts(state, nodes)
-    return None if amounts is None else tuple(one * state.symbols.units.metres for one in amounts)
+    return None if amounts is None else tuple(amount * state.symbols.units.metres for amount in amounts)
 
 
 def _amounts(state: "FlowState", nodes: Sequence[tree.Expression]) -> tuple[float, ...] | None:
     """Return numbers in the units of the program."""
-    found = []
+    pose = []
     for node in nodes:
         if isinstance(node, tree.Number):
             number = None if math.isnan(node.value) else convert(node.value, node.unit, state.symbols.units)
@@ -111,5 +111,5 @@ def _amounts(state: "FlowState", nodes: Sequence[tree.Expression]) -> tuple[floa
             number = None if known is None else known[0]
         if number is None:
             return None
-        found.append(number)
-    return tuple(found)
+        pose.append(number)
+    return tuple(pose)

@@ -85,8 +85,8 @@ def written_name(node: tree.Expression, scope: Scope) -> str | None:
     if isinstance(node, tree.ArmName):
         return node.key
     if isinstance(node, tree.Index):
-        inner = ",".join(f"{one.value:.12g}" for one in node.indices if isinstance(one, tree.Number))
-        literal = all(isinstance(one, tree.Number) for one in node.indices)
+        inner = ",".join(f"{index.value:.12g}" for index in node.indices if isinstance(index, tree.Number))
+        literal = all(isinstance(index, tree.Number) for index in node.indices)
         return f"{qualified(node.name.key, scope)}[{inner if literal else ''}]"
     return qualified(node.key, scope) if isinstance(node, tree.Name) else None
 
@@ -106,27 +106,29 @@ class Writing:
         self._known: dict[int, SideEffects] = {}
         self._procedures: dict[str, SideEffects] = {}
         bodies = (program.statements, *(node.body.statements for node in program.procedures))
-        self.rigid = any(isinstance(one, tree.Affix) and one.rigid for body in bodies for one in every(body))
+        self.rigid = any(
+            isinstance(statement, tree.Affix) and statement.rigid for body in bodies for statement in every(body)
+        )
         self._settle(program)
 
     def of(self, statement: tree.Statement, scope: Scope) -> SideEffects:
         """Return what a statement and all inside it may change."""
-        found = self._known.get(id(statement))
-        if found is None:
-            found = self._own(statement, scope)
+        effects = self._known.get(id(statement))
+        if effects is None:
+            effects = self._own(statement, scope)
             for inner in parts(statement):
-                found |= self.of(inner, scope)
-            if isinstance(statement, tree.Try) and found.retries:
-                found = attrs.evolve(found, retries=self.all(statement.body, scope).retries)
-            self._known[id(statement)] = found
-        return found
+                effects |= self.of(inner, scope)
+            if isinstance(statement, tree.Try) and effects.retries:
+                effects = attrs.evolve(effects, retries=self.all(statement.body, scope).retries)
+            self._known[id(statement)] = effects
+        return effects
 
     def all(self, statements: Iterable[tree.Statement], scope: Scope) -> SideEffects:
         """Return what several statements may change."""
-        found = NOTHING
+        effects = NOTHING
         for statement in statements:
-            found |= self.of(statement, scope)
-        return found
+            effects |= self.of(statement, scope)
+        return effects
 
     def called(self, call: tree.Call, scope: Scope) -> SideEffects:
         """Return what a call may change."""
@@ -134,8 +136,8 @@ class Writing:
         if procedure is None:
             return NOTHING
         writes = self._procedures.get(call.name.key, NOTHING)
-        given = dict(zip(procedure.parameters, call.arguments, strict=False))
-        return _seen_from_outside(writes, call.name.key, given, scope)
+        arguments = dict(zip(procedure.parameters, call.arguments, strict=False))
+        return _seen_from_outside(writes, call.name.key, arguments, scope)
 
     def _settle(self, program: tree.Program) -> None:
         """Find out what procedures may change, through all that they call."""
@@ -147,12 +149,14 @@ class Writing:
                 continue
             scope, inner = self._symbols.scope(key), list(every(node.body.statements))
             calls[key] = [
-                one for one in inner if isinstance(one, tree.Call) and one.name.key in self._symbols.procedures
+                statement
+                for statement in inner
+                if isinstance(statement, tree.Call) and statement.name.key in self._symbols.procedures
             ]
             self._procedures[key] = _union(
-                self._own(one, scope) for one in inner if not isinstance(one, tree.Call | tree.Retry)
+                self._own(statement, scope) for statement in inner if not isinstance(statement, tree.Call | tree.Retry)
             )
-        order = _callees_first({key: [one.name.key for one in several] for key, several in calls.items()})
+        order = _callees_first({key: [statement.name.key for statement in several] for key, several in calls.items()})
         for _ in range(_MOST_ROUNDS):
             news = {}
             for key in order:
@@ -262,33 +266,33 @@ def _arms(scope: Scope, node: tree.Expression | None) -> frozenset[str]:
 
 
 def _union(several: Iterable[SideEffects]) -> SideEffects:
-    found = NOTHING
-    for one in several:
-        found |= one
-    return found
+    effects = NOTHING
+    for statement in several:
+        effects |= statement
+    return effects
 
 
 def _callees_first(calls: Mapping[str, list[str]]) -> list[str]:
     """Return procedures in an order in which those that are called come first, as far as that is possible."""
     order: dict[str, None] = {}
-    seen: set[str] = set()
+    visited: set[str] = set()
     for first in calls:
-        way = [(first, iter(calls[first]))] if first not in seen else []
-        seen.add(first)
+        way = [(first, iter(calls[first]))] if first not in visited else []
+        visited.add(first)
         while way:
             key, others = way[-1]
-            callee = next((one for one in others if one not in seen), None)
+            callee = next((other for other in others if other not in visited), None)
             if callee is None:
                 order[key] = None
                 way.pop()
             else:
-                seen.add(callee)
+                visited.add(callee)
                 way.append((callee, iter(calls[callee])))
     return list(order)
 
 
 def _seen_from_outside(
-    writes: SideEffects, procedure: str, given: Mapping[str, tree.Expression], scope: Scope
+    writes: SideEffects, procedure: str, arguments: Mapping[str, tree.Expression], scope: Scope
 ) -> SideEffects:
     """Return what a procedure changes, in the names of its caller: its own variables are nobody else's."""
 
@@ -298,7 +302,7 @@ def _seen_from_outside(
         owner, point, key = head.partition(".")
         if not point:
             return name
-        argument = given.get(key) if owner == procedure else None
+        argument = arguments.get(key) if owner == procedure else None
         # Numbers and steps are given by value; an array is given itself.
         if argument is None or (value and not bracket) or (bracket and not isinstance(argument, tree.Name)):
             return ""
@@ -306,7 +310,7 @@ def _seen_from_outside(
         return f"{passed}{bracket}{indices}" if passed else ""
 
     def frames(names: frozenset[str]) -> frozenset[str]:
-        return frozenset(seen for name in names if (seen := outside(name)) and not is_arm(seen))
+        return frozenset(visited for name in names if (visited := outside(name)) and not is_arm(visited))
 
     def may_be_arm(name: str) -> bool:
         return name == ANY_ARM or is_arm(name) or _is_parameter(name, scope)
@@ -315,8 +319,8 @@ def _seen_from_outside(
         placed=frames(writes.placed),
         hung=frames(writes.hung),
         moved=frames(writes.moved),
-        values=frozenset(seen for name in writes.values if (seen := outside(name, value=True))),
-        arms=frozenset(seen for name in writes.arms if (seen := outside(name)) and may_be_arm(seen)),
+        values=frozenset(visited for name in writes.values if (visited := outside(name, value=True))),
+        arms=frozenset(visited for name in writes.arms if (visited := outside(name)) and may_be_arm(visited)),
         grasps=writes.grasps,
         everything=writes.everything,
         halts=writes.halts,

@@ -9,7 +9,7 @@ from armwright.program.flow_analysis import constants
 from armwright.program.flow_analysis.facts import UNKNOWN, Divergence
 from armwright.program.flow_analysis.frame_state import FrameState
 from armwright.program.flow_analysis.lattice import EVERYTHING, Facts, FactTable, same
-from armwright.program.flow_analysis.poses import Place
+from armwright.program.flow_analysis.poses import Pose
 from armwright.program.flow_analysis.side_effects import ANY_ARM, SideEffects, Writing
 from armwright.program.language.diagnostic import Findings, Label, Severity
 from armwright.program.language.kinds import VariableKind
@@ -70,8 +70,8 @@ class Called:
     span: Span
 
 
-def _joined_arms(one: str | None, other: str | None) -> str | None:
-    return one if one == other else UNKNOWN
+def _joined_arms(arm: str | None, other: str | None) -> str | None:
+    return arm if arm == other else UNKNOWN
 
 
 class FlowState:
@@ -104,7 +104,7 @@ class FlowState:
         self.numbers: FactTable[tuple[float, Span] | None] = FactTable(
             self.facts, default=None, unknown=None, joined=same
         )
-        self.steps: FactTable[Place | None] = FactTable(self.facts, default=None, unknown=None, joined=same)
+        self.steps: FactTable[Pose | None] = FactTable(self.facts, default=None, unknown=None, joined=same)
         self.last: FactTable[str | None] = FactTable(self.facts, default=None, unknown=UNKNOWN, joined=_joined_arms)
         self.main = Activation(scope=symbols.scope(None))
         self.now = self.main
@@ -162,17 +162,17 @@ class FlowState:
             key, indices = node.name.key, node.indices
         else:
             return None
-        found = self.now.scope.type(key)
-        if found is None or bool(found.sizes) is not bool(indices):
+        result = self.now.scope.type(key)
+        if result is None or bool(result.sizes) is not bool(indices):
             return None
-        if found.kind is not kind if kind else found.kind is VariableKind.EVENT:
+        if result.kind is not kind if kind else result.kind is VariableKind.EVENT:
             return None
-        kept = self.bound(key)
-        if not indices or kept is None:
-            return kept
-        numbers = [self._index(*pair) for pair in zip(indices, found.sizes, strict=False)]
+        slot = self.bound(key)
+        if not indices or slot is None:
+            return slot
+        numbers = [self._index(*pair) for pair in zip(indices, result.sizes, strict=False)]
         known = [str(number) for number in numbers if number is not None]
-        return f"{kept}[{','.join(known) if len(known) == len(found.sizes) else ''}]"
+        return f"{slot}[{','.join(known) if len(known) == len(result.sizes) else ''}]"
 
     def frame(self, node: object) -> str | None:
         """Return where a FRAME is kept, or an arm; None for anything else or what is unknown."""
@@ -184,8 +184,8 @@ class FlowState:
             # A number that was reported before is NaN, one with a unit depends on the units of the program.
             return None if node.unit or node.value != node.value else (node.value, node.span)
         if isinstance(node, tree.Binary | tree.Unary):
-            found = constants.value(node, self._known)
-            return None if found is None else (found, node.span)
+            result = constants.value(node, self._known)
+            return None if result is None else (result, node.span)
         name = self.variable(node, VariableKind.SCALAR)
         return None if name is None or is_any(name) else self.numbers[name]
 
@@ -206,14 +206,14 @@ class FlowState:
         return constants.passes(node, self._known)
 
     def _known(self, node: tree.Expression) -> float | None:
-        found = None if isinstance(node, tree.Binary | tree.Unary) else self.number(node)
-        return None if found is None else found[0]
+        result = None if isinstance(node, tree.Binary | tree.Unary) else self.number(node)
+        return None if result is None else result[0]
 
-    def name(self, kept: str) -> str:
+    def name(self, slot: str) -> str:
         """Return a kept name as the program writes it."""
-        head, bracket, rest = kept.partition("[")
+        head, bracket, suffix = slot.partition("[")
         key = head.partition("'")[0].rpartition(".")[2]
-        return f"{self.spelling.get(key, key)}{bracket}{rest}"
+        return f"{self.spelling.get(key, key)}{bracket}{suffix}"
 
     def some_arm(self) -> str:
         """Return an arm to name in advice."""
@@ -258,9 +258,9 @@ class FlowState:
         """Take note that an arm is set to work; ``hung`` tells why it is this one."""
         self.last.put(LAST, arm)
         for branch in self.branches:
-            place = self.calls[branch.depth].span if len(self.calls) > branch.depth else span
+            site = self.calls[branch.depth].span if len(self.calls) > branch.depth else span
             if arm not in branch.arms or (moves and not branch.arms[arm].moves):
-                branch.arms[arm] = Use(place, moves, hung)
+                branch.arms[arm] = Use(site, moves, hung)
 
     def look_up(self, arm: str, span: Span) -> None:
         """Say once that the cell does not have an arm."""
@@ -327,9 +327,9 @@ class FlowState:
         for name in sorted(names):
             head, bracket, indices = name.partition("[")
             _, point, key = head.partition(".")
-            kept = self.now.bindings.get(key) if point else name
-            if kept is not None:
-                yield f"{kept}{bracket}{indices}" if point else kept
+            slot = self.now.bindings.get(key) if point else name
+            if slot is not None:
+                yield f"{slot}{bracket}{indices}" if point else slot
 
     def _lose_value(self, name: str) -> None:
         if is_any(name):
@@ -343,9 +343,9 @@ class FlowState:
 
     # ---- saying ----------------------------------------------------------------------------------------------------
 
-    def settle(self, kept: str) -> bool:
+    def settle(self, slot: str) -> bool:
         """Whether this is the first thing said of a variable or an arm; no second shall follow."""
-        key = kept.partition("[")[0].partition("'")[0]
+        key = slot.partition("[")[0].partition("'")[0]
         news = key not in self._settled
         self._settled.add(key)
         return news
@@ -366,7 +366,7 @@ class FlowState:
         if (code, span) in self._said:
             return
         self._said.add((code, span))
-        calls = tuple(Label(one.span, f"{one.text} is called here") for one in self.calls[: -_MOST_CALLS - 1 : -1])
+        calls = tuple(Label(call.span, f"{call.text} is called here") for call in self.calls[: -_MOST_CALLS - 1 : -1])
         self.found.say(
             code, message, span, label, severity=severity, secondary=(*secondary, *calls), notes=notes, helps=helps
         )

@@ -65,7 +65,7 @@ def _lines(source: Source, std: Standard, width: int) -> list[str]:
     text, _ = without_numbers(source)
     scanned = scan(source, text, std)
     program, slips = parse(source, scanned.tokens, std)
-    wrong = in_order(one for one in (*scanned.found, *slips) if one.is_error)
+    wrong = in_order(diagnostic for diagnostic in (*scanned.found, *slips) if diagnostic.is_error)
     if wrong:
         raise UnformattableError(source, wrong[0])
     pieces = pieces_of(text, scanned, program)
@@ -77,6 +77,6 @@ def _numbered(lines: list[str], step: int) -> list[str]:
     """Put a number in front of each line."""
     field = len(str(step * len(lines))) + 2
     return [
-        ((" " * field if line.lstrip().startswith(_NOT_NUMBERED) else f"{step * at}".ljust(field)) + line).rstrip()
-        for at, line in enumerate(lines, 1)
+        ((" " * field if line.lstrip().startswith(_NOT_NUMBERED) else f"{step * number}".ljust(field)) + line).rstrip()
+        for number, line in enumerate(lines, 1)
     ]

@@ -65,15 +65,15 @@ def rows_of(program: tree.Program, pieces: Sequence[Piece], width: int) -> list[
     layout = _Layout(pieces, width)
     layout.program(program)
     rows: list[Row] = []
-    for at, piece in enumerate(pieces):
+    for index, piece in enumerate(pieces):
         is_first = layout.clauses.get(piece.start)
         # A comma stands in front of each clause but the first.
         if is_first is False and rows[-1].pieces[-1].word != ",":
             rows[-1].pieces.append(Piece(",", ",", TokenKind.SYMBOL, piece.start, 0, [], blank=False))
         if (row := layout.rows.get(piece.start)) is not None:
             rows.append(row)
-        if piece.word == "," and layout.clauses.get(pieces[at + 1].start):
-            pieces[at + 1].comments[:0] = piece.comments
+        if piece.word == "," and layout.clauses.get(pieces[index + 1].start):
+            pieces[index + 1].comments[:0] = piece.comments
             continue
         rows[-1].add(piece)
         if is_first is not None and len(rows[-1].pieces) > 1:
@@ -83,7 +83,7 @@ def rows_of(program: tree.Program, pieces: Sequence[Piece], width: int) -> list[
 
 def length(pieces: Sequence[Piece]) -> int:
     """Return how many characters pieces take in one line."""
-    return sum(len(one.text) + one.blank for one in pieces) - (bool(pieces) and pieces[0].blank)
+    return sum(len(piece.text) + piece.blank for piece in pieces) - (bool(pieces) and pieces[0].blank)
 
 
 class _Layout:
@@ -98,7 +98,7 @@ class _Layout:
         self.rows: dict[int, Row] = {}
         self.clauses: dict[int, bool] = {}
         self._pieces, self._width = pieces, width
-        self._at = {piece.start: at for at, piece in enumerate(pieces)}
+        self._at = {piece.start: index for index, piece in enumerate(pieces)}
         self._visits: dict[type, Callable[[Any, int], None]] = {
             tree.Block: self._block,
             tree.If: self._if,
@@ -216,7 +216,9 @@ class _Layout:
     def _is_small(self, start: int, block: tree.Block, column: int) -> bool:
         """Whether a clause that begins at a place and ends with a block fits into a row, and holds nothing large."""
         pieces = self._pieces[self._at[start] : self._at[block.end.start] + 1]
-        if any(isinstance(one, _LARGE) for one in block.statements) or any(one.comments for one in pieces[1:]):
+        if any(isinstance(statement, _LARGE) for statement in block.statements) or any(
+            piece.comments for piece in pieces[1:]
+        ):
             return False
         # Behind the block comes a comma or a semicolon.
         return column + length(pieces) + LEVEL <= self._width

@@ -40,10 +40,10 @@ class _Page:
         if row.breaks > 1 and lines:
             lines.append("")
         pieces = row.pieces
-        text = "".join([f" {one.text}" if one.blank else one.text for one in pieces])
+        text = "".join([f" {piece.text}" if piece.blank else piece.text for piece in pieces])
         if pieces[0].blank:
             text = text[1:]
-        if not row.is_open and row.column + len(text) <= self._width and not any(one.is_hard for one in pieces):
+        if not row.is_open and row.column + len(text) <= self._width and not any(piece.is_hard for piece in pieces):
             lines.append(" " * row.column + text)
         elif row.clauses:
             self._clauses(row)
@@ -73,7 +73,7 @@ class _Page:
         pieces, starts = row.pieces, row.clauses
         column = row.column + CLAUSE
         head, end = pieces[: starts[0]], starts[1] if len(starts) > 1 else len(pieces)
-        first = row.column + length(_visible(pieces[:end])) <= self._width and not any(one.is_hard for one in head)
+        first = row.column + length(_visible(pieces[:end])) <= self._width and not any(piece.is_hard for piece in head)
         self._fill(pieces[:end] if first else head, row.column, column)
         bounds = [*starts, len(pieces)][first:]
         for start, stop in pairwise(bounds):
@@ -88,45 +88,45 @@ class _Page:
             goes_on: where the others do, outside of parentheses; inside, they begin where those do.
         """
         brackets: list[int] = []
-        start, at = 0, column
+        start, column_ = 0, column
         while start < len(pieces):
-            stop = self._stop(pieces, start, at)
-            line = " " * at
+            stop = self._stop(pieces, start, column_)
+            line = " " * column_
             more: list[str] = []
             for index in range(start, stop):
-                one = pieces[index]
-                if one.blank and index > start:
+                piece = pieces[index]
+                if piece.blank and index > start:
                     line += " "
-                if one.comment is not None:
-                    first, *more = one.comment.lines(len(line))
+                if piece.comment is not None:
+                    first, *more = piece.comment.lines(len(line))
                     line += first
                     continue
-                line += one.text
-                if one.word in ("(", "["):
+                line += piece.text
+                if piece.word in ("(", "["):
                     brackets.append(len(line))
-                elif one.word in (")", "]"):
+                elif piece.word in (")", "]"):
                     brackets.pop()
             self.lines += [line, *more]
             start = stop
-            at = brackets[-1] if brackets and brackets[-1] <= self._width * 2 // 3 else goes_on
+            column_ = brackets[-1] if brackets and brackets[-1] <= self._width * 2 // 3 else goes_on
 
     def _stop(self, pieces: Sequence[Piece], start: int, column: int) -> int:
         """Return where the line that starts with a piece should end."""
         best, lowest = 0, 0
         for index in range(start, len(pieces)):
-            one = pieces[index]
+            piece = pieces[index]
             if index > start:
                 hard = pieces[index - 1].is_hard
                 fits = column <= self._width
                 if hard and (fits or not best):
                     return index
-                if one.cut is not None:
+                if piece.cut is not None:
                     if not fits:
                         return best or index
-                    if not best or one.cut <= lowest:
-                        best, lowest = index, one.cut
-            if not one.is_hard:
-                column += len(one.text) + (one.blank and index > start)
+                    if not best or piece.cut <= lowest:
+                        best, lowest = index, piece.cut
+            if not piece.is_hard:
+                column += len(piece.text) + (piece.blank and index > start)
         return len(pieces) if column <= self._width or not best else best
 
 

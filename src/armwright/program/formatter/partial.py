@@ -32,9 +32,9 @@ def formatted_around(source: Source, *, std: Standard = Standard.RLO_2, width: i
     try:
         return formatted(source, std=std, width=width)
     except UnformattableError:
-        whole = Source(source.name, source.text.replace("\r\n", "\n").replace("\r", "\n"))
-        after = _around(whole, std, width)
-        if after is None or _words(whole.text, std) != _words(after, std):
+        unix = Source(source.name, source.text.replace("\r\n", "\n").replace("\r", "\n"))
+        after = _around(unix, std, width)
+        if after is None or _words(unix.text, std) != _words(after, std):
             raise
         return after
 
@@ -47,37 +47,37 @@ def _around(source: Source, std: Standard, width: int) -> str | None:
         return None
     scanned = scan(source, text, std)
     program, slips = parse(source, scanned.tokens, std)
-    wrong = [one.span for one in (*scanned.found, *slips) if one.is_error]
-    begin = next((one for one in scanned.tokens if one.key == "BEGIN" and _is_main(one.start, program)), None)
-    end = next((one for one in reversed(scanned.tokens) if one.key == "END"), None)
+    wrong = [diagnostic.span for diagnostic in (*scanned.found, *slips) if diagnostic.is_error]
+    begin = next((token for token in scanned.tokens if token.key == "BEGIN" and _is_main(token.start, program)), None)
+    end = next((token for token in reversed(scanned.tokens) if token.key == "END"), None)
     if begin is None or end is None or not program.statements or end.start < program.statements[-1].span.end:
         return None
     head = source.text[: begin.start]
-    head_wrong = any(one.start <= begin.end for one in wrong)
-    pieces, done, found = [], 0, False
+    head_wrong = any(diagnostic.start <= begin.end for diagnostic in wrong)
+    pieces, done, has_tail = [], 0, False
     for span in _stretches(source, program, Span(begin.end, end.start), wrong):
         laid = _alone("" if head_wrong else head, source.slice(span), std, width)
         if laid is not None and laid != source.slice(span):
             pieces += [source.text[done : span.start], laid]
             done = span.end
-        found = found or laid is not None
-    return "".join((*pieces, source.text[done:])) if found else None
+        has_tail = has_tail or laid is not None
+    return "".join((*pieces, source.text[done:])) if has_tail else None
 
 
 def _is_main(start: int, program: tree.Program) -> bool:
     """Whether a BEGIN is that of the main program: it stands behind all headers and in front of all statements."""
-    behind = max((one.span.end for one in program.headers), default=0)
+    behind = max((header.span.end for header in program.headers), default=0)
     return start >= behind and (not program.statements or start < program.statements[0].span.start)
 
 
 def _stretches(source: Source, program: tree.Program, body: Span, wrong: list[Span]) -> Iterator[Span]:
     """Give stretches of whole lines that hold statements of the main program without a mistake."""
-    starts = [one.span.start for one in program.statements]
+    starts = [statement.span.start for statement in program.statements]
     ends = [*starts[1:], body.end]
     first, last = -1, body.start
     for statement, start, end in zip(program.statements, starts, ends, strict=True):
-        line, next_line = (source.text.rfind("\n", 0, at) + 1 for at in (start, end))
-        wrong_here = any(one.start <= end and one.end >= start for one in wrong)
+        line, next_line = (source.text.rfind("\n", 0, index) + 1 for index in (start, end))
+        wrong_here = any(diagnostic.start <= end and diagnostic.end >= start for diagnostic in wrong)
         if isinstance(statement, tree.Poison) or wrong_here:
             if last > first >= 0:
                 yield Span(first, last)
@@ -99,7 +99,7 @@ def _alone(head: str, stretch: str, std: Standard, width: int) -> str | None:
         lines = formatted(Source("", program), std=std, width=width).split("\n")
     except UnformattableError:
         return None
-    marks = [at for at, line in enumerate(lines) if line.strip() in (_FROM, _TO)]
+    marks = [index for index, line in enumerate(lines) if line.strip() in (_FROM, _TO)]
     if len(marks) != 2:
         return None
     laid = "\n".join((*lines[marks[0] + 1 : marks[1]], ""))

@@ -86,7 +86,7 @@ def pieces_of(text: str, scanned: Scanned, program: tree.Program) -> list[Piece]
         scanned: its tokens and comments.
         program: its tree, for the names that are declared.
     """
-    found: list[Piece] = []
+    pieces_: list[Piece] = []
     gaps = _Gaps(text, scanned.comments)
     dropped: list[Comment] = []
     most = 0
@@ -107,26 +107,28 @@ def pieces_of(text: str, scanned: Scanned, program: tree.Program) -> list[Piece]
             dropped, most = comments, breaks
             continue
         word = token.key if kind is _KEYWORD or kind is _SYMBOL else ""
-        found.append(Piece(spelt, word, kind, start, breaks, comments))
-    _behind_signs(found)
-    return found
+        pieces_.append(Piece(spelt, word, kind, start, breaks, comments))
+    _behind_signs(pieces_)
+    return pieces_
 
 
 def _joined(first: list[Comment], breaks: int, second: list[Comment], later: int) -> tuple[list[Comment], int]:
     """Join two gaps between pieces, the piece between them being left out."""
     if not second:
         return first, max(breaks, later)
-    one = attrs.evolve(second[0], breaks=max(breaks, second[0].breaks))
-    return [*first, one, *second[1:]], later
+    piece = attrs.evolve(second[0], breaks=max(breaks, second[0].breaks))
+    return [*first, piece, *second[1:]], later
 
 
 def _behind_signs(pieces: Sequence[Piece]) -> None:
     """Put comments that end a line behind a sign that must not begin one."""
-    for one, following in pairwise(pieces):
-        if one.comments and one.word in _CLOSING:
-            first = next((at for at, comment in enumerate(one.comments) if comment.is_hard), len(one.comments))
-            following.comments[:0] = one.comments[first:]
-            del one.comments[first:]
+    for piece, following in pairwise(pieces):
+        if piece.comments and piece.word in _CLOSING:
+            first = next(
+                (index for index, comment in enumerate(piece.comments) if comment.is_hard), len(piece.comments)
+            )
+            following.comments[:0] = piece.comments[first:]
+            del piece.comments[first:]
 
 
 class _Gaps:
@@ -145,13 +147,13 @@ class _Gaps:
 
     def read(self, stop: int) -> tuple[list[Comment], int]:
         """Return the comments up to a place, and how many lines end behind the last."""
-        found = []
+        pieces_ = []
         while not self.is_plain(stop):
             span = self._comments[self._next]
-            found.append(self._comment(span))
+            pieces_.append(self._comment(span))
             self._next += 1
             self.at = span.end
-        return found, self._text.count("\n", self.at, stop)
+        return pieces_, self._text.count("\n", self.at, stop)
 
     def _comment(self, span: Span) -> Comment:
         text = self._text
@@ -177,14 +179,14 @@ def _spellings(tokens: Sequence[Token], program: tree.Program) -> Iterator[str]:
     key = before = ""
     in_units = False
     last = len(tokens) - 1
-    for at, token in enumerate(tokens):
+    for index, token in enumerate(tokens):
         kind = token.kind
         earlier, before, key = before, key, token.key
         if kind is _KEYWORD:
             in_units = key == "UNITS"
             yield key
         elif kind is _NAME:
-            follows = tokens[at + 1].key if at < last else ""
+            follows = tokens[index + 1].key if index < last else ""
             is_axis = before == "(" and earlier == "FORCE" and key in AXES and follows == ")"
             if in_units or is_axis or (before == "READ" and key in SENSORS):
                 yield key
@@ -208,9 +210,9 @@ class _Names:
             name = procedure.name
             self._procedures.setdefault(name.key, name.text)
             own = (*procedure.parameters, *procedure.declarations)
-            self._declared |= {name.span.start, *(one.span.start for one in _declared_in(own))}
+            self._declared |= {name.span.start, *(piece.span.start for piece in _declared_in(own))}
             self._own.append((procedure.span, _as_declared(own)))
-        self._own.sort(key=lambda one: one[0].start, reverse=True)
+        self._own.sort(key=lambda piece: piece[0].start, reverse=True)
 
     def spelling(self, token: Token, follows: str) -> str:
         """Return a name as it is declared, or as it is written where it is not."""

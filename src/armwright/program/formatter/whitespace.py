@@ -46,31 +46,31 @@ def set_blanks(pieces: Sequence[Piece]) -> None:
     open_: list[_Bracket] = []
     before = earlier = Piece("", ";", None, 0, 0, [])
     joining = unary = False
-    for one in pieces:
-        word, last = one.word, before.word
+    for piece in pieces:
+        word, last = piece.word, before.word
         is_operand = before.kind in _OPERANDS or last in _CLOSING
         is_sign = word in _ARITHMETIC
         if last == ",":
-            _behind_comma(one, open_)
+            _behind_comma(piece, open_)
         elif word in _NOTHING_BEFORE or last in _OPENING or unary:
-            one.blank = False
+            piece.blank = False
         elif word in _OPENING:
-            one.blank = not _belongs(one, before, earlier) and not (joining and open_)
+            piece.blank = not _belongs(piece, before, earlier) and not (joining and open_)
         elif joining and open_:
             # Of two signs the second is that of a number; the two are kept apart.
-            one.blank = is_sign
+            piece.blank = is_sign
             before.blank = before.blank or is_sign
         elif is_sign and is_operand:
-            one.blank = not open_
+            piece.blank = not open_
         if is_operand and word in _WORSE:
-            one.cut = _DEEPER * len(open_) + _WORSE[word]
+            piece.cut = _DEEPER * len(open_) + _WORSE[word]
         elif word in _PARTS and not open_:
-            one.cut = 0
+            piece.cut = 0
         unary = word == "-" and not is_operand
         joining = is_sign and is_operand
         if word in _BRACKETS:
-            _bracket(one, before, open_)
-        earlier, before = before, one
+            _bracket(piece, before, open_)
+        earlier, before = before, piece
 
 
 def _belongs(bracket: Piece, before: Piece, earlier: Piece) -> bool:
@@ -80,24 +80,24 @@ def _belongs(bracket: Piece, before: Piece, earlier: Piece) -> bool:
     return before.word == "PRINT" or (before.kind is _NAME and earlier.word != "READ")
 
 
-def _behind_comma(one: Piece, open_: list[_Bracket]) -> None:
-    one.cut = _DEEPER * len(open_)
+def _behind_comma(piece: Piece, open_: list[_Bracket]) -> None:
+    piece.cut = _DEEPER * len(open_)
     if open_:
-        open_[-1].behind_commas.append(one)
+        open_[-1].behind_commas.append(piece)
         if open_[-1].is_index:
-            one.blank, one.cut = False, one.cut + _IN_A_GROUP
+            piece.blank, piece.cut = False, piece.cut + _IN_A_GROUP
 
 
-def _bracket(one: Piece, before: Piece, open_: list[_Bracket]) -> None:
+def _bracket(piece: Piece, before: Piece, open_: list[_Bracket]) -> None:
     """Open or close a bracket; group the numbers of a matrix."""
-    if one.word in _OPENING:
-        is_list = one.word == "[" or before.kind is _NAME or before.word in _LISTS
-        open_.append(_Bracket(one.word == "[", is_list, []))
+    if piece.word in _OPENING:
+        is_list = piece.word == "[" or before.kind is _NAME or before.word in _LISTS
+        open_.append(_Bracket(piece.word == "[", is_list, []))
         return
     bracket = open_.pop()
     if bracket.is_list or len(bracket.behind_commas) != _COMMAS_OF_A_MATRIX:
         return
-    for at, number in enumerate(bracket.behind_commas, 1):
-        if at % 3:
+    for index, number in enumerate(bracket.behind_commas, 1):
+        if index % 3:
             number.blank = False
             number.cut = (number.cut or 0) + _IN_A_GROUP

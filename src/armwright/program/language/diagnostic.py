@@ -143,12 +143,12 @@ class Findings(list[Diagnostic]):
 
 def in_order(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     """Return them sorted by their place in the text."""
-    return tuple(sorted(diagnostics, key=lambda one: (one.span.start, one.span.end)))
+    return tuple(sorted(diagnostics, key=lambda diagnostic: (diagnostic.span.start, diagnostic.span.end)))
 
 
 def count_line(diagnostics: Sequence[Diagnostic], source: Source) -> str:
     """Return the last line of a report, such as ``m6.rlo: 3 errors, 1 warning``."""
-    errors = sum(one.is_error for one in diagnostics)
+    errors = sum(diagnostic.is_error for diagnostic in diagnostics)
     return f"{source.name}: {counts_text(errors, len(diagnostics) - errors)}"
 
 

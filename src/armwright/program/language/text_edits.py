@@ -16,7 +16,7 @@ class Edit:
 def apply_edits(text: str, edits: tuple[Edit, ...]) -> str:
     """Return a text with edits made, all counted in the text as given; of two that overlap the first is made."""
     pieces, done = [], 0
-    for edit in sorted(edits, key=lambda one: (one.span.start, one.span.end)):
+    for edit in sorted(edits, key=lambda edit: (edit.span.start, edit.span.end)):
         if edit.span.start >= done:
             pieces += [text[done : edit.span.start], edit.text]
             done = edit.span.end

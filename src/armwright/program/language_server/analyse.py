@@ -68,8 +68,8 @@ def analyse(name: str, text: str, folder: Path | None, cells: Cells, settings: S
     files = [cells.read(path) for path in brought]
     if around.file is not None:
         files.append(around.file)
-    whole = _whole(cell, compiled)
-    analysis = Analysis(compiled=compiled, cell=whole, frames=_frames(whole, around.file), files=_places(files))
+    merged = _whole(cell, compiled)
+    analysis = Analysis(compiled=compiled, cell=merged, frames=_frames(merged, around.file), files=_places(files))
     return Analysed(analysis=analysis, problem=around.problem)
 
 

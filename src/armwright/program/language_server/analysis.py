@@ -52,14 +52,14 @@ class Analysis:
     @cached_property
     def by_key(self) -> Mapping[str, tuple[Occurrence, ...]]:
         """All occurrences of each name."""
-        found: dict[str, list[Occurrence]] = {}
-        for one in self.occurrences:
-            found.setdefault(one.key, []).append(one)
-        return {key: tuple(several) for key, several in found.items()}
+        operands: dict[str, list[Occurrence]] = {}
+        for occurrence in self.occurrences:
+            operands.setdefault(occurrence.key, []).append(occurrence)
+        return {key: tuple(several) for key, several in operands.items()}
 
     @cached_property
     def _occurrence_starts(self) -> list[int]:
-        return [one.start for one in self.occurrences]
+        return [occurrence.start for occurrence in self.occurrences]
 
     @cached_property
     def token_starts(self) -> list[int]:
@@ -79,18 +79,18 @@ class Analysis:
 
     def at(self, offset: int) -> Occurrence | None:
         """Return the name at a place, or right in front of it."""
-        at = bisect_right(self._occurrence_starts, offset) - 1
-        return self.occurrences[at] if at >= 0 and self.occurrences[at].end >= offset else None
+        index = bisect_right(self._occurrence_starts, offset) - 1
+        return self.occurrences[index] if index >= 0 and self.occurrences[index].end >= offset else None
 
     def token_at(self, offset: int) -> Token | None:
         """Return the token that holds a place."""
-        at = bisect_right(self.token_starts, offset) - 1
-        token = self.compiled.tokens[at] if at >= 0 else None
+        index = bisect_right(self.token_starts, offset) - 1
+        token = self.compiled.tokens[index] if index >= 0 else None
         return token if token is not None and token.start <= offset < token.end else None
 
     def same(self, occurrence: Occurrence) -> tuple[Occurrence, ...]:
         """Return all occurrences of the same thing."""
-        return tuple(one for one in self.by_key.get(occurrence.key, ()) if one.is_same(occurrence))
+        return tuple(diagnostic for diagnostic in self.by_key.get(occurrence.key, ()) if diagnostic.is_same(occurrence))
 
     def declaration(self, occurrence: Occurrence) -> tree.Name | None:
         """Return where the name was declared, if it was."""
@@ -131,13 +131,13 @@ def before(text: str, offset: int, std: Standard) -> Before | None:
     word = Span(_word_start(text, start, offset), offset)
     source = Source("", text)
     scanned = scan(source, without_numbers(source)[0], std)
-    if any(one.start < offset < one.end + text.startswith("//", one.start) for one in scanned.comments):
+    if any(comment.start < offset < comment.end + text.startswith("//", comment.start) for comment in scanned.comments):
         return None
     front = tuple(token for token in scanned.tokens if token.end <= word.start and token.kind is not TokenKind.END)
     behind = scanned.tokens[len(front) :]
     if behind[0].kind is TokenKind.STRING and behind[0].start < offset:
         return None
-    opened = any(one.code == "E102" and one.span.end <= offset for one in scanned.found)
+    opened = any(diagnostic.code == "E102" and diagnostic.span.end <= offset for diagnostic in scanned.found)
     return None if opened else Before(tokens=front, word=word, behind=behind)
 
 
@@ -150,20 +150,20 @@ def _word_start(text: str, start: int, end: int) -> int:
 
 
 def _hinted(program: tree.Program) -> list[tree.Move | tree.Call | tree.Grasp]:
-    found: list[tree.Move | tree.Call | tree.Grasp] = []
+    operands: list[tree.Move | tree.Call | tree.Grasp] = []
     waiting: list[object] = [*reversed(program.statements)]
     waiting += [procedure.body for procedure in reversed(program.procedures)]
     while waiting:
         node = waiting.pop()
         match node:
             case tree.Move(clauses=clauses):
-                found.append(node)
+                operands.append(node)
                 waiting += [clause.action for clause in clauses if isinstance(clause, tree.On)]
             case tree.Call() | tree.Grasp():
-                found.append(node)
+                operands.append(node)
             case _:
                 waiting += reversed(_inner(node))
-    return sorted(found, key=lambda one: one.span.start)
+    return sorted(operands, key=lambda diagnostic: diagnostic.span.start)
 
 
 _INNER: Mapping[type, Callable[[Any], tuple[tree.Statement, ...]]] = {

@@ -145,7 +145,7 @@ def _read(path: Path) -> CellFile | FileFormatError:
 
 def _lines(path: Path) -> dict[str, int]:
     document = Document.read(path)
-    found: dict[str, int] = {}
+    lines: dict[str, int] = {}
     for table in ("visions", "frames", "arms"):
         if not document.root.is_table(table):
             continue
@@ -153,5 +153,5 @@ def _lines(path: Path) -> dict[str, int]:
             line = document.line((table, key))
             arm = _ARM.fullmatch(key)
             if line is not None:
-                found[f"ARM_{arm[1]}" if arm else key.upper()] = line
-    return found
+                lines[f"ARM_{arm[1]}" if arm else key.upper()] = line
+    return lines

@@ -36,11 +36,11 @@ class QuickFix:
 def quickfixes(analysis: Analysis, span: Span) -> tuple[QuickFix, ...]:
     """Return the cures of what is wrong in a stretch of text: those that are certain, and names that were meant."""
     source = analysis.compiled.source
-    found = [_meant(one, source) for one in analysis.compiled.diagnostics]
+    diagnostics = [_meant(diagnostic, source) for diagnostic in analysis.compiled.diagnostics]
     return tuple(
-        QuickFix(_title(one, source), _edits(one), said)
-        for one, said in zip(found, analysis.compiled.diagnostics, strict=True)
-        if one.fixes and any(_touch(place, span) for place in (one.span, *(fix.span for fix in one.fixes)))
+        QuickFix(_title(first, source), _edits(first), diagnostic)
+        for first, diagnostic in zip(diagnostics, analysis.compiled.diagnostics, strict=True)
+        if first.fixes and any(_touch(place, span) for place in (first.span, *(fix.span for fix in first.fixes)))
     )
 
 
@@ -49,7 +49,7 @@ def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:
 
     It is no certain one, so that an editor offers it and `armwright fix` leaves it alone.
     """
-    word = next((match[1] for one in diagnostic.helps if (match := _DID_YOU_MEAN.match(one))), None)
+    word = next((match[1] for first in diagnostic.helps if (match := _DID_YOU_MEAN.match(first))), None)
     if diagnostic.fixes or word is None:
         return diagnostic
     written = _LAST_WORD.search(source.slice(diagnostic.span))
@@ -61,7 +61,11 @@ def _meant(diagnostic: Diagnostic, source: Source) -> Diagnostic:
 
 def all_fixes(diagnostics: Iterable[Diagnostic]) -> tuple[Edit, ...]:
     """Return all certain cures that can be made at once, in the order of the text; of two that touch the first."""
-    made = [edit for one in apart([one for one in diagnostics if one.fixes]) for edit in _edits(one)]
+    made = [
+        edit
+        for first in apart([diagnostic for diagnostic in diagnostics if diagnostic.fixes])
+        for edit in _edits(first)
+    ]
     return tuple(sorted(made, key=lambda edit: edit.span.start))
 
 
@@ -69,8 +73,8 @@ def _edits(diagnostic: Diagnostic) -> tuple[Edit, ...]:
     return tuple(Edit(fix.span, fix.replacement) for fix in diagnostic.fixes)
 
 
-def _touch(one: Span, other: Span) -> bool:
-    return one.start <= other.end and other.start <= one.end
+def _touch(diagnostic: Span, other: Span) -> bool:
+    return diagnostic.start <= other.end and other.start <= diagnostic.end
 
 
 def _title(diagnostic: Diagnostic, source: Source) -> str:

@@ -179,41 +179,46 @@ def completions(text: str, analysis: Analysis, offset: int) -> list[Completion]:
         return []
     end = Token(TokenKind.END, "", "", around.word.start, around.word.start)
     source = Source(compiled.source.name, text)
-    asked = expected(source, (*around.tokens, end), compiled.standard, declared=compiled.symbols.types)
-    procedure = asked.procedure if asked.procedure in compiled.symbols.procedures else None
+    expectation = expected(source, (*around.tokens, end), compiled.standard, declared=compiled.symbols.types)
+    procedure = expectation.procedure if expectation.procedure in compiled.symbols.procedures else None
     maker = _Maker(analysis, around.word, compiled.symbols.scope(procedure))
-    operand = _NOTHING if asked.operand is None else _operand(asked, around.tokens, maker.scope)
-    words = (*operand.words, *_words(asked, around, compiled.standard))
-    if not asked.starts:
-        found = [*maker.arms(operand), *maker.names(operand.kinds), *maker.devices(operand), *maker.functions(operand)]
-        return [*found, *maker.words(words)]
-    found = [*maker.words(words, starts=True)]
+    operand = _NOTHING if expectation.operand is None else _operand(expectation, around.tokens, maker.scope)
+    words = (*operand.words, *_words(expectation, around, compiled.standard))
+    if not expectation.starts:
+        operand_ = [
+            *maker.arms(operand),
+            *maker.names(operand.kinds),
+            *maker.devices(operand),
+            *maker.functions(operand),
+        ]
+        return [*operand_, *maker.words(words)]
+    operand_ = [*maker.words(words, starts=True)]
     if "MOVE" not in words and "HALT" not in words:
-        return found
+        return operand_
     kinds = frozenset(VariableKind) - {VariableKind.EVENT}
-    return [*found, *maker.procedures(), *maker.names(kinds, starts=True)]
+    return [*operand_, *maker.procedures(), *maker.names(kinds, starts=True)]
 
 
-def _operand(asked: Expected, tokens: Sequence[Token], scope: Scope) -> _Operand:
+def _operand(operand: Expected, tokens: Sequence[Token], scope: Scope) -> _Operand:
     """Return what may stand for the value or name that is looked for."""
-    assert asked.operand is not None  # noqa: S101 - the caller has looked
-    wants, where = asked.operand
-    found = _OPERANDS.get(wants)
+    assert operand.operand is not None  # noqa: S101 - the caller has looked
+    wants, where = operand.operand
+    operand_ = _OPERANDS.get(wants)
     call = open_call(tokens)
     if call is not None and wants not in ("an index", "the name of a FRAME", "an arm such as ARM_1"):
-        found = _argument(*call, scope.symbols)
+        operand_ = _argument(*call, scope.symbols)
     elif where in ("after SPEED =", "after BLEND =", "after DURATION ="):
-        found = _NUMBER
-    elif found is None:
-        kind = scope.type(asked.target)
+        operand_ = _NUMBER
+    elif operand_ is None:
+        kind = scope.type(operand.target)
         # Behind a comma stands a number of a matrix.
-        found = _NUMBER if tokens[-1].key == "," else _ANYTHING if kind is None else _OF_KIND[kind.kind]
+        operand_ = _NUMBER if tokens[-1].key == "," else _ANYTHING if kind is None else _OF_KIND[kind.kind]
     if tokens and tokens[-1].key == "*":
         # Behind `*` stands a step.
-        if VariableKind.FRAME in found.kinds:
+        if VariableKind.FRAME in operand_.kinds:
             return _STEP
-        return _TRANS if VariableKind.TRANS in found.kinds else found
-    return found
+        return _TRANS if VariableKind.TRANS in operand_.kinds else operand_
+    return operand_
 
 
 def _argument(name: Token, number: int, symbols: Symbols) -> _Operand:
@@ -226,20 +231,20 @@ def _argument(name: Token, number: int, symbols: Symbols) -> _Operand:
     return _ANYTHING if kind is None else _OF_KIND[kind.kind]
 
 
-def _words(asked: Expected, around: Before, std: Standard) -> Iterator[str]:
+def _words(operand: Expected, around: Before, std: Standard) -> Iterator[str]:
     """Give the words that may stand at a place; of clauses those that go with the others of their MOVE."""
     vocabulary = VOCABULARIES[std]
     clauses = frozenset(("DIRECTLY", "STRAIGHTLY", "VIA", *VOCABULARIES[Standard.RLO_2].with_clauses))
-    given = asked.given | {token.key for token in takewhile(lambda one: not _ends(one), around.behind)}
+    written = operand.given | {token.key for token in takewhile(lambda name: not _ends(name), around.behind)}
     # What ends a stretch of statements is not offered behind each of them, unless it is being written.
-    unasked = frozenset() if asked.starts or around.word.start < around.word.end else frozenset(CLOSING | {"RECOVER"})
-    for word in dict.fromkeys(asked.words):
+    unasked = frozenset() if operand.starts or around.word.start < around.word.end else frozenset(CLOSING | {"RECOVER"})
+    for word in dict.fromkeys(operand.words):
         last = word.rpartition(" ")[2]
         # The action of ON is over in front of the place, or behind it.
         excluded = last in clauses and (
-            last in given or _EXCLUDES[last] & given or (last == "BLEND" and "VIA" not in given)
+            last in written or _EXCLUDES[last] & written or (last == "BLEND" and "VIA" not in written)
         )
-        if last in vocabulary.reserved - unasked and not excluded and (word != "RETRY" or asked.recovering):
+        if last in vocabulary.reserved - unasked and not excluded and (word != "RETRY" or operand.recovering):
             yield word
 
 
@@ -298,7 +303,7 @@ class _Maker:
         own = {} if local is None else local.types
         others = [(key, kind) for key, kind in symbols.types.items() if key not in own]
         # What the program declares comes before what there is without it.
-        others.sort(key=lambda one: one[0] not in symbols.declared)
+        others.sort(key=lambda token: token[0] not in symbols.declared)
         for key, kind in (*own.items(), *others):
             if kind is None or kind.kind not in kinds or (starts and key == WORLD):
                 continue
@@ -315,9 +320,9 @@ class _Maker:
             return ""
         return f"hangs on {frames.parent(key)} in the cell"
 
-    def arms(self, asked: _Operand) -> Iterator[Completion]:
+    def arms(self, operand: _Operand) -> Iterator[Completion]:
         """Give the arms of the cell, or those of the program where there is none."""
-        if not asked.arms:
+        if not operand.arms:
             return
         cell = self._analysis.cell
         if cell is not None:
@@ -328,15 +333,15 @@ class _Maker:
         for name in sorted(used | {"ARM_1"}):
             yield self._one(name, Sort.ARM, "", "arm")
 
-    def devices(self, asked: _Operand) -> Iterator[Completion]:
+    def devices(self, operand: _Operand) -> Iterator[Completion]:
         """Give the devices of the cell."""
-        if asked.devices and self._analysis.cell is not None:
+        if operand.devices and self._analysis.cell is not None:
             for name in sorted(self._analysis.cell.devices or ()):
                 yield self._one(self._cased(name), Sort.DEVICE, "", "device")
 
-    def functions(self, asked: _Operand) -> Iterator[Completion]:
+    def functions(self, operand: _Operand) -> Iterator[Completion]:
         """Give functions of the language, which RLO-83 has none of."""
-        for name in asked.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
+        for name in operand.functions if self._analysis.compiled.standard is Standard.RLO_2 else ():
             meaning = explained(name)
             form, text = (meaning.form, meaning.text) if meaning else ("", "")
             yield self._one(self._cased(name), Sort.FUNCTION, f"{self._cased(name)}($1)", form, text)

@@ -43,27 +43,27 @@ def _at_a_place(server: RloServer) -> None:
     @server.feature(lsp.TEXT_DOCUMENT_HOVER)
     async def on_hover(params: lsp.HoverParams) -> lsp.Hover | None:
         document = server.document(params.text_document.uri)
-        found = hover(await document.analysis(), lsp_types.offset_of(document.codec, params.position))
-        if found is None:
+        result = hover(await document.analysis(), lsp_types.offset_of(document.codec, params.position))
+        if result is None:
             return None
         markdown = lsp.MarkupKind.Markdown in (server.can("text_document", "hover", "content_format") or ())
-        return lsp_types.hover(found, document.codec, markdown=markdown)
+        return lsp_types.hover(result, document.codec, markdown=markdown)
 
     @server.feature(lsp.TEXT_DOCUMENT_COMPLETION, lsp.CompletionOptions(trigger_characters=[" ", "(", "=", ","]))
     async def on_completion(params: lsp.CompletionParams) -> lsp.CompletionList:
         document = server.document(params.text_document.uri)
         # Names may be those from before the last words, which are read anew in any case.
         analysis = document.last or await document.analysis()
-        found = completions(document.text, analysis, lsp_types.offset_of(document.codec, params.position))
+        result = completions(document.text, analysis, lsp_types.offset_of(document.codec, params.position))
         snippets = bool(server.can("text_document", "completion", "completion_item", "snippet_support"))
-        return lsp_types.completion(found, document.codec, snippets=snippets)
+        return lsp_types.completion(result, document.codec, snippets=snippets)
 
     @server.feature(lsp.TEXT_DOCUMENT_SIGNATURE_HELP, lsp.SignatureHelpOptions(trigger_characters=["(", ","]))
     async def on_signature(params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
         document = server.document(params.text_document.uri)
         analysis = document.last or await document.analysis()
-        found = signature_at(document.text, analysis, lsp_types.offset_of(document.codec, params.position))
-        return None if found is None else lsp_types.signature(found, server.encoding)
+        result = signature_at(document.text, analysis, lsp_types.offset_of(document.codec, params.position))
+        return None if result is None else lsp_types.signature(result, server.encoding)
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------
@@ -74,37 +74,37 @@ def _of_names(server: RloServer) -> None:
     async def on_definition(params: lsp.DefinitionParams) -> lsp.Location | None:
         document = server.document(params.text_document.uri)
         analysis = await document.analysis()
-        one = analysis.at(lsp_types.offset_of(document.codec, params.position))
-        if one is None:
+        occurrence = analysis.at(lsp_types.offset_of(document.codec, params.position))
+        if occurrence is None:
             return None
-        declared = analysis.declaration(one)
+        declared = analysis.declaration(occurrence)
         if declared is not None:
             return lsp.Location(document.uri, lsp_types.span_range(document.codec, declared.span))
-        if one.key not in analysis.files:
+        if occurrence.key not in analysis.files:
             return None
-        uri, line = analysis.files[one.key]
+        uri, line = analysis.files[occurrence.key]
         start = lsp.Position(line - 1, 0)
         return lsp.Location(uri, lsp.Range(start, start))
 
     async def same(uri: str, position: lsp.Position) -> list[tuple[Occurrence, lsp.Range]]:
         document = server.document(uri)
         analysis = await document.analysis()
-        one = analysis.at(lsp_types.offset_of(document.codec, position))
-        others = () if one is None else analysis.same(one)
+        occurrence = analysis.at(lsp_types.offset_of(document.codec, position))
+        others = () if occurrence is None else analysis.same(occurrence)
         return [(other, lsp_types.span_range(document.codec, other.span)) for other in others]
 
     @server.feature(lsp.TEXT_DOCUMENT_REFERENCES)
     async def on_references(params: lsp.ReferenceParams) -> list[lsp.Location]:
         uri, declaration = params.text_document.uri, params.context.include_declaration
-        found = await same(uri, params.position)
-        return [lsp.Location(uri, where) for one, where in found if declaration or not one.declares]
+        result = await same(uri, params.position)
+        return [lsp.Location(uri, where) for occurrence, where in result if declaration or not occurrence.declares]
 
     @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_HIGHLIGHT)
     async def on_highlight(params: lsp.DocumentHighlightParams) -> list[lsp.DocumentHighlight]:
         write, read = lsp.DocumentHighlightKind.Write, lsp.DocumentHighlightKind.Read
         return [
-            lsp.DocumentHighlight(where, write if one.writes or one.declares else read)
-            for one, where in await same(params.text_document.uri, params.position)
+            lsp.DocumentHighlight(where, write if occurrence.writes or occurrence.declares else read)
+            for occurrence, where in await same(params.text_document.uri, params.position)
         ]
 
 
@@ -114,11 +114,11 @@ def _renames(server: RloServer) -> None:
         document = server.document(params.text_document.uri)
         analysis = await document.analysis()
         try:
-            one = nameable(analysis, lsp_types.offset_of(document.codec, params.position))
+            occurrence = nameable(analysis, lsp_types.offset_of(document.codec, params.position))
         except ArmwrightError as error:
             raise refusal(str(error)) from error
-        where = lsp_types.span_range(document.codec, one.span)
-        return lsp.PrepareRenamePlaceholder(where, document.text[one.start : one.end])
+        where = lsp_types.span_range(document.codec, occurrence.span)
+        return lsp.PrepareRenamePlaceholder(where, document.text[occurrence.start : occurrence.end])
 
     @server.feature(lsp.TEXT_DOCUMENT_RENAME, lsp.RenameOptions(prepare_provider=True))
     async def on_rename(params: lsp.RenameParams) -> lsp.WorkspaceEdit:
@@ -146,19 +146,25 @@ def _changes(server: RloServer) -> None:
 
         def wanted(kind: str) -> bool:
             asked = params.context.only
-            return asked is None or any(kind == one or kind.startswith(f"{one}.") for one in map(_word, asked))
+            return asked is None or any(
+                kind == occurrence or kind.startswith(f"{occurrence}.") for occurrence in map(_word, asked)
+            )
 
         if wanted(_word(lsp.CodeActionKind.QuickFix)):
-            told = {(one.code, _place(one.range)): one for one in params.context.diagnostics}
-            for one in quickfixes(analysis, lsp_types.span_of(codec, params.range)):
-                diagnostic = told.get((one.diagnostic.code, _place(lsp_types.span_range(codec, one.diagnostic.span))))
+            published = {
+                (diagnostic.code, _place(diagnostic.range)): diagnostic for diagnostic in params.context.diagnostics
+            }
+            for quickfix in quickfixes(analysis, lsp_types.span_of(codec, params.range)):
+                diagnostic = published.get(
+                    (quickfix.diagnostic.code, _place(lsp_types.span_range(codec, quickfix.diagnostic.span)))
+                )
                 actions.append(
                     lsp.CodeAction(
-                        title=one.title,
+                        title=quickfix.title,
                         kind=lsp.CodeActionKind.QuickFix,
                         diagnostics=None if diagnostic is None else [diagnostic],
-                        is_preferred=bool(one.diagnostic.fixes),
-                        edit=lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(codec, one.edits)}),
+                        is_preferred=bool(quickfix.diagnostic.fixes),
+                        edit=lsp.WorkspaceEdit(changes={uri: lsp_types.text_edits(codec, quickfix.edits)}),
                     )
                 )
         every = all_fixes(analysis.compiled.diagnostics)
@@ -205,8 +211,8 @@ def _of_the_whole(server: RloServer) -> None:
     async def on_hints(params: lsp.InlayHintParams) -> list[lsp.InlayHint]:
         document = server.document(params.text_document.uri)
         analysis = await document.analysis()
-        found = hints(analysis, lsp_types.span_of(document.codec, params.range))
-        return lsp_types.inlay_hints(found, document.codec)
+        result = hints(analysis, lsp_types.span_of(document.codec, params.range))
+        return lsp_types.inlay_hints(result, document.codec)
 
 
 # ---- colours -------------------------------------------------------------------------------------------------------

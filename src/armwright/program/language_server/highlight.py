@@ -123,12 +123,12 @@ class RloLexer(RegexLexer):
         blanked, _ = without_numbers(Source("", text))
         numbers = deque(match.span() for match in re.finditer(r"[0-9]+", text) if blanked[match.start()] == " ")
         for start, kind, value in super().get_tokens_unprocessed(blanked, stack):
-            at, end = start, start + len(value)
+            start_, end = start, start + len(value)
             while numbers and numbers[0][0] < end:
                 first, last = numbers.popleft()
-                if at < first:
-                    yield at, kind, text[at:first]
+                if start_ < first:
+                    yield start_, kind, text[start_:first]
                 yield first, Name.Label, text[first:last]
-                at = last
-            if at < end:
-                yield at, kind, text[at:end]
+                start_ = last
+            if start_ < end:
+                yield start_, kind, text[start_:end]

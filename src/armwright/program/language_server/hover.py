@@ -56,15 +56,15 @@ def hover(analysis: Analysis, offset: int) -> Hover | None:
 
 def signature(procedure: tree.Procedure) -> tuple[str, tuple[tuple[int, int], ...]]:
     """Return the head of a procedure on one line, and where its parameters stand in that."""
-    text, places = f"PROCEDURE {procedure.name.text}", []
+    text, notes = f"PROCEDURE {procedure.name.text}", []
     for number, declaration in enumerate(procedure.parameters):
         text += ", " if number else " ("
         for index, name in enumerate(declaration.names):
             text += ", " if index else ""
-            places.append((len(text), len(text) + len(name.text)))
+            notes.append((len(text), len(text) + len(name.text)))
             text += name.text
         text += f" : {_type_text(declaration.type)}"
-    return text + ")" * bool(places), tuple(places)
+    return text + ")" * bool(notes), tuple(notes)
 
 
 def _type_text(written: tree.TypeName) -> str:
@@ -76,43 +76,43 @@ def _type_text(written: tree.TypeName) -> str:
 def _statement(analysis: Analysis, token: Token) -> str:
     """Return the word that starts the statement that a token stands in."""
     tokens = analysis.compiled.tokens
-    at = analysis.token_starts.index(token.start)
-    while at >= 0 and tokens[at].key != ";":
-        if tokens[at].key in _STARTS and tokens[at].kind is TokenKind.KEYWORD:
-            return tokens[at].key
-        at -= 1
+    index = analysis.token_starts.index(token.start)
+    while index >= 0 and tokens[index].key != ";":
+        if tokens[index].key in _STARTS and tokens[index].kind is TokenKind.KEYWORD:
+            return tokens[index].key
+        index -= 1
     return ""
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------
 
 
-def _of_name(analysis: Analysis, one: Occurrence) -> Hover | None:
-    text = analysis.text[one.start : one.end]
-    match one.what:
+def _of_name(analysis: Analysis, occurrence: Occurrence) -> Hover | None:
+    text = analysis.text[occurrence.start : occurrence.end]
+    match occurrence.what:
         case What.VARIABLE:
-            found: tuple[str, list[str]] | None = _variable(analysis, one, text)
+            entry: tuple[str, list[str]] | None = _variable(analysis, occurrence, text)
         case What.ARM:
-            found = f"{one.key} : FRAME", _arm(analysis, one.key)
+            entry = f"{occurrence.key} : FRAME", _arm(analysis, occurrence.key)
         case What.PROCEDURE:
-            found = _procedure(analysis, one.key)
+            entry = _procedure(analysis, occurrence.key)
         case What.DEVICE:
-            found = text, [_device(analysis, one.key)]
+            entry = text, [_device(analysis, occurrence.key)]
         case What.UNIT:
-            found = (one.key, [f"a unit of {dimension(one.key)}"]) if one.key in UNITS else None
+            entry = (occurrence.key, [f"a unit of {dimension(occurrence.key)}"]) if occurrence.key in UNITS else None
         case What.AXIS:
-            found = one.key, [f"the {one.key.lower()} axis"]
+            entry = occurrence.key, [f"the {occurrence.key.lower()} axis"]
         case _:
-            found = _word(one)
-    return None if found is None else Hover(one.span, found[0], tuple(found[1]))
+            entry = _word(occurrence)
+    return None if entry is None else Hover(occurrence.span, entry[0], tuple(entry[1]))
 
 
-def _word(one: Occurrence) -> tuple[str, list[str]] | None:
+def _word(occurrence: Occurrence) -> tuple[str, list[str]] | None:
     """Return what there is to say about a function of the language, or a word that is one only here."""
-    word = explained(one.key) if one.what in (What.FUNCTION, What.SENSOR) else None
+    word = explained(occurrence.key) if occurrence.what in (What.FUNCTION, What.SENSOR) else None
     if word is None:
         return None
-    gives = f" : {FUNCTIONS[one.key].gives.name}" if one.what is What.FUNCTION else ""
+    gives = f" : {FUNCTIONS[occurrence.key].gives.name}" if occurrence.what is What.FUNCTION else ""
     return word.form + gives, [word.text]
 
 
@@ -124,24 +124,24 @@ def _procedure(analysis: Analysis, key: str) -> tuple[str, list[str]] | None:
     return signature(procedure.node)[0], [f"declared in line {line}"]
 
 
-def _variable(analysis: Analysis, one: Occurrence, text: str) -> tuple[str, list[str]]:
+def _variable(analysis: Analysis, occurrence: Occurrence, text: str) -> tuple[str, list[str]]:
     symbols = analysis.compiled.symbols
-    declared = analysis.declaration(one)
-    code = f"{declared.text if declared else text} : {one.type or 'of a type that is wrong'}"
+    declared = analysis.declaration(occurrence)
+    code = f"{declared.text if declared else text} : {occurrence.type or 'of a type that is wrong'}"
     lines = []
     if declared is not None:
         line = analysis.compiled.source.line(declared.span.start)
-        if one.owner is None:
+        if occurrence.owner is None:
             lines.append(f"declared in line {line}")
         else:
-            what = "parameter" if one.key in symbols.procedures[one.owner].parameters else "variable"
-            lines.append(f"{what} of `{symbols.procedures[one.owner].node.name.text}`, declared in line {line}")
-    elif one.key in symbols.imported:
+            what = "parameter" if occurrence.key in symbols.procedures[occurrence.owner].parameters else "variable"
+            lines.append(f"{what} of `{symbols.procedures[occurrence.owner].node.name.text}`, declared in line {line}")
+    elif occurrence.key in symbols.imported:
         lines.append("imported")
-    elif one.key in PREDECLARED:
+    elif occurrence.key in PREDECLARED:
         lines.append("predeclared")
-    if one.owner is None and one.type == VariableType(VariableKind.FRAME):
-        lines += _frame(analysis, one.key)
+    if occurrence.owner is None and occurrence.type == VariableType(VariableKind.FRAME):
+        lines += _frame(analysis, occurrence.key)
     return code, lines
 
 

@@ -36,12 +36,12 @@ class Hint:
 def hints(analysis: Analysis, span: Span) -> tuple[Hint, ...]:
     """Return the words that belong to a stretch of text, in order."""
     statements = analysis.statements
-    at = bisect_left(statements, span.start - _REACH, key=lambda one: one.span.start)
-    found: list[Hint] = []
-    while at < len(statements) and statements[at].span.start <= span.end:
-        found += _of(analysis, statements[at])
-        at += 1
-    return tuple(sorted((one for one in found if span.start <= one.place <= span.end), key=lambda one: one.place))
+    index = bisect_left(statements, span.start - _REACH, key=lambda statement: statement.span.start)
+    result: list[Hint] = []
+    while index < len(statements) and statements[index].span.start <= span.end:
+        result += _of(analysis, statements[index])
+        index += 1
+    return tuple(sorted((hint for hint in result if span.start <= hint.place <= span.end), key=lambda hint: hint.place))
 
 
 def _of(analysis: Analysis, statement: tree.Move | tree.Call | tree.Grasp) -> Iterator[Hint]:

@@ -48,10 +48,10 @@ def offset_of(codec: PositionCodec, position: lsp.Position) -> int:
     return codec.offset(position.line, position.character)
 
 
-def span_of(codec: PositionCodec, asked: lsp.Range) -> Span:
+def span_of(codec: PositionCodec, range_: lsp.Range) -> Span:
     """Return the stretch of text between two places."""
-    start = offset_of(codec, asked.start)
-    return Span(start, max(start, offset_of(codec, asked.end)))
+    start = offset_of(codec, range_.start)
+    return Span(start, max(start, offset_of(codec, range_.end)))
 
 
 def text_edits(codec: PositionCodec, edits: Iterable[Edit]) -> list[lsp.TextEdit]:
@@ -71,102 +71,108 @@ def diagnostics(analysis: Analysis, codec: PositionCodec, uri: str, *, related: 
         uri: of its document.
         related: whether the editor shows other places beside the first.
     """
-    return [_diagnostic(one, codec, uri, related=related) for one in analysis.compiled.diagnostics]
+    return [_diagnostic(diagnostic, codec, uri, related=related) for diagnostic in analysis.compiled.diagnostics]
 
 
-def _diagnostic(one: Diagnostic, codec: PositionCodec, uri: str, *, related: bool) -> lsp.Diagnostic:
-    severity = lsp.DiagnosticSeverity.Error if one.is_error else lsp.DiagnosticSeverity.Warning
-    if one.code.startswith("L"):
+def _diagnostic(diagnostic: Diagnostic, codec: PositionCodec, uri: str, *, related: bool) -> lsp.Diagnostic:
+    severity = lsp.DiagnosticSeverity.Error if diagnostic.is_error else lsp.DiagnosticSeverity.Warning
+    if diagnostic.code.startswith("L"):
         severity = lsp.DiagnosticSeverity.Information
-    places = [
+    locations = [
         lsp.DiagnosticRelatedInformation(lsp.Location(uri, span_range(codec, label.span)), label.text)
-        for label in one.secondary
+        for label in diagnostic.secondary
     ]
     return lsp.Diagnostic(
-        range=span_range(codec, one.span),
-        message=message_of(one),
+        range=span_range(codec, diagnostic.span),
+        message=message_of(diagnostic),
         severity=severity,
-        code=one.code,
+        code=diagnostic.code,
         source="armwright",
-        tags=[lsp.DiagnosticTag.Unnecessary] if one.code == "L304" else None,
-        related_information=places if related and places else None,
+        tags=[lsp.DiagnosticTag.Unnecessary] if diagnostic.code == "L304" else None,
+        related_information=locations if related and locations else None,
     )
 
 
-def message_of(one: Diagnostic) -> str:
+def message_of(diagnostic: Diagnostic) -> str:
     """Return all words of a diagnostic, a line each."""
-    first = f"{one.message}: {one.label}" if one.label and one.label not in one.message else one.message
-    return "\n".join((first, *(f"note: {note}" for note in one.notes), *(f"help: {help_}" for help_ in one.helps)))
+    first = (
+        f"{diagnostic.message}: {diagnostic.label}"
+        if diagnostic.label and diagnostic.label not in diagnostic.message
+        else diagnostic.message
+    )
+    return "\n".join(
+        (first, *(f"note: {note}" for note in diagnostic.notes), *(f"help: {help_}" for help_ in diagnostic.helps))
+    )
 
 
 # ---- at a place ----------------------------------------------------------------------------------------------------
 
 
-def hover(found: Hover, codec: PositionCodec, *, markdown: bool) -> lsp.Hover:
+def hover(result: Hover, codec: PositionCodec, *, markdown: bool) -> lsp.Hover:
     """Return what there is to say about a stretch of text."""
     if markdown:
-        code = f"```rlo\n{found.code}\n```"
-        text = "\n\n".join((code, *found.lines))
+        code = f"```rlo\n{result.code}\n```"
+        text = "\n\n".join((code, *result.lines))
         content = lsp.MarkupContent(lsp.MarkupKind.Markdown, text)
     else:
-        text = "\n".join((found.code, *found.lines)).replace("`", "")
+        text = "\n".join((result.code, *result.lines)).replace("`", "")
         content = lsp.MarkupContent(lsp.MarkupKind.PlainText, text)
-    return lsp.Hover(content, span_range(codec, found.span))
+    return lsp.Hover(content, span_range(codec, result.span))
 
 
-def completion(found: Sequence[Completion], codec: PositionCodec, *, snippets: bool) -> lsp.CompletionList:
+def completion(result: Sequence[Completion], codec: PositionCodec, *, snippets: bool) -> lsp.CompletionList:
     """Return what can be written; whole statements only for an editor that leads from gap to gap."""
     items = []
-    for number, one in enumerate(found):
-        if one.sort is Sort.SNIPPET and not snippets:
+    for number, diagnostic in enumerate(result):
+        if diagnostic.sort is Sort.SNIPPET and not snippets:
             continue
-        text = one.text if snippets or not one.snippet else one.label
+        text = diagnostic.text if snippets or not diagnostic.snippet else diagnostic.label
         items.append(
             lsp.CompletionItem(
-                label=one.label,
-                kind=_ITEMS[one.sort],
-                detail=one.detail or None,
-                documentation=one.documentation or None,
+                label=diagnostic.label,
+                kind=_ITEMS[diagnostic.sort],
+                detail=diagnostic.detail or None,
+                documentation=diagnostic.documentation or None,
                 sort_text=f"{number:04d}",
                 insert_text_format=lsp.InsertTextFormat.Snippet
-                if one.snippet and snippets
+                if diagnostic.snippet and snippets
                 else lsp.InsertTextFormat.PlainText,
-                text_edit=lsp.TextEdit(span_range(codec, one.span), text),
+                text_edit=lsp.TextEdit(span_range(codec, diagnostic.span), text),
             )
         )
     return lsp.CompletionList(is_incomplete=False, items=items)
 
 
-def signature(found: Signature, encoding: str) -> lsp.SignatureHelp:
+def signature(result: Signature, encoding: str) -> lsp.SignatureHelp:
     """Return what a call takes."""
-    codec = PositionCodec(found.label, encoding)
+    codec = PositionCodec(result.label, encoding)
     parameters = [
-        lsp.ParameterInformation((codec.width(0, start), codec.width(0, end))) for start, end in found.parameters
+        lsp.ParameterInformation((codec.width(0, start), codec.width(0, end))) for start, end in result.parameters
     ]
-    one = lsp.SignatureInformation(
-        label=found.label,
-        documentation=found.text or None,
+    diagnostic = lsp.SignatureInformation(
+        label=result.label,
+        documentation=result.text or None,
         parameters=parameters,
-        active_parameter=found.active if parameters else None,
+        active_parameter=result.active if parameters else None,
     )
-    return lsp.SignatureHelp([one], 0, found.active if parameters else None)
+    return lsp.SignatureHelp([diagnostic], 0, result.active if parameters else None)
 
 
 # ---- of the whole --------------------------------------------------------------------------------------------------
 
 
-def inlay_hints(found: Iterable[Hint], codec: PositionCodec) -> list[lsp.InlayHint]:
+def inlay_hints(result: Iterable[Hint], codec: PositionCodec) -> list[lsp.InlayHint]:
     """Return words between the words of a program."""
     return [
         lsp.InlayHint(
-            position=lsp.Position(*codec.place(one.place)),
-            label=one.text,
-            kind=lsp.InlayHintKind.Parameter if one.parameter else lsp.InlayHintKind.Type,
-            tooltip=one.tooltip,
-            padding_left=not one.parameter,
-            padding_right=one.parameter,
+            position=lsp.Position(*codec.place(diagnostic.place)),
+            label=diagnostic.text,
+            kind=lsp.InlayHintKind.Parameter if diagnostic.parameter else lsp.InlayHintKind.Type,
+            tooltip=diagnostic.tooltip,
+            padding_left=not diagnostic.parameter,
+            padding_right=diagnostic.parameter,
         )
-        for one in found
+        for diagnostic in result
     ]
 
 

@@ -59,8 +59,10 @@ def outline(analysis: Analysis) -> tuple[Entry, ...]:
         elif isinstance(header, tree.Procedure):
             own = symbols.procedures.get(header.name.key)
             types = {} if own is None else own.types
-            inside = [entry for one in header.parameters for entry in _variables(one, types, parameter=True)]
-            inside += [entry for one in header.declarations for entry in _variables(one, types)]
+            inside = [
+                entry for parameter in header.parameters for entry in _variables(parameter, types, parameter=True)
+            ]
+            inside += [entry for declaration in header.declarations for entry in _variables(declaration, types)]
             detail = signature(header)[0].partition(" (")[2]
             found.append(
                 Entry(

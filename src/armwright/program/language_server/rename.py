@@ -138,4 +138,4 @@ def _require_unused_globally(analysis: Analysis, one: Occurrence, new: str) -> N
 def _meant(analysis: Analysis) -> tuple[Occurrence, ...]:
     """Return the occurrences that stand for something by their name, and not by their place."""
     fixed = (What.UNIT, What.SENSOR, What.AXIS, What.DEVICE)
-    return tuple(one for one in analysis.occurrences if one.what not in fixed)
+    return tuple(occurrence for occurrence in analysis.occurrences if occurrence.what not in fixed)

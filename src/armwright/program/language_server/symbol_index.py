@@ -97,7 +97,9 @@ class Extents:
 
 def extents_of(symbols: Symbols) -> Extents:
     """Return where the procedures of a program stand."""
-    found = sorted((one.node.span.start, one.node.span.end, key) for key, one in symbols.procedures.items())
+    found = sorted(
+        (procedure.node.span.start, procedure.node.span.end, key) for key, procedure in symbols.procedures.items()
+    )
     return Extents(
         symbols=symbols,
         starts=tuple(start for start, _, _ in found),

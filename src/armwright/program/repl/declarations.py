@@ -106,7 +106,7 @@ def merged(
         renamed=changed.renamed,
         dropped=changed.dropped,
         imports=tuple(imports),
-        remarks=(*remarks, *_said(changed, declared(old), again)),
+        remarks=(*remarks, *_messages(changed, declared(old), again)),
     )
 
 
@@ -115,19 +115,19 @@ def _spelling(changed: Redeclared) -> dict[str, str]:
     return {key: now[key].text for key in changed.renamed.values()}
 
 
-def _said(changed: Redeclared, old: Mapping[str, tree.Name], again: Collection[str]) -> list[str]:
-    said, now = [], _spelling(changed)
+def _messages(changed: Redeclared, old: Mapping[str, tree.Name], again: Collection[str]) -> list[str]:
+    messages, now = [], _spelling(changed)
     for key in sorted(again):
         text = f"`{old[key].text}` is declared anew"
         if key in changed.renamed:
             text += f"; what it was before is now called `{now[changed.renamed[key]]}`"
-        said.append(text)
-    said += [
+        messages.append(text)
+    messages += [
         f"`{old[key].text}` means the new one; what it did before is now called `{now[name]}`"
         for key, name in sorted(changed.renamed.items())
         if key not in again
     ]
-    return said
+    return messages
 
 
 def _known_to_the_cell(name: tree.Name) -> Diagnostic:
@@ -153,10 +153,10 @@ def _with_units(
     """
     now = {unit.key for unit in _units(headers)}
     changes = [unit for unit in new.units if unit.key in UNITS and unit.key not in now]
-    began = statements or any(isinstance(one, tree.Procedure) for one in headers)
+    began = statements or any(isinstance(header, tree.Procedure) for header in headers)
     standard = {"M", "DEG"}
     dimensions = {dimension(key) for key in now}
-    changes = [one for one in changes if one.key not in standard or dimension(one.key) in dimensions]
+    changes = [change for change in changes if change.key not in standard or dimension(change.key) in dimensions]
     if began and changes:
         raise NotNowError(
             Diagnostic(
@@ -168,14 +168,14 @@ def _with_units(
             )
         )
     replaced = {dimension(unit.key) for unit in new.units if unit.key in UNITS}
-    left: list[tree.Header] = []
+    remaining: list[tree.Header] = []
     for header in headers:
         if isinstance(header, tree.Units):
-            kept = tuple(unit for unit in header.units if dimension(unit.key) not in replaced)
-            left += [attrs.evolve(header, units=kept)] if kept else []
+            units = tuple(unit for unit in header.units if dimension(unit.key) not in replaced)
+            remaining += [attrs.evolve(header, units=units)] if units else []
         else:
-            left.append(header)
-    return tuple(left)
+            remaining.append(header)
+    return tuple(remaining)
 
 
 def _units(headers: Sequence[tree.Header]) -> list[tree.Name]:

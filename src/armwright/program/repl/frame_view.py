@@ -25,8 +25,8 @@ def frames(session: Session) -> list[str]:
             rows.append([shown, "no value yet"])
             continue
         X = machine.state.tree.world(name)
-        place = [_number(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
-        rows.append([shown, *place, "", *map(_degrees, to_zyx(X[:3, :3]).tolist()), ""])
+        position = [_number(value, _DIGITS[units.length]) for value in X[:3, 3] / units.metres]
+        rows.append([shown, *position, "", *map(_degrees, to_zyx(X[:3, :3]).tolist()), ""])
     return _aligned(rows)
 
 
@@ -58,18 +58,18 @@ def to_zyx(R: Array) -> Array:
 def arms(session: Session) -> list[str]:
     """Return the arms as lines: the position of each joint [deg] or [mm], and what the hand is at and holds."""
     machine, lines = session.state.machine, []
-    for name, place in machine.cell.arms.items():
+    for name, arm in machine.cell.arms.items():
         q = machine.hardware.configuration(name, machine.now)
         shown = [
             f"{_degrees(value)} deg" if joint.revolute else f"{_number(value * 1e3, 2)} mm"
-            for joint, value in zip(place.arm.joints, q.tolist(), strict=True)
+            for joint, value in zip(arm.arm.joints, q.tolist(), strict=True)
         ]
         hand = machine.state.hands[name]
-        at = f"at {session.spelled(hand.at)}" if hand.at else "at no frame"
+        location = f"at {session.spelled(hand.at)}" if hand.at else "at no frame"
         holds = f", closed on {session.spelled(hand.holds)}" if hand.holds else ""
         hanging = [session.spelled(one) for one, node in machine.state.tree.nodes.items() if node.parent == name]
         carries = f", carries {', '.join(hanging)}" if hanging else ""
-        lines += [f"{name}  {place.arm.name}", f"  joints  {', '.join(shown)}", f"  hand    {at}{holds}{carries}"]
+        lines += [f"{name}  {arm.arm.name}", f"  joints  {', '.join(shown)}", f"  hand    {location}{holds}{carries}"]
     return lines or ["no arms: begin with `--cell`, or with an IMPORT of a cell"]
 
 
@@ -90,8 +90,8 @@ def _number(value: float, digits: int) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    whole = [row for row in rows if len(row) == len(rows[0])]
-    widths = [max(len(row[column]) for row in whole) for column in range(len(rows[0]))]
+    complete = [row for row in rows if len(row) == len(rows[0])]
+    widths = [max(len(row[column]) for row in complete) for column in range(len(rows[0]))]
     widths[0] = max(len(row[0]) for row in rows)
     lines = []
     for row in rows:

@@ -67,12 +67,12 @@ def read(
         procedures: the procedures that are.
         is_file: whether it is the text of a file; elsewhere a number that begins a line may begin an expression.
     """
-    text, found = source.text[start:], []
+    text, diagnostics = source.text[start:], []
     if is_file or std is Standard.RLO_83 or _NUMBERED.match(text):
         text, odd = without_numbers(Source(source.name, text))
-        found += [moved(one, start) for one in odd]
+        diagnostics += [moved(diagnostic, start) for diagnostic in odd]
     scanned = scan(source, " " * start + text, std)
-    found += scanned.found
+    diagnostics += scanned.found
     tokens = _without_frame(scanned.tokens[:-1])
     reader = _Reader(source, std, names, procedures)
     for is_header, part in _parts(tokens, VOCABULARIES[std]):
@@ -80,14 +80,14 @@ def read(
             reader.headers_of(part)
         else:
             reader.statements_of(part)
-    found += map(_advised, reader.found)
+    diagnostics += map(_advised, reader.found)
     return Entry(
         headers=tuple(reader.headers),
         statements=tuple(reader.statements),
         shown=frozenset(reader.shown),
         spelling={token.key: token.text for token in reversed(tokens) if token.kind is TokenKind.NAME},
-        found=tuple(found),
-        complete=_is_complete(scanned.tokens[:-1], found),
+        found=tuple(diagnostics),
+        complete=_is_complete(scanned.tokens[:-1], diagnostics),
     )
 
 
@@ -113,11 +113,11 @@ def _advised(diagnostic: Diagnostic) -> Diagnostic:
     return attrs.evolve(diagnostic, helps=(*diagnostic.helps, help_))
 
 
-def _is_complete(tokens: Sequence[Token], found: Sequence[Diagnostic]) -> bool:
+def _is_complete(tokens: Sequence[Token], diagnostics: Sequence[Diagnostic]) -> bool:
     """Whether nothing is open, and the first thing that is wrong is not that the text ends."""
-    if any(one.code == "E102" for one in found) or (tokens and _depth(tokens) > 0):
+    if any(diagnostic.code == "E102" for diagnostic in diagnostics) or (tokens and _depth(tokens) > 0):
         return False
-    first = next((one for one in in_order(found) if one.is_syntax), None)
+    first = next((diagnostic for diagnostic in in_order(diagnostics) if diagnostic.is_syntax), None)
     # A character that RLO does not have stays wrong whatever follows, a comment of another language too.
     if first is None or first.code == "E101" or not tokens or first.span.start < tokens[-1].end:
         return True
@@ -133,18 +133,18 @@ def _depth(tokens: Sequence[Token]) -> int:
 
 def _without_frame(tokens: Sequence[Token]) -> list[Token]:
     """Return the tokens without the BEGIN and the ``END.`` of a whole program."""
-    left = list(tokens)
-    if len(left) > 1 and left[-1].key == "." and left[-2].key == "END":
-        left.pop()
+    remaining = list(tokens)
+    if len(remaining) > 1 and remaining[-1].key == "." and remaining[-2].key == "END":
+        remaining.pop()
         depth = 0
-        for at in reversed(range(len(left))):
-            if left[at].kind is TokenKind.KEYWORD:
-                depth += (left[at].key in CLOSING) - (left[at].key in OPENING)
+        for index in reversed(range(len(remaining))):
+            if remaining[index].kind is TokenKind.KEYWORD:
+                depth += (remaining[index].key in CLOSING) - (remaining[index].key in OPENING)
             if depth == 0:
-                if left[at].key == "BEGIN" and (at == 0 or left[at - 1].key == ";"):
-                    del left[-1], left[at]
+                if remaining[index].key == "BEGIN" and (index == 0 or remaining[index - 1].key == ";"):
+                    del remaining[-1], remaining[index]
                 break
-    return left
+    return remaining
 
 
 # ---- parts ---------------------------------------------------------------------------------------------------------
@@ -152,62 +152,62 @@ def _without_frame(tokens: Sequence[Token]) -> list[Token]:
 
 def _parts(tokens: Sequence[Token], words: Vocabulary) -> Iterator[tuple[bool, Sequence[Token]]]:
     """Cut an input into headers and stretches of statements, each with whether it is a header."""
-    at = 0
-    while at < len(tokens):
+    index = 0
+    while index < len(tokens):
         is_header = True
-        if _is_header(tokens[at], words):
-            end = _end_of_header(tokens, at)
-        elif _goes_on_declaring(tokens, at):
-            end = _end_of_variables(tokens, at)
+        if _is_header(tokens[index], words):
+            end = _end_of_header(tokens, index)
+        elif _goes_on_declaring(tokens, index):
+            end = _end_of_variables(tokens, index)
         else:
-            is_header, end = False, _end_of_statements(tokens, at, words)
-        yield is_header, tokens[at:end]
-        at = end
+            is_header, end = False, _end_of_statements(tokens, index, words)
+        yield is_header, tokens[index:end]
+        index = end
 
 
 def _is_header(token: Token, words: Vocabulary) -> bool:
     return token.kind is TokenKind.KEYWORD and token.key in words.headers
 
 
-def _goes_on_declaring(tokens: Sequence[Token], at: int) -> bool:
+def _goes_on_declaring(tokens: Sequence[Token], index: int) -> bool:
     """Whether names and a type follow, as behind the first ``;`` of a VAR part."""
-    while at + 1 < len(tokens) and tokens[at].kind is TokenKind.NAME:
-        if tokens[at + 1].key == ":":
+    while index + 1 < len(tokens) and tokens[index].kind is TokenKind.NAME:
+        if tokens[index + 1].key == ":":
             return True
-        if tokens[at + 1].key != ",":
+        if tokens[index + 1].key != ",":
             return False
-        at += 2
+        index += 2
     return False
 
 
-def _end_of_header(tokens: Sequence[Token], at: int) -> int:
-    if tokens[at].key == "VAR":
-        return _end_of_variables(tokens, at)
-    if tokens[at].key != "PROCEDURE":
-        return _behind(tokens, at, ";")
-    at, depth = _behind(tokens, at, "BEGIN"), 1
-    while at < len(tokens) and depth:
-        depth += _depth(tokens[at : at + 1])
-        at += 1
-    return at + 1 if at < len(tokens) and tokens[at].key in (";", ".") else at
+def _end_of_header(tokens: Sequence[Token], index: int) -> int:
+    if tokens[index].key == "VAR":
+        return _end_of_variables(tokens, index)
+    if tokens[index].key != "PROCEDURE":
+        return _behind(tokens, index, ";")
+    index, depth = _behind(tokens, index, "BEGIN"), 1
+    while index < len(tokens) and depth:
+        depth += _depth(tokens[index : index + 1])
+        index += 1
+    return index + 1 if index < len(tokens) and tokens[index].key in (";", ".") else index
 
 
-def _end_of_variables(tokens: Sequence[Token], at: int) -> int:
-    at = _behind(tokens, at, ";")
-    while _goes_on_declaring(tokens, at):
-        at = _behind(tokens, at, ";")
-    return at
+def _end_of_variables(tokens: Sequence[Token], index: int) -> int:
+    index = _behind(tokens, index, ";")
+    while _goes_on_declaring(tokens, index):
+        index = _behind(tokens, index, ";")
+    return index
 
 
-def _behind(tokens: Sequence[Token], at: int, key: str) -> int:
+def _behind(tokens: Sequence[Token], index: int, key: str) -> int:
     """Return the place behind the next token that reads so; the end without one."""
-    return next((number + 1 for number in range(at, len(tokens)) if tokens[number].key == key), len(tokens))
+    return next((number + 1 for number in range(index, len(tokens)) if tokens[number].key == key), len(tokens))
 
 
-def _end_of_statements(tokens: Sequence[Token], at: int, words: Vocabulary) -> int:
+def _end_of_statements(tokens: Sequence[Token], index: int, words: Vocabulary) -> int:
     depth = 0
-    for number in range(at, len(tokens)):
-        if depth <= 0 and number > at and tokens[number - 1].key == ";" and _is_header(tokens[number], words):
+    for number in range(index, len(tokens)):
+        if depth <= 0 and number > index and tokens[number - 1].key == ";" and _is_header(tokens[number], words):
             return number
         depth += _depth(tokens[number : number + 1])
     return len(tokens)
@@ -230,11 +230,11 @@ class _Reader:
     def headers_of(self, part: Sequence[Token]) -> None:
         """Read declarations, units, an import or a procedure; the last ``;`` and the word VAR may be left out."""
         first, last = part[0], part[-1]
-        var = _words("VAR", at=first.start) if first.kind is TokenKind.NAME else []
-        semicolon = [] if last.key in (";", ".") else _words(";", at=last.end)
+        var = _words("VAR", index=first.start) if first.kind is TokenKind.NAME else []
+        semicolon = [] if last.key in (";", ".") else _words(";", index=last.end)
         tokens = [*var, *part]
         if _depth(part) <= 0:
-            tokens += [*semicolon, *_words("BEGIN", "END", ".", at=last.end)]
+            tokens += [*semicolon, *_words("BEGIN", "END", ".", index=last.end)]
         program = self._parse(tokens, last.end, self._std)
         self.headers += program.headers
         for header in program.headers:
@@ -245,7 +245,7 @@ class _Reader:
 
     def statements_of(self, part: Sequence[Token]) -> None:
         """Read statements; an expression among them becomes a PRINT of it."""
-        std, tokens = self._std, _words("BEGIN", at=part[0].start)
+        std, tokens = self._std, _words("BEGIN", index=part[0].start)
         pieces = list(_pieces(part))
         for piece in pieces:
             if not self._is_expression(piece, alone=len(pieces) == 1):
@@ -253,50 +253,55 @@ class _Reader:
                 continue
             self.shown.append(piece[0].start)
             std = Standard.RLO_2
-            rest = piece[:-1] if piece[-1].key == ";" else piece
-            start, end = rest[0].start, rest[-1].end
-            tokens += [*_words("PRINT", "(", at=start), *rest, *_words(")", at=end), *piece[len(rest) :]]
-        tokens += _words("END", ".", at=part[-1].end)
+            remaining = piece[:-1] if piece[-1].key == ";" else piece
+            start, end = remaining[0].start, remaining[-1].end
+            tokens += [
+                *_words("PRINT", "(", index=start),
+                *remaining,
+                *_words(")", index=end),
+                *piece[len(remaining) :],
+            ]
+        tokens += _words("END", ".", index=part[-1].end)
         self.statements += self._parse(tokens, part[-1].end, std).statements
 
     def _parse(self, tokens: list[Token], end: int, std: Standard) -> tree.Program:
         """Parse what has a program around it already, up to the end of the text."""
         tokens.append(Token(TokenKind.END, "", "", end, end))
-        program, found = parse(self._source, tokens, std, declared=self._names, procedures=self._procedures)
-        self.found += found
+        program, diagnostics = parse(self._source, tokens, std, declared=self._names, procedures=self._procedures)
+        self.found += diagnostics
         return program
 
     def _is_expression(self, piece: Sequence[Token], *, alone: bool) -> bool:
         """Whether what stands between two ``;`` is a value and no statement."""
-        first, rest = piece[0], [token for token in piece[1:] if token.key != ";"]
+        first, remaining = piece[0], [token for token in piece[1:] if token.key != ";"]
         if self._std is Standard.RLO_83:
             known = first.kind is TokenKind.ARM or (first.kind is TokenKind.NAME and first.key in self._names)
-            return alone and known and not rest
+            return alone and known and not remaining
         if first.kind is TokenKind.NAME:
-            return self._begins_value(first, _behind_brackets(rest))
+            return self._begins_value(first, _behind_brackets(remaining))
         if first.kind is TokenKind.ARM:
-            return not rest or rest[0].key not in _ASSIGNING
+            return not remaining or remaining[0].key not in _ASSIGNING
         return first.kind in _BEGINNINGS or first.key in ("(", "-", "NOT")
 
-    def _begins_value(self, name: Token, rest: Sequence[Token]) -> bool:
+    def _begins_value(self, name: Token, remaining: Sequence[Token]) -> bool:
         """Whether a name with this behind it and its indices is a value."""
-        if not rest:
+        if not remaining:
             known = name.key in self._names
             words = VOCABULARIES[self._std].statements
             return name.key not in self._procedures and (known or closest(name.text, words) is None)
-        if rest[0].key == "(":
+        if remaining[0].key == "(":
             return name.key in FUNCTIONS and name.key not in self._procedures
-        return rest[0].key in _OPERATORS
+        return remaining[0].key in _OPERATORS
 
 
 def _pieces(part: Sequence[Token]) -> Iterator[Sequence[Token]]:
     """Cut a stretch of statements behind each ``;`` that is not inside one of them."""
     first, depth = 0, 0
-    for at, token in enumerate(part):
+    for index, token in enumerate(part):
         depth += _depth((token,))
         if token.key == ";" and depth <= 0:
-            yield part[first : at + 1]
-            first = at + 1
+            yield part[first : index + 1]
+            first = index + 1
     if first < len(part):
         yield part[first:]
 
@@ -306,14 +311,14 @@ def _behind_brackets(tokens: Sequence[Token]) -> Sequence[Token]:
     if not tokens or tokens[0].key != "[":
         return tokens
     depth = 0
-    for at, token in enumerate(tokens):
+    for index, token in enumerate(tokens):
         depth += (token.key == "[") - (token.key == "]")
         if depth == 0:
-            return tokens[at + 1 :]
+            return tokens[index + 1 :]
     return ()
 
 
-def _words(*keys: str, at: int) -> list[Token]:
+def _words(*keys: str, index: int) -> list[Token]:
     """Return words and signs that nobody has written."""
     kinds = {True: TokenKind.KEYWORD, False: TokenKind.SYMBOL}
-    return [Token(kinds[key.isalpha()], key, key, at, at) for key in keys]
+    return [Token(kinds[key.isalpha()], key, key, index, index) for key in keys]

@@ -31,13 +31,13 @@ class Redeclared:
 
 def declared(headers: Iterable[tree.Header]) -> dict[str, tree.Name]:
     """Return the names that headers declare, variables and procedures, by key."""
-    found: dict[str, tree.Name] = {}
+    names_: dict[str, tree.Name] = {}
     for header in headers:
         if isinstance(header, tree.Declaration):
-            found.update((name.key, name) for name in header.names)
+            names_.update((name.key, name) for name in header.names)
         elif isinstance(header, tree.Procedure):
-            found[header.name.key] = header.name
-    return found
+            names_[header.name.key] = header.name
+    return names_
 
 
 def redeclare(
@@ -65,22 +65,22 @@ def redeclare(
     used = _reached(mentioned(tuple(statements)), mentions)
     old = {key for key in names if key in used}
     affected = {key for key in procedures if key in used and _reached(mentions[key], mentions) & old} - old
-    found, fresh = declared(headers), _Fresh(taken, longest)
-    new = {key: fresh.name(found[key].text) for key in sorted(old | affected)}
-    left: list[tree.Header] = []
+    names_, fresh = declared(headers), _Fresh(taken, longest)
+    new = {key: fresh.name(names_[key].text) for key in sorted(old | affected)}
+    remaining: list[tree.Header] = []
     for header in headers:
         if isinstance(header, tree.Procedure):
             key = header.name.key
             if key in new:
-                left.append(renamed(header, new))
+                remaining.append(renamed(header, new))
             if key not in names:
-                left.append(header)
+                remaining.append(header)
         elif isinstance(header, tree.Declaration):
-            left += _declarations(header, names, new)
+            remaining += _declarations(header, names, new)
         else:
-            left.append(header)
+            remaining.append(header)
     return Redeclared(
-        headers=tuple(left),
+        headers=tuple(remaining),
         statements=tuple(renamed(statement, new) for statement in statements),
         renamed={key: new[key].key for key in new},
         dropped=frozenset(names) - old,
@@ -90,8 +90,8 @@ def redeclare(
 def _declarations(
     header: tree.Declaration, names: Collection[str], new: Mapping[str, tree.Name]
 ) -> list[tree.Declaration]:
-    kept = [_named(name, new) for name in header.names if name.key not in names or name.key in new]
-    return [attrs.evolve(header, names=tuple(kept))] if kept else []
+    unchanged = [_named(name, new) for name in header.names if name.key not in names or name.key in new]
+    return [attrs.evolve(header, names=tuple(unchanged))] if unchanged else []
 
 
 def _reached(names: Collection[str], mentions: Mapping[str, Collection[str]]) -> set[str]:
@@ -115,10 +115,10 @@ class _Fresh:
         number = 1
         while True:
             end = f"_{number}"
-            given = text[: self._longest - len(end)] + end
-            if given.upper() not in self._taken:
-                self._taken.add(given.upper())
-                return tree.Name(Span(0, 0), given, given.upper())
+            candidate = text[: self._longest - len(end)] + end
+            if candidate.upper() not in self._taken:
+                self._taken.add(candidate.upper())
+                return tree.Name(Span(0, 0), candidate, candidate.upper())
             number += 1
 
 
@@ -134,18 +134,18 @@ def mentioned(node: object) -> set[str]:
     """Return the keys of the variables and procedures that a part of a program uses."""
     match node:
         case Span():
-            found = set()
+            names_ = set()
         case tree.Name(key=key):
-            found = {key}
+            names_ = {key}
         case tree.Function(name=name, arguments=arguments):
-            found = set() if name.key in _WITH_AXIS else mentioned(arguments)
+            names_ = set() if name.key in _WITH_AXIS else mentioned(arguments)
         case tree.Procedure(body=body):
-            found = mentioned(body) - own_names(node)
+            names_ = mentioned(body) - own_names(node)
         case tuple():
-            found = set().union(*map(mentioned, node))
+            names_ = set().union(*map(mentioned, node))
         case _:
-            found = set().union(*map(mentioned, _values(node).values()))
-    return found
+            names_ = set().union(*map(mentioned, _values(node).values()))
+    return names_
 
 
 def renamed(node: Any, new: Mapping[str, tree.Name]) -> Any:
@@ -160,7 +160,7 @@ def renamed(node: Any, new: Mapping[str, tree.Name]) -> Any:
             if name.key not in _WITH_AXIS:
                 changed = attrs.evolve(node, arguments=renamed(arguments, new))
         case tree.Procedure(name=name, body=body):
-            inner = {key: given for key, given in new.items() if key not in own_names(node)}
+            inner = {key: candidate for key, candidate in new.items() if key not in own_names(node)}
             changed = attrs.evolve(node, name=_named(name, new), body=renamed(body, inner))
         case tuple():
             changed = tuple(renamed(item, new) for item in node)
@@ -170,8 +170,8 @@ def renamed(node: Any, new: Mapping[str, tree.Name]) -> Any:
 
 
 def _named(name: tree.Name, new: Mapping[str, tree.Name]) -> tree.Name:
-    given = new.get(name.key)
-    return name if given is None else attrs.evolve(name, text=given.text, key=given.key)
+    candidate = new.get(name.key)
+    return name if candidate is None else attrs.evolve(name, text=candidate.text, key=candidate.key)
 
 
 def _values(node: object) -> dict[str, object]:

@@ -92,7 +92,7 @@ class Answer:
     @property
     def is_wrong(self) -> bool:
         """Whether something in it could not be done."""
-        return self.refused or any(one.is_error for one in self.diagnostics)
+        return self.refused or any(diagnostic.is_error for diagnostic in self.diagnostics)
 
     @property
     def status(self) -> ExitStatus:
@@ -236,14 +236,14 @@ class Session:
         """Count lines that say nothing to the cell, so that messages name the lines that people have seen."""
         self._text += text if text.endswith("\n") or not text else f"{text}\n"
 
-    def enter(self, text: str, *, whole: bool = False) -> Answer:
+    def enter(self, text: str, *, complete: bool = False) -> Answer:
         """Take declarations, statements, or an expression whose value is to be shown.
 
         Args:
             text: an input; or its beginning, which is then given again with the next line behind it.
-            whole: whether nothing more comes, so that what is missing is an error.
+            complete: whether nothing more comes, so that what is missing is an error.
         """
-        return self._enter(text, whole=whole)
+        return self._enter(text, complete=complete)
 
     def load(self, file: Source, path_of: Callable[[str], str] = str) -> Answer:
         """Take the text of a file, such as a whole program; messages about it name its own lines.
@@ -253,30 +253,36 @@ class Session:
             path_of: how the session shall name a file that this one imports.
         """
         start = len(self._text)
-        answer = self._enter(file.text, whole=True, is_file=True, path_of=path_of)
-        spans = [span for one in answer.diagnostics for span in (one.span, *(label.span for label in one.secondary))]
+        answer = self._enter(file.text, complete=True, is_file=True, path_of=path_of)
+        spans = [
+            span
+            for diagnostic in answer.diagnostics
+            for span in (diagnostic.span, *(label.span for label in diagnostic.secondary))
+        ]
         if any(span.start < start for span in spans):
             return answer
-        own = tuple(moved(one, -start) for one in answer.diagnostics)
+        own = tuple(moved(diagnostic, -start) for diagnostic in answer.diagnostics)
         return attrs.evolve(answer, source=file, diagnostics=own)
 
-    def _enter(self, text: str, *, whole: bool, is_file: bool = False, path_of: Callable[[str], str] = str) -> Answer:
+    def _enter(
+        self, text: str, *, complete: bool, is_file: bool = False, path_of: Callable[[str], str] = str
+    ) -> Answer:
         start, symbols = len(self._text), self.state.symbols
         source = Source(self.name, self._text + (text if text.endswith("\n") else f"{text}\n"))
         entry = read(source, start, self.std, names=symbols.types, procedures=symbols.procedures, is_file=is_file)
-        if not (entry.complete or whole):
+        if not (entry.complete or complete):
             return Answer(complete=False, source=source)
         # Whatever becomes of it: the lines of the session keep their numbers.
         self._text = source.text
         try:
-            checked, said = self._check(source, start, entry, path_of)
+            checked, reported = self._check(source, start, entry, path_of)
         except NotNowError as refused:
             return Answer(source=source, diagnostics=(refused.diagnostic,))
         if checked is None:
-            return Answer(source=source, diagnostics=said)
+            return Answer(source=source, diagnostics=reported)
         answer = self._do(checked)
         remarks = (*checked.heading.remarks, *answer.remarks)
-        return attrs.evolve(answer, diagnostics=(*said, *answer.diagnostics), remarks=remarks)
+        return attrs.evolve(answer, diagnostics=(*reported, *answer.diagnostics), remarks=remarks)
 
     # ---- checking --------------------------------------------------------------------------------------------------
 
@@ -295,30 +301,36 @@ class Session:
         end = _end(source)
         program = tree.Program(Span(0, end.end), heading.headers, (*heading.statements, *entry.statements), end)
         cell, symbols, wrong = self._check_names(program)
-        found = [*entry.found, *wrong]
+        diagnostics = [*entry.found, *wrong]
         course = None
-        if not any(one.is_syntax for one in found):
+        if not any(diagnostic.is_syntax for diagnostic in diagnostics):
             course, odd = analysis.check(program, symbols, spelling, known_cell(cell), source=source)
-            found += odd
-        new = (one for one in found if one.is_error or (one.span.start >= start and one.code not in _TOO_EARLY))
-        said = in_order(new)
-        if course is None or any(one.is_error for one in said):
-            return None, said
+            diagnostics += odd
+        new = (
+            diagnostic
+            for diagnostic in diagnostics
+            if diagnostic.is_error or (diagnostic.span.start >= start and diagnostic.code not in _TOO_EARLY)
+        )
+        reported = in_order(new)
+        if course is None or any(diagnostic.is_error for diagnostic in reported):
+            return None, reported
         checked = _Checked(
             source=source, entry=entry, heading=heading, cell=cell, symbols=symbols, flow=course, spelling=spelling
         )
-        return checked, said
+        return checked, reported
 
     def _check_names(self, program: tree.Program) -> tuple[Cell, Symbols, list[Diagnostic]]:
         """Check names and types; where nothing was done yet, the arms of an imported cell are those of the session."""
         cell = self.state.cell
         read_import = None if self._read_import is None else self._import
-        symbols, found, imports = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
-        other = next((one.cell for one in imports if one.cell is not None and one.cell.arms), None)
+        symbols, diagnostics, imports = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
+        other = next(
+            (diagnostic.cell for diagnostic in imports if diagnostic.cell is not None and diagnostic.cell.arms), None
+        )
         if other is not None and not cell.arms and not self.state.statements:
             cell = other
-            symbols, found, _ = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
-        return cell, symbols, found
+            symbols, diagnostics, _ = check.check(program, known_cell(cell), std=self.std, read_import=read_import)
+        return cell, symbols, diagnostics
 
     def _import(self, path: str) -> Imported:
         if path not in self._imports:
@@ -334,7 +346,7 @@ class Session:
         if checked.heading.headers != self.state.headers:
             self._declare(checked)
         effects: list[Effect] = []
-        found: list[Diagnostic] = []
+        diagnostics: list[Diagnostic] = []
         remarks: list[str] = []
         refused = failed = False
         for number, statement in enumerate(entry.statements):
@@ -348,19 +360,19 @@ class Session:
             try:
                 go_through(machine)
             except RunError as error:
-                found.append(error.diagnostic)
+                diagnostics.append(error.diagnostic)
                 failed = True
                 remarks += [*taken_back(before.machine, machine), *_left(len(entry.statements) - number - 1)]
                 break
             effects += machine.state.effects[len(before.machine.state.effects) :]
-            found += new_warnings(before.machine, machine)
+            diagnostics += new_warnings(before.machine, machine)
             if not shown:
                 text = " ".join(source.slice(statement.span).split())
                 self._go_on(checked.state(machine, (*before.statements, statement), text))
         return Answer(
             source=source,
             effects=tuple(effects),
-            diagnostics=tuple(found),
+            diagnostics=tuple(diagnostics),
             remarks=tuple(remarks),
             refused=refused,
             failed=failed,

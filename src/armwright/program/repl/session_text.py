@@ -29,11 +29,11 @@ def program_text(
     """
     rows = [f"// {' '.join(remark.split())}"] if remark else []
     rows += _units(headers)
-    rows += [f'IMPORT "{path_of(one.path.value)}" ;' for one in headers if isinstance(one, tree.Import)]
-    variables = [one for one in headers if isinstance(one, tree.Declaration)]
-    rows += [("VAR " if one is variables[0] else "    ") + declaration(one) + " ;" for one in variables]
-    rows += [f"{as_written(source, one)} ;" for one in headers if isinstance(one, tree.Procedure)]
-    rows += ["BEGIN", *(f"{as_written(source, one)} ;" for one in statements), "END.", ""]
+    rows += [f'IMPORT "{path_of(header.path.value)}" ;' for header in headers if isinstance(header, tree.Import)]
+    variables = [header for header in headers if isinstance(header, tree.Declaration)]
+    rows += [("VAR " if variable is variables[0] else "    ") + declaration(variable) + " ;" for variable in variables]
+    rows += [f"{as_written(source, header)} ;" for header in headers if isinstance(header, tree.Procedure)]
+    rows += ["BEGIN", *(f"{as_written(source, statement)} ;" for statement in statements), "END.", ""]
     return formatted(Source(source.name, "\n".join(rows)), std=std)
 
 
@@ -68,6 +68,6 @@ def as_written(source: Source, node: tree.Procedure | tree.Statement) -> str:
 
 
 def _changes(source: Source, node: object) -> Iterator[tuple[int, int, str]]:
-    for one in tree.walk(node):
-        if isinstance(one, tree.Name) and source.slice(one.span) != one.text:
-            yield one.span.start, one.span.end, one.text
+    for node_ in tree.walk(node):
+        if isinstance(node_, tree.Name) and source.slice(node_.span) != node_.text:
+            yield node_.span.start, node_.span.end, node_.text

@@ -89,8 +89,8 @@ def new_warnings(before: Machine, after: Machine) -> tuple[Diagnostic, ...]:
 def rename(machine: Machine, names: Mapping[str, str]) -> None:
     """Let variables have other names from now on."""
 
-    def other(kept: str) -> str:
-        base, bracket, indices = kept.partition("[")
+    def other(slot: str) -> str:
+        base, bracket, indices = slot.partition("[")
         return f"{names.get(base, base)}{bracket}{indices}"
 
     machine.state.tree = _renamed(machine.state.tree, names, other)

@@ -22,21 +22,25 @@ def taken_back(before: Machine, after: Machine) -> list[str]:
         after: what the statement had come to.
     """
     done = [effect.text for effect in after.state.effects[len(before.state.effects) :] if effect.kind not in SILENT]
-    left = len(done) - _MOST_SAID
-    done = [*done[:_MOST_SAID], f"{left} more"] if left > 1 else done
-    said = [f"before that it had done: {'; '.join(done)}"] if done else []
+    count = len(done) - _MOST_SAID
+    done = [*done[:_MOST_SAID], f"{count} more"] if count > 1 else done
+    sentences = [f"before that it had done: {'; '.join(done)}"] if done else []
     back = _arms(before, after)
     if frames := [after.spelled(name) for name in _frames(before, after)]:
         back.append(f"{'frames' if len(frames) > 1 else 'frame'} {', '.join(frames)}")
     if after.state.ticks > before.state.ticks:
         back.append(f"the clock to {before.now:.3f} s")
-    return [*said, *([f"put back: {', '.join(back)}"] if back else [])]
+    return [*sentences, *([f"put back: {', '.join(back)}"] if back else [])]
 
 
 def _arms(before: Machine, after: Machine) -> list[str]:
     """Return the arms that stand otherwise after than before."""
-    places = ((name, before.hardware.configuration(name, before.now)) for name in after.state.hands)
-    return [name for name, q in places if np.abs(q - after.hardware.configuration(name, after.now)).max() > _ROUNDING]
+    configurations = ((name, before.hardware.configuration(name, before.now)) for name in after.state.hands)
+    return [
+        name
+        for name, q in configurations
+        if np.abs(q - after.hardware.configuration(name, after.now)).max() > _ROUNDING
+    ]
 
 
 def _frames(before: Machine, after: Machine) -> list[str]:

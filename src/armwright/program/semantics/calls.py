@@ -49,9 +49,9 @@ class Calls:
             if procedure is not None:
                 _wrong_count(names, node, procedure)
             return
-        for place, (argument, parameter) in enumerate(zip(arguments, procedure.parameters, strict=True)):
+        for position, (argument, parameter) in enumerate(zip(arguments, procedure.parameters, strict=True)):
             kind = procedure.own.types.get(parameter)
-            if kind is None or procedure.parameters.index(parameter) != place:
+            if kind is None or procedure.parameters.index(parameter) != position:
                 # Something has been said of this parameter.
                 _look(names, argument)
                 continue
@@ -67,15 +67,15 @@ class Calls:
     def finish(self) -> None:
         """Say which arguments can be changed by nobody, though the procedure changes them."""
         self._follow()
-        for one in self._passed:
-            changed = self._changed.get((id(one.procedure), one.parameter))
-            argument = one.argument
+        for passed_ in self._passed:
+            changed = self._changed.get((id(passed_.procedure), passed_.parameter))
+            argument = passed_.argument
             fixed = isinstance(argument, tree.ArmName) or (
-                argument.key == WORLD and (one.caller is None or WORLD not in one.caller.own.types)
+                argument.key == WORLD and (passed_.caller is None or WORLD not in passed_.caller.own.types)
             )
             if changed is None or not fixed:
                 continue
-            called_so, parameter = one.procedure.node.name.text, _text(one.procedure, one.parameter)
+            called_so, parameter = passed_.procedure.node.name.text, _text(passed_.procedure, passed_.parameter)
             self._names.found.say(
                 "E220",
                 f"`{called_so}` changes its parameter `{parameter}`, and `{argument.text}` cannot be changed",
@@ -87,13 +87,15 @@ class Calls:
 
     def _follow(self) -> None:
         """A parameter that is handed on to where it is changed is changed too."""
-        on = [one for one in self._passed if one.caller and one.argument.key in one.caller.parameters]
+        callers = [
+            passed_ for passed_ in self._passed if passed_.caller and passed_.argument.key in passed_.caller.parameters
+        ]
         news = True
         while news:
             news = False
-            for one in on:
-                key = (id(one.caller), one.argument.key)
-                changed = self._changed.get((id(one.procedure), one.parameter))
+            for passed_ in callers:
+                key = (id(passed_.caller), passed_.argument.key)
+                changed = self._changed.get((id(passed_.procedure), passed_.parameter))
                 if changed is not None and key not in self._changed:
                     self._changed[key] = changed
                     news = True
@@ -119,14 +121,14 @@ def _fits(names: Names, argument: tree.Expression, procedure: Procedure, paramet
             text = f"{what}an {kind}, but {called(argument)} is {is_one.value}"
             names.found.say("E220", text, argument.span, "no array")
         return
-    given = names.type(argument)
-    if given is None or given == kind:
+    argument_type = names.type(argument)
+    if argument_type is None or argument_type == kind:
         return
     names.found.say(
         "E220",
-        f"{what}an {kind}, but `{argument.text}` is {a_type(given)}",
+        f"{what}an {kind}, but `{argument.text}` is {a_type(argument_type)}",
         argument.span,
-        f"{given}",
+        f"{argument_type}",
         secondary=names.where_declared(argument.key),
     )
 
@@ -136,16 +138,16 @@ def _text(procedure: Procedure, parameter: str) -> str:
 
 
 def _wrong_count(names: Names, node: tree.Call, procedure: Procedure) -> None:
-    name, takes, given = node.name, len(procedure.parameters), len(node.arguments)
+    name, takes, argument_type = node.name, len(procedure.parameters), len(node.arguments)
     listed = ", ".join(
-        f"{', '.join(one.text for one in declaration.names)} : {declaration.type.text}"
+        f"{', '.join(name.text for name in declaration.names)} : {declaration.type.text}"
         for declaration in procedure.node.parameters
     )
     names.found.say(
         "E220",
-        f"`{name.text}` takes {takes} argument{'s' * (takes != 1)}, not {given}",
+        f"`{name.text}` takes {takes} argument{'s' * (takes != 1)}, not {argument_type}",
         node.span,
-        f"{given} given here",
+        f"{argument_type} given here",
         secondary=(Label(procedure.node.head, "declared here"),),
         helps=(f"its parameters are ({listed})",) if takes else (),
     )

@@ -54,7 +54,7 @@ def known_cell(cell: Cell) -> KnownCell:
         frames={name: node.parent for name, node in cell.frames.items()},
         devices=cell.devices,
         visions=frozenset(cell.visions),
-        reach=max((one.arm.reach for one in cell.arms.values()), default=None),
+        reach=max((arm.arm.reach for arm in cell.arms.values()), default=None),
     )
 
 

@@ -72,10 +72,10 @@ def _arm(names: Names, node: tree.Mobile | None, who: str) -> None:
     near = names.near(written(node), names.arms)
     kind = names.peek(key)
     if isinstance(node, tree.Index):
-        found = sort(names, node)
-        if found is None:
+        sort_ = sort(names, node)
+        if sort_ is None:
             return
-        kind = VariableType(VariableKind[found.name])
+        kind = VariableType(VariableKind[sort_.name])
     is_one = "is no arm" if kind is None else f"is {a_type(kind)}"
     names.found.say(
         "E201",

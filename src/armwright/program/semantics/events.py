@@ -16,6 +16,6 @@ def refuse(names: Names, node: tree.Expression, what: str = "computed with") -> 
             f"{called(node)} is an EVENT and cannot be {what}",
             node.span,
             "EVENT",
-            secondary=tuple(label for one in keys for label in names.where_declared(one)),
+            secondary=tuple(label for key in keys for label in names.where_declared(key)),
             notes=(_NOTE,),
         )

@@ -89,10 +89,10 @@ def _written(node: tree.Expression) -> tuple[str, int]:
         case tree.Binary():
             first, chain = tree.chain(node)
             text, own = _written(first)
-            for one in chain:
-                strength = _STRENGTH.get(one.operation, _COMPARISON)
-                left = text if own >= strength + (strength == _COMPARISON) else f"({text})"
-                text, own = f"{left} {one.operation} {_inside(one.right, strength + 1)}", strength
+            for node_ in chain:
+                strength = _STRENGTH.get(node_.operation, _COMPARISON)
+                left_text = text if own >= strength + (strength == _COMPARISON) else f"({text})"
+                text, own = f"{left_text} {node_.operation} {_inside(node_.right, strength + 1)}", strength
             return text, own
         case _:
             return _atom(node), _ATOM

@@ -25,7 +25,7 @@ def assign(context: Context, node: tree.Assign) -> None:
     """Check that a variable can be given a value, and gets one of its kind."""
     context.changes(node.target, node.span)
     names, target = context.names, node.target
-    given = sort(names, node.value)
+    actual = sort(names, node.value)
     if isinstance(target, tree.ArmName):
         help_ = f"move it, or write `READ SYSTEM ({target.key})`"
         names.found.say(
@@ -37,24 +37,24 @@ def assign(context: Context, node: tree.Assign) -> None:
         takes = sort(names, target)
         if takes is ExpressionType.EVENT:
             events.refuse(names, target, "given a value")
-        elif takes is not given and takes is not None and given is not None and given not in FITTING[takes]:
-            _misfit(names, node, takes, given)
+        elif takes is not actual and takes is not None and actual is not None and actual not in FITTING[takes]:
+            _misfit(names, node, takes, actual)
 
 
-def _misfit(names: Names, node: tree.Assign, takes: ExpressionType, given: ExpressionType) -> None:
+def _misfit(names: Names, node: tree.Assign, takes: ExpressionType, actual: ExpressionType) -> None:
     target, value = node.target, node.value
-    if given is ExpressionType.EVENT:
+    if actual is ExpressionType.EVENT:
         events.refuse(names, value, "a value")
         return
     if not names.first("E217", *plain_keys(target)):
         return
     if names.std is Standard.RLO_83:
         what = "one number" if takes is ExpressionType.SCALAR else "twelve numbers in `( )`"
-        message, label = "", "a matrix" if given is ExpressionType.MATRIX else "one number"
+        message, label = "", "a matrix" if actual is ExpressionType.MATRIX else "one number"
     else:
-        what, is_one = _TAKES[takes], is_what(value, given)
+        what, is_one = _TAKES[takes], is_what(value, actual)
         message, label = f", but {called(value)} is {is_one}", bare(is_one)
-    help_ = _advice(target, value, takes, given) if message else ""
+    help_ = _advice(target, value, takes, actual) if message else ""
     names.found.say(
         "E217",
         f"{called(target)} is {takes.value} and takes {what}{message}",
@@ -65,8 +65,8 @@ def _misfit(names: Names, node: tree.Assign, takes: ExpressionType, given: Expre
     )
 
 
-def _advice(target: tree.Expression, value: tree.Expression, takes: ExpressionType, given: ExpressionType) -> str:
-    match takes, given:
+def _advice(target: tree.Expression, value: tree.Expression, takes: ExpressionType, actual: ExpressionType) -> str:
+    match takes, actual:
         case _, ExpressionType.INVERSE:
             return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
         case ExpressionType.SCALAR, ExpressionType.CONDITION:
@@ -96,8 +96,8 @@ def affix(context: Context, node: tree.Affix) -> None:
         return
     where, is_arm = written(node.at), isinstance(node.at, tree.ArmName)
 
-    def advice(found: ExpressionType) -> str:
-        is_place = found is ExpressionType.FRAME and not (is_arm and names.std is Standard.RLO_83)
+    def advice(actual: ExpressionType) -> str:
+        is_place = actual is ExpressionType.FRAME and not (is_arm and names.std is Standard.RLO_83)
         return f"for the step from {whence} to {where} write `AT INV({whence}) * {where}`" if is_place else ""
 
     need(

@@ -82,9 +82,9 @@ def _type(names: Names, written: tree.TypeName) -> VariableType | None:
     sizes = [_size(names, number) for number in written.sizes]
     if written.key is None or None in sizes:
         return None
-    whole = tuple(size for size in sizes if size is not None)
+    known = tuple(size for size in sizes if size is not None)
     count = 1
-    for size in whole:
+    for size in known:
         count *= size
     if count > MOST_ELEMENTS:
         span = written.sizes[0].span.to(written.sizes[-1].span)
@@ -95,7 +95,7 @@ def _type(names: Names, written: tree.TypeName) -> VariableType | None:
             f"more than {MOST_ELEMENTS}",
         )
         return None
-    return VariableType(VariableKind(written.key), whole)
+    return VariableType(VariableKind(written.key), known)
 
 
 def _size(names: Names, number: tree.Number) -> int | None:

@@ -21,7 +21,7 @@ _WORDS: dict[type, str] = {
     tree.Blend: "BLEND",
     tree.Duration: "DURATION",
 }
-_GIVEN: dict[type, str] = {
+_CLAUSE_NAMES: dict[type, str] = {
     tree.Straightly: "a straight line asked for here",
     tree.Via: "via points given here",
     tree.Approach: "approach point given here",
@@ -42,17 +42,17 @@ def move(context: Context, node: tree.Move) -> None:
     """Check one MOVE."""
     names = context.names
     need(names, node.moved, ExpressionType.FRAME, "E215", "MOVE moves an arm or a FRAME")
-    _place(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
+    _pose(names, node.goal, "E211", "a MOVE must go to a FRAME", node)
     _combination(names, node.clauses)
     for clause in node.clauses:
         match clause:
             case tree.Via(points=points):
                 for point in points:
-                    _place(names, point, "E212", "a via point must be a FRAME")
+                    _pose(names, point, "E212", "a via point must be a FRAME")
             case tree.Approach(point=point):
-                _place(names, point, "E215", "an approach point must be a FRAME")
+                _pose(names, point, "E215", "an approach point must be a FRAME")
             case tree.Departure(point=point):
-                _place(names, point, "E215", "a departure point must be a FRAME")
+                _pose(names, point, "E215", "a departure point must be a FRAME")
             case tree.Speed(value=value):
                 _speed(names, value)
             case tree.Blend() | tree.Duration():
@@ -64,11 +64,11 @@ def move(context: Context, node: tree.Move) -> None:
                 pass
 
 
-def _place(names: Names, node: tree.Expression, code: str, what: str, move: tree.Move | None = None) -> None:
+def _pose(names: Names, node: tree.Expression, code: str, what: str, move: tree.Move | None = None) -> None:
     """Check a frame to come to."""
 
-    def helps(found: ExpressionType) -> str:
-        if move is None or found is not ExpressionType.TRANS:
+    def helps(actual: ExpressionType) -> str:
+        if move is None or actual is not ExpressionType.TRANS:
             return ""
         moved = "ARM_1" if isinstance(move.moved, tree.Poison) else written(move.moved)
         step = written(node)
@@ -128,7 +128,7 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
                 "E208",
                 f"DIRECTLY cannot be combined with {_WORDS[kind]}",
                 clause.span,
-                _GIVEN[kind],
+                _CLAUSE_NAMES[kind],
                 secondary=(Label(direct.span, _NOT_ASKED[kind]),),
                 helps=("remove one of the two",),
             )
@@ -137,7 +137,7 @@ def _ways(names: Names, first: dict[type, tree.Clause]) -> None:
                 "E209",
                 f"STRAIGHTLY cannot be combined with {_WORDS[kind]}",
                 clause.span,
-                _GIVEN[kind],
+                _CLAUSE_NAMES[kind],
                 secondary=(Label(straight.span, "asks for one straight line"),),
                 helps=("write one `MOVE ... STRAIGHTLY` for each leg",),
             )

@@ -19,7 +19,7 @@ _PRODUCTS: Mapping[tuple[ExpressionType, ExpressionType], ExpressionType] = {
     (ExpressionType.INVERSE, ExpressionType.FRAME): ExpressionType.TRANS,
     (ExpressionType.INVERSE, ExpressionType.MATRIX): ExpressionType.TRANS,
 }
-_PLACES = frozenset((ExpressionType.FRAME, ExpressionType.MATRIX))
+_POSES = frozenset((ExpressionType.FRAME, ExpressionType.MATRIX))
 _STEPS = frozenset((ExpressionType.TRANS, ExpressionType.MATRIX))
 
 
@@ -60,9 +60,9 @@ def negative(names: Names, node: tree.Unary, sort: ExpressionType | None) -> Exp
 
 
 def _refuse(names: Names, node: tree.Binary, left: ExpressionType, right: ExpressionType) -> None:
-    one, other = is_what(node.left, left), is_what(node.right, right)
-    message = f"`{node.operation}` has no meaning between {one} and {other}"
-    label = f"{bare(one)} {node.operation} {bare(other)}"
+    left_text, other = is_what(node.left, left), is_what(node.right, right)
+    message = f"`{node.operation}` has no meaning between {left_text} and {other}"
+    label = f"{bare(left_text)} {node.operation} {bare(other)}"
     _say(names, node, message, label, _advice(node, left, right))
 
 
@@ -75,7 +75,7 @@ def _say(
 ) -> None:
     """Speak of an operation, unless the same was said of the same variables."""
     operands = (node.operand,) if isinstance(node, tree.Unary) else (node.left, node.right)
-    variables = [one.key for one in operands if isinstance(one, tree.Name)]
+    variables = [operand.key for operand in operands if isinstance(operand, tree.Name)]
     if not names.first("E221", *variables):
         return
     secondary = tuple(label for key in dict.fromkeys(variables) for label in names.where_declared(key))
@@ -84,34 +84,34 @@ def _say(
 
 def _advice(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
     """Return what was probably meant, empty where nobody knows."""
-    one, other = written(node.left), written(node.right)
+    left_text, other = written(node.left), written(node.right)
     if ExpressionType.CONDITION in (left, right):
         return "a condition is no number; conditions are joined by AND and OR"
     if node.operation in _COMPARISONS:
-        return f"for how far apart they are write `DIST({one}, {other})`" if {left, right} <= _PLACES else ""
+        return f"for how far apart they are write `DIST({left_text}, {other})`" if {left, right} <= _POSES else ""
     if node.operation in ("*", "/"):
         return _advice_on_product(node, left, right)
-    if left in _PLACES | _STEPS and right in _STEPS:
+    if left in _POSES | _STEPS and right in _STEPS:
         back = other if node.operation == "+" else f"INV({other})"
-        return f"steps follow one another by `*`: write `{one} * {back}`"
-    if {left, right} <= _PLACES and node.operation == "-":
-        return f"for the step from {other} to {one} write `INV({other}) * {one}`"
+        return f"steps follow one another by `*`: write `{left_text} * {back}`"
+    if {left, right} <= _POSES and node.operation == "-":
+        return f"for the step from {other} to {left_text} write `INV({other}) * {left_text}`"
     return ""
 
 
 def _advice_on_product(node: tree.Binary, left: ExpressionType, right: ExpressionType) -> str:
-    one, other = written(node.left), written(node.right)
+    left_text, other = written(node.left), written(node.right)
     if node.operation == "/":
         return (
-            f"for the way back write `{one} * INV({other})`"
+            f"for the way back write `{left_text} * INV({other})`"
             if right in _STEPS and left is not ExpressionType.SCALAR
             else ""
         )
     match left, right:
         case ExpressionType.FRAME, ExpressionType.FRAME:
-            return f"for the step from {one} to {other} write `INV({one}) * {other}`"
+            return f"for the step from {left_text} to {other} write `INV({left_text}) * {other}`"
         case ((ExpressionType.TRANS | ExpressionType.MATRIX), ExpressionType.FRAME):
-            return f"a step comes behind the place it starts from: write `{other} * {one}`"
+            return f"a step comes behind the place it starts from: write `{other} * {left_text}`"
         case (ExpressionType.INVERSE, _) | (_, ExpressionType.INVERSE):
             return "INV of a FRAME goes in front of another FRAME, such as `INV(f) * g`"
         case (ExpressionType.SCALAR, _) | (_, ExpressionType.SCALAR):

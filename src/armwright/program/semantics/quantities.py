@@ -7,16 +7,16 @@ from armwright.program.syntax import tree
 _WHAT: dict[Dimension, str] = {"length": "a length", "angle": "an angle", "time": "a time", "force": "a force"}
 
 
-def measure(names: Names, node: tree.Expression, wanted: Dimension | None, what: str) -> bool:
+def measure(names: Names, node: tree.Expression, expected: Dimension | None, what: str) -> bool:
     """Whether a number, if the expression is one, has no unit or one of the right dimension; say so if not.
 
     Args:
         names: for what is found.
         node: any expression; only of numbers something is asked.
-        wanted: what it has to measure; None for a pure number.
+        expected: what it has to measure; None for a pure number.
         what: the first half of the message, such as ``XYZ takes three lengths``.
     """
-    if not isinstance(node, tree.Number) or node.unit is None or dimension(node.unit) == wanted:
+    if not isinstance(node, tree.Number) or node.unit is None or dimension(node.unit) == expected:
         return True
     is_what = _WHAT[dimension(node.unit)]
     names.found.say("E224", f"{what}, but `{node.text}` is {is_what}", node.span, is_what)

@@ -211,7 +211,7 @@ class Names:
         if self._comparisons > _MOST_COMPARISONS:
             return None
         self._comparisons += len(self.procedures)
-        return next((one for one in self.procedures.values() if key in one.own.types), None)
+        return next((procedure for procedure in self.procedures.values() if key in procedure.own.types), None)
 
     def _undeclared(self, name: tree.Name) -> None:
         helps: tuple[str, ...] = ("declare it in the VAR part",)

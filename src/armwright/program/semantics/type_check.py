@@ -56,7 +56,7 @@ def refuse_world(names: Names, node: tree.Expression) -> None:
 def need(
     names: Names,
     node: tree.Expression,
-    wanted: ExpressionType,
+    expected: ExpressionType,
     code: str,
     what: str,
     *,
@@ -68,7 +68,7 @@ def need(
     Args:
         names: what is known, and for what is found.
         node: the expression.
-        wanted: what it must be.
+        expected: what it must be.
         code: of the diagnostic.
         what: the first half of the message, such as ``AT needs a TRANS``.
         notes: of the diagnostic.
@@ -77,28 +77,28 @@ def need(
     Returns:
         Whether it is what is wanted.
     """
-    return _fits(names, node, sort(names, node), wanted, code, what, notes, helps)
+    return _fits(names, node, sort(names, node), expected, code, what, notes, helps)
 
 
 def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
     names: Names,
     node: tree.Expression,
-    found: ExpressionType | None,
-    wanted: ExpressionType,
+    actual: ExpressionType | None,
+    expected: ExpressionType,
     code: str,
     what: str,
     notes: tuple[str, ...] = (),
     helps: Callable[[ExpressionType], str] | None = None,
 ) -> bool:
     """Do what ``need`` does for an expression of which one knows what it is."""
-    if found is wanted:
+    if actual is expected:
         return True
-    if found is None or found in FITTING[wanted]:
-        return found is not None
+    if actual is None or actual in FITTING[expected]:
+        return actual is not None
     for key in plain_keys(node):
         names.poison(key)
-    is_one = is_what(node, found)
-    help_ = helps(found) if helps else ""
+    is_one = is_what(node, actual)
+    help_ = helps(actual) if helps else ""
     names.found.say(
         code,
         f"{what}, but {called(node)} is {is_one}",
@@ -111,16 +111,16 @@ def _fits(  # noqa: PLR0917 - what ``need`` is given, and the sort
     return False
 
 
-def quantity(names: Names, node: tree.Expression, wanted: Dimension, what: str) -> bool:
+def quantity(names: Names, node: tree.Expression, expected: Dimension, what: str) -> bool:
     """Whether an expression is a number of the right dimension; say so if not.
 
     Args:
         names: what is known, and for what is found.
         node: the expression.
-        wanted: what a number with a unit must measure.
+        expected: what a number with a unit must measure.
         what: the first half of the message, such as ``PAUSE needs a time``.
     """
-    return need(names, node, ExpressionType.SCALAR, "E216", what) and measure(names, node, wanted, what)
+    return need(names, node, ExpressionType.SCALAR, "E216", what) and measure(names, node, expected, what)
 
 
 def condition(names: Names, node: tree.Expression, who: str) -> None:
@@ -128,13 +128,13 @@ def condition(names: Names, node: tree.Expression, who: str) -> None:
     _is_condition(names, node, sort(names, node), who)
 
 
-def _is_condition(names: Names, node: tree.Expression, found: ExpressionType | None, who: str) -> None:
-    def helps(found: ExpressionType) -> str:
-        if found is ExpressionType.SCALAR and not isinstance(node, tree.Number):
+def _is_condition(names: Names, node: tree.Expression, actual: ExpressionType | None, who: str) -> None:
+    def helps(actual: ExpressionType) -> str:
+        if actual is ExpressionType.SCALAR and not isinstance(node, tree.Number):
             return f"write `{written(node)} <> 0`"
         return "a condition compares two numbers, such as `n > 0`"
 
-    _fits(names, node, found, ExpressionType.CONDITION, "E219", f"{who} needs a condition", helps=helps)
+    _fits(names, node, actual, ExpressionType.CONDITION, "E219", f"{who} needs a condition", helps=helps)
 
 
 def _number(_names: Names, node: tree.Number) -> ExpressionType | None:
@@ -160,7 +160,9 @@ def _function(names: Names, node: tree.Function) -> ExpressionType | None:
     if name.key in FUNCTIONS:
         # An axis has a name but is no variable.
         named = name.key == "FORCE"
-        sorts = [None if named and isinstance(one, tree.Name) else sort(names, one) for one in node.arguments]
+        sorts = [
+            None if named and isinstance(argument, tree.Name) else sort(names, argument) for argument in node.arguments
+        ]
         return builtins.result(names, node, sorts)
     for argument in node.arguments:
         # A procedure may be given a whole array, and this may have been meant as a call of one.
@@ -201,15 +203,15 @@ def _unary(names: Names, node: tree.Unary) -> ExpressionType | None:
 
 def _binary(names: Names, node: tree.Binary) -> ExpressionType | None:
     first, chain = tree.chain(node)
-    found = sort(names, first)
-    for one in chain:
-        if one.operation in ("AND", "OR"):
-            _is_condition(names, one.left, found, one.operation)
-            condition(names, one.right, one.operation)
-            found = ExpressionType.CONDITION
+    actual = sort(names, first)
+    for link in chain:
+        if link.operation in ("AND", "OR"):
+            _is_condition(names, link.left, actual, link.operation)
+            condition(names, link.right, link.operation)
+            actual = ExpressionType.CONDITION
         else:
-            found = operators.result(names, one, found, sort(names, one.right))
-    return found
+            actual = operators.result(names, link, actual, sort(names, link.right))
+    return actual
 
 
 def _matrix(names: Names, node: tree.Matrix) -> ExpressionType | None:
@@ -218,11 +220,11 @@ def _matrix(names: Names, node: tree.Matrix) -> ExpressionType | None:
         if len(node.items) == 3 and names.std is Standard.RLO_2:
             fault = attrs.evolve(fault, helps=(f"for a step without a turn write `XYZ{written(node)}`",))
         names.found.append(fault)
-    for place, item in enumerate(node.items):
+    for position, item in enumerate(node.items):
         if not isinstance(item, tree.Number):
             need(names, item, ExpressionType.SCALAR, "E216", "a matrix is made of numbers")
         elif item.unit is not None and fault is None:
-            turns = place < 9
+            turns = position < 9
             what = "n, o, a of a matrix have no unit" if turns else "the last three numbers of a matrix are lengths"
             measure(names, item, None if turns else "length", what)
     return None if fault is not None and fault.is_error else ExpressionType.MATRIX

@@ -30,9 +30,9 @@ def block(tokens: Tokens) -> tree.Block:
     """Read a block; where its END is missing, say so. BEGIN has been looked for, and may be missing too."""
     start = tokens.now
     tokens.accept("BEGIN")
-    found = statements(tokens, "END")
+    body = statements(tokens, "END")
     end = close(tokens, "END", start)
-    return tree.Block(tokens.since(start), found, end or tokens.gap())
+    return tree.Block(tokens.since(start), body, end or tokens.gap())
 
 
 def part(tokens: Tokens, wants: str, where: str, *ends: str) -> tree.Expression:
@@ -49,13 +49,13 @@ def part(tokens: Tokens, wants: str, where: str, *ends: str) -> tree.Expression:
     """
     start, depth = tokens.now, tokens.depth
     try:
-        found = expression(tokens, wants, where)
+        body = expression(tokens, wants, where)
         if wants == _CONDITION:
             tokens.offer("AND", "OR")
         while wants == _CONDITION and _misspelt_joint(tokens):
             sign = tokens.take()
             right = expression(tokens, wants, "")
-            found = tree.Binary(tokens.since(start), sign.key, found, right)
+            body = tree.Binary(tokens.since(start), sign.key, body, right)
     except TooDeepError:
         raise
     except LostError:
@@ -64,7 +64,7 @@ def part(tokens: Tokens, wants: str, where: str, *ends: str) -> tree.Expression:
     if tokens.now.kind in _OPERANDS and _comes_soon(tokens, ends) and not closest(tokens.now.text, (*ends, _DOWNWARDS)):
         tokens.say_once("E117", f"{shown(tokens.now)} does not belong here", tokens.now.span, f"expected `{ends[0]}`")
         _passed_over(tokens, start, ends)
-    return found
+    return body
 
 
 def _comes_soon(tokens: Tokens, ends: tuple[str, ...]) -> bool:
@@ -221,10 +221,10 @@ def _counter(tokens: Tokens) -> tree.Name | tree.Poison:
         tokens.take()
         return tree.Name(token.span, token.text, token.key)
     if token.kind in (TokenKind.NAME, TokenKind.ARM):
-        found = mobile(tokens, "a name", "after FOR")
+        body = mobile(tokens, "a name", "after FOR")
         text = "FOR counts with a variable of its own" if token.kind is TokenKind.NAME else "FOR counts with a SCALAR"
-        tokens.found.say("E111", text, found.span, "expected the name of a SCALAR")
-        return tree.Poison(found.span, frozenset((token.key,)))
+        tokens.found.say("E111", text, body.span, "expected the name of a SCALAR")
+        return tree.Poison(body.span, frozenset((token.key,)))
     if reserved_as_name(tokens):
         tokens.refuse_reserved()
         tokens.take()
@@ -236,16 +236,16 @@ def _counter(tokens: Tokens) -> tree.Name | tree.Poison:
 def cobegin(tokens: Tokens) -> tree.Cobegin:
     """Read one COBEGIN."""
     start = tokens.take()
-    found: list[tree.Branch] = []
+    body: list[tree.Branch] = []
     depth, level = tokens.depth, len(tokens.waiting)
     tokens.waiting.append(("COEND", "PRIORITY"))
     tokens.offer("BEGIN", "PRIORITY", "COEND", starts=True)
     while not (tokens.done or tokens.sees("COEND", "UNTIL", "RECOVER")):
-        at = tokens.at
+        index = tokens.at
         if tokens.sees("END") and not _needless_end(tokens):
             break
         try:
-            found.append(_branch(tokens))
+            body.append(_branch(tokens))
             _between(tokens)
             if tokens.before.key == ";":
                 tokens.offer("BEGIN", "PRIORITY", "COEND", starts=True)
@@ -257,13 +257,13 @@ def cobegin(tokens: Tokens) -> tree.Cobegin:
             next_statement(tokens)
             tokens.accept(";")
             tokens.hush()
-        if tokens.at == at:
+        if tokens.at == index:
             tokens.take()
     tokens.waiting.pop()
-    if not found and tokens.sees("COEND"):
+    if not body and tokens.sees("COEND"):
         tokens.say_once("E126", "COBEGIN has no branches", tokens.now.span, "expected `BEGIN ... END`")
     end = close(tokens, "COEND", start)
-    return tree.Cobegin(tokens.since(start), tuple(found), end or tokens.gap())
+    return tree.Cobegin(tokens.since(start), tuple(body), end or tokens.gap())
 
 
 # branch = [ "PRIORITY" number ":" ] block ;
@@ -301,12 +301,12 @@ def _bare(tokens: Tokens) -> tree.Block:
         tokens.lost("a `;` stands only between two branches", "expected `BEGIN`", code="E126")
     helps = ("write `BEGIN ... END` around the statements of each branch",)
     tokens.say_once("E126", "a branch of COBEGIN is a block", token.span, "expected `BEGIN` before this", helps=helps)
-    found = statements(tokens, "END")
+    body = statements(tokens, "END")
     if tokens.sees("END") and tokens.ahead().key != ".":
         tokens.take()
     else:
         tokens.hush()
-    return tree.Block(tokens.since(token), found, tokens.gap())
+    return tree.Block(tokens.since(token), body, tokens.gap())
 
 
 def _needless_end(tokens: Tokens) -> bool:

@@ -45,19 +45,19 @@ def _reserved(tokens: Tokens) -> bool:
 
 def declarations(tokens: Tokens) -> list[tree.Declaration]:
     """Read declarations, as many as there are."""
-    found = []
+    names_ = []
     depth = tokens.depth
     while _goes_on(tokens):
-        at = tokens.at
+        index = tokens.at
         names: list[tree.Name | None] = []
         try:
-            found.append(_declaration(tokens, names))
+            names_.append(_declaration(tokens, names))
         except LostError:
             tokens.depth = depth
-            found.append(passed_over(tokens, names))
-        if tokens.at == at:
+            names_.append(passed_over(tokens, names))
+        if tokens.at == index:
             tokens.take()
-    return found
+    return names_
 
 
 def _goes_on(tokens: Tokens) -> bool:

@@ -51,7 +51,7 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
     start, outer = tokens.now, tokens.asked
     if wants != "a value" or where not in ("", "here"):
         tokens.asked = wants, where
-    left = _unary(tokens, wants, where, lowest)
+    left_operand = _unary(tokens, wants, where, lowest)
     last = 0
     while (strength := _STRENGTH.get(tokens.now.key, 0)) >= lowest or (tokens.now.key in FOREIGN and _foreign(tokens)):
         strength = strength or _STRENGTH[tokens.now.key]
@@ -70,14 +70,14 @@ def expression(tokens: Tokens, wants: str = "a value", where: str = "here", lowe
         right = expression(tokens, "a value", "", strength + 1)
         tokens.depth -= 1
         tokens.height = max(height, tokens.height + 1)
-        if chained and isinstance(left, tree.Binary):
+        if chained and isinstance(left_operand, tree.Binary):
             # What was meant is that both hold.
-            right = tree.Binary(right.span, sign.key, left.right, right)
-            left = tree.Binary(tokens.since(start), "AND", left, right)
+            right = tree.Binary(right.span, sign.key, left_operand.right, right)
+            left_operand = tree.Binary(tokens.since(start), "AND", left_operand, right)
         else:
-            left = tree.Binary(tokens.since(start), sign.key, left, right)
+            left_operand = tree.Binary(tokens.since(start), sign.key, left_operand, right)
     tokens.asked = outer
-    return left
+    return left_operand
 
 
 def _foreign(tokens: Tokens) -> bool:

@@ -59,11 +59,11 @@ def affix(tokens: Tokens) -> tree.Affix:
     tokens.expect("TO", "after the frame that follows")
     parent = mobile(tokens, "the name of a FRAME or an arm", "after TO")
     link = tokens.since(start)
-    at = None
+    position = None
     if tokens.accept("AT"):
-        at = expression(tokens, "a TRANS", "after AT")
+        position = expression(tokens, "a TRANS", "after AT")
     rigid = tokens.accept("RIGIDLY", "NONRIGIDLY")
-    return tree.Affix(tokens.since(start), link, child, parent, at, rigid is not None and rigid.key == "RIGIDLY")
+    return tree.Affix(tokens.since(start), link, child, parent, position, rigid is not None and rigid.key == "RIGIDLY")
 
 
 # unfix = "UNFIX" lvalue [ "FROM" mobile ] ;

@@ -20,33 +20,33 @@ _BY_REFERENCE = (
 
 def head(tokens: Tokens) -> list[tree.Header]:
     """Read everything up to and including BEGIN; at the end of the text BEGIN may be missing."""
-    found: list[tree.Header] = []
+    headers_: list[tree.Header] = []
     while True:
         _semicolons(tokens)
         tokens.offer(*tokens.words.headers, "BEGIN", starts=True)
         token, after = tokens.now, tokens.ahead()
         if token.kind is TokenKind.KEYWORD and token.key in tokens.words.headers:
-            found += header(tokens)
+            headers_ += header(tokens)
         elif token.kind is TokenKind.NAME and after.key in (",", ":"):
             gap = Span(token.start, token.start)
             tokens.found.say(
                 "E112", "missing `VAR` before the declarations", gap, "expected `VAR` here", fixes=(Fix(gap, "VAR "),)
             )
-            found += declarations(tokens)
+            headers_ += declarations(tokens)
         elif word := _misspelt_header(tokens):
             _misspelt(tokens, word)
-            found += header(tokens)
+            headers_ += header(tokens)
         elif tokens.at < tokens.begin() and not tokens.sees(*tokens.words.statements) and after.key != "=":
-            found.append(_nonsense(tokens))
+            headers_.append(_nonsense(tokens))
         else:
             break
     _begin(tokens)
-    return found
+    return headers_
 
 
 def header(tokens: Tokens) -> list[tree.Header]:
     """Read one part of what stands in front of BEGIN; what makes no sense is passed over."""
-    at, level, depth = tokens.at, len(tokens.waiting), tokens.depth
+    index, level, depth = tokens.at, len(tokens.waiting), tokens.depth
     names: list[tree.Name | None] = []
     try:
         tokens.deep = -1
@@ -55,7 +55,7 @@ def header(tokens: Tokens) -> list[tree.Header]:
         del tokens.waiting[level:]
         tokens.depth = depth
         passed_over(tokens, names)
-    if tokens.at == at:
+    if tokens.at == index:
         tokens.take()
     return []
 
@@ -170,7 +170,7 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
         own += var_part(tokens)
     tokens.offer("BEGIN", starts=True)
     body = _body(tokens, above, name)
-    found = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
+    headers_ = tree.Procedure(tokens.since(start), above, name, tuple(parameters), tuple(own), body)
     if tokens.sees("END") and tokens.ahead().key != ".":
         tokens.say_once("E127", "`END` without BEGIN", tokens.now.span, "the procedure has ended before")
         tokens.take()
@@ -180,7 +180,7 @@ def _procedure(tokens: Tokens) -> list[tree.Header]:
         tokens.take()
     else:
         _semicolon(tokens, "after the procedure")
-    return [found]
+    return [headers_]
 
 
 def _own_name(tokens: Tokens) -> tree.Name:
@@ -202,13 +202,13 @@ def _own_name(tokens: Tokens) -> tree.Name:
 # param = name { "," name } ":" type ;
 def _parameters(tokens: Tokens) -> list[tree.Declaration]:
     opening, depth = tokens.take(), tokens.depth
-    found: list[tree.Declaration] = []
+    headers_: list[tree.Declaration] = []
     if tokens.sees(")"):
         fix = Fix(opening.span.to(tokens.now.span), "")
         text = "a procedure without parameters is declared without `( )`"
         tokens.say_once("E111", text, tokens.now.span, "nothing stands in between", fixes=(fix,))
         tokens.take()
-        return found
+        return headers_
     while True:
         start = tokens.now
         if tokens.sees("VAR"):
@@ -224,12 +224,12 @@ def _parameters(tokens: Tokens) -> list[tree.Declaration]:
             while not tokens.done and not tokens.sees(")", ";", "BEGIN", *tokens.words.headers):
                 tokens.take()
             kind = tree.TypeName(tokens.since(start), "", None)
-        found.append(tree.Declaration(tokens.since(start), tuple(name for name in names if name), kind))
+        headers_.append(tree.Declaration(tokens.since(start), tuple(name for name in names if name), kind))
         if not _another(tokens):
             break
     if not tokens.accept(")"):
         tokens.insert(")", "after the parameters")
-    return found
+    return headers_
 
 
 def _no_result(tokens: Tokens) -> None:
@@ -273,9 +273,9 @@ def _body(tokens: Tokens, above: Span, name: tree.Name) -> tree.Block:
         if not fixes:
             return tree.Block(gap, (), gap)
     tokens.in_procedure = name.key or "?"
-    found = block(tokens)
+    headers_ = block(tokens)
     tokens.in_procedure = ""
-    return _without_main(tokens, above, found)
+    return _without_main(tokens, above, headers_)
 
 
 def _without_main(tokens: Tokens, above: Span, body: tree.Block) -> tree.Block:
@@ -285,7 +285,7 @@ def _without_main(tokens: Tokens, above: Span, body: tree.Block) -> tree.Block:
     if not open_ended or last is None or body.end.start != body.end.end or not tokens.sees("END"):
         return body
     tokens.back_to(last.span.start)
-    tokens.found[:] = [one for one in tokens.found if one.span.start < last.span.start]
+    tokens.found[:] = [diagnostic for diagnostic in tokens.found if diagnostic.span.start < last.span.start]
     gap = tokens.gap()
     label = Label(above, "this procedure")
     tokens.say_once("E115", "the procedure has no END", gap, "expected `END ;` here", secondary=(label,))

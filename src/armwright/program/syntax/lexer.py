@@ -331,17 +331,17 @@ class _Scanner:
 
     def _hush(self) -> None:
         """Take what stands behind such a character, in its line, for something that has been told of."""
-        for at, end in self._behind.items():
-            token = self._tokens[at]
+        for index, end in self._behind.items():
+            token = self._tokens[index]
             token.damaged |= self._written.find("\n", end, token.start) < 0
 
     def _look_alikes(self, start: int, end: int) -> None:
         if self._written[start:end] == self._text[start:end]:
             return
-        for at in range(start, end):
+        for index in range(start, end):
             # Line numbers have been blanked out and are no look-alikes.
-            if ord(self._written[at]) in LOOK_ALIKES:
-                self._strays.setdefault(self._written[at], []).append(Span(at, at + 1))
+            if ord(self._written[index]) in LOOK_ALIKES:
+                self._strays.setdefault(self._written[index], []).append(Span(index, index + 1))
 
     def _say(
         self,

@@ -50,7 +50,7 @@ def move(tokens: Tokens) -> tree.Move:
 
 def _words(clauses: list[tree.Clause]) -> frozenset[str]:
     """Return the words by which clauses begin, behind WITH."""
-    return frozenset(type(one).__name__.upper() for one in clauses)
+    return frozenset(type(clause).__name__.upper() for clause in clauses)
 
 
 def _starts_clause(tokens: Tokens) -> bool:
@@ -176,8 +176,8 @@ def _assigned(tokens: Tokens, start: Token, key: str) -> tree.Clause:
         tokens.take()
     else:
         equals(tokens, f"`WITH {key}`", f"WITH {key}")
-    found = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a place", f"after {key} =")
-    return _VALUES[key](tokens.since(start), found)
+    value = expression(tokens, "a value" if key not in ("APPROACH", "DEPARTURE") else "a place", f"after {key} =")
+    return _VALUES[key](tokens.since(start), value)
 
 
 # "ON" expr "DO" action

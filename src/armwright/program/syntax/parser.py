@@ -72,10 +72,10 @@ def parse(
     cursor = Tokens(source, tokens, _RULES, standard)
     cursor.declared.update(declared)
     cursor.procedures.update(procedures)
-    found, slips = program(cursor), cursor.found
+    statements_, slips = program(cursor), cursor.found
     if standard is Standard.RLO_83:
-        found, slips = rlo83.conform(found, slips, source, cursor.tokens)
-    return found, [*torn, *slips]
+        statements_, slips = rlo83.conform(statements_, slips, source, cursor.tokens)
+    return statements_, [*torn, *slips]
 
 
 def expected(
@@ -98,28 +98,28 @@ def program(tokens: Tokens) -> tree.Program:
     """Read a whole program."""
     start = tokens.now
     headers = head(tokens)
-    found: list[tree.Statement] = []
+    statements_: list[tree.Statement] = []
     if not tokens.done:
-        found += _statements(tokens)
+        statements_ += _statements(tokens)
         while not tokens.done and not _ends(tokens):
-            found += _statements(tokens)
+            statements_ += _statements(tokens)
     elif not tokens.silent:
         begun = tokens.before.key == "BEGIN"
         if begun:
             tokens.offer(*tokens.words.statements, "END", starts=True)
-        at = tokens.gap() if headers or begun else Span(0, 0)
+        span = tokens.gap() if headers or begun else Span(0, 0)
         text = "the program has no statements" if headers else "there is no program here"
         text, expected = ("the program has no END", "END.") if begun else (text, "BEGIN ... END.")
-        tokens.found.say("E115", text, at, f"expected `{expected}`")
-    return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(found), tokens.before.span)
+        tokens.found.say("E115", text, span, f"expected `{expected}`")
+    return tree.Program(tokens.since(start), (*headers, *tokens.late), tuple(statements_), tokens.before.span)
 
 
 def _statements(tokens: Tokens) -> tuple[tree.Statement, ...]:
     """Read statements up to END, which stays."""
-    found = statements(tokens, "END")
+    statements_ = statements(tokens, "END")
     if tokens.done:
         tokens.say_once("E115", "the program has no END", tokens.gap(), "expected `END.` here")
-    return found
+    return statements_
 
 
 def _ends(tokens: Tokens) -> bool:

@@ -33,17 +33,17 @@ def check(matrix: tree.Matrix, units: UnitSystem | None = None) -> Diagnostic | 
     # A number that was reported before is NaN.
     if any(math.isnan(value) for value in values):
         return None
-    found = None
+    diagnostic = None
     if len(matrix.items) != 12:
-        found = _wrong_count(matrix, values)
+        diagnostic = _wrong_count(matrix, values)
     elif all(isinstance(item, tree.Number) for item in matrix.items[:9]):
         error = rotation_error(tuple(values[:9]))
-        found = _not_exact(matrix, values, error) if error > EXACT else None
-    if found is None or found.code != "E206":
-        return found
+        diagnostic = _not_exact(matrix, values, error) if error > EXACT else None
+    if diagnostic is None or diagnostic.code != "E206":
+        return diagnostic
     lengths = _LENGTHS[units.length if units else "M"]
     note = f"the numbers are the columns n, o, a, p one after the other: n, o, a turn, p shifts, in {lengths}"
-    return attrs.evolve(found, notes=(note, *found.notes))
+    return attrs.evolve(diagnostic, notes=(note, *diagnostic.notes))
 
 
 def _not_exact(matrix: tree.Matrix, values: Sequence[float], error: float) -> Diagnostic:
@@ -115,13 +115,13 @@ def _rearranged(matrix: tree.Matrix, order: Sequence[int], message: str) -> Diag
     numbers = [item for item in matrix.items if isinstance(item, tree.Number)]
     texts = [numbers[index].text for index in order]
     literal = "(" + ", ".join(",".join(texts[i : i + 3]) for i in range(0, 12, 3)) + ")"
-    whole = len(numbers) == 12
+    is_full = len(numbers) == 12
     return Diagnostic(
         code="E206",
         message=message,
         span=matrix.span,
-        label="n, o, a are no rotation this way" if whole else "16 numbers here",
-        notes=() if whole else ("the bottom row 0 0 0 1 is left out",),
+        label="n, o, a are no rotation this way" if is_full else "16 numbers here",
+        notes=() if is_full else ("the bottom row 0 0 0 1 is left out",),
         helps=(f"write `{literal}`",),
         fixes=(Fix(matrix.span, literal),),
     )

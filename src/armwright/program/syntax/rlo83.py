@@ -37,14 +37,14 @@ def reserve(tokens: Sequence[Token], declared: Collection[str]) -> Sequence[Toke
         tokens: of a program of RLO-83.
         declared: all names that are declared in it or before it.
     """
-    found = list(tokens)
-    for at, token in enumerate(tokens):
+    tokens_ = list(tokens)
+    for index, token in enumerate(tokens):
         if token.kind is not TokenKind.NAME or token.key in declared or not is_later(token.key):
             continue
-        named = at > 0 and tokens[at - 1].key in _BEFORE_NAMES and token.key not in _NEVER_NAMES
-        if not named and tokens[at + 1].key not in _BEHIND_NAMES:
-            found[at] = attrs.evolve(token, kind=TokenKind.KEYWORD)
-    return found
+        named = index > 0 and tokens[index - 1].key in _BEFORE_NAMES and token.key not in _NEVER_NAMES
+        if not named and tokens[index + 1].key not in _BEHIND_NAMES:
+            tokens_[index] = attrs.evolve(token, kind=TokenKind.KEYWORD)
+    return tokens_
 
 
 def conform(
@@ -62,12 +62,12 @@ def conform(
         The program with a poison in the place of each part that belongs to RLO-2, and what is wrong with both.
     """
     visitor = _Visitor(source, tokens, program)
-    headers = tuple(one for header in program.headers if (one := visitor.header(header)) is not None)
-    statements = tuple(visitor.statement(one) for one in program.statements)
-    found = Findings()
-    found += [one for one in slips if not visitor.is_inside(one.span)]
-    found += visitor.found
-    return attrs.evolve(program, headers=headers, statements=statements), found
+    headers = tuple(node_ for header in program.headers if (node_ := visitor.header(header)) is not None)
+    statements = tuple(visitor.statement(statement) for statement in program.statements)
+    tokens_ = Findings()
+    tokens_ += [slip for slip in slips if not visitor.is_inside(slip.span)]
+    tokens_ += visitor.found
+    return attrs.evolve(program, headers=headers, statements=statements), tokens_
 
 
 class _Visitor:
@@ -95,8 +95,8 @@ class _Visitor:
 
     def is_inside(self, span: Span) -> bool:
         """Whether something stands in a stretch that has been passed over, behind its first word."""
-        at = bisect_left(self._passed_over, span.start, key=lambda one: one.start) - 1
-        return at >= 0 and span.start <= self._passed_over[at].end
+        index = bisect_left(self._passed_over, span.start, key=lambda node_: node_.start) - 1
+        return index >= 0 and span.start <= self._passed_over[index].end
 
     def _report(self, what: str, span: Span, instead: str) -> None:
         self.found.say("E214", f"{what} belongs to RLO-2", span, instead)
@@ -117,7 +117,7 @@ class _Visitor:
 
     def _names(self, span: Span) -> frozenset[str]:
         tokens = self._tokens[self._at(span) : bisect_left(self._starts, span.end)]
-        return frozenset(one.key for one in tokens if one.kind in (TokenKind.NAME, TokenKind.ARM))
+        return frozenset(token.key for token in tokens if token.kind in (TokenKind.NAME, TokenKind.ARM))
 
     def _with_parentheses(self, span: Span) -> Span:
         """Return where an expression stands with the parentheses around it, which are not those of a list."""
@@ -207,7 +207,7 @@ class _Visitor:
             return self._none(node, "indexing", bracket.span, "RLO-83 has no arrays")
         value = node.value
         numbers = value.items if isinstance(value, tree.Matrix) else (value,)
-        if all(isinstance(one, tree.Number | tree.Poison) for one in numbers) and not self._grouped(value):
+        if all(isinstance(number, tree.Number | tree.Poison) for number in numbers) and not self._grouped(value):
             bare = tuple(map(self._without_unit, numbers))
             known = attrs.evolve(value, items=bare) if isinstance(value, tree.Matrix) else bare[0]
             return attrs.evolve(node, value=known)
@@ -216,7 +216,7 @@ class _Visitor:
     def _grouped(self, value: tree.Expression) -> bool:
         """Whether parentheses stand around a value, or around a single number of a matrix."""
         tokens = self._tokens[self._at(value.span) - 1 : bisect_left(self._starts, value.span.end) + 1]
-        opening = sum(one.key == "(" for one in tokens)
+        opening = sum(token.key == "(" for token in tokens)
         return opening > isinstance(value, tree.Matrix)
 
     def _without_unit(self, node: tree.Expression) -> tree.Expression:
@@ -252,16 +252,16 @@ class _Visitor:
     def _read_visions(self, node: tree.ReadVisions) -> tree.ReadVisions:
         first, *others = node.targets or (tree.Poison(node.span),)
         if not others:
-            return attrs.evolve(node, targets=tuple(self._operand(one, _FRAME) for one in node.targets))
-        rest = Span(others[0].span.start, others[-1].span.end)
-        self._report("reading several frames at once", rest, "RLO-83 reads one frame at a time")
-        return attrs.evolve(node, targets=(tree.Poison(rest, self._names(first.span.to(rest))),))
+            return attrs.evolve(node, targets=tuple(self._operand(target, _FRAME) for target in node.targets))
+        span_ = Span(others[0].span.start, others[-1].span.end)
+        self._report("reading several frames at once", span_, "RLO-83 reads one frame at a time")
+        return attrs.evolve(node, targets=(tree.Poison(span_, self._names(first.span.to(span_))),))
 
     # ---- MOVE
 
     def _move(self, node: tree.Move) -> tree.Move:
         moved, goal = self._operand(node.moved, _MOVED), self._goal(node.goal)
-        clauses = tuple(one for clause in node.clauses if (one := self._clause(clause)) is not None)
+        clauses = tuple(node_ for clause in node.clauses if (node_ := self._clause(clause)) is not None)
         return attrs.evolve(node, moved=moved, goal=goal, clauses=clauses)
 
     def _clause(self, node: tree.Clause) -> tree.Clause | None:
@@ -270,8 +270,8 @@ class _Visitor:
             case tree.On():
                 self._report("ON ... DO", self._word(node.span).span, "RLO-83 has no guarded motions")
             case tree.Blend() | tree.Duration():
-                at = self._at(node.span)
-                word = self._tokens[at + (self._tokens[at].key == "WITH")]
+                index = self._at(node.span)
+                word = self._tokens[index + (self._tokens[index].key == "WITH")]
                 self._report(f"WITH {word.key}", word.span, "RLO-83 has APPROACH, DEPARTURE and SPEED")
             case tree.Via(points=points):
                 return attrs.evolve(node, points=tuple(map(self._goal, points)))

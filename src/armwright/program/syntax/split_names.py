@@ -30,19 +30,21 @@ def joined(
     Returns:
         The tokens with one in the place of each pair, and what was found.
     """
-    pairs = [at for at in range(1, len(tokens)) if tokens[at].kind is _NUMBER and _is_pair(source, tokens, at)]
+    pairs = [
+        index for index in range(1, len(tokens)) if tokens[index].kind is _NUMBER and _is_pair(source, tokens, index)
+    ]
     if not pairs:
         return tokens, []
     inside, names = _declarations(tokens, frozenset(pairs))
     names |= set(declared)
     imports = any(token.key == "IMPORT" and token.kind is _KEYWORD for token in tokens)
     kept: list[Token] = []
-    found = Findings()
+    findings = Findings()
     done = 0
-    for at in pairs:
-        first, number = tokens[at - 1], tokens[at]
-        key, before = f"{first.key}{number.key}", tokens[at - 2].key if at > 1 else ""
-        declared_here = at in inside
+    for pair in pairs:
+        first, number = tokens[pair - 1], tokens[pair]
+        key, before = f"{first.key}{number.key}", tokens[pair - 2].key if pair > 1 else ""
+        declared_here = pair in inside
         device = first.kind is _NAME and before == "OPERATE"
         counts = first.kind is _KEYWORD and first.key in _BEFORE_NUMBERS
         torn = key in names and first.key not in names and not counts
@@ -50,19 +52,19 @@ def joined(
         if not (declared_here or torn or device or guessed):
             continue
         text = f"{first.text}{number.text}"
-        kept += [*tokens[done : at - 1], Token(_NAME, text, key, first.start, number.end)]
-        done = at + 1
-        found.append(_torn(source, Span(first.start, number.end), text, certain=declared_here or torn or device))
-    return [*kept, *tokens[done:]], found
+        kept += [*tokens[done : pair - 1], Token(_NAME, text, key, first.start, number.end)]
+        done = pair + 1
+        findings.append(_torn(source, Span(first.start, number.end), text, certain=declared_here or torn or device))
+    return [*kept, *tokens[done:]], findings
 
 
-def _is_pair(source: Source, tokens: Sequence[Token], at: int) -> bool:
+def _is_pair(source: Source, tokens: Sequence[Token], index: int) -> bool:
     """Whether a number without sign, point and unit stands behind a word, with nothing but blanks in between."""
-    first, number = tokens[at - 1], tokens[at]
+    first, number = tokens[index - 1], tokens[index]
     if first.kind is not _NAME and first.kind is not _KEYWORD:
         return False
-    whole = not number.damaged and not first.damaged and number.text.isdigit()
-    return whole and not source.text[first.end : number.start].strip(_BLANKS)
+    is_pair = not number.damaged and not first.damaged and number.text.isdigit()
+    return is_pair and not source.text[first.end : number.start].strip(_BLANKS)
 
 
 def declared_names(tokens: Sequence[Token]) -> set[str]:
@@ -75,18 +77,18 @@ def _declarations(tokens: Sequence[Token], pairs: frozenset[int]) -> tuple[set[i
     inside: set[int] = set()
     names: set[str] = set()
     declaring = False
-    for at, token in enumerate(tokens):
+    for index, token in enumerate(tokens):
         if token.kind is _KEYWORD:
             # The types and words of a declaration do not end it, and neither do torn words.
             declaring = token.key in ("VAR", "PROCEDURE") or (
                 declaring and token.key not in ("BEGIN", "IMPORT", "UNITS")
             )
-        elif declaring and token.key in (",", ":") and tokens[at - 2].key not in (":", "OF"):
-            if at - 1 in pairs:
-                inside.add(at - 1)
-                names.add(f"{tokens[at - 2].key}{tokens[at - 1].key}")
-            elif tokens[at - 1].kind is _NAME:
-                names.add(tokens[at - 1].key)
+        elif declaring and token.key in (",", ":") and tokens[index - 2].key not in (":", "OF"):
+            if index - 1 in pairs:
+                inside.add(index - 1)
+                names.add(f"{tokens[index - 2].key}{tokens[index - 1].key}")
+            elif tokens[index - 1].kind is _NAME:
+                names.add(tokens[index - 1].key)
     return inside, names
 
 

@@ -31,7 +31,7 @@ _OPENED_BY = {
 # statements = [ statement ] { ";" [ statement ] } ;
 def statements(tokens: Tokens, *closing: str) -> tuple[tree.Statement, ...]:
     """Read statements up to one of the ``closing`` words, which stays, or to where it is clearly missing."""
-    found: list[tree.Statement] = []
+    statements_: list[tree.Statement] = []
     depth, level = tokens.depth, len(tokens.waiting)
     tokens.waiting.append(closing)
     while True:
@@ -43,25 +43,25 @@ def statements(tokens: Tokens, *closing: str) -> tuple[tree.Statement, ...]:
             break
         if _ends_nothing(tokens):
             continue
-        at = tokens.at
+        index = tokens.at
         if not level:
             tokens.deep = -1
         try:
-            found.append(statement(tokens))
+            statements_.append(statement(tokens))
             _separator(tokens)
         except TooDeepError:
             if level:
                 raise
-            _pass_over_all(tokens, at)
+            _pass_over_all(tokens, index)
         except LostError:
             next_statement(tokens)
         # Where nothing was lost, this is so already.
         del tokens.waiting[level + 1 :]
         tokens.depth = depth
-        if tokens.at == at:
+        if tokens.at == index:
             tokens.take()
     tokens.waiting.pop()
-    return tuple(found)
+    return tuple(statements_)
 
 
 def _ends_here(tokens: Tokens) -> bool:
@@ -100,9 +100,9 @@ def _misspelt_end(tokens: Tokens) -> bool:
     token, after = tokens.now, tokens.ahead()
     if after.key in (*ASSIGNING, "(", "[") or token.key in ABSENT or _is_known(tokens, token):
         return False
-    wanted = ("END",) if after.key == "." else tokens.waiting[-1]
-    near = closest(token.text, wanted if after.key == "." else (*wanted, *tokens.words.statements))
-    if near not in wanted:
+    expected = ("END",) if after.key == "." else tokens.waiting[-1]
+    near = closest(token.text, expected if after.key == "." else (*expected, *tokens.words.statements))
+    if near not in expected:
         return False
     misspelt(tokens, near)
     return True
@@ -131,9 +131,9 @@ def statement(tokens: Tokens) -> tree.Statement:
         tokens.statement_depth = tokens.depth
         if tokens.depth > DEEPEST:
             tokens.too_deep()
-        found = tokens.rules[token.key](tokens)
+        statements_ = tokens.rules[token.key](tokens)
         tokens.depth -= 1
-        return found
+        return statements_
     after = tokens.ahead()
     if token.kind is _ARM and after.key in ASSIGNING:
         return tokens.rules["="](tokens)
@@ -169,9 +169,9 @@ def _reserved(tokens: Tokens) -> tree.Statement:
     tokens.refuse_reserved()
     token = tokens.now
     tokens.replace_by_name()
-    found = tokens.rules["="](tokens)
-    assert isinstance(found, tree.Assign)  # noqa: S101 - that is what the rule reads
-    return tree.Assign(found.span, tree.Poison(token.span, frozenset((token.key,))), found.value)
+    statements_ = tokens.rules["="](tokens)
+    assert isinstance(statements_, tree.Assign)  # noqa: S101 - that is what the rule reads
+    return tree.Assign(statements_.span, tree.Poison(token.span, frozenset((token.key,))), statements_.value)
 
 
 def _no_statement(tokens: Tokens) -> tree.Statement:
@@ -226,8 +226,8 @@ def nested(tokens: Tokens, behind: str, *words: str) -> tree.Statement:
         tokens.say_once("E111", f"expected a statement after {behind}", gap, "expected a statement here")
         tokens.hush()
         return tree.Poison(gap)
-    found = salvaged(tokens, statement)
-    return tree.Poison(tokens.since(token)) if found is None else found
+    statements_ = salvaged(tokens, statement)
+    return tree.Poison(tokens.since(token)) if statements_ is None else statements_
 
 
 def salvaged(tokens: Tokens, read: Callable[[Tokens], _Read]) -> _Read | None:
@@ -333,9 +333,9 @@ def next_statement(tokens: Tokens) -> None:
         tokens.take()
 
 
-def _pass_over_all(tokens: Tokens, at: int) -> None:
+def _pass_over_all(tokens: Tokens, index: int) -> None:
     """Pass over a statement from its start with all that is in it, at least to where it was too deep."""
-    tokens.back(at)
+    tokens.back(index)
     depth = 0
     while not tokens.done:
         token = tokens.now

@@ -100,8 +100,8 @@ class Tokens:
 
     def ahead(self, steps: int = 1) -> Token:
         """Return a token further on or, with less than no steps, back; behind the end it is always the end."""
-        at = self.at + steps
-        return self.tokens[at] if at < self._last else self.tokens[-1]
+        index = self.at + steps
+        return self.tokens[index] if index < self._last else self.tokens[-1]
 
     @property
     def done(self) -> bool:
@@ -119,11 +119,11 @@ class Tokens:
                 self._wrong_before = len(self.found)
         return token
 
-    def back(self, at: int) -> None:
+    def back(self, index: int) -> None:
         """Return to where ``at`` tokens had been read."""
-        self.at = at
-        self.now = self.tokens[at]
-        self.before = self.tokens[max(0, at - 1)]
+        self.at = index
+        self.now = self.tokens[index]
+        self.before = self.tokens[max(0, index - 1)]
 
     def back_to(self, offset: int) -> None:
         """Return to the token that begins at a character."""
@@ -193,8 +193,8 @@ class Tokens:
     def begin(self) -> int:
         """Return where the next BEGIN stands; -1 if there is none."""
         if self._next_begin < self.at:
-            rest = range(max(self.at, self._next_begin), self._last)
-            here = (at for at in rest if self.tokens[at].key == "BEGIN")
+            ahead = range(max(self.at, self._next_begin), self._last)
+            here = (index for index in ahead if self.tokens[index].key == "BEGIN")
             self._next_begin = next(here, self._last)
         return self._next_begin if self._next_begin < self._last else -1
 

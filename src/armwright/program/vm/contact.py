@@ -122,9 +122,9 @@ def look_out(machine: Machine, motion: Motion) -> None:
     motion.alarm = None if deep is None else max(machine.state.ticks, math.ceil(deep / machine.cell.period - _ROUNDING))
 
 
-def note_contact(machine: Machine, motion: Motion, at: int | None = None) -> None:
+def note_contact(machine: Machine, motion: Motion, tick: int | None = None) -> None:
     """Remember how hard an arm has pressed by now, or by a later tick, before it begins something else."""
-    pressed = machine.hardware.pressed(motion.arm, machine.now if at is None else at * machine.cell.period)
+    pressed = machine.hardware.pressed(motion.arm, machine.now if tick is None else tick * machine.cell.period)
     if pressed.depth > motion.pressed.depth:
         motion.pressed = pressed
 
@@ -152,7 +152,7 @@ def too_deep(machine: Machine, process: Process, motion: Motion) -> NoReturn:
     note_contact(machine, motion, end)
     # On its way to rest it may come deeper; that is said now.
     motion.alarm = None
-    allowed = machine.cell.contact_deepest
+    allowed = machine.cell.contact.deepest
     least = _least_depth(machine, motion)
     notes = [f"the arm is stopped within its limits, and has pressed {_deep(motion.pressed)} then"]
     helps = ["stop sooner: at a smaller force, or at a lower speed"]
@@ -185,15 +185,15 @@ def _slower(motion: Motion, share: float) -> list[str]:
 
 def _least_depth(machine: Machine, motion: Motion) -> float | None:
     """Return how deep a stop from the first servo tick in contact on presses [m]; None where nothing came down."""
-    if motion.touch is None or machine.cell.contact_height is None:
+    if motion.touch is None or machine.cell.contact.height is None:
         return None
     trajectory, local = motion.touch
-    place, period = machine.cell.arms[motion.arm], machine.cell.period
+    cell_arm, period = machine.cell.arms[motion.arm], machine.cell.period
     tick = min(math.ceil(local / period - _ROUNDING) * period, trajectory.duration)
-    braking = brake(trajectory, tick, place.arm.limit("acceleration"), period=period)
+    braking = brake(trajectory, tick, cell_arm.arm.limit("acceleration"), period=period)
     q: Array = braking(np.arange(round(braking.duration / period) + 1) * period)
-    X_WT = machine.state.tree.world(base_name(motion.arm)) @ forward(place.arm, q) @ motion.tip
-    return machine.cell.contact_height - float(X_WT[:, 2, 3].min())
+    X_WT = machine.state.tree.world(base_name(motion.arm)) @ forward(cell_arm.arm, q) @ motion.tip
+    return machine.cell.contact.height - float(X_WT[:, 2, 3].min())
 
 
 def comes_down(machine: Machine, process: Process, motion: Motion, to: str) -> NoReturn:
@@ -213,5 +213,5 @@ def comes_down(machine: Machine, process: Process, motion: Motion, to: str) -> N
 
 
 def _height(machine: Machine) -> str:
-    plane = machine.cell.contact_height
+    plane = machine.cell.contact.height
     return "" if plane is None else f" at z = {plane * 1e3:g} mm"

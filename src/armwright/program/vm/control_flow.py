@@ -17,10 +17,10 @@ _ROUNDING = 1e-9
 _LONGEST_PAUSE = 1e6
 
 
-def _place(step: Instruction, at: int) -> int:
-    place = step.operands[at]
-    assert isinstance(place, JumpTarget)  # noqa: S101 - the translator lands them
-    return place.index
+def _place(step: Instruction, index: int) -> int:
+    target = step.operands[index]
+    assert isinstance(target, JumpTarget)  # noqa: S101 - the translator lands them
+    return target.index
 
 
 def _jump(machine: Machine, process: Process, step: Instruction) -> None:  # noqa: ARG001 - a handler
@@ -35,13 +35,13 @@ def _jump_if_not(machine: Machine, process: Process, step: Instruction) -> None:
 def _for(machine: Machine, process: Process, step: Instruction) -> None:
     variable, count, *bounds = step.operands[:5]
     done = machine.number(process, count, step)
-    first, last, by = (machine.number(process, bound, step) for bound in bounds)
-    if by == 0:
+    first, last, step_ = (machine.number(process, bound, step) for bound in bounds)
+    if step_ == 0:
         raise machine.error(process, "E229", "the STEP of this FOR is 0", step.span, "it would never end")
-    if done > (last - first) / by + _ROUNDING:
+    if done > (last - first) / step_ + _ROUNDING:
         process.at = _place(step, 5)
         return
-    machine.write(process, variable, first + done * by, step)
+    machine.write(process, variable, first + done * step_, step)
     machine.write(process, count, done + 1, step)
 
 
@@ -57,7 +57,7 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
     machine.state.activations += 1
     bindings, own = {}, []
     for key, kind in procedure.types.items():
-        kept = f"{key}'{machine.state.activations}"
+        slot = f"{key}'{machine.state.activations}"
         if key in procedure.parameters:
             operand = step.operands[1 + procedure.parameters.index(key)]
             by_value = not kind.sizes and kind.kind in (VariableKind.SCALAR, VariableKind.TRANS)
@@ -65,14 +65,14 @@ def _call(machine: Machine, process: Process, step: Instruction) -> None:
                 bindings[key] = machine.name(process, operand)
                 continue
             if not by_value:
-                machine.grow(machine.state.tree.place(kept, machine.pose(process, operand, step)), kept, step.span)
+                machine.grow(machine.state.tree.place(slot, machine.pose(process, operand, step)), slot, step.span)
             elif kind.kind is VariableKind.SCALAR:
-                machine.state.values[kept] = machine.number(process, operand, step)
+                machine.state.values[slot] = machine.number(process, operand, step)
             else:
-                machine.state.values[kept] = machine.pose(process, operand, step)
-        bindings[key] = kept
-        machine.state.types[kept] = kind
-        own.append(kept)
+                machine.state.values[slot] = machine.pose(process, operand, step)
+        bindings[key] = slot
+        machine.state.types[slot] = kind
+        own.append(slot)
     process.stack.append(
         Activation(
             kind="procedure",
@@ -96,18 +96,18 @@ def _leave(machine: Machine, process: Process, span: Span) -> None:
     """Leave the present activation: its variables are gone, its locks given back."""
     activation = process.stack.pop()
     release(machine, process, activation.locks)
-    for kept in activation.own:
-        kind = machine.state.types.pop(kept)
-        elements = [name for name in machine.state.tree if name.startswith(f"{kept}[")] if kind.sizes else []
-        for name in (kept, *elements):
+    for slot in activation.own:
+        kind = machine.state.types.pop(slot)
+        elements = [name for name in machine.state.tree if name.startswith(f"{slot}[")] if kind.sizes else []
+        for name in (slot, *elements):
             if kind.kind is VariableKind.FRAME and name in machine.state.tree:
                 machine.grow(machine.state.tree.without(name), name, span)
                 machine.state.written.pop(name, None)
                 for hand in machine.state.hands.values():
                     hand.forget(name)
-        for name in [one for one in machine.state.values if one == kept or one.startswith(f"{kept}[")]:
+        for name in [value for value in machine.state.values if value == slot or value.startswith(f"{slot}[")]:
             del machine.state.values[name]
-        machine.state.events.pop(kept, None)
+        machine.state.events.pop(slot, None)
 
 
 # ---- processes -----------------------------------------------------------------------------------------------------
@@ -209,7 +209,7 @@ def _retry(machine: Machine, process: Process, step: Instruction) -> None:  # no
 
 def _halt(machine: Machine, process: Process, step: Instruction) -> None:
     """End the program; in a procedure that an action calls, the MOVE of that action, as in the action itself."""
-    if not any(one.kind == "action" for one in process.stack):
+    if not any(activation.kind == "action" for activation in process.stack):
         finish(machine, process, step.span, "HALT")
         return
     while process.now.kind != "action":
@@ -232,11 +232,11 @@ def rest(machine: Machine, span: Span) -> list[str]:
     machine.state.ticks = max(
         [machine.state.ticks, *(_still(machine, process, span) for process in machine.state.processes)]
     )
-    off = sorted(machine.hardware.running())
-    for device in off:
+    not_at_rest = sorted(machine.hardware.running())
+    for device in not_at_rest:
         machine.hardware.operate(device, on=False)
     machine.state.over = True
-    return off
+    return not_at_rest
 
 
 def _still(machine: Machine, process: Process, span: Span) -> int:
@@ -266,13 +266,13 @@ def _still(machine: Machine, process: Process, span: Span) -> int:
 
 def finish(machine: Machine, process: Process, span: Span, word: str) -> None:
     """End the program: arms at rest, devices off, the frame table true."""
-    off = rest(machine, span)
-    machine.effect(process, "END", f"{word}{words_of(machine, off)}", span, data={"switched_off": off})
+    not_at_rest = rest(machine, span)
+    machine.effect(process, "END", f"{word}{words_of(machine, not_at_rest)}", span, data={"switched_off": not_at_rest})
 
 
-def words_of(machine: Machine, off: Sequence[str]) -> str:
+def words_of(machine: Machine, not_at_rest: Sequence[str]) -> str:
     """Return what is said behind the end of a program of the devices that it switched off."""
-    return "".join(f"; {machine.spelled(device)} OFF" for device in off)
+    return "".join(f"; {machine.spelled(device)} OFF" for device in not_at_rest)
 
 
 def recover(machine: Machine, process: Process, error: RunError) -> bool:
@@ -295,8 +295,10 @@ def recover(machine: Machine, process: Process, error: RunError) -> bool:
         if (attempt := _attempt(machine, process, span)) is not None:
             process.at = attempt.recovery
             release(machine, process, attempt.locks)
-            said = f"{error.diagnostic.code} in line {machine.code.source.line(span.start)}: {error.diagnostic.message}"
-            machine.effect(process, "ERROR", said, span, data={"code": error.diagnostic.code})
+            cause = (
+                f"{error.diagnostic.code} in line {machine.code.source.line(span.start)}: {error.diagnostic.message}"
+            )
+            machine.effect(process, "ERROR", cause, span, data={"code": error.diagnostic.code})
             return True
         if process.parent is None:
             machine.state.ticks = process.wake

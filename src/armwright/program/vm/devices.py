@@ -27,7 +27,7 @@ def _gripper(machine: Machine, process: Process, step: Instruction) -> None:
         raise machine.error(process, "E231", text, step.span, "expected 0 to 1 m")
     hand = machine.state.hands[arm]
     hand.holds = hand.at if closed else None
-    motions = [one.motion for one in machine.state.processes if one.motion and one.motion.arm == arm]
+    motions = [process.motion for process in machine.state.processes if process.motion and process.motion.arm == arm]
     for motion in motions:
         note_contact(machine, motion)
     time = machine.hardware.fingers(arm, closed=closed, width=metres)
@@ -60,9 +60,9 @@ def _read_visions(machine: Machine, process: Process, step: Instruction) -> None
     except DeviceError as error:
         raise machine.error(process, "R601", str(error), step.span, "the camera is asked here") from None
     text = f"READ VISIONS {machine.spelled(name)}"
-    place = (name, np.asarray(X_WF))
-    data: dict[str, object] = {"frame": name, "pose": to_noap(place[1]).tolist()}
-    pending = Pending(kind="READ", text=text, since=machine.starts(), span=step.span, place=place, data=data)
+    reading = (name, np.asarray(X_WF))
+    data: dict[str, object] = {"frame": name, "pose": to_noap(reading[1]).tolist()}
+    pending = Pending(kind="READ", text=text, since=machine.starts(), span=step.span, place=reading, data=data)
     machine.take_time(process, time, pending)
 
 

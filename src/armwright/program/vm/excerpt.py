@@ -29,9 +29,9 @@ class Excerpt(NamedTuple, Generic[T]):
         """Return what ``show`` makes of each."""
         return Excerpt([*map(show, self.first)], [*map(show, self.last)], self.left_out)
 
-    def joined(self, *rest: T) -> list[T]:
+    def joined(self, *others: T) -> list[T]:
         """Return the items, with ``rest`` in place of those that are left out."""
-        return [*self.first, *(rest if self.left_out else ()), *self.last]
+        return [*self.first, *(others if self.left_out else ()), *self.last]
 
 
 def excerpt(items: Sequence[T], most: int) -> Excerpt[T]:
@@ -54,11 +54,11 @@ def more(left_out: int, where: str = KEPT) -> str:
 
 def one_line(text: str, where: str = KEPT) -> str:
     """Return a text as one line of a list: the midst of a very long one is left out."""
-    found = excerpt(text, IN_A_LINE)
-    return "".join(found.joined(f" {more(found.left_out, where)} "))
+    shown = excerpt(text, IN_A_LINE)
+    return "".join(shown.joined(f" {more(shown.left_out, where)} "))
 
 
 def listed(texts: Sequence[str], most: int, where: str = KEPT) -> list[str]:
     """Return lines of a list, with one that says how many there are more."""
-    found = excerpt(texts, most)
-    return [one_line(text, where) for text in found.joined(more(found.left_out, where))]
+    shown = excerpt(texts, most)
+    return [one_line(text, where) for text in shown.joined(more(shown.left_out, where))]

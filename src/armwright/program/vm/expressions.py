@@ -23,9 +23,9 @@ def _copy(machine: Machine, process: Process, step: Instruction) -> None:
 
 
 def _compute(machine: Machine, process: Process, step: Instruction) -> None:
-    given = [machine.read(process, operand, step) for operand in step.operands[1:]]
+    values = [machine.read(process, operand, step) for operand in step.operands[1:]]
     try:
-        value = PLAIN[step.op](*given) if step.op in PLAIN else IN_UNITS[step.op](*given, machine.code.units)
+        value = PLAIN[step.op](*values) if step.op in PLAIN else IN_UNITS[step.op](*values, machine.code.units)
     except ValueFault as fault:
         raise machine.error(process, fault.code, fault.message, step.span, fault.label) from None
     machine.write(process, step.operands[0], value, step)
@@ -68,14 +68,14 @@ HANDLERS: Mapping[Op, Handler] = {
 }
 
 
-def evaluate_instructions(machine: Machine, process: Process, steps: Sequence[Instruction], at: int = 0) -> None:
+def evaluate_instructions(machine: Machine, process: Process, steps: Sequence[Instruction], index: int = 0) -> None:
     """Do instructions that only give values, up to RET or the last: those of a condition or an expression."""
-    while at < len(steps) and (step := steps[at]).op is not Op.RET:
-        at += 1
+    while index < len(steps) and (step := steps[index]).op is not Op.RET:
+        index += 1
         if step.op is Op.JZ:
             # AND and OR jump forwards; nothing else in an expression jumps.
             target = step.operands[1]
             assert isinstance(target, JumpTarget)  # noqa: S101 - the translator lands them
-            at = at if machine.read(process, step.operands[0], step) else target.index
+            index = index if machine.read(process, step.operands[0], step) else target.index
         else:
             HANDLERS[step.op](machine, process, step)

@@ -28,11 +28,11 @@ def _affix(machine: Machine, process: Process, step: Instruction) -> None:
         note = "frames form a tree; each hangs on one other and in the end on WORLD"
         label = f"{spelled(child)} cannot hang on {'itself' if child == parent else spelled(parent)}"
         chain = [
-            one
-            for one in (parent, *machine.state.tree.ancestors(parent))
-            if one != child and one in machine.state.written
+            ancestor
+            for ancestor in (parent, *machine.state.tree.ancestors(parent))
+            if ancestor != child and ancestor in machine.state.written
         ]
-        hung = [Label(machine.state.written[one], f"{spelled(one)} got its place here") for one in chain[:3]]
+        hung = [Label(machine.state.written[frame], f"{spelled(frame)} got its place here") for frame in chain[:3]]
         raise machine.error(
             process, "E305", "this AFFIX would close a ring", step.span, label, secondary=hung, notes=[note]
         )

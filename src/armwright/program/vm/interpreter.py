@@ -164,16 +164,17 @@ def _advance(machine: Machine, process: Process) -> None:
 
 def _stopped(machine: Machine, error: RunError, process: Process, arm: str | None) -> RunError:
     """Return the error with the frames as they are when all arms are at rest and all devices off."""
-    off = rest(machine, error.diagnostic.span)
+    stopped = rest(machine, error.diagnostic.span)
     failure = Failure(diagnostic=error.diagnostic, time=error.time, arm=arm, process=process.title)
-    return RunError(error.diagnostic, machine.state.tree, machine.now, lambda: _failed(machine, failure, off))
+    return RunError(error.diagnostic, machine.state.tree, machine.now, lambda: _failed(machine, failure, stopped))
 
 
-def _failed(machine: Machine, failure: Failure, off: Sequence[str]) -> Recording:
+def _failed(machine: Machine, failure: Failure, stopped: Sequence[str]) -> Recording:
     """Return all that happened up to a failure, and as the last thing the failure, with the devices it switched off."""
     found, recording = failure.diagnostic, machine.recording()
-    text = f"{found.code} in line {machine.code.source.line(found.span.start)}: {found.message}{words_of(machine, off)}"
-    data = {"code": found.code, "failed_at": failure.time, "switched_off": list(off)}
+    line = machine.code.source.line(found.span.start)
+    text = f"{found.code} in line {line}: {found.message}{words_of(machine, stopped)}"
+    data = {"code": found.code, "failed_at": failure.time, "switched_off": list(stopped)}
     end = Effect(
         t0=failure.time,
         t1=machine.now,

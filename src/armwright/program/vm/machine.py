@@ -118,10 +118,8 @@ class Machine:
             effects=in_order(self.state.effects),
             stages=tuple(self.state.stages),
             streams=tuple(
-                stream(
-                    name, place, self.state.runs[name], self.state.pushes[name], duration=self.now, period=cell.period
-                )
-                for name, place in cell.arms.items()
+                stream(name, arm, self.state.runs[name], self.state.pushes[name], duration=self.now, period=cell.period)
+                for name, arm in cell.arms.items()
             ),
             trees=tuple(self.state.trees),
             configurations={name: self.hardware.configuration(name, self.now) for name in cell.arms},
@@ -250,10 +248,12 @@ class Machine:
 
     def look(self, process: Process, name: str) -> None:
         """Let the frame table know where a frame is now, if an arm that is on its way carries it."""
-        if name not in self.state.tree or not any(one.motion for one in self.state.processes):
+        if name not in self.state.tree or not any(process.motion for process in self.state.processes):
             return
-        arm = next((one for one in (name, *self.state.tree.ancestors(name)) if is_arm(one)), None)
-        mover = next((one for one in self.state.processes if one.motion and one.motion.arm == arm), None)
+        arm = next((ancestor for ancestor in (name, *self.state.tree.ancestors(name)) if is_arm(ancestor)), None)
+        mover = next(
+            (process for process in self.state.processes if process.motion and process.motion.arm == arm), None
+        )
         # A condition of a MOVE finds the arm of this MOVE where it is.
         if arm is not None and mover is not None and not (mover is process and process.now.kind == "condition"):
             X_BH = forward(self.cell.arms[arm].arm, self.hardware.configuration(arm, self.now))
@@ -363,9 +363,9 @@ class Machine:
     ) -> RunError:
         """Return the error that says why a process cannot go on."""
         calls = [
-            Label(one.called, f"{self.spelled(one.name)} is called here")
-            for one in process.stack[:0:-1]
-            if one.kind == "procedure" and one.called
+            Label(activation.called, f"{self.spelled(activation.name)} is called here")
+            for activation in process.stack[:0:-1]
+            if activation.kind == "procedure" and activation.called
         ]
         diagnostic = Diagnostic(
             code=code,

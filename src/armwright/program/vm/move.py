@@ -40,31 +40,31 @@ def move(machine: Machine, process: Process, step: Instruction) -> None:
     """Plan a MOVE and begin its first stage; in the action of a MOVE, when that one has come to rest."""
     if process.motion is not None and not _made_way(machine, process, process.motion, step.span):
         return
-    asked = move_request(machine, process, step)
-    moved = machine.name(process, asked.begin.operands[0])
-    arm, implied = _carrier(machine, process, moved, asked.begin)
+    request = move_request(machine, process, step)
+    moved = machine.name(process, request.begin.operands[0])
+    arm, implied = _carrier(machine, process, moved, request.begin)
     machine.claim(process, arm, step.span, moved)
     _one_at_a_time(machine, process, arm, step.span)
     machine.state.idle += _STEPS_OF_A_MOVE
-    stages = _plan(machine, process, asked, arm, moved)
+    stages = _plan(machine, process, request, arm, moved)
     spelled = machine.spelled(moved)
     who = arm if moved == arm else f"{arm} [{spelled}]"
-    manner = f"@{asked.speed:g}" if asked.duration is None else f"in {asked.duration:g} s"
+    manner = f"@{request.speed:g}" if request.duration is None else f"in {request.duration:g} s"
     process.motion = Motion(
         arm=arm,
         moved=moved,
         tip=machine.state.tree.relation(moved, arm),
         span=step.span,
-        text=f"{who} MOVE: {stages_text(asked.form).replace(' / ', '; ')} {manner}",
-        goal=_goal_name(machine, process, asked),
+        text=f"{who} MOVE: {stages_text(request.form).replace(' / ', '; ')} {manner}",
+        goal=_goal_name(machine, process, request),
         implied=implied,
         stages=stages,
-        speed=asked.speed,
+        speed=request.speed,
         depth=len(process.stack),
         begun=machine.starts(),
         since=machine.state.ticks,
         until=machine.state.ticks,
-        guards=asked.guards,
+        guards=request.guards,
     )
     _start(machine, process, process.motion)
 
@@ -142,9 +142,9 @@ def release(machine: Machine, process: Process, keep: int) -> None:
 # ---- planning ------------------------------------------------------------------------------------------------------
 
 
-def _goal_name(machine: Machine, process: Process, asked: MoveRequest) -> str:
-    goal = asked.begin.operands[1]
-    return machine.name(process, goal) if machine.names_variable(process, goal) else asked.form.goal
+def _goal_name(machine: Machine, process: Process, request: MoveRequest) -> str:
+    goal = request.begin.operands[1]
+    return machine.name(process, goal) if machine.names_variable(process, goal) else request.form.goal
 
 
 def _carrier(machine: Machine, process: Process, moved: str, begin: Instruction) -> tuple[str, bool]:
@@ -187,7 +187,7 @@ def _one_at_a_time(machine: Machine, process: Process, arm: str, span: Span) -> 
     Raises:
         RunError: one is.
     """
-    other = next((one for one in machine.state.processes if one.motion and one.motion.arm == arm), None)
+    other = next((process for process in machine.state.processes if process.motion and process.motion.arm == arm), None)
     if other is None or other.motion is None:
         return
     text = f"{arm} cannot begin a MOVE in {process.title} before that of {other.title} is over"
@@ -196,53 +196,53 @@ def _one_at_a_time(machine: Machine, process: Process, arm: str, span: Span) -> 
 
 
 def _plan(
-    machine: Machine, process: Process, asked: MoveRequest, arm: str, moved: str
+    machine: Machine, process: Process, request: MoveRequest, arm: str, moved: str
 ) -> list[tuple[Stage, tuple[str, ...]]]:
     """Return the stages of a MOVE with the names of where they lead.
 
     Source:
         TR-83-008, third paper: ARM-1' = Base^-1 f2 f1^-1, where f1 is the relation from the arm to it.
     """
-    cell, place = machine.cell, machine.cell.arms[arm]
-    plans = stages_of(asked.form)
+    cell, cell_arm = machine.cell, machine.cell.arms[arm]
+    plans = stages_of(request.form)
     X_BW = inverse(machine.state.tree.world(base_name(arm)))
     X_MH = inverse(machine.state.tree.relation(moved, arm))
     goals = [
         StageGoal(
-            kind=one.kind.value,
-            poses=np.stack([X_BW @ _pose(machine, process, asked.goals[label]) @ X_MH for label in one.frames]),
-            blend=asked.blend,
+            kind=legs.kind.value,
+            poses=np.stack([X_BW @ _pose(machine, process, request.goals[label]) @ X_MH for label in legs.frames]),
+            blend=request.blend,
             corner=cell.corner_room
-            if one.kind is MotionKind.SPLINE and machine.code.standard is Standard.RLO_2
+            if legs.kind is MotionKind.SPLINE and machine.code.standard is Standard.RLO_2
             else None,
         )
-        for one in plans
+        for legs in plans
     ]
-    manner = Manner(speed=asked.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
+    manner = Manner(speed=request.speed, deviation=cell.deviation, period=cell.period, around=cell.around)
     try:
-        stages = plan(place.arm, machine.hardware.configuration(arm, machine.now), goals, manner)
+        stages = plan(cell_arm.arm, machine.hardware.configuration(arm, machine.now), goals, manner)
     except StageError as error:
-        _fail_move(machine, process, error.obstacle, asked=asked, stage=plans[error.stage], arm=arm)
+        _fail_move(machine, process, error.obstacle, request=request, stage=plans[error.stage], arm=arm)
     except IncapableArmError as error:
         raise machine.error(
-            process, "E406", f"{arm} cannot make this MOVE at any speed: {error}", asked.span, "asked for here"
+            process, "E406", f"{arm} cannot make this MOVE at any speed: {error}", request.span, "asked for here"
         ) from None
-    if asked.duration is not None:
-        stages = _timed(machine, process, asked, stages)
-    return [(stage, one.frames) for stage, one in zip(stages, plans, strict=True)]
+    if request.duration is not None:
+        stages = _timed(machine, process, request, stages)
+    return [(stage, legs.frames) for stage, legs in zip(stages, plans, strict=True)]
 
 
 def _pose(machine: Machine, process: Process, goal: Goal) -> Array:
     return machine.pose(process, goal.operand, goal.step)
 
 
-def _timed(machine: Machine, process: Process, asked: MoveRequest, stages: Sequence[Stage]) -> list[Stage]:
+def _timed(machine: Machine, process: Process, request: MoveRequest, stages: Sequence[Stage]) -> list[Stage]:
     """Return the stages slowed so that the whole MOVE takes as long as was asked for."""
-    asked_for, least = asked.duration, sum(stage.trajectory.duration for stage in stages)
+    asked_for, least = request.duration, sum(stage.trajectory.duration for stage in stages)
     assert asked_for is not None  # noqa: S101 - asked for only then
     if asked_for < least - machine.cell.period:
         text = f"this MOVE cannot be done in {asked_for:g} s"
-        raise machine.error(process, "E405", text, asked.span, f"it takes {least:.3f} s or more")
+        raise machine.error(process, "E405", text, request.span, f"it takes {least:.3f} s or more")
     if not least:
         # Nothing is to be moved: the arm stands still for so long.
         still = hold(stages[0].trajectory(0.0), asked_for)
@@ -253,11 +253,11 @@ def _timed(machine: Machine, process: Process, asked: MoveRequest, stages: Seque
     return [
         attrs.evolve(
             stage,
-            trajectory=one,
+            trajectory=legs,
             slowed="" if longer else stage.slowed,
-            certificate=_retimed(stage, one, longer=longer),
+            certificate=_retimed(stage, legs, longer=longer),
         )
-        for stage, one in zip(stages, slow, strict=True)
+        for stage, legs in zip(stages, slow, strict=True)
     ]
 
 
@@ -270,10 +270,10 @@ def _retimed(stage: Stage, slow: Trajectory, *, longer: bool) -> Certificate | N
 
 
 def _fail_move(
-    machine: Machine, process: Process, obstacle: Obstacle, *, asked: MoveRequest, stage: StagePlan, arm: str
+    machine: Machine, process: Process, obstacle: Obstacle, *, request: MoveRequest, stage: StagePlan, arm: str
 ) -> NoReturn:
     label = stage.frames[min(obstacle.pose, len(stage.frames) - 1)]
-    goal, kind = asked.goals[label], stage.kind.value
+    goal, kind = request.goals[label], stage.kind.value
     secondary = []
     if (
         machine.names_variable(process, goal.operand)
@@ -345,9 +345,9 @@ def _start(machine: Machine, process: Process, motion: Motion) -> None:
     )
     motion.since, motion.until = machine.state.ticks, machine.state.ticks + ticks
     if any(guard.looks for guard in motion.guards):
-        looks = np.arange(counted + 1) * period
+        times = np.arange(counted + 1) * period
         X_WB = machine.state.tree.world(base_name(motion.arm))
-        motion.hands = X_WB @ forward(arm, trajectory(looks))
+        motion.hands = X_WB @ forward(arm, trajectory(times))
     process.wake = machine.state.ticks if motion.guards else motion.until
 
 
@@ -355,8 +355,8 @@ def _holds(machine: Machine, process: Process, motion: Motion, guard: Guard) -> 
     """Whether the condition of a guard holds now, with the arm where it is now."""
     tree, now = machine.state.tree, process.now
     if guard.looks and len(motion.hands):
-        at = min(machine.state.ticks - motion.since, len(motion.hands) - 1)
-        machine.state.tree = tree.place(motion.arm, motion.hands[at])
+        index = min(machine.state.ticks - motion.since, len(motion.hands) - 1)
+        machine.state.tree = tree.place(motion.arm, motion.hands[index])
     process.stack.append(Activation(kind="condition", bindings=now.bindings, passing=now.passing, wrote=now.wrote))
     evaluate_instructions(machine, process, machine.code.instructions, guard.condition)
     process.stack.pop()

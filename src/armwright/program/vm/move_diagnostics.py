@@ -23,7 +23,7 @@ _ON_THE_WAY = {
 # Farther away nobody counts tenths [mm].
 _FAR = 1e6
 _THROUGH_FRAMES = ("SPLINE", "BLEND")
-_BY = {"via": "by a via pose", "damped": "by damped rates"}
+_METHODS = {"via": "by a via pose", "damped": "by damped rates"}
 
 
 def stopped(obstacle: Obstacle, goal: str, name: str, arm: Arm) -> str:
@@ -42,14 +42,14 @@ def where_and_why(obstacle: Obstacle, kind: str, to: Sequence[str], arm: str) ->
         to: the frames it goes to, as the program spells them.
         arm: name of the arm.
     """
-    place = f"at {_place(obstacle.place)} mm from the base of {arm}"
+    position = f"at {_place(obstacle.place)} mm from the base of {arm}"
     if obstacle.along is None or obstacle.length is None or obstacle.certain:
-        return f"{place}: {obstacle.reason}"
+        return f"{position}: {obstacle.reason}"
     way = f"{obstacle.fraction * 100:.0f} % of the way there"
     if kind in _THROUGH_FRAMES:
         before = "where the hand was" if obstacle.pose == 0 else f"`{to[obstacle.pose - 1]}`"
         way += f" from {before} (way {obstacle.pose + 1} of {len(to)})"
-    return f"{way}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, {place}: {obstacle.reason}"
+    return f"{way}, {obstacle.along * 1e3:.1f} of {obstacle.length * 1e3:.1f} mm, {position}: {obstacle.reason}"
 
 
 def ways_round(obstacle: Obstacle, kind: str, around: str | None) -> tuple[str, ...]:
@@ -68,7 +68,7 @@ def ways_round(obstacle: Obstacle, kind: str, around: str | None) -> tuple[str, 
     if around is None:
         return ("`armwright run --around via` looks for a way round",)
     other = "`--around via` looks further" if around == "damped" else "a VIA of the program may lead farther round"
-    return (f"no way round {_BY[around]} was found on which the whole MOVE could be made; {other}",)
+    return (f"no way round {_METHODS[around]} was found on which the whole MOVE could be made; {other}",)
 
 
 def _lead(detour: Detour, arm: str) -> str:
@@ -105,7 +105,7 @@ def detour_warning(run: RunStage) -> Diagnostic | None:
     return Diagnostic(
         code="W402",
         severity=Severity.WARNING,
-        message=f"{run.arm} leaves the straight way to `{run.to[-1]}`, {_BY[detour.by]}: {detour.price}",
+        message=f"{run.arm} leaves the straight way to `{run.to[-1]}`, {_METHODS[detour.method]}: {detour.price}",
         span=run.span,
         label=f"stopped {obstacle.fraction * 100:.0f} % of the way there; begun at {run.t0:.3f} s",
         notes=(

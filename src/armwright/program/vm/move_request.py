@@ -35,11 +35,11 @@ class MoveRequest(NamedTuple):
 
 def move_request(machine: Machine, process: Process, step: Instruction) -> MoveRequest:
     """Gather the instructions of a MOVE, from MVBEG to MVEND."""
-    instructions, at = machine.code.instructions, process.at - 1
-    first = at
+    instructions, index = machine.code.instructions, process.at - 1
+    first = index
     while instructions[first].op is not Op.MVBEG:
         first -= 1
-    begin, parts = instructions[first], instructions[first + 1 : at]
+    begin, parts = instructions[first], instructions[first + 1 : index]
     goals: dict[str, list[Goal]] = {"goal": [_goal(machine, process, begin.operands[1], begin)]}
     numbers: dict[Op, float] = {}
     guards = []
@@ -82,13 +82,13 @@ def _goal(machine: Machine, process: Process, operand: Operand, step: Instructio
 
 def _told_apart(goals: dict[str, list[Goal]]) -> dict[str, list[Goal]]:
     """Return the goals with a label of its own for each, also where a program names two places alike."""
-    seen: dict[str, Operand] = {}
+    operands: dict[str, Operand] = {}
     for several in goals.values():
-        for at, goal in enumerate(several):
+        for index, goal in enumerate(several):
             label = goal.label
-            while seen.setdefault(label, goal.operand) != goal.operand:
+            while operands.setdefault(label, goal.operand) != goal.operand:
                 label += "'"
-            several[at] = goal._replace(label=label)
+            several[index] = goal._replace(label=label)
     return goals
 
 
@@ -115,8 +115,8 @@ def _guard(machine: Machine, part: Instruction) -> Guard:
     condition, truth, action = part.operands
     assert isinstance(condition, JumpTarget)  # noqa: S101 - the translator lands them
     assert isinstance(action, JumpTarget)  # noqa: S101
-    at, looks = condition.index, False
-    while (step := machine.code.instructions[at]).op is not Op.RET:
-        looks = looks or step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV)
-        at += 1
-    return Guard(condition=condition.index, truth=str(truth), action=action.index, looks=looks)
+    index, reads_pose = condition.index, False
+    while (step := machine.code.instructions[index]).op is not Op.RET:
+        reads_pose = reads_pose or step.op in (Op.DIST, Op.COPY, Op.MUL, Op.INV)
+        index += 1
+    return Guard(condition=condition.index, truth=str(truth), action=action.index, looks=reads_pose)

@@ -58,9 +58,9 @@ def _turn(axis: int) -> Callable[[float, UnitSystem], Array]:
         # Whole quarter turns are exact: 90 degrees leave no 6e-17 in a program's places.
         quarters = angle / (math.pi / 2 / units.radians)
         exact = {0: (1.0, 0.0), 1: (0.0, 1.0), 2: (-1.0, 0.0), 3: (0.0, -1.0)}
-        whole = quarters == round(quarters)
+        is_quarter = quarters == round(quarters)
         radians = angle * units.radians
-        c, s = exact[round(quarters) % 4] if whole else (math.cos(radians), math.sin(radians))
+        c, s = exact[round(quarters) % 4] if is_quarter else (math.cos(radians), math.sin(radians))
         X = np.eye(4)
         X[first, first], X[first, second], X[second, first], X[second, second] = c, -s, s, c
         return X
@@ -120,5 +120,5 @@ IN_UNITS: Mapping[Op, Callable[..., Any]] = {
     Op.ROTY: _turn(1),
     Op.ROTZ: _turn(2),
     Op.DIST: lambda f, g, units: _distance(f[:3, 3], g[:3, 3]) / units.metres,
-    Op.MATX: lambda *given: matrix(given[:-1], given[-1]),
+    Op.MATX: lambda *values: matrix(values[:-1], values[-1]),
 }

@@ -288,7 +288,7 @@ class Process:
     def follows(self) -> Motion | None:
         """The MOVE that is followed now; None in an action of it, or in a procedure that an action calls."""
         motion = self.motion
-        if motion is None or any(one.kind == "action" for one in self.stack[motion.depth :]):
+        if motion is None or any(activation.kind == "action" for activation in self.stack[motion.depth :]):
             return None
         return motion
 

@@ -214,7 +214,7 @@ class Recording:
     @property
     def processes(self) -> tuple[str, ...]:
         """The processes that did anything, in the order in which they began."""
-        return tuple(dict.fromkeys(one.process for one in self.effects))
+        return tuple(dict.fromkeys(effect.process for effect in self.effects))
 
     @property
     def tree(self) -> FrameTree:
@@ -233,7 +233,7 @@ class Recording:
 
 def in_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     """Return effects in the order in which they began."""
-    return tuple(sorted(effects, key=lambda one: (one.t0, one.order)))
+    return tuple(sorted(effects, key=lambda effect: (effect.t0, effect.order)))
 
 
 def thinned(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[float, FrameTree]]:
@@ -243,13 +243,13 @@ def thinned(trees: Sequence[tuple[float, FrameTree]], gap: float) -> list[tuple[
         trees: with the time from which on each holds [s], in order.
         gap: [s].
     """
-    kept = {int(time / gap): (time, tree) for time, tree in trees[1:]}
-    return [trees[0], *kept.values()]
+    sampled = {int(time / gap): (time, tree) for time, tree in trees[1:]}
+    return [trees[0], *sampled.values()]
 
 
 def stream(
     name: str,
-    place: CellArm,
+    cell_arm: CellArm,
     runs: Sequence[Run],
     pushes: Sequence[Push],
     *,
@@ -260,17 +260,17 @@ def stream(
 
     Args:
         name: of the arm in the cell.
-        place: its model, and its posture at the start.
+        cell_arm: its model, and its posture at the start.
         runs: in order; the arm rests between.
         pushes: in order; each counts until the next.
         duration: of the whole run [s].
         period: of the servo [s].
     """
-    arm, ticks = place.arm, round(duration / period) + 1
+    arm, ticks = cell_arm.arm, round(duration / period) + 1
     q = np.empty((ticks, arm.n))
     qd, qdd = np.zeros((ticks, arm.n)), np.zeros((ticks, arm.n))
     tau, known = np.empty((ticks, arm.n)), np.zeros(ticks, dtype=bool)
-    first, configuration = 0, place.start
+    first, configuration = 0, cell_arm.start
     for run in runs:
         # A run that was stopped by an obstacle ends between two ticks.
         begin, end = round(run.t0 / period), math.ceil((run.t0 + run.duration) / period - _ON_A_TICK)
@@ -287,8 +287,8 @@ def stream(
     for push in pushes:
         begin = round(push.t0 / period)
         wrench[begin:] = push.on(max(ticks - begin, 0))
-    left = np.flatnonzero(~known)
-    tau[left] = _tau(arm, (q[left], qd[left], qdd[left]), wrench[left])
+    unknown = np.flatnonzero(~known)
+    tau[unknown] = _tau(arm, (q[unknown], qd[unknown], qdd[unknown]), wrench[unknown])
     return Stream(arm=name, t=t, q=q, qd=qd, qdd=qdd, tau=tau)
 
 
@@ -322,12 +322,12 @@ def peaks_of(tau: Array, period: float) -> tuple[Array, Array]:
     return sizes.max(axis=0), sizes.argmax(axis=0) * period
 
 
-def motion_rows(streams: Iterable[Stream], kept: slice = slice(None)) -> Iterable[str]:
+def motion_rows(streams: Iterable[Stream], sampled: slice = slice(None)) -> Iterable[str]:
     """Give the lines of motion.csv: time, arm, and per joint position, speed, acceleration and effort, in SI.
 
     Args:
         streams: one per arm.
-        kept: which ticks of each.
+        sampled: which ticks of each.
     """
     streams = tuple(streams)
     joints = max((s.q.shape[1] for s in streams), default=0)
@@ -339,7 +339,7 @@ def motion_rows(streams: Iterable[Stream], kept: slice = slice(None)) -> Iterabl
         blank = "," * (joints - n)
         cell = ",".join(["%.12g"] * n) + blank
         line = f"%.12g,{s.arm},{cell},{cell},{cell},{cell}\n"
-        first, end, _ = kept.indices(len(s.t))
+        first, end, _ = sampled.indices(len(s.t))
         for part in _chunks(end - first):
             rows = slice(first + part.start, min(first + part.stop, end))
             block = np.concatenate([s.t[rows, None], s.q[rows], s.qd[rows], s.qdd[rows], s.tau[rows]], axis=1)

@@ -124,15 +124,15 @@ class MachineState:
 
     def _all_processes(self) -> dict[int, Process]:
         """Return every process that is known in some way, by its id."""
-        found: dict[int, Process] = {}
+        processes: dict[int, Process] = {}
         waiting = [self.program, *self.processes, *self.locks.values()]
         waiting += [process for owners in self.owners.values() for process in owners]
         while waiting:
             process = waiting.pop()
-            if id(process) not in found:
-                found[id(process)] = process
+            if id(process) not in processes:
+                processes[id(process)] = process
                 waiting += process.branches if process.parent is None else [*process.branches, process.parent]
-        return found
+        return processes
 
 
 def _copied(processes: dict[int, Process]) -> dict[int, Process]:

@@ -26,7 +26,7 @@ def wait(machine: Machine, process: Process, step: Instruction) -> None:
         _hold(process, waiting)
         return
     machine.state.events[name] -= 1
-    _told(machine, process, waiting)
+    _description(machine, process, waiting)
 
 
 def lock(machine: Machine, process: Process, step: Instruction) -> None:
@@ -39,7 +39,7 @@ def lock(machine: Machine, process: Process, step: Instruction) -> None:
     for name in names:
         machine.state.locks[name] = process
     process.locks += names
-    _told(machine, process, waiting)
+    _description(machine, process, waiting)
 
 
 def unlock(machine: Machine, process: Process, step: Instruction) -> None:
@@ -51,7 +51,7 @@ def unlock(machine: Machine, process: Process, step: Instruction) -> None:
 def give_up(machine: Machine, process: Process) -> None:
     """Take note of an event or a lock that a process has waited for in vain, when it is ended."""
     if process.unmet is not None:
-        _told(machine, process, process.unmet, in_vain=True)
+        _description(machine, process, process.unmet, in_vain=True)
     process.waiting = None
 
 
@@ -61,7 +61,7 @@ def _hold(process: Process, waiting: Waiting) -> None:
     process.waiting = process.unmet = waiting
 
 
-def _told(machine: Machine, process: Process, waiting: Waiting, *, in_vain: bool = False) -> None:
+def _description(machine: Machine, process: Process, waiting: Waiting, *, in_vain: bool = False) -> None:
     """Record what a process has waited for, from the time at which it began to wait."""
     names = waiting.names
     is_event = waiting.what == "event"
@@ -79,14 +79,14 @@ def _locked_by(machine: Machine, name: str) -> set[Process]:
     array, bracket, _ = name.partition("[")
     return {
         holder
-        for held, holder in machine.state.locks.items()
-        if held == name or (bracket and held == array) or (not bracket and held.startswith(f"{name}["))
+        for locked, holder in machine.state.locks.items()
+        if locked == name or (bracket and locked == array) or (not bracket and locked.startswith(f"{name}["))
     }
 
 
 def deadlock(machine: Machine) -> RunError:
     """Return the error of processes that all wait for one another."""
-    stuck = [one for one in machine.state.processes if one.waiting and one.waiting.what != "branches"]
+    stuck = [process for process in machine.state.processes if process.waiting and process.waiting.what != "branches"]
     stuck.sort(key=lambda one: one.path)
     says = []
     for one in stuck:
@@ -95,8 +95,8 @@ def deadlock(machine: Machine) -> RunError:
         what = f"waits for {names}" if one.waiting.what == "event" else f"waits for the lock of {names}"
         locks = one.waiting.what == "locks"
         holders = {holder for name in one.waiting.names if locks for holder in _locked_by(machine, name)} - {one}
-        held = ", ".join(holder.title for holder in sorted(holders, key=lambda holder: holder.path))
-        says.append((one.waiting.span, f"{one.title} {what}{f', held by {held}' if held else ''}"))
+        locked = ", ".join(holder.title for holder in sorted(holders, key=lambda holder: holder.path))
+        says.append((one.waiting.span, f"{one.title} {what}{f', held by {locked}' if locked else ''}"))
     (span, label), *others = says
     text = f"{len(says)} processes wait for ever" if others else "the program waits for ever"
     return machine.error(stuck[0], "E501", text, span, label, secondary=[Label(*other) for other in others])

@@ -33,17 +33,17 @@ class If:
     @property
     def chain(self) -> tuple[list["If"], "Statement | None"]:
         """This IF and all that follow it with ELSE IF, and the statement behind the last ELSE."""
-        found, last = [self], self.otherwise
+        conditionals, last = [self], self.otherwise
         while isinstance(last, If):
-            found.append(last)
+            conditionals.append(last)
             last = last.otherwise
-        return found, last
+        return conditionals, last
 
     @property
     def statements(self) -> "tuple[Statement, ...]":
         """The statements of its chain of which one is done."""
-        found, last = self.chain
-        return (*(one.then for one in found), *(() if last is None else (last,)))
+        conditionals, last = self.chain
+        return (*(conditional.then for conditional in conditionals), *(() if last is None else (last,)))
 
 
 @attrs.frozen
