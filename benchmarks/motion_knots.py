@@ -29,7 +29,7 @@ def walk(count: int) -> np.ndarray:
 
 def planner(knots: np.ndarray) -> Callable[[], object]:
     """Return what plans all knots, one after the other, in a compiled loop; it has been compared with the whole."""
-    one = xspline_kernel(JOINTS).one
+    single = xspline_kernel(JOINTS).single
     state, step = begin(knots[0], knots[1], STEP), np.array([STEP])
     segments = np.empty((len(knots) - 2, 4, JOINTS))
 
@@ -37,7 +37,7 @@ def planner(knots: np.ndarray) -> Callable[[], object]:
     def plan(state: np.ndarray, knots: np.ndarray, segments: np.ndarray, step: np.ndarray) -> int:
         lost = 0
         for i in range(len(segments)):
-            lost += one(state, knots[i + 2], step, state, segments[i])
+            lost += single(state, knots[i + 2], step, state, segments[i])
         return lost
 
     if plan(state.copy(), knots, segments, step):

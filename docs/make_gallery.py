@@ -110,7 +110,8 @@ EXHIBITS = (
     Exhibit(
         name="joint-move",
         title="A joint move",
-        says="Every joint goes straight from posture to posture, blended at the middle pose; the hand swings out.",
+        says="Every joint moves linearly from configuration to configuration, blended at the middle pose; the tool "
+        "swings out.",
         alt="A film of a PUMA that moves through three poses, with the path of its hand",
         command="move joint puma560-seed examples/puma_poses.toml",
         shown="move.gif",
@@ -118,9 +119,9 @@ EXHIBITS = (
     Exhibit(
         name="round-the-post",
         title="A Cartesian move",
-        says="The hand goes straight from pose to pose and looks at a post all the way; the path comes with a bound on "
-        "how far the hand may stray from it between two samples.",
-        alt="A path in space with straight ways, rounded at two poses, and approach vectors that point to one line",
+        says="The tool moves on straight lines from pose to pose and points at a post all the time; the path "
+        "comes with a bound of the deviation of the tool between two samples.",
+        alt="A path in space of straight segments, blended at two poses, and approach vectors that point to one line",
         command="move cartesian puma560 examples/round_the_post.toml",
         shown="path.svg",
     ),
@@ -144,9 +145,10 @@ EXHIBITS = (
     Exhibit(
         name="puma-moves",
         title="A move that nobody asked the joints about",
-        says="Figure 23 of a project on the PUMA, computed again: the hand runs from A by B to C on straight ways. The "
+        says="Figure 23 of a project on the PUMA, computed again: the tool moves from A by B to C on straight "
+        "lines. The "
         "study then asks what the joints have to do, and finds that they cannot.",
-        alt="Position, speed and acceleration of the hand over a second, and its path in space",
+        alt="Position, speed and acceleration of the tool over a second, and its path in space",
         command="study puma-moves",
         shown="figure23.svg",
     ),
@@ -156,14 +158,14 @@ EXHIBITS = (
         says="Journals half a millimetre smaller than their bearings: they lie at the walls while the arm speeds up "
         "and rattle when it slows down. The page shows the linkage and its bearings moving, errors, forces and the "
         "energy account.",
-        alt="The page of a simulated five-bar: the linkage, its three bearings with the ways of the journals, charts",
+        alt="The page of a simulated five-bar: the linkage, its three bearings with the paths of the journals, charts",
         command="clearance simulate five-bar --path y1",
         moment=0.9,
     ),
     Exhibit(
         name="corrected",
         title="Moving right in spite of play",
-        says="The path of a pick-and-place move told otherwise, so that the tip comes to its targets.",
+        says="The commanded path of a pick-and-place move corrected, so that the tip reaches its targets.",
         alt="A path with three targets, and the corrected one beside it",
         command="clearance correct five-bar --clearance J2=0.328 --clearance J3=0.171 --clearance J4=0.483",
         shown="paths.svg",
@@ -180,19 +182,19 @@ EXHIBITS = (
     Exhibit(
         name="calibration",
         title="A better arm from measured points",
-        says="Points that a laser tracker would measure of a PUMA: a millimetre off as drawn, half a millimetre with "
-        "its geometry calibrated, and as near as the arm comes back with the joints that give under gravity, which "
-        "held-out points confirm. Errors that the points do not tell are named.",
-        alt="How many of the readings are nearer than a distance: before, calibrated, and with joints that give",
+        says="Points that a laser tracker would measure of a PUMA: a millimetre of error as drawn, half a millimetre "
+        "with "
+        "its geometry calibrated, and within its repeatability with joint compliance under gravity, which "
+        "held-out points confirm. Errors that are not identifiable from the points are named.",
+        alt="How many of the readings are nearer than a distance: before, calibrated, and with joint compliance",
         command="calibrate puma560-seed examples/puma_points.csv --beyond",
         shown="distances.svg",
     ),
     Exhibit(
         name="board",
         title="An arm calibrated on a board",
-        says="Errors at six places before, after the fit of a thesis, and after one that leaves nothing out that the "
-        "points tell.",
-        alt="Groups of bars at six places on a logarithmic scale, the last ones a hundred times lower than the first",
+        says="Errors at six positions before, after the fit of a thesis, and after a fit of all identifiable errors.",
+        alt="Groups of bars at six positions on a logarithmic scale, the last a hundred times lower than the first",
         command="study dh-calibration",
         shown="verification.svg",
     ),
@@ -208,7 +210,7 @@ EXHIBITS = (
 )
 # Drawn by docs/pictures/make.py for the pages on physics.
 ALSO = {
-    "pictures/postures.svg": "[All postures of a PUMA for one pose](physics/kinematics.md)",
+    "pictures/postures.svg": "[All joint configurations of a PUMA for one pose](physics/kinematics.md)",
     "pictures/released.svg": "[Where the energy of a released arm goes](physics/dynamics.md)",
     "pictures/two_moves.svg": "[A joint move and a Cartesian move](physics/motion.md)",
     "pictures/rattling.svg": "[Journals in their bearings](physics/clearance.md)",

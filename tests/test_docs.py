@@ -230,7 +230,7 @@ def check_explained(message: str) -> None:
 
 def test_load_of_the_page(tmp_path: Path) -> None:
     """The load on the page on arms is read, every quantity in SI units."""
-    (tmp_path / "part.toml").write_text(example(ARMS.partition("## A load in the hand")[2]), encoding="utf-8")
+    (tmp_path / "part.toml").write_text(example(ARMS.partition("## A load at the tool")[2]), encoding="utf-8")
 
     load = read_load(tmp_path / "part.toml")
 

@@ -235,7 +235,7 @@ REFUSED = {
     "no link for one joint": (lambda: Arm(name="one", joints=ONE, links=[]), "arm 'one': 1 joints but 0 links"),
     "a base that is no pose": (
         lambda: Arm(name="one", joints=ONE, base=2 * np.eye(4)),
-        "base: expected a rotation, a place and the row 0 0 0 1",
+        "base: expected a rotation, a position and the row 0 0 0 1",
     ),
     "a tool of three rows": (
         lambda: Arm(name="one", joints=ONE, tool=np.eye(4)[:3]),

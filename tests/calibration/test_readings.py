@@ -392,7 +392,9 @@ def test_no_poses(by: tuple[float, ...], truth: Truth) -> None:
     X = truth.poses(q)
     X[2, :3, :3] *= by
 
-    with pytest.raises(InvalidValueError, match=r"points: expected a rotation, a place .* in every pose.* as number 3"):
+    with pytest.raises(
+        InvalidValueError, match=r"points: expected a rotation, a position .* in every pose.* as number 3"
+    ):
         readings(q, X)
 
 

@@ -83,7 +83,7 @@ def test_masked_entries(fast: CompiledArm, mask: Any) -> None:
     q = np.ma.array(np.zeros(6), mask=mask)
     for function in (fast.forward, compile_arm(PUMA).link_poses):
         for given in (q, np.ma.stack([q, q])):
-            with pytest.raises(InvalidValueError, match="q: masked entries have no value; fill them or leave them out"):
+            with pytest.raises(InvalidValueError, match="q: masked entries have no value; fill them or omit them"):
                 function(given)
 
 
@@ -173,7 +173,7 @@ def test_arrays_to_fill(fast: CompiledArm, lead: tuple[int, ...], rng: np.random
 
 def test_status_of_one_configuration() -> None:
     """Compiled code that calls the function of one configuration learns what came out without meaning, what is odd."""
-    one = compile_arm(PUMA).kernel("forward").one
+    one = compile_arm(PUMA).kernel("forward").single
 
     @njit
     def status(value: float) -> int:

@@ -153,7 +153,7 @@ def test_called_from_other_compiled_code(rng: np.random.Generator) -> None:
     """A compiled loop that calls the function of one configuration gets the bits that a batch has."""
     arm = load_arm("stanford-jpl")
     fast = compile_arm(arm)
-    one = fast.kernel("inverse_dynamics").one
+    one = fast.kernel("inverse_dynamics").single
 
     @njit
     def efforts(q: Array, qd: Array, qdd: Array, tau: Array) -> int:

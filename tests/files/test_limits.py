@@ -65,7 +65,7 @@ BEYOND: dict[str, tuple[int, str, Callable[[Path], object]]] = {
         lambda path: read_cell(path, arms_needed=False),
     ),
     "arms": (1, "[arms.ARM_1]\n[arms.ARM_2]\n", read_cell),
-    "turns": (2, "[[joint]]\nkind = 'revolute'\nlimits = { upper_deg = 721, lower_deg = 0 }\n", read_arm),
+    "revolutions": (2, "[[joint]]\nkind = 'revolute'\nlimits = { upper_deg = 721, lower_deg = 0 }\n", read_arm),
 }
 
 

@@ -29,7 +29,7 @@ from armwright.tracing.emit import emit
 from armwright.tracing.kernel import Kernel
 from armwright.tracing.scalar import sin
 kernel = Kernel(emitted=emit("wave", lambda x: [[sin(x[0]) * 1.25]], {"x": 1}))
-print(repr(float(kernel(np.array([0.5]))[0])), len(kernel.one.stats.cache_hits))
+print(repr(float(kernel(np.array([0.5]))[0])), len(kernel.single.stats.cache_hits))
 """
 
 

@@ -147,13 +147,13 @@ def _joint(table: Table) -> Joint:
     if not values["lower"] < values["upper"]:
         lower, upper = (_written(kind, values[name]) for name in ("lower", "upper"))
         raise limits.error(None, f"the lower limit must be below the upper, got {lower} and {upper}")
-    most = limit("turns") * math.tau
+    most = limit("revolutions") * math.tau
     for name in ("lower", "upper"):
         if kind == "revolute" and most < abs(values[name]) < math.inf:
             raise limits.error(
                 given(limits, name, units) and f"{name}_{given(limits, name, units)}",
-                f"too far from zero: {beyond('turns', _written(kind, values[name]))}; a joint that turns without end "
-                "has no limit: leave it out",
+                f"too far from zero: {beyond('revolutions', _written(kind, values[name]))}; for a joint without "
+                "limits leave it out",
             )
     return Joint(
         kind="revolute" if kind == "revolute" else "prismatic",

@@ -208,8 +208,8 @@ def _refuse_no_poses(given: Array) -> None:
     worst = int(np.argmax(error)) if len(error) else 0
     if len(error) and error[worst] > _WRITTEN:
         raise InvalidValueError(
-            f"points: expected a rotation, a place and the row 0 0 0 1 in every pose, got {given[worst].tolist()} as "
-            f"number {worst + 1}"
+            f"points: expected a rotation, a position and the row 0 0 0 1 in every pose, got {given[worst].tolist()} "
+            f"as number {worst + 1}"
         )
 
 

@@ -33,7 +33,7 @@ def kernel(
 
     emitted = emit_quantity(load_arm(arm), quantity)
     total = sum(emitted.operations.values())
-    source = emitted.one if single else emitted.rows
+    source = emitted.single if single else emitted.rows
     if as_json:
         counts = {"operations": emitted.operations, "total": total, "joined": emitted.joined}
         print_json({**counts, "source": source})

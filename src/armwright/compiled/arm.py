@@ -84,7 +84,7 @@ class CompiledArm:
     """Functions of one arm, as fast as the processor goes.
 
     They are called like the plain functions of the same names, without the arm, and give the same numbers but for
-    rounding. A configuration has the same bits alone, in any batch and on any number of threads. Positions that look
+    rounding. A configuration has the same bits alone, in any batch and on any number of threads. Positions that seem
     like degrees get the same warning.
 
     Every function takes, by name, ``threads``, how many cores to use (all when left out), and ``out``, the arrays to
@@ -172,7 +172,7 @@ class CompiledArm:
 
         Args:
             pose: (..., 4, 4) tool poses in the base frame.
-            near: (..., 6) joint positions [rad] or [m]; angles come back within half a turn of it, and a free joint
+            near: (..., 6) joint positions [rad] or [m]; angles come back within pi of it, and a free joint
                 takes its value from it.
             threads: how many cores to use; all when None.
             out: (..., 8, 6) and (..., 8) to fill.

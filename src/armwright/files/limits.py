@@ -53,7 +53,7 @@ LIMITS: Mapping[str, Limit] = {
     "imports": Limit(100, "files", "files that a program IMPORTs; their frames together count as those of a cell"),
     "hanging": Limit(1000, "frames", "frames of a cell that hang on one another, from a frame down to WORLD"),
     "arms": Limit(20, "arms", "arms of a cell"),
-    "turns": Limit(1000, "turns", "how far the limits of a revolute joint may lie from zero"),
+    "revolutions": Limit(1000, "revolutions", "how far the limits of a revolute joint may lie from zero"),
     "message_mb": Limit(16, "MB", "one message to the language server or the debug adapter"),
     "header_bytes": Limit(8192, "bytes", "the header of such a message"),
 }

@@ -41,7 +41,7 @@ def pose(
         quaternion: (..., 4) w, x, y, z, which are normalized.
         rpy: (..., 3) roll, pitch, yaw [rad] about the fixed axes x, y, z, as in URDF.
         euler: (..., 3) Euler angles [rad] about the axes of ``sequence``.
-        sequence: of three axes: capital letters turn about the moving axes, such as ``ZYZ``; small ones about the fixed
+        sequence: of three axes: capital letters are the moving axes, such as ``ZYZ``; small ones about the fixed
             axes, such as ``xyz``.
         axis: (..., 3) of a rotation by ``angle``; of any length but 0.
         angle: (...) [rad].

@@ -1,4 +1,4 @@
-"""ZYZ Euler angles: R = Rz(phi) Ry(theta) Rz(psi), as the wrist of a PUMA turns the hand; and roll, pitch, yaw."""
+"""ZYZ Euler angles: R = Rz(phi) Ry(theta) Rz(psi), as in the wrist of a PUMA; and roll, pitch, yaw."""
 
 from __future__ import annotations
 
@@ -43,24 +43,24 @@ def to_zyz(R: ArrayLike) -> Array:
     phi = np.where(singular, 0.0, np.arctan2(R[..., 1, 2], R[..., 0, 2]))
     theta = np.arctan2(sine, R[..., 2, 2])
     c, s = np.cos(phi), np.sin(phi)
-    # With phi turned back the second column is that of the last turn.
+    # After rotating back by phi the second column is that of the last rotation.
     psi = np.arctan2(c * R[..., 1, 0] - s * R[..., 0, 0], c * R[..., 1, 1] - s * R[..., 0, 1])
     return np.stack([phi, theta, psi], axis=-1)
 
 
 def next_zyz(R: ArrayLike, near: ArrayLike) -> Array:
-    """Return the ZYZ angles (3,) of one rotation (3, 3) that are nearest to others (3,).
+    """Return the ZYZ angles (3,) of one rotation (3, 3) that are neatilted to others (3,).
 
-    Both solutions, theta and -theta, and whole turns are looked at; where theta is 0 or pi, phi stays as it is near.
+    Both solutions, theta and -theta, and revolutions are considered; where theta is 0 or pi, phi stays as it is near.
     """
     R, last = of_shape(R, (3, 3), "rotation"), of_shape(near, (3,), "near")
     phi, theta, psi = to_zyz(R)
     if np.sin(theta) < _SINGULAR:
         psi = psi - (last[0] - phi) * np.sign(np.cos(theta))
         phi = last[0]
-    found = np.array([(phi, theta, psi), (phi + np.pi, -theta, psi + np.pi)])
-    found += 2 * np.pi * np.round((last - found) / (2 * np.pi))
-    return np.asarray(found[np.abs(found - last).sum(axis=1).argmin()])
+    solutions = np.array([(phi, theta, psi), (phi + np.pi, -theta, psi + np.pi)])
+    solutions += 2 * np.pi * np.round((last - solutions) / (2 * np.pi))
+    return np.asarray(solutions[np.abs(solutions - last).sum(axis=1).argmin()])
 
 
 def matlab_zyz(R: ArrayLike) -> Array:
@@ -89,10 +89,11 @@ def matlab_zyz(R: ArrayLike) -> Array:
 def to_rpy(R: Array) -> Array:
     """Return roll, pitch and yaw (3,) of a rotation (3, 3), to the last digits also where pitch is a right angle [rad].
 
-    They turn about the fixed axes x, then y, then z. Where pitch is a right angle, yaw and roll turn about one axis.
-    Roll is read from what is left when yaw has been taken off, so any yaw will do.
+    They are rotations about the fixed axes x, then y, then z. Where pitch is a right angle, yaw and roll share an axis.
+    Roll is read from the remaining rotation after removing yaw, so any yaw will do.
     """
     level = math.hypot(R[0, 0], R[1, 0])
     c, s = (R[0, 0] / level, R[1, 0] / level) if level else (1.0, 0.0)
-    rest = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0))) @ R
-    return np.array((math.atan2(-rest[1, 2], rest[1, 1]), math.atan2(-rest[2, 0], rest[0, 0]), math.atan2(s, c)))
+    tilted = np.array(((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0))) @ R
+    roll, pitch = math.atan2(-tilted[1, 2], tilted[1, 1]), math.atan2(-tilted[2, 0], tilted[0, 0])
+    return np.array((roll, pitch, math.atan2(s, c)))

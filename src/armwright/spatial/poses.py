@@ -1,4 +1,4 @@
-"""Poses: homogeneous matrices, their twelve numbers, their inverse, the straight way between two."""
+"""Poses: homogeneous matrices, their twelve numbers, their inverse, the straight path between two."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ def one_pose(value: ArrayLike, what: str = "pose") -> Array:
     """
     X = exact_shape(value, (4, 4), what)
     if orthonormality_error(X[:3, :3]) > _ROUNDING or not np.array_equal(X[3], (0, 0, 0, 1)):
-        raise InvalidValueError(f"{what}: expected a rotation, a place and the row 0 0 0 1, got {X.tolist()}")
+        raise InvalidValueError(f"{what}: expected a rotation, a position and the row 0 0 0 1, got {X.tolist()}")
     return X
 
 
 def homogeneous(R: ArrayLike, p: ArrayLike) -> Array:
-    """Join a rotation (..., 3, 3) and a place (..., 3) [m] to a pose (..., 4, 4)."""
+    """Join a rotation (..., 3, 3) and a position (..., 3) [m] to a pose (..., 4, 4)."""
     R, p = of_shape(R, (3, 3), "rotation"), of_shape(p, (3,), "position")
     lead = np.broadcast_shapes(R.shape[:-2], p.shape[:-1])
     X = np.zeros((*lead, 4, 4))
@@ -37,7 +37,7 @@ def homogeneous(R: ArrayLike, p: ArrayLike) -> Array:
 
 
 def inverse(X_AB: ArrayLike) -> Array:
-    """Return X_BA, (..., 4, 4), without solving: the rotation turned over, the place turned back."""
+    """Return X_BA, (..., 4, 4), without solving: from the transposed rotation and the rotated position."""
     X_AB = of_shape(X_AB, (4, 4), "pose")
     R_BA = np.swapaxes(X_AB[..., :3, :3], -1, -2)
     return homogeneous(R_BA, -(R_BA @ X_AB[..., :3, 3:])[..., 0])
@@ -66,18 +66,18 @@ def to_noap(X: ArrayLike) -> Array:
 
 
 def between(X_A: ArrayLike, X_B: ArrayLike, s: ArrayLike) -> Array:
-    """Return poses on the straight way from X_A to X_B: place on the line, turn about one fixed axis.
+    """Return poses on the straight path from X_A to X_B: position on the line, rotation about a fixed axis.
 
     Args:
         X_A: (4, 4) where s = 0.
         X_B: (4, 4) where s = 1.
-        s: (...) fractions of the way.
+        s: (...) fractions of the path.
 
     Returns:
         (..., 4, 4).
     """
     X_A, X_B, s = of_shape(X_A, (4, 4), "pose"), of_shape(X_B, (4, 4), "pose"), np.asarray(s, dtype=np.float64)
-    turn = rotation_vector(X_A[:3, :3].T @ X_B[:3, :3])
-    R = X_A[:3, :3] @ rotation_from_vector(s[..., None] * turn)
+    rotation = rotation_vector(X_A[:3, :3].T @ X_B[:3, :3])
+    R = X_A[:3, :3] @ rotation_from_vector(s[..., None] * rotation)
     p = X_A[:3, 3] + s[..., None] * (X_B[:3, 3] - X_A[:3, 3])
     return homogeneous(R, p)

@@ -1,4 +1,4 @@
-"""Rotations: how far from one a matrix is, the nearest one, the turn between two, the way from one to another."""
+"""Rotations: how far from one a matrix is, the nearest one, the rotation between two, and interpolation."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def nearest_rotation(R: ArrayLike) -> Array:
         (..., 3, 3).
 
     Source:
-        Higham (1986): the polar factor, with the last singular direction turned where the determinant is negative.
+        Higham (1986): the polar factor, with the last singular direction reversed where the determinant is negative.
     """
     U, _, Vt = np.linalg.svd(of_shape(R, (3, 3), "rotation"))
-    turn = np.ones(U.shape[:-1])
-    turn[..., 2] = np.sign(np.linalg.det(U @ Vt))
-    return np.asarray((U * turn[..., None, :]) @ Vt)
+    signs = np.ones(U.shape[:-1])
+    signs[..., 2] = np.sign(np.linalg.det(U @ Vt))
+    return np.asarray((U * signs[..., None, :]) @ Vt)
 
 
 def rotation_vector(R: ArrayLike) -> Array:
@@ -62,7 +62,7 @@ def rotation_vector(R: ArrayLike) -> Array:
     small = sine < _TINY_ANGLE
     factor = np.where(small, 1.0, angle / np.where(small, 1.0, sine))
     vector = skew * factor[..., None]
-    # Near half a turn the skew part vanishes, and the axis is the largest column of the symmetric part.
+    # Near 180° the skew part vanishes, and the axis is the largest column of the symmetric part.
     half = cosine < -0.99
     if np.any(half):
         symmetric = (R + np.swapaxes(R, -1, -2)) / 2 - cosine[..., None, None] * np.eye(3)
@@ -76,7 +76,7 @@ def rotation_vector(R: ArrayLike) -> Array:
 
 
 def rotation_from_vector(w: ArrayLike) -> Array:
-    """Return the turn by |w| about w.
+    """Return the rotation by |w| about w.
 
     Args:
         w: (..., 3) rotation vectors [rad].
@@ -101,7 +101,7 @@ def rotation_from_vector(w: ArrayLike) -> Array:
 
 
 def angle_between(R_A: ArrayLike, R_B: ArrayLike) -> Array:
-    """Return the angle of the turn from R_A to R_B, (...) [rad]."""
+    """Return the angle of the rotation from R_A to R_B, (...) [rad]."""
     R_AB = np.swapaxes(of_shape(R_A, (3, 3), "rotation"), -1, -2) @ of_shape(R_B, (3, 3), "rotation")
     return np.asarray(np.linalg.norm(rotation_vector(R_AB), axis=-1))
 

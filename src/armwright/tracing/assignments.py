@@ -30,7 +30,7 @@ _NOT_FINITE = {"nan": "np.nan", "inf": "np.inf", "-inf": "-np.inf"}
 
 
 class Watched(NamedTuple):
-    """What tells whether a configuration can be trusted.
+    """Sums of squares that are finite where a configuration is valid.
 
     Attributes:
         angles: inputs whose sine is taken, which must be finite and no larger than ``LARGEST_ANGLE``.

@@ -1,7 +1,7 @@
 """Sine, cosine and arc tangent as straight-line arithmetic, so that a compiler can run many at once.
 
 The text of these functions goes into every emitted kernel that needs them. They use no branch that a compiler
-cannot turn into a choice between two values, and no call but ``fma``.
+cannot replace by a choice between two values, and no call but ``fma``.
 
 Accuracy, against correctly rounded values (tests/tracing/test_kernel.py): sine and cosine within 2 ulp for
 |x| up to 1e5; beyond, the error grows as |x| · 1e-22 and reaches 1e-9 at 1e13; not meant beyond 1e15. Arc tangent
@@ -20,7 +20,7 @@ def fma(a: float, b: float, c: float) -> float:
 
 def sine_cosine(x: float) -> tuple[float, float]:
     """Return the sine and the cosine of ``x`` [rad]."""
-    # Adding and taking away 1.5 · 2^52 rounds to a whole number: the quarter turns in x.
+    # Adding and taking away 1.5 · 2^52 rounds to a whole number: the multiples of pi/2 in x.
     n = fma(x, 0.6366197723675814, 6755399441055744.0) - 6755399441055744.0
     r = fma(n, -2.0222662487959506e-21, fma(n, -6.077100506303966e-11, fma(n, -1.5707963267341256, x)))
     z = r * r
@@ -31,7 +31,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
     p = fma(z, fma(z, p, 2.480158728947673e-05), -0.001388888888887411)
     w = fma(z, -0.5, 1.0)
     c = w + fma(z * z, fma(z, p, 0.0416666666666666), fma(z, -0.5, 1.0 - w))
-    # The quarter, -2 to 2: odd ones swap sine and cosine, and half a turn changes the sign.
+    # The quarter, -2 to 2: odd ones swap sine and cosine, and pi changes the sign.
     m = fma(fma(n, 0.25, 6755399441055744.0) - 6755399441055744.0, -4.0, n)
     odd = abs(m) == 1.0
     half = abs(m) == 2.0
@@ -48,7 +48,7 @@ def arc_tangent(y: float, x: float) -> float:
     ay = abs(y)
     low = ay if ay < ax else ax
     high = ax if ay < ax else ay
-    # Above 0.66 the angle is measured from an eighth of a turn; one division serves both.
+    # Above 0.66 the angle is measured from pi/4; one division serves both.
     past = 1.0 if low > 0.66 * high else 0.0
     below = fma(past, low, high)
     t = fma(past, -high, low) / (below if below > 0.0 else 1.0)

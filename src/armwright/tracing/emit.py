@@ -81,7 +81,7 @@ def rows(first, last, {arguments}):
     return found
 """
 
-_ONE = """
+_SINGLE = """
 SIGNATURE = int64({signature})
 
 def one({arguments}):
@@ -120,7 +120,7 @@ class Emitted:
     Attributes:
         title: what it computes, in words.
         rows: source of ``rows(first, last, *inputs, *outputs)``, for arrays of (N, *shape).
-        one: source of ``one(*inputs, *outputs)``, for arrays of (*shape).
+        single: source of ``one(*inputs, *outputs)``, for arrays of (*shape).
         inputs: shape of one value of each input, by its name.
         angles: the names of inputs that hold a number whose sine is taken.
         outputs: shape of one value of each output.
@@ -131,7 +131,7 @@ class Emitted:
 
     title: str
     rows: str
-    one: str
+    single: str
     inputs: dict[str, Shape]
     angles: frozenset[str]
     outputs: tuple[Shape, ...]
@@ -158,7 +158,7 @@ def emit(
             by row.
         shapes: shape of one value of each output; vectors when left out.
         flags: numbers of the outputs that are truth values.
-        bounds: by the name of an input, how far from 0 each of its numbers usually is; what is farther is told.
+        bounds: by the name of an input, how far from 0 each of its numbers usually is; farther numbers are reported.
 
     Raises:
         InvalidValueError: the name of an input is no identifier: names become part of what is executed.
@@ -172,7 +172,7 @@ def emit(
     result = equation(*lists)
     rows, positive = result if isinstance(result, Guarded) else (result, ())
     outputs = [[_node(graph, x) for x in row] for row in rows]
-    given = tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes)
+    row_shapes = tuple((len(row),) for row in outputs) if shapes is None else tuple(shapes)
     flat = [node for row in outputs for node in row]
     far = {
         x.node: float(bound)
@@ -190,18 +190,18 @@ def emit(
     )
     code = Code(graph, flat, watched)
     operations = operation_count(graph, flat)
-    signature = ArraySignature(tuple(taken.values()), given, tuple(flags))
+    signature = ArraySignature(tuple(taken.values()), row_shapes, tuple(flags))
     top = head(sum(operations.values()))
     helpers = "".join(_helper(name) for name, ops in _HELPERS.items() if ops & set(operations))
     return Emitted(
         title=title,
         rows=top + helpers + _rows_source(code, signature),
-        one=top + helpers + _one_source(code, signature),
+        single=top + helpers + _one_source(code, signature),
         inputs=taken,
         angles=frozenset(
             name for name, row in zip(taken, lists, strict=True) if turned.intersection(x.node for x in row)
         ),
-        outputs=given,
+        outputs=row_shapes,
         flags=tuple(flags),
         operations=operations,
         joined=len(code.joined),
@@ -240,8 +240,8 @@ def kernel_body(equation: Callable[[list[Scalar]], Sequence[Scalar]], inputs: in
         inputs: how many scalars it takes.
     """
     graph = Graph()
-    given = graph.inputs(inputs)
-    outputs = [_node(graph, x) for x in equation(list(given))]
+    scalars = graph.inputs(inputs)
+    outputs = [_node(graph, x) for x in equation(list(scalars))]
     code = Code(graph, outputs, Watched([], [], [], {}))
     operations = operation_count(graph, outputs)
     load = [f"x[{row} * {LANES} + k]" for row in range(inputs)]
@@ -324,14 +324,14 @@ class ArraySignature(NamedTuple):
                 yield f"in{i}.shape[{axis + before}] != {size}"
 
     def elements(self, side: Literal["in", "out"], before: str = "") -> Iterator[str]:
-        """Give the place of every number of the inputs or the outputs, such as ``in0[1, 2]``."""
+        """Yield the location of every number of the inputs or the outputs, such as ``in0[1, 2]``."""
         shapes = self.inputs if side == "in" else self.outputs
         for i, shape in enumerate(shapes):
             for index in np.ndindex(shape):
                 yield f"{side}{i}[{before}{', '.join(map(str, index))}]"
 
     def stores(self, before: str = "") -> Iterator[str]:
-        """Give the statement that fills every place of the outputs, with a gap for the value."""
+        """Yield the statement that fills every element of the outputs, with a gap for the value."""
         for element in self.elements("out", before):
             is_flag = int(element[3 : element.index("[")]) in self.flags
             yield f"{element} = {{}} != 0" if is_flag else f"{element} = {{}}"
@@ -374,7 +374,7 @@ def _moves(lines: Sequence[str], shapes: Sequence[Shape]) -> str:
 
 def _one_source(code: Code, signature: ArraySignature) -> str:
     body = code.lines(list(signature.elements("in")), list(signature.stores()))
-    return _ONE.format(
+    return _SINGLE.format(
         signature=signature.types(rows=False),
         arguments=", ".join(signature.names),
         misfit=" or ".join(signature.misfits()),

@@ -22,7 +22,7 @@ Key: TypeAlias = tuple[Any, ...]
 
 
 class Node(NamedTuple):
-    """One operation and the numbers of the nodes it takes; a constant has its value, an input its place."""
+    """One operation and the numbers of the nodes it takes; a constant has its value, an input its index."""
 
     op: str
     operands: tuple[int, ...]

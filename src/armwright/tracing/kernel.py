@@ -74,9 +74,9 @@ class Kernel:
     remark: Callable[[Sequence[Array], int], object] | None = None
 
     @cached_property
-    def one(self) -> Callable[..., int]:
+    def single(self) -> Callable[..., int]:
         """The function of one configuration, for calls from other compiled code: see ``Emitted``."""
-        return compiled(self.emitted.one, "one", self.emitted.title)
+        return compiled(self.emitted.single, "one", self.emitted.title)
 
     @cached_property
     def rows(self) -> Callable[..., int]:
@@ -202,7 +202,7 @@ class Kernel:
 
     def _run(self, arrays: list[Array], lead: Shape, results: list[Array], threads: int | None) -> int:
         if not lead:
-            return self.one(*map(np.ascontiguousarray, arrays), *results)
+            return self.single(*map(np.ascontiguousarray, arrays), *results)
         rows = math.prod(lead)
         shapes = self.emitted.inputs.values()
         flat = [_rows(x, lead, shape) for x, shape in zip(arrays, shapes, strict=True)]
@@ -258,7 +258,7 @@ def on_cores_for_long(work: Callable[[int, int, CalledOff], object], rows: int, 
     """Do parts of many rows whose work takes long, so that a signal is heard meanwhile: it is waited for, not done.
 
     Args:
-        work: does rows ``first`` to ``last`` without holding the interpreter, and looks now and then whether it is
+        work: does rows ``first`` to ``last`` without holding the interpreter, and checks now and then whether it is
             called off.
         rows: how many there are.
         threads: how many cores to use; all when None.

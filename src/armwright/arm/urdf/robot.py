@@ -274,12 +274,12 @@ def limits_of(joint: UrdfJoint) -> tuple[Limits, list[str]]:
             "that turns without end is of type continuous",
         )
     lower, upper = (value if abs(value) < NO_LIMIT else math.copysign(math.inf, value) for value in (lower, upper))
-    most = limit("turns") * math.tau
+    most = limit("revolutions") * math.tau
     for key, value in (("lower", lower), ("upper", upper)):
         if joint.kind == "revolute" and most < abs(value) < math.inf:
             raise element.error(
                 key,
-                f"too far from zero: {beyond('turns', f'{value:g} rad')}; a joint that turns without end is of type "
+                f"too far from zero: {beyond('revolutions', f'{value:g} rad')}; a joint without limits has the type "
                 "continuous",
             )
     return Limits(lower=lower, upper=upper, **largest), notes
