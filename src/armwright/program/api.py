@@ -48,7 +48,7 @@ class Compilation:
         imports: what its IMPORTs brought.
         flow: the arms of its statements; None where the syntax is wrong.
         diagnostics: what is wrong or odd, in the order of the text.
-        code: what it does; None when there are errors.
+        code: the intermediate code; None where the program has errors or no code was requested.
         cell: the cell that it was compiled for, or the first that it IMPORTs and that has arms, with all frames that
             it imports; None where there is none, or only its names are known.
     """
@@ -91,6 +91,7 @@ def compile(  # noqa: A001 - what a translator does
     strict: bool = False,
     std: Standard = Standard.RLO_2,
     read_import: ReadImport | None = None,
+    generate_code: bool = True,
 ) -> Compilation:
     """Compile a program.
 
@@ -102,6 +103,7 @@ def compile(  # noqa: A001 - what a translator does
         std: the language: RLO-2, or RLO-83 with nothing more than the report has.
         read_import: how to read what an IMPORT names; of a file, the files beside it unless something else is given;
             of a text, imports stay unknown without it.
+        generate_code: whether to generate intermediate code; all diagnostics come from the analysis before it.
 
     Returns:
         Tree, diagnostics and, where there are no errors, code. A wrong program raises nothing.
@@ -117,7 +119,7 @@ def compile(  # noqa: A001 - what a translator does
     place = read_cell(Path(cell)) if isinstance(cell, str | Path) else cell
     known = known_cell(place) if isinstance(place, Cell) else place
     with no_collection():
-        compiled = _compile(source, known, strict=strict, std=std, read_import=read_import)
+        compiled = _compile(source, known, strict=strict, std=std, read_import=read_import, generate_code=generate_code)
     if place is None:
         place = next((one.cell for one in compiled.imports if one.cell and one.cell.arms), None)
     return attrs.evolve(compiled, cell=_with_imports(place, compiled) if isinstance(place, Cell) else None)
@@ -231,7 +233,13 @@ def _imported(program: tree.Program, read_import: ReadImport) -> KnownCell | Non
 
 
 def _compile(
-    source: Source, cell: KnownCell | None, *, strict: bool, std: Standard, read_import: ReadImport | None
+    source: Source,
+    cell: KnownCell | None,
+    *,
+    strict: bool,
+    std: Standard,
+    read_import: ReadImport | None,
+    generate_code: bool,
 ) -> Compilation:
     text, found = without_numbers(source)
     scanned = scan(source, text, std)
@@ -249,7 +257,7 @@ def _compile(
     if not guessed:
         course, odd_course = analysis.check(program, symbols, spelling, cell, strict=strict, source=source)
         found += odd_course
-        if not any(one.is_error for one in found):
+        if generate_code and not any(one.is_error for one in found):
             code = attrs.evolve(generate(source, program, symbols, course, spelling), standard=std)
     return Compilation(
         source=source,

@@ -248,12 +248,22 @@ def test_rename_keeps_the_code() -> None:
     for old, new in (("a, b", "first"), ("b : SCALAR", "second"), ("c : SCALAR", "third"), ("p (", "act")):
         analysis = analysis_of(text)
         text = apply_edits(text, rename(analysis, text.index(old.replace("a, b", ", ") if old == "a, b" else old), new))
-    before, after = analysis_of(SCOPES).compiled.code, analysis_of(text).compiled.code
+    before, after = (translate(Source("test.rlo", program)).code for program in (SCOPES, text))
 
     assert before is not None
     assert after is not None
     assert [step.op for step in before.instructions] == [step.op for step in after.instructions]
     assert "first = 1 ; act (first)" in text
+
+
+def test_analysis_without_code_has_all_diagnostics() -> None:
+    """A program that is only analysed has the diagnostics of the compiled program, and no intermediate code."""
+    for path in ACCEPTED:
+        source = Source(path.name, path.read_text())
+        analysed = translate(source, generate_code=False)
+
+        assert analysed.code is None
+        assert analysed.diagnostics == translate(source).diagnostics
 
 
 def test_names_of_rlo_83_are_short() -> None:

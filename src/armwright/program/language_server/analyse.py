@@ -1,4 +1,4 @@
-"""From a text to all that is known of it."""
+"""Analysis of a text: it is compiled in its surroundings, with the cell and the imports that belong to it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,7 +7,7 @@ import attrs
 
 from armwright.cell.frames import FrameTree
 from armwright.cell.model import Cell
-from armwright.program.api import Compilation, compile as translate
+from armwright.program.api import Compilation, compile as compile_program
 from armwright.program.language.source import Source
 from armwright.program.language.words import Standard
 from armwright.program.language_server.analysis import Analysis
@@ -17,11 +17,11 @@ from armwright.program.semantics.cell_symbols import Imported, known_cell
 
 @attrs.frozen(kw_only=True)
 class Settings:
-    """How programs are to be read.
+    """The settings with which programs are compiled.
 
     Attributes:
-        cell: the cell file; None to look for one.
-        std: the language.
+        cell: the cell file; None to search for one beside the program.
+        std: the standard of the language.
         strict: whether an AFFIX that is only implied is an error.
     """
 
@@ -32,50 +32,56 @@ class Settings:
 
 @attrs.frozen(kw_only=True)
 class Analysed:
-    """What is known of a text, and why the cell of the settings could not be read; empty if it could."""
+    """The analysis of a text.
+
+    Attributes:
+        analysis: the analysis.
+        problem: why the cell of the settings cannot be read; empty if it can.
+    """
 
     analysis: Analysis
     problem: str = ""
 
 
 def analyse(name: str, text: str, folder: Path | None, cells: Cells, settings: Settings) -> Analysed:
-    """Translate a text in its surroundings.
+    """Analyse a program with its cell and its imports; intermediate code is not generated.
 
     Args:
-        name: of the program, as shown.
-        text: the program.
-        folder: where it lies; None where that is nowhere.
-        cells: those read so far.
-        settings: how it is to be read.
+        name: the name of the program, as messages show it.
+        text: the text of the program.
+        folder: the folder of the program; None for a text without a file.
+        cells: the cells read so far.
+        settings: cell, standard and strictness.
     """
     around = cells.around(folder, text, settings.cell)
     cell = None if around.file is None else around.file.cell
-    brought: list[Path] = []
+    imports: list[Path] = []
 
     def read_import(path: str) -> Imported:
-        assert folder is not None  # noqa: S101 - it is not asked for otherwise
+        assert folder is not None  # noqa: S101 - imports are read only with a folder
         imported = cells.imported(folder, path)
-        brought.append(folder / path)
+        imports.append(folder / path)
         return imported
 
-    compiled = translate(
+    compiled = compile_program(
         Source(name, text),
         None if cell is None else known_cell(cell),
         strict=settings.strict,
         std=settings.std,
         read_import=None if folder is None else read_import,
+        generate_code=False,
     )
-    files = [cells.read(path) for path in brought]
+    files = [cells.read(path) for path in imports]
     if around.file is not None:
         files.append(around.file)
-    merged = _whole(cell, compiled)
-    analysis = Analysis(compiled=compiled, cell=merged, frames=_frames(merged, around.file), files=_places(files))
+    merged = _with_imports(cell, compiled)
+    analysis = Analysis(compiled=compiled, cell=merged, frames=_frames(merged, around.file), files=_declarations(files))
     return Analysed(analysis=analysis, problem=around.problem)
 
 
-def _whole(cell: Cell | None, compiled: Compilation) -> Cell | None:
+def _with_imports(cell: Cell | None, compiled: Compilation) -> Cell | None:
     """Return a cell with the frames that a program imports; a frame of the cell itself stays as it is."""
-    cells = [one.cell for one in compiled.imports if one.cell is not None]
+    cells = [imported.cell for imported in compiled.imports if imported.cell is not None]
     if cell is None:
         cell, cells = (cells[0], cells[1:]) if cells else (None, [])
     if cell is None or not cells:
@@ -92,5 +98,5 @@ def _frames(cell: Cell | None, file: CellFile | None) -> FrameTree | None:
     return file.frames if file is not None and file.cell is cell else cell.tree()
 
 
-def _places(files: list[CellFile]) -> Mapping[str, tuple[str, int]]:
+def _declarations(files: list[CellFile]) -> Mapping[str, tuple[str, int]]:
     return {name: (file.path.absolute().as_uri(), line) for file in files for name, line in file.lines.items()}
