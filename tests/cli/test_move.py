@@ -52,7 +52,7 @@ def test_cartesian_move(tmp_path: Path) -> None:
 
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    assert "certificate holds: hand within 0.0" in done.stdout
+    assert "certificate holds: tool within 0.0" in done.stdout
     assert (FILES - {path.name for path in tmp_path.iterdir()}) == set()
     summary = json.loads((tmp_path / "move.json").read_text())
     assert summary["branch"] == "left, down, no-flip"
@@ -78,7 +78,7 @@ def test_no_branch(tmp_path: Path) -> None:
 
     assert done.returncode == 3
     assert done.stdout == ""
-    assert "no branch carries the hand to its last pose. left, down, no-flip: at 0." in done.stderr
+    assert "no branch carries the tool to its last pose. left, down, no-flip: at 0." in done.stderr
     assert "between poses 2 and 3" in done.stderr
     assert done.stderr.endswith("`--around damped` and `--around via` search for a detour\n")
     assert not (tmp_path / "out").exists()

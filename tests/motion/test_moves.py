@@ -87,7 +87,7 @@ def test_the_seeds_poses_as_printed(puma: CompiledArm) -> None:
 def test_the_seeds_cartesian_move_has_no_branch(puma: CompiledArm, orientation: str) -> None:
     """The seed never solved its Cartesian move: the only branch inside the limits at A meets the wrist before C."""
     with pytest.raises(
-        PathError, match=r"no branch carries the hand to its last pose. left, down, no-flip: at"
+        PathError, match=r"no branch carries the tool to its last pose. left, down, no-flip: at"
     ) as stop:
         cartesian_move(puma, SEED_POSES, SEED_TIMES, blend=SEED_BLEND, ends="running", orientation=orientation)  # type: ignore[arg-type]
 
@@ -212,7 +212,7 @@ def test_a_certificate_that_does_not_hold(puma: CompiledArm) -> None:
 
     assert certificate is not None
     assert not certificate.holds
-    assert str(certificate).startswith("DOES NOT HOLD: hand within 0.0")
+    assert str(certificate).startswith("DOES NOT HOLD: tool within 0.0")
     joint, part = certificate.use("acceleration")
     assert part > 10
     assert f"joint {joint + 1} uses {part:.0%} of its acceleration" in str(certificate)
@@ -311,7 +311,7 @@ def test_times_and_blends_that_are_none(puma: CompiledArm) -> None:
         joint_move(puma, X, [0, 1, 0.5])
     with pytest.raises(ShapeError, match=r"times: expected 3, one per pose, got shape \(2,\)"):
         joint_move(puma, X, [0, 1])
-    with pytest.raises(InvalidValueError, match="blends overlap on the way from point 1 to point 2"):
+    with pytest.raises(InvalidValueError, match="blends overlap on the path from point 1 to point 2"):
         cartesian_move(puma, X, [0, 0.5, 1], blend=0.4)
     with pytest.raises(ShapeError, match=r"blend: expected one number, or 3, one per pose"):
         joint_move(puma, X, [0, 0.5, 1], blend=[0.1, 0.1])
@@ -363,5 +363,5 @@ def test_stops_at_one_and_the_same_place(puma: CompiledArm) -> None:
     """Poses that are all the same leave no way on which to stop."""
     X = forward(puma.arm, [[0.6, 0.2, 0.6, 0.3, 0.9, 0.1]] * 3)
 
-    with pytest.raises(InvalidValueError, match="all of them are the same, so there is no way to go"):
+    with pytest.raises(InvalidValueError, match="all of them are the same, so there is no path to go"):
         stopping_move(puma, X)

@@ -219,7 +219,7 @@ def test_no_room_to_turn_back() -> None:
     """At 1 m/s a tenth of a metre before its end a slide cannot stop; where it just can is known to the micrometre."""
     arm = slide(lower=-1.0, upper=2.0)
     with pytest.raises(
-        OnlineError, match=r"on the way to its new goal joint 1 would stand at .* beyond its limit 2000"
+        OnlineError, match=r"on its motion to the new goal joint 1 would stand at .* beyond its limit 2000"
     ):
         retarget(arm, [1.9], [1], [0], [0.0], jerk=1000.0)
 
@@ -227,7 +227,7 @@ def test_no_room_to_turn_back() -> None:
     ramp = 4 / 1000
     way = ramp - 1000 * ramp**3 / 6 + (1 - 1000 * ramp**2 / 2) ** 2 / (2 * 4)
     assert retarget(arm, [2 - way - 1e-6], [1], [0], [0.0], jerk=1000.0).extremes(0)[1][0] <= 2
-    with pytest.raises(OnlineError, match="moves too fast to turn back before"):
+    with pytest.raises(OnlineError, match="moves too fast to reverse before"):
         retarget(arm, [2 - way + 1e-6], [1], [0], [0.0], jerk=1000.0)
 
 

@@ -296,7 +296,7 @@ FAST = Arm(name="fast", joints=[Joint(kind="revolute", limits=Limits(speed=1.0))
         (PUMA, "line", {}, KindError, "path: expected numbers, got 'line'"),
         (PUMA, [np.zeros(6)], {}, ShapeError, r"path: expected a Trajectory, or \(k, 6\) knots .* got \(1, 6\)"),
         (PUMA, np.zeros((3, 5)), {}, ShapeError, "path: expected 6 numbers"),
-        (PUMA, np.zeros((3, 6)), {}, InvalidValueError, "path: knots 1 and 2 are the same place"),
+        (PUMA, np.zeros((3, 6)), {}, InvalidValueError, "path: knots 1 and 2 are the same point"),
         (PUMA, quintic([0], [1], 1.0), {}, ShapeError, "path: expected one of 6 joints"),
         (PUMA, [np.zeros(6), np.full(6, 2.5)], {}, InvalidValueError, r"path: joint 2 would stand at 143\.2 deg"),
         (PUMA, [np.zeros(6), np.ones(6)], {"intervals": 3}, InvalidValueError, "intervals: expected 10 to 20000"),

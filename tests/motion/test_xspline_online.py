@@ -59,7 +59,7 @@ def test_memory_is_constant(rng: np.random.Generator) -> None:
 def test_pushed_from_a_compiled_loop(joints: int, rng: np.random.Generator) -> None:
     """A compiled loop that pushes knots, the planner filled in place, gets the segments of the plain functions."""
     h, q = walk(rng, 40, joints)
-    one = xspline_kernel(joints).one
+    one = xspline_kernel(joints).single
 
     @njit
     def plan(state: Array, knots: Array, steps: Array, segments: Array) -> int:
@@ -95,7 +95,7 @@ def test_compiled_from_python(rng: np.random.Generator) -> None:
 
 def test_status_of_bad_knots() -> None:
     """A compiled push answers 0 for what it can use, and another number for a knot or a step that is none."""
-    one = xspline_kernel(2).one
+    one = xspline_kernel(2).single
     state, knot = begin([0.0, 0.0], [1.0, 2.0], 0.1), np.ones(2)
     after, segment = np.empty(7), np.empty((4, 2))
 

@@ -176,7 +176,7 @@ def test_rest_between_stages(twelve: Recording) -> None:
 
 
 def test_straight_lines_are_straight(twelve: Recording) -> None:
-    """During a LINE every tick has the hand within the asked deviation of the line between its ends."""
+    """During a LINE every tick has the tool within the asked deviation of the line between its ends."""
     (s,) = twelve.streams
     arm = twelve.cell.arms["ARM_1"].arm
     lines = [stage for stage in twelve.stages if stage.stage.kind == "LINE"]

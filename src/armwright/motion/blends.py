@@ -1,7 +1,7 @@
-"""Straight ways from point to point, joined by blends of the fourth degree: Paul's way through via points.
+"""Straight segments from point to point, joined by blends of the fourth degree: Paul's method through via points.
 
-The path does not go through the via points: it leaves the straight way a time ``blend`` before a point and is on the
-next one a time ``blend`` after it. Position, speed and acceleration are continuous.
+The path does not go through the via points: it leaves the straight segment a time ``blend`` before a point and is on
+the next one a time ``blend`` after it. Position, speed and acceleration are continuous.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ Ends: TypeAlias = Literal["rest", "running"]
 # Of a blend whose speed changes by 1 in a half-width of 1: its peak acceleration, and what it misses its point by.
 PEAK_ACCELERATION = 3 / 4
 MISS = 3 / 16
-# Blends that overlap by this part of their way only touch.
+# Blends that overlap by this part of their segment only touch.
 _ROUNDING = 1e-12
 
 
 class BlendPlan(NamedTuple):
-    """Ways and blends between k points.
+    """Segments and blends between k points.
 
     Attributes:
-        centres: (k,) when blends are half over; a point is on both of the ways that meet there then [s].
+        centres: (k,) when blends are half over; a point is on both of the segments that meet there then [s].
         blend: (k,) half-widths [s]; 0 where there is none.
         points: (k, n).
         before: (k, n) rate before each blend.
@@ -46,26 +46,26 @@ class BlendPlan(NamedTuple):
 
 
 def blended(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends: Ends = "rest") -> Trajectory:
-    """Return straight ways through points at constant rates, joined by blends at every via point.
+    """Return straight segments through points at constant rates, joined by blends at every via point.
 
     With h = (t - t_via + blend) / (2 blend) a blend is a0 + a1 h + a3 h³ + a4 h⁴, where a0 is where it leaves the
-    straight way, a1 = 2 blend · (rate before), a3 = 2 blend · (change of the rate), a4 = -a3 / 2. Speeds never pass
-    those of the ways beside it; the acceleration is largest at the via point, 3/4 · (change of the rate) / blend.
+    straight segment, a1 = 2 blend · (rate before), a3 = 2 blend · (change of the rate), a4 = -a3 / 2. Speeds never pass
+    those of the segments beside it; the acceleration is largest at the via point, 3/4 · (change of the rate) / blend.
 
     Args:
         times: (k,) when the points are passed, rising from 0 [s].
         points: (k, n) joint positions, or whatever is to be blended.
-        blend: how long before and after a point the path is off its straight ways [s], one number or (k,). With ends
-            at rest the first and the last are the times in which the motion gathers speed and loses it; running ends
-            have none, and theirs do not count.
+        blend: how long before and after a point the path is away from its straight segments [s], one number or (k,).
+            With ends at rest the first and the last are the times in which the motion gathers speed and loses it;
+            running ends have none, and theirs do not count.
         ends: ``rest`` starts and stops, by blends from and to standing still, in the given time: the first and the
-            last way are run a little faster for it. ``running`` starts and stops at full speed.
+            last segment are run a little faster for it. ``running`` starts and stops at full speed.
 
     Raises:
         KindError: an argument is something else than real numbers.
         ShapeError: fewer than two points, or shapes that do not fit.
         InvalidValueError: times do not rise from 0, a blend is not above 0, a number is not finite, or blends overlap:
-            with the way, the time they need and the time it has.
+            with the segment, the time they need and the time it has.
         UnknownNameError: no such kind of ends.
 
     Source:
@@ -113,12 +113,12 @@ def via_deviations(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, end
 def via_distances(times: ArrayLike, points: ArrayLike, blend: ArrayLike, *, ends: Ends = "rest") -> Array:
     """Return the shortest distance at which the path passes each point, found by roots.
 
-    It is not farther than ``via_deviations`` tells, and just as far where the rates before and after are equal in
+    It is not farther than ``via_deviations`` reports, and just as far where the rates before and after are equal in
     size.
 
     Args:
         times: as for ``blended``.
-        points: (k, n) places, in one unit.
+        points: (k, n) positions, in one unit.
         blend: as for ``blended``.
         ends: as for ``blended``.
 
@@ -149,7 +149,7 @@ def blend_timing(
 ) -> tuple[Array, Array]:
     """Return times and blends (k,) with which ``blended`` keeps limits of speed and acceleration.
 
-    Every way is run at the speed limit of some joint, every blend at the acceleration limit of some joint. Where
+    Every segment is run at the speed limit of some joint, every blend at the acceleration limit of some joint. Where
     blends would overlap then, all is run slower, just so much that two of them touch.
 
     Args:
@@ -161,7 +161,7 @@ def blend_timing(
     Raises:
         KindError: an argument is something else than real numbers.
         ShapeError: fewer than two points, or limits that do not fit.
-        InvalidValueError: a number is NaN, two neighbours are the same, a limit is not above 0, or a way or a blend
+        InvalidValueError: a number is NaN, two neighbours are the same, a limit is not above 0, or a segment or a blend
             has none.
         UnknownNameError: no such kind of ends.
     """
@@ -174,7 +174,7 @@ def blend_timing(
     )
     way = np.diff(q, axis=0)
     for i in np.flatnonzero(np.abs(way).max(axis=1) <= NOWHERE):
-        raise InvalidValueError(f"blends: points {i + 1} and {i + 2} are the same place; leave one of them out")
+        raise InvalidValueError(f"blends: points {i + 1} and {i + 2} are the same point; leave one of them out")
     cruise = (np.abs(way) / speeds).max(axis=1)
     for i in np.flatnonzero(cruise == 0):
         raise InvalidValueError(f"speed: no joint that moves from point {i + 1} to point {i + 2} has a limit")
@@ -183,7 +183,7 @@ def blend_timing(
     blend = (PEAK_ACCELERATION * change / accelerations).max(axis=1)
     for i in np.flatnonzero((blend == 0) & (change.max(axis=1) > 0)):
         raise InvalidValueError(f"acceleration: no joint whose speed changes at point {i + 1} has a limit")
-    # Run k times slower, a way takes k times as long, and the blends at its ends 1/k of their time.
+    # Run k times slower, a segment takes k times as long, and the blends at its ends 1/k of their time.
     slower = np.sqrt(max(1.0, ((blend[:-1] + blend[1:]) / cruise).max()))
     blend, lasting = blend / slower, cruise * slower
     # Where the rate does not change there is nothing to blend; any width does.
@@ -197,7 +197,7 @@ def blend_timing(
 
 
 def blend_plan(times: ArrayLike, points: ArrayLike, blend: ArrayLike, ends: Ends) -> BlendPlan:
-    """Return when blends are, and the rates of the ways between them; arguments and errors as of ``blended``."""
+    """Return when blends are, and the rates of the segments between them; arguments and errors as of ``blended``."""
     t, q = timed_points("blends", times, points)
     one_of("kind of ends", ends, ("rest", "running"))
     if t[0] != 0:
@@ -225,13 +225,13 @@ def _check_room(t: Array, b: Array) -> None:
     """Refuse blends that overlap."""
     for i in np.flatnonzero(b[:-1] + b[1:] > np.diff(t) * (1 + _ROUNDING)):
         raise InvalidValueError(
-            f"blends overlap on the way from point {i + 1} to point {i + 2}: they need {b[i]:g} s and {b[i + 1]:g} s "
+            f"blends overlap on the path from point {i + 1} to point {i + 2}: they need {b[i]:g} s and {b[i + 1]:g} s "
             f"of it, {b[i] + b[i + 1]:g} s together; it lasts {t[i + 1] - t[i]:g} s"
         )
 
 
 def _rates(ways: Array, ends: Ends) -> tuple[Array, Array]:
-    """Return the rates (k, n) before and after each point, from those of the ways (k-1, n)."""
+    """Return the rates (k, n) before and after each point, from those of the segments (k-1, n)."""
     still = np.zeros_like(ways[:1])
     first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])
     return np.concatenate([first, ways]), np.concatenate([ways, last])

@@ -1,6 +1,6 @@
 """A controlled stop: from any moment of a motion to rest, along the path that was planned.
 
-A motion q(τ) is run by a clock τ(t), which goes at the rate 1 until the stop and comes to a standstill. The hand stays
+A motion q(τ) is run by a clock τ(t), which goes at the rate 1 until the stop and comes to a standstill. The tool stays
 on its path, and with
 
     qd = q' τ̇,    qdd = q'' τ̇² + q' τ̈
@@ -35,7 +35,7 @@ _ROUNDING = 1e-6
 _HAIR = 1e-9
 # Steps are halved so often before the motion is run to its own end instead.
 _HALVINGS = 6
-# Places on each step at which accelerations are looked at.
+# Positions on each step at which accelerations are sampled.
 _LOOKS = np.linspace(0.0, 1.0, 9)
 
 
@@ -207,7 +207,7 @@ def _run_by(running: Trajectory, cells: list[_Cell]) -> Trajectory:
 
 
 def _peaks(motion: Trajectory) -> Array:
-    """Return the largest accelerations (n,) at places close to one another."""
+    """Return the largest accelerations (n,) at positions close to one another."""
     steps = np.diff(motion.times)
     states = motion.coefficients[:, None].repeat(len(_LOOKS), axis=1).reshape(-1, *motion.coefficients.shape[1:])
     fractions = (steps[:, None] * _LOOKS).reshape(-1, 1)

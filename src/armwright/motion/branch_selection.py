@@ -1,4 +1,4 @@
-"""Which posture to take at each of several poses: one branch kept where it can be, else the shortest way."""
+"""Which configuration to take at each of several poses: one branch kept where it can be, else the shortest path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class LabelledConfiguration(NamedTuple):
 
 
 def configurations_at(arm: Arm, X: Array, near: Array) -> list[list[LabelledConfiguration]]:
-    """Return the postures inside the limits at every pose, whole turns included.
+    """Return the configurations inside the limits at every pose, revolutions included.
 
     Args:
         arm: the arm.
@@ -30,7 +30,7 @@ def configurations_at(arm: Arm, X: Array, near: Array) -> list[list[LabelledConf
         near: (n,) joint positions near which the first ones are sought; without a closed form it decides what is found.
 
     Raises:
-        PathError: a pose has none; ``segment`` is the way that leads to it, from 0.
+        PathError: a pose has none; ``segment`` is the one that leads to it, from 0.
     """
     layers: list[list[LabelledConfiguration]] = []
     for i, each in enumerate(X):
@@ -49,9 +49,9 @@ def configurations_at(arm: Arm, X: Array, near: Array) -> list[list[LabelledConf
 
 
 def configurations_through(arm: Arm, X: Array, near: Array) -> list[LabelledConfiguration]:
-    """Return a posture for every pose: of one branch where it is inside the limits throughout, else of any.
+    """Return a configuration for every pose: of one branch where it is inside the limits throughout, else of any.
 
-    Of all such ways the shortest is taken, measured by the sum of the times that the joints need for it.
+    Of all such sequences the shortest is taken, measured by the sum of the times that the joints need for it.
 
     Args:
         arm: the arm.
@@ -59,7 +59,7 @@ def configurations_through(arm: Arm, X: Array, near: Array) -> list[LabelledConf
         near: (n,) where the arm comes from.
 
     Raises:
-        PathError: a pose has no posture inside the limits.
+        PathError: a pose has no configuration inside the limits.
     """
     layers = configurations_at(arm, X, near)
     common = set.intersection(*({configuration.label for configuration in layer} for layer in layers))
@@ -73,7 +73,7 @@ def configurations_through(arm: Arm, X: Array, near: Array) -> list[LabelledConf
 def _shortest(
     arm: Arm, near: Array, layers: Sequence[Sequence[LabelledConfiguration]]
 ) -> tuple[float, list[LabelledConfiguration]]:
-    """Return the shortest way through one posture of every layer, and its length."""
+    """Return the shortest path through one configuration of every layer, and its length."""
     speed = arm.limit("speed")
     weight = 1.0 / np.where(np.isfinite(speed), speed, 1.0)
     previous, lengths, came = near[None], np.zeros(1), []

@@ -22,22 +22,22 @@ class Certificate:
 
     Attributes:
         arm: the arm.
-        deviation_asked: bound of the distance of the hand from the path [m].
+        deviation_asked: bound of the distance of the tool from the path [m].
         deviation: upper bound of what that distance is, between samples as well [m].
         deviation_seen: the largest distance at the samples [m].
         turn_asked: bound of the angle from the orientation that belongs to the progress on the path, and on a straight
-            line to the position of the hand on it as well [rad].
+            line to the position of the tool on it as well [rad].
         turn: upper bound of what that angle is [rad].
         turn_seen: the largest angle at the samples [rad]; None where only the bound is known.
-        backward: upper bound of how far the hand runs backwards along a straight line [m]; None for other paths.
+        backward: upper bound of how far the tool runs backwards along a straight line [m]; None for other paths.
         worst_time: when the largest distance was sampled [s].
-        worst_place: (3,) where the hand was then, seen from the base [m].
+        worst_place: (3,) where the tool was then, seen from the base [m].
         knots: number of poses that were solved.
-        samples: how often the hand was sampled in between.
+        samples: how often the tool was sampled in between.
         peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at
             samples.
         factor: how many times slower the motion is than the speed of the tool has it, 1 for not at all.
-        because: which limit, and which joint, from 0, that is for; None where nothing had to give way.
+        because: which limit, and which joint, from 0, that is for; None where no limit binds.
     """
 
     arm: Arm
@@ -58,7 +58,7 @@ class Certificate:
 
     @classmethod
     def trivial(cls, arm: Arm, position: Array, tolerance: Tolerance) -> Certificate:
-        """Return that of an arm which stands still with its hand at a position (3,) [m]."""
+        """Return that of an arm which stands still with its tool at a position (3,) [m]."""
         still = np.zeros(arm.n)
         return cls(
             arm=arm,
@@ -99,7 +99,7 @@ class Certificate:
 
     @property
     def slowed(self) -> str:
-        """How many times slower the motion is, and for which limit, in words; empty where nothing had to give way."""
+        """How many times slower the motion is, and for which limit, in words; empty where no limit binds."""
         return "" if self.because is None else slower(self.arm, self.factor, self.because)
 
     @property
@@ -143,7 +143,7 @@ class Certificate:
         x, y, z = self.worst_place * 1e3
         verdict = "holds" if self.holds else "DOES NOT HOLD"
         within = (
-            f"{verdict}: hand within {self.deviation * 1e3:.4f} mm of the path (asked "
+            f"{verdict}: tool within {self.deviation * 1e3:.4f} mm of the path (asked "
             f"{self.deviation_asked * 1e3:g} mm), within {self.turn * 1e3:.3f} mrad of its orientation (asked "
             f"{self.turn_asked * 1e3:g} mrad)"
         )

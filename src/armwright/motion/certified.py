@@ -1,4 +1,4 @@
-"""Motions with a certificate: a followed motion of the hand, run as fast as the limits of the joints allow."""
+"""Motions with a certificate: a followed motion of the tool, run as fast as the limits of the joints allow."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armwright.motion.tolerance import Tolerance
 from armwright.motion.tracking import Tracking
 from armwright.motion.trajectory import Trajectory, hold, join, whole_ticks
 
-# Efforts are sampled so often; those that come as near to a limit as this part of it are looked at closely.
+# Efforts are sampled so often; those that come as near to a limit as this part of it are sampled closely.
 _SAMPLES, _NEAR = 101, 0.95
 # A joint that moves at less than this part of its top speed stands.
 _STANDS = 1e-9
@@ -96,9 +96,9 @@ def certificate_of(
     Args:
         arm: the arm, or a compiled one.
         trajectory: the motion.
-        error: of the hand on it.
+        error: of the tool on it.
         allowed: what it was asked to keep.
-        time: when the hand is farthest off [s]; as ``error`` has it when left out.
+        time: when the tool is farthest off [s]; as ``error`` has it when left out.
         peaks: of speeds, accelerations and efforts, where they are known.
     """
     solver = solver_of(arm)
@@ -133,7 +133,7 @@ def fastest(
 ) -> CertifiedMotion:
     """Return the fastest run along a followed path whose time is a mere parameter, inside all limits.
 
-    Speeds and accelerations are kept place by place, efforts by running all of it slower.
+    Speeds and accelerations are kept point by point, efforts by running all of it slower.
 
     Args:
         arm: the arm, or a compiled one.

@@ -1,4 +1,4 @@
-"""Postures along a path: each next to the one before it."""
+"""Configurations along a path: each next to the one before it."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from armwright.spatial.rotations import angle_between
 
 # A pose is met to this [m], and to this in the entries of its rotation.
 MET, _TURN_MET = 1e-8, 1e-6
-# A joint that moves farther from pose to pose may have jumped from one posture to another [rad] or [m].
+# A joint that moves farther from pose to pose may have jumped from one configuration to another [rad] or [m].
 _JUMP = 1.0
-# A posture this far from the one the arm has at the start of the path is another one [rad] or [m].
+# A configuration this far from the one the arm has at the start of the path is another one [rad] or [m].
 _OTHER = 1e-6
-# Without a closed form every so many poses are solved one after the other. Those between are off the straight way by no
-# more than this part of it, or by this [rad] or [m].
+# Without a closed form every so many poses are solved one after the other. Those between are away from the straight
+# segment by no more than this part of it, or by this [rad] or [m].
 _STRIDE, _STRAIGHT, _CLOSE = 4, 0.25, 0.02
-# A step is halved at most so often; no hand has to keep nearer to its way than this [m], [rad].
+# A step is halved at most so often; no tool has to keep nearer to its path than this [m], [rad].
 _HALVINGS, _CLOSEST = 16, (1e-6, 5e-6)
 
 
 class Step(NamedTuple):
-    """A posture on the way through poses.
+    """A configuration along poses.
 
     Attributes:
-        place: which pose, from 0; a fraction on the way to the next.
+        place: which pose, from 0; with the fraction of the segment to the next.
         X: (4, 4) the pose.
-        q: (n,) the posture.
+        q: (n,) the configuration.
     """
 
     place: float
@@ -44,13 +44,14 @@ class Step(NamedTuple):
 
 
 def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
-    """Solve the poses of a path one after the other, each by the posture nearest to the one before it.
+    """Solve the poses of a path one after the other, each by the configuration nearest to the one before it.
 
-    Beside a singularity, where a joint has to turn far between two poses, the nearest posture may be of another branch
-    or be reached by turning the other way. A motion through such postures leaves the path between the poses: whoever
-    plans one looks there, and where the path cannot be kept, asks ``step_by_step`` for what really stops the arm.
+    Beside a singularity, where a joint has to rotate far between two poses, the nearest configuration may be of
+    another branch or be reached by rotating in the other direction. A motion through such configurations leaves the
+    path between the poses: whoever plans one takes samples there, and where the path cannot be kept, asks
+    ``step_by_step`` for the obstacle.
 
-    A free joint stays where it was at the pose before. Without a closed form each posture is sought from the one
+    A free joint stays where it was at the pose before. Without a closed form each configuration is sought from the one
     before it.
 
     Args:
@@ -59,8 +60,8 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
         q_start: (n,) joint positions at the first pose.
 
     Returns:
-        (k, n) postures, and the number of the first pose that is not met; None where all are. Postures beyond that
-        one mean nothing.
+        (k, n) configurations, and the number of the first pose that is not met; None where all are. Configurations
+        beyond that one mean nothing.
     """
     q = np.empty((len(X), solver.arm.n))
     q[:] = q_start
@@ -82,10 +83,11 @@ def chain(solver: Solver, X: Array, q_start: Array) -> tuple[Array, int | None]:
 
 
 def _several_at_once(solver: Solver, X: Array, q_start: Array) -> Array | None:
-    """Solve some poses of a path one after the other and those between them at once, from straight ways between.
+    """Solve some poses of a path one after the other and those between them at once, from straight segments between.
 
     Returns:
-        (k, n) postures; None where one is not met, or is so far from the straight way that the arm may have jumped.
+        (k, n) configurations; None where one is not met, or is so far from the straight segment that the arm may have
+        jumped.
     """
     some = np.append(np.arange(0, len(X) - 1, _STRIDE), len(X) - 1)
     q = [q_start]
@@ -101,7 +103,7 @@ def _several_at_once(solver: Solver, X: Array, q_start: Array) -> Array | None:
 
 
 def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
-    """Whether the branch of the first posture meets all poses (k, 4, 4) without a jump, so that no doubt is left."""
+    """Whether the branch of the first configuration meets all poses (k, 4, 4) without a jump."""
     if solver.inverse_branches is None:
         return False
     q = np.empty((len(X), solver.arm.n))
@@ -111,7 +113,7 @@ def on_one_branch(solver: Solver, X: Array, q_start: Array) -> bool:
 
 
 def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
-    """Solve poses (k, 4, 4) each by the posture nearest to its guide (k, n); returns what ``chain`` does."""
+    """Solve poses (k, 4, 4) each by the configuration nearest to its guide (k, n); returns what ``chain`` does."""
     if solver.inverse_branches is None:
         q = descend_from(solver.arm, X, guide)
     else:
@@ -121,16 +123,16 @@ def beside(solver: Solver, X: Array, guide: Array) -> tuple[Array, int | None]:
 
 
 def step_by_step(solver: Solver, X: Array, q_start: Array, allowed: Tolerance) -> Iterator[Step]:
-    """Give the postures that an arm comes to on its way through poses.
+    """Give the configurations that an arm comes to along poses.
 
-    Where the hand, halfway between two postures, would be off the straight way between their poses, the step is taken
-    in two halves, and so on.
+    Where the tool, halfway between two configurations, would be off the straight segment between their poses, the step
+    is taken in two halves, and so on.
 
     Args:
         solver: the arm.
         X: (k, 4, 4) poses, of which the first is that of ``q_start``.
         q_start: (n,) joint positions at the first pose.
-        allowed: how far the hand may be off.
+        allowed: how far the tool may be off.
 
     Yields:
         Every pose and those that were put between, from the first; whether they are met is for the caller to see.
@@ -142,7 +144,7 @@ def step_by_step(solver: Solver, X: Array, q_start: Array, allowed: Tolerance) -
 
 
 def _between(solver: Solver, first: Step, goal: Step, allowed: Tolerance, halvings: int) -> Generator[Step, None, Step]:
-    """Give the postures after ``first`` up to the pose of ``goal``, whose posture is not looked at; return the last."""
+    """Yield the configurations after ``first`` up to the pose of ``goal``, whose own is not used; return the last."""
     last = goal._replace(q=_nearest(solver, goal.X, first.q))
     halfway = between(first.X, goal.X, 0.5)
     if halvings == 0 or not _astray(solver.forward((first.q + last.q) / 2), halfway, allowed):
@@ -155,14 +157,14 @@ def _between(solver: Solver, first: Step, goal: Step, allowed: Tolerance, halvin
 
 
 def _astray(X: Array, X_asked: Array, allowed: Tolerance) -> bool:
-    """Whether a hand is off its way."""
+    """Whether the tool deviates from its path by more than is allowed."""
     distance = float(np.linalg.norm(X[:3, 3] - X_asked[:3, 3]))
     turned = float(angle_between(X_asked[:3, :3], X[:3, :3]))
     return distance > max(allowed.position, _CLOSEST[0]) or turned > max(allowed.orientation, _CLOSEST[1])
 
 
 def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None) -> Array:
-    """Return the posture (n,) at a pose that is nearest to ``q``, of ``candidates`` (k, n) where they are known."""
+    """Return the configuration (n,) at a pose nearest to ``q``, of ``candidates`` (k, n) where they are known."""
     if solver.inverse_branches is None:
         return np.asarray(descend_from(solver.arm, X[None], q[None])[0])
     if candidates is None:
@@ -171,14 +173,14 @@ def _nearest(solver: Solver, X: Array, q: Array, candidates: Array | None = None
 
 
 def _nearest_of(arm: Arm, candidates: Array, q: Array) -> Array:
-    """Return of candidates (..., k, n) those that are reached soonest from postures (..., n)."""
+    """Return of candidates (..., k, n) those that are reached soonest from configurations (..., n)."""
     turned = wrapped_near(arm, candidates, q[..., None, :])
     nearest = joint_distances(arm, q[..., None, :], turned).argmin(axis=-1)
     return np.asarray(np.take_along_axis(turned, nearest[..., None, None], axis=-2)[..., 0, :])
 
 
 def _along_one_branch(solver: Solver, branches: Array, singular: Array, q: Array) -> bool:
-    """Fill in the branch that the first posture belongs to, where it goes on to the end without a jump."""
+    """Fill in the branch that the first configuration belongs to, where it goes on to the end without a jump."""
     branch = int(np.abs(branches[0] - q[0]).max(axis=-1).argmin())
     steps = np.diff(branches[:, branch], axis=0)
     turns = np.array([joint.revolute for joint in solver.arm.joints])
@@ -190,7 +192,7 @@ def _along_one_branch(solver: Solver, branches: Array, singular: Array, q: Array
 
 
 def missed(solver: Solver, q: Array, X: Array) -> Flags:
-    """Return which postures (..., n) do not meet their poses (..., 4, 4): an arm of few joints may turn otherwise."""
+    """Return which configurations (..., n) miss their poses (..., 4, 4), as those of arms of few joints may."""
     difference = np.abs(solver.forward(q) - X)
     return np.asarray(
         (difference[..., :3, 3].max(axis=-1) > MET) | (difference[..., :3, :3].max(axis=(-2, -1)) > _TURN_MET)

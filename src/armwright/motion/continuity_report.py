@@ -38,7 +38,7 @@ class Continuity:
     def order(self) -> int:
         """The highest derivative up to which nothing jumps at the knots between start and end.
 
-        0 is position, 3 jerk, the highest that is looked at; -1 where the position jumps already.
+        0 is position, 3 jerk, the highest that is sampled; -1 where the position jumps already.
         """
         return _order(self.counted[:, 1:-1])
 

@@ -30,7 +30,7 @@ def cubic(
     start: ArrayLike | None = None,
     end: ArrayLike | None = None,
 ) -> Trajectory:
-    """Return the cubic from one posture to another; at rest at both ends, unless rates are given.
+    """Return the cubic from one configuration to another; at rest at both ends, unless rates are given.
 
     Args:
         q_start: (n,) joint positions [rad] or [m].
@@ -67,7 +67,7 @@ def shortest_cubic(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike) ->
 
     Raises:
         KindError: an argument is something else than real numbers.
-        ShapeError: the limits do not fit the way.
+        ShapeError: the limits do not fit the path.
         InvalidValueError: a limit is not above 0.
     """
     way = np.abs(one_way(way))
@@ -82,8 +82,8 @@ def cubic_through(times: ArrayLike, points: ArrayLike, rates: ArrayLike | None =
     Args:
         times: (k,) of the points, rising from 0 [s].
         points: (k, n) joint positions.
-        rates: (k, n) at the points. When left out, a joint rests at both ends, and where it turns back; elsewhere it
-            has the mean of the slopes of the ways before and after. ``xspline`` chooses better rates, which follow
+        rates: (k, n) at the points. When left out, a joint rests at both ends, and where it reverses; elsewhere it
+            has the mean of the slopes of the paths before and after. ``xspline`` chooses better rates, which follow
             a curve to the fourth order.
 
     Raises:

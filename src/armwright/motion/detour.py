@@ -1,4 +1,4 @@
-"""Ways round what stops a straight line: by a via pose beside it, or along it by damped rates; and their price."""
+"""Detours of straight lines: by a via pose beside the line, or along it by damped rates; and their cost."""
 
 from __future__ import annotations
 
@@ -32,41 +32,41 @@ from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
 DetourMethod: TypeAlias = Literal["via", "damped"]
 
-# Via poses that are tried: distances beside the line [m], directions at each, and turns of the hand [rad].
+# Via poses that are tried: distances beside the line [m], directions at each, and rotations of the tool [rad].
 _BESIDE = (0.02, 0.05, 0.1, 0.2, 0.4)
 _DIRECTIONS = 8
 _TURNS = (0.1, 0.3, 0.6)
-# Poses of the joint moves between the ends that are tried: fractions of the way, and joint moves, the shortest first.
+# Poses of the joint moves between the ends that are tried: fractions of the path, and joint moves, the shortest first.
 _ON_THE_WAY = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 _JOINT_MOVES = 3
-# Then what lies round the shortest one is tried: rings of so many, joints off by so much, in parts of the way.
+# Then what lies round the shortest one is tried: rings of so many, joints off by so much, in parts of the path.
 _SCATTERED, _SCATTER, _PARTS = 16, (0.1, 0.1, 0.2, 0.2), (0.3, 0.9)
-# A way round that takes longer than the line by so many times its duration is worth looking for another.
+# A detour that takes longer than the line by so many times its duration is worth looking for another.
 _LONG = 2.0
-# A line that takes so many times its duration, and so much longer [s], is crawled along. A way round is looked for
+# A line that takes so many times its duration, and so much longer [s], is crawled along. A detour is searched for
 # then too, and taken where it needs no more than this part of the time.
 _CRAWL, _WAIT, _BETTER = 10.0, 1.0, 0.5
 # A via pose stands no nearer to the ends of the line than this part of it.
 _MARGIN = 0.1
-# Damped rates: steps of the way, how fast what is missing is made up for [1/s], and how long after the end, at most.
+# Damped rates: steps of the path, how fast what is missing is made up for [1/s], and how long after the end, at most.
 _STEPS = 600
 _MAKE_UP = 20.0
 _AFTER = 1.0
 _LITTLE = 0.1
-# Where a joint rushes the way is run slower: so often, over so many intervals to either side.
+# Where a joint rushes the path is run slower: so often, over so many intervals to either side.
 _EASINGS, _AROUND = 3, 20
 # How far damped rates leave the line is found to a part of this [m].
 _LOOKED_AT = 1e-3
-# The end is met to this [m], a turn counted as ``ROTATION_PER_METRE`` says.
+# The end is met to this [m], a rotation counted as ``ROTATION_PER_METRE`` says.
 _ARRIVED = 1e-6
 
 
 @attrs.frozen(kw_only=True)
 class Price:
-    """What a way round costs.
+    """Cost of a detour.
 
     Attributes:
-        distance: largest distance of the hand from the straight line [m].
+        distance: largest distance of the tool from the straight line [m].
         turn: largest angle from the orientation that belongs to the line [rad].
         time: how much longer it takes than the line by the report's rule would [s]; 0 for a line that is run, if it is
             no crawl.
@@ -89,7 +89,7 @@ class Detour:
         trajectory: of the joints, at rest at both ends.
         method: ``line`` where the straight line itself can be run, ``via`` or ``damped`` otherwise.
         obstacle: what stopped the line, or made it a crawl; None where the line is run.
-        via: (4, 4) the pose that it stops at on the way; None unless by ``via``.
+        via: (4, 4) the pose that it stops at on the path; None unless by ``via``.
         price: what it costs.
         legs: the certified lines it is made of; none by ``damped`` rates, which follow no line.
     """
@@ -112,12 +112,12 @@ def line_or_detour(
     speed: float = 100.0,
     damping: float = 0.05,
 ) -> Detour:
-    """Plan a straight line, and where it cannot be run, a way round.
+    """Plan a straight line, and where it cannot be run, a detour.
 
-    By ``via``: a stop at a pose beside the line, at the same place with the hand turned, or on or near a joint move
+    By ``via``: a stop at a pose beside the line, at the same point with the tool rotated, or on or near a joint move
     between the ends, that two certified lines lead to and from; the nearest that is found. By ``damped``: along the
-    line, where the posture is nearly singular with joint rates that stay bounded, so that the hand leaves the line
-    there and comes back. A line that could only be crawled along, at a tenth of its speed, is gone round too, where
+    line, where the configuration is nearly singular with joint rates that stay bounded, so that the tool leaves the
+    line there and comes back. A line that could only be crawled along, at a tenth of its speed, is bypassed too, where
     that takes less than half the time.
 
     Args:
@@ -125,16 +125,16 @@ def line_or_detour(
         q_start: (n,) present joint positions [rad] or [m].
         X_goal: (4, 4) pose at the end of the line.
         method: ``via`` or ``damped``.
-        deviation: allowed distance of the hand from a line [m].
+        deviation: allowed distance of the tool from a line [m].
         speed: 1 to 120, 100 is normal.
         damping: singular value at which damping begins [m]; see ``damped_rates``.
 
     Raises:
-        PathError: there is no way round either; what stopped the line itself, with place and cause.
+        PathError: there is no detour either; the obstacle of the line itself, with position and cause.
         InvalidValueError: ``by``, deviation, speed or damping are none.
         IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
     """
-    one_of("way round", method, ("via", "damped"))
+    one_of("detour", method, ("via", "damped"))
     solver = solver_of(arm)
     q, B = single_configuration(solver.arm, q_start, "q_start"), exact_pose(X_goal)
     allowed = tolerance(deviation)
@@ -187,7 +187,7 @@ def _crawl(requested: StraightPath, line: CertifiedMotion) -> PathError:
 def _by_via(
     arm: AnyArm, line: StraightPath, q: Array, obstacle: PathError, *, allowed: Tolerance, speed: float
 ) -> Detour | None:
-    """Return the fastest way by one of the nearest via poses; None where none is found."""
+    """Return the fastest path by one of the nearest via poses; None where none is found."""
     ways: list[Detour] = []
     for ring in chain(_rings(line, obstacle.fraction), _on_joint_moves(solver_of(arm), q, line.poses[-1])):
         for via in ring:
@@ -195,7 +195,7 @@ def _by_via(
                 there = certified_line(arm, q, via, allowed, speed=speed, diagnose=False)
                 at_via = there.trajectory(there.trajectory.duration)
                 back = certified_line(arm, at_via, line.poses[-1], allowed, speed=speed, diagnose=False)
-            # A leg on which gravity alone takes more than a joint may give is no way either.
+            # A leg on which gravity alone takes more than a joint may give is no detour either.
             except (PathError, IncapableArmError):
                 continue
             motion = join([there.trajectory, back.trajectory])
@@ -205,14 +205,14 @@ def _by_via(
                 Detour(trajectory=motion, method="via", obstacle=obstacle, via=via, price=price, legs=(there, back))
             )
         best = min(ways, key=lambda way: way.price.time, default=None)
-        # Near the obstacle a way round may still be slow; farther off it is looked for only then.
+        # Near the obstacle a detour may still be slow; farther off it is searched for only then.
         if best is not None and best.price.time < _LONG * line.duration:
             return best
     return min(ways, key=lambda way: way.price.time, default=None)
 
 
 def _rings(line: StraightPath, fraction: float) -> Iterator[list[Array]]:
-    """Give via poses for a place on the line, the nearest first: turned on the spot, then beside it."""
+    """Give via poses for a position on the line, the nearest first: rotated on the spot, then beside it."""
     s = min(max(fraction, _MARGIN), 1 - _MARGIN)
     X = line.at(0, np.array([s]))[0]
     way = line.shifts[0]
@@ -232,7 +232,7 @@ def _rings(line: StraightPath, fraction: float) -> Iterator[list[Array]]:
 
 
 def _on_joint_moves(solver: Solver, q: Array, X_goal: Array) -> Iterator[list[Array]]:
-    """Give poses through which joint moves to the goal bring the hand, then poses round the shortest such move.
+    """Give poses through which joint moves to the goal bring the tool, then poses round the shortest such move.
 
     Joint moves pass where no line near the straight one does: from one branch to the other through a singular
     configuration. The poses round it are the same in every call.
@@ -251,7 +251,7 @@ def _on_joint_moves(solver: Solver, q: Array, X_goal: Array) -> Iterator[list[Ar
 
 
 def _turning(arm: Arm) -> Flags:
-    """Return which joints turn (n,): a slide is not moved by radians."""
+    """Return which joints rotate (n,): a slide is not moved by radians."""
     return np.array([joint.revolute for joint in arm.joints])
 
 
@@ -263,14 +263,14 @@ def _moved(X: Array, shift: Array, turn: Array) -> Array:
 
 
 def _apart(line: StraightPath, X: Array) -> tuple[float, float]:
-    """Return how far a pose is from the nearest place of the line, and turned from the orientation there."""
+    """Return how far a pose is from the nearest position of the line, and rotated from the orientation there."""
     on = line.at(0, np.array([_nearest(line, X)]))[0]
     turn = rotation_vector(on[:3, :3].T @ X[:3, :3])
     return float(np.linalg.norm(X[:3, 3] - on[:3, 3])), float(np.linalg.norm(turn))
 
 
 def _nearest(line: StraightPath, X: Array) -> float:
-    """Return at which fraction of a line the position nearest to a hand (4, 4) is; the middle if it has no length."""
+    """Return at which fraction of a line the position nearest to a tool (4, 4) is; the middle if it has no length."""
     way = line.shifts[0]
     square = float(way @ way)
     return min(max(float((X[:3, 3] - line.poses[0, :3, 3]) @ way) / square, 0.0), 1.0) if square else 0.5
@@ -296,7 +296,7 @@ def _damped(arm: AnyArm, line: StraightPath, q: Array, damping: float, obstacle:
     error = tracking_error(solver, eased, trajectory, hand, tolerance(_LOOKED_AT))
     try:
         factor, _ = slowing_for_limits(arm, trajectory)
-    except IncapableArmError:  # where gravity alone takes more than a joint may give there is no way either
+    except IncapableArmError:  # where gravity alone takes more than a joint may give there is no detour either
         return None
     trajectory = trajectory.slowed(factor)
     price = Price(
@@ -322,9 +322,9 @@ def _easing(arm: Arm, trajectory: Trajectory) -> Array:
 
 
 def _integrated(solver: Solver, line: StraightPath, q: Array, damping: float) -> tuple[Array, Array | None]:
-    """Return times (k,) and postures (k, n) from the start to where the end is met.
+    """Return times (k,) and configurations (k, n) from the start to where the end is met.
 
-    No postures where it is not met, or where a joint passes a limit before.
+    No configurations where it is not met, or where a joint passes a limit before.
     """
     h = line.duration / _STEPS
     lower, upper = solver.arm.limit("lower"), solver.arm.limit("upper")
@@ -338,7 +338,7 @@ def _integrated(solver: Solver, line: StraightPath, q: Array, damping: float) ->
         # What is missing at the end is little, so that bounded rates need no more than a little damping there.
         damping_now = damping if t < line.duration else _LITTLE * damping
         rates = damped_rates(solver.arm, q, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates
-        # The middle of the step, so that the way is kept to second order.
+        # The middle of the step, so that the path is kept to second order.
         middle = q + rates * h / 2
         missing = _missing(solver.forward(middle), line(np.minimum([t + h / 2], line.duration))[0])
         rates = damped_rates(solver.arm, middle, twist + min(_MAKE_UP, 0.5 / h) * missing, damping=damping_now).rates

@@ -1,7 +1,7 @@
-"""How far the hand leaves its path: an upper bound that holds between the samples as well.
+"""How far the tool leaves its path: an upper bound that holds between the samples as well.
 
-The hand is sampled so often on every interval between two knots. Between two samples a time d apart a curve leaves its
-chord by no more than d²/8 times its greatest second derivative. How much the hand may accelerate follows from the
+The tool is sampled so often on every interval between two knots. Between two samples a time d apart a curve leaves its
+chord by no more than d²/8 times its greatest second derivative. How much the tool may accelerate follows from the
 speeds and accelerations of the joints, which are known exactly on every interval, and the levers of the arm.
 """
 
@@ -22,12 +22,12 @@ from armwright.motion.trajectory import Trajectory
 # exceed it, but no fewer and no more on an interval than these.
 _ADDED = 0.25
 _SAMPLES = (4, 200)
-# Positions of the hand and entries of its rotation are computed to so many roundings.
+# Positions of the tool and entries of its rotation are computed to so many roundings.
 ROUNDINGS = 64 * float(np.finfo(np.float64).eps)
 
 
 class HandBounds(NamedTuple):
-    """Upper bounds of how the hand moves on m intervals, (m,) each.
+    """Upper bounds of how the tool moves on m intervals, (m,) each.
 
     Attributes:
         pull: acceleration [m/s²].
@@ -53,13 +53,13 @@ class ErrorBounds(NamedTuple):
 
 
 class HandSamples(NamedTuple):
-    """Where the hand is, k + 1 times on each of m intervals.
+    """Where the tool is, k + 1 times on each of m intervals.
 
     Attributes:
         times: (m, k + 1) [s].
         poses: (m, k + 1, 4, 4).
         step: (m,) between two of them [s].
-        hand: how the hand moves on the intervals.
+        hand: how the tool moves on the intervals.
         bounds: of the error between samples.
     """
 
@@ -71,7 +71,7 @@ class HandSamples(NamedTuple):
 
 
 class TrackingError(NamedTuple):
-    """How far the hand is from its path on m intervals between knots, (m,) each.
+    """How far the tool is from its path on m intervals between knots, (m,) each.
 
     Attributes:
         position: upper bound of the distance [m].
@@ -79,8 +79,8 @@ class TrackingError(NamedTuple):
         sampled_position: the largest distance at the samples [m].
         sampled_orientation: the largest angle at the samples [rad].
         times: when the largest distance was sampled [s].
-        samples: how often the hand was sampled on an interval.
-        backward: upper bound of how far the hand runs backwards along a straight line [m]; None for other paths.
+        samples: how often the tool was sampled on an interval.
+        backward: upper bound of how far the tool runs backwards along a straight line [m]; None for other paths.
     """
 
     position: Array
@@ -93,32 +93,32 @@ class TrackingError(NamedTuple):
 
 
 class HandMotion(Protocol):
-    """A motion of the hand that the joints are to follow."""
+    """A motion of the tool that the joints are to follow."""
 
     def __call__(self, t: Array) -> Array:
         """Return the poses (k, 4, 4) at times (k,), from 0 to the end."""
 
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
-        """Return bounds of the error on the intervals between times (m + 1,), where the hand moves as told."""
+        """Return bounds of the error on the intervals between times (m + 1,), where the tool moves as described."""
 
     def error(self, samples: HandSamples) -> TrackingError:
-        """Return how far a sampled hand is from this motion."""
+        """Return how far a sampled tool is from this motion."""
 
     def where(self, t: float) -> tuple[int, float, str]:
-        """Return on which way between two poses, from 0, a time is, at which fraction of it, and that in words."""
+        """Return on which path between two poses, from 0, a time is, at which fraction of it, and that in words."""
 
 
 def tracking_error(
     solver: Solver, motion: HandMotion, trajectory: Trajectory, hand: HandBounds, allowed: Tolerance
 ) -> TrackingError:
-    """Return how far a motion of the joints leaves the motion of the hand that it follows.
+    """Return how far a motion of the joints leaves the motion of the tool that it follows.
 
     Args:
         solver: the arm, with n joints.
-        motion: where the hand should be.
+        motion: where the tool should be.
         trajectory: where the joints are, cubics on m segments.
-        hand: how the hand moves on them at most.
-        allowed: the errors that matter; they decide how often the hand is sampled.
+        hand: how the tool moves on them at most.
+        allowed: the errors that matter; they decide how often the tool is sampled.
     """
     h = np.diff(trajectory.times)
     bounds = motion.bounds(trajectory.times, hand)
@@ -137,11 +137,11 @@ def error_of(
     """Return the error from what is measured at the samples.
 
     Args:
-        samples: of the hand, (m, k + 1).
+        samples: of the tool, (m, k + 1).
         errors: (m, k + 1) distances from the path [m].
         half: (m,) the largest sines of half the angles from its orientation.
         orientation: (m,) upper bound of the sine of half the angle; by the bounds of the samples when left out.
-        backward: how far the hand runs backwards [m].
+        backward: how far the tool runs backwards [m].
     """
     between = samples.step**2 / 8
     largest = errors.max(axis=1)
@@ -169,7 +169,7 @@ def rotated(rotation: Array, fraction: Array) -> Array:
 
 
 def half_sines(R_A: Array, R_B: Array) -> Array:
-    """Return sin(angle / 2) (...) of the turns from rotations (..., 3, 3) to others, small ones to all digits."""
+    """Return sin(angle / 2) (...) of the rotations from rotations (..., 3, 3) to others, small ones to all digits."""
     Q = np.swapaxes(R_A, -1, -2) @ R_B
     w = np.sqrt(np.maximum(1 + Q[..., 0, 0] + Q[..., 1, 1] + Q[..., 2, 2], 1e-12)) / 2
     a, b, c = Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]
@@ -177,13 +177,13 @@ def half_sines(R_A: Array, R_B: Array) -> Array:
 
 
 def spin_bound(hand: HandBounds, change: Array, rate: Array) -> Array:
-    """Return an upper bound (m,) of the acceleration of half the turn of the hand off an orientation that turns itself.
+    """Return an upper bound (m,) of the acceleration of half the rotation between the tool and a rotating orientation.
 
-    The turn off it is a unit quaternion; the second derivative of its vector part is at most half the angular
+    This rotation is a unit quaternion; the second derivative of its vector part is at most half the angular
     acceleration and a quarter of the squared angular speed.
 
     Args:
-        hand: how the hand moves.
+        hand: how the tool moves.
         change: (m,) angular acceleration of that orientation, at most [rad/s²].
         rate: (m,) its angular speed, at most [rad/s].
     """
@@ -191,10 +191,10 @@ def spin_bound(hand: HandBounds, change: Array, rate: Array) -> Array:
 
 
 def hand_bounds(arm: Arm, joints: Array, lengths: Array, qd: Array, qdd: Array) -> HandBounds:
-    """Return upper bounds of how the hand moves on intervals.
+    """Return upper bounds of how the tool moves on intervals.
 
-    The hand accelerates by sum J_i qdd_i + sum H_ij qd_i qd_j, where |J_i| is at most the lever r_i of joint i and
-    |H_ij| at most that of the later of two joints that turn.
+    The tool accelerates by sum J_i qdd_i + sum H_ij qd_i qd_j, where |J_i| is at most the lever r_i of joint i and
+    |H_ij| at most that of the later of two joints that rotate.
 
     Args:
         arm: the arm, with n joints.
@@ -208,7 +208,7 @@ def hand_bounds(arm: Arm, joints: Array, lengths: Array, qd: Array, qdd: Array) 
     n = arm.n
     later = np.maximum(np.arange(n)[:, None], np.arange(n))
     both = turns[:, None] & turns
-    # A slide is turned by the joints before it; those beyond it do not change its direction.
+    # A slide is rotated by the joints before it; those beyond it do not change its direction.
     carried = turns[np.minimum(np.arange(n)[:, None], np.arange(n))] & ~turns[later]
     H = np.where(both, lever[later], np.where(carried & ~np.eye(n, dtype=bool), 1.0, 0.0))
     pull = qdd @ lever + np.einsum("mi,ij,mj->m", qd, H, qd)
@@ -230,7 +230,7 @@ def cubic_peaks(c: Array, lengths: Array) -> tuple[Array, Array]:
 
 
 def turning_points(c: Array, lengths: Array) -> Array:
-    """Return the times (2, m, n) at which cubics (m, 4, n) turn round, exactly; an end where there is no such time."""
+    """Return the times (2, m, n) at which cubics (m, 4, n) reverse, exactly; an end where there is no such time."""
     a, b, start = 3 * c[:, 3], c[:, 2], c[:, 1]
     root = np.sqrt(np.maximum(b * b - a * start, 0.0))
     # Of a t² + 2 b t + start = 0 the root of larger size without cancellation, and the other by their product.

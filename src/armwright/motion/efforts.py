@@ -1,10 +1,10 @@
 """What a motion asks of the motors, and how much slower it must run for them to give it.
 
-Run k times slower, a motion asks of every joint at every place for
+Run k times slower, a motion asks of every joint at every point for
 
     tau(k) = gravity + dry friction + (viscous friction) / k + (inertia, centrifugal and Coriolis efforts) / k²
 
-so the least slowing follows from the roots of a parabola in 1/k, for each look at the motion by itself.
+so the least slowing follows from the roots of a parabola in 1/k, for each sample of the motion.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from armwright.motion.polynomials import derivative, evaluate
 from armwright.motion.solver import AnyArm, Solver, solver_of
 from armwright.motion.trajectory import Trajectory
 
-# Looks at a segment at least, and at a whole motion at least.
+# Least numbers of samples of a segment, and of a motion.
 _LOOKS_OF_SEGMENT = 9
 _SAMPLES = 600
-# Looks at the ends of a segment are inside it by this part of it: there a joint that starts has its dry friction.
+# Samples at the ends of a segment are inside it by this part of it: there a joint that starts has its dry friction.
 _INSIDE = 1e-8
-# Where a joint turns back is found by so many halvings of the space between two looks.
+# Where a joint reverses is found by so many halvings of the space between two samples.
 _HALVINGS = 16
-# From so many of the largest looks the peak is sought: so often, with so many looks, each time closer.
+# From so many of the largest samples the peak is sought: so often, with so many samples, each time closer.
 _TOPS, _ZOOMS, _CLOSER = 6, 6, 9
 # A joint that moves at less than this part of its top speed stands: the sign of its speed is rounding.
 _STANDS = 1e-9
@@ -56,7 +56,7 @@ class EffortSlowing(NamedTuple):
 
     Attributes:
         factor: times slower; 1 where the efforts are inside their limits as it is.
-        joint: that it is for, from 0; None where nothing has to give way.
+        joint: that it is for, from 0; None where no limit binds.
         time: when that joint is at its limit, in the motion as it was given [s].
     """
 
@@ -66,7 +66,7 @@ class EffortSlowing(NamedTuple):
 
 
 class _Samples(NamedTuple):
-    """Places of a motion that are looked at: which segments, and which parts of them, (k,) each."""
+    """Points of a motion that are sampled: which segments, and which parts of them, (k,) each."""
 
     segments: npt.NDArray[np.intp]
     parts: Array
@@ -77,7 +77,7 @@ class _Samples(NamedTuple):
 
 
 class _Shares(NamedTuple):
-    """The efforts at k looks by how they change when the motion is slowed, (k, n) each."""
+    """The efforts at k samples by how they change when the motion is slowed, (k, n) each."""
 
     lasting: Array
     viscous: Array
@@ -91,9 +91,9 @@ class _Shares(NamedTuple):
 def effort_peaks(arm: AnyArm, trajectory: Trajectory) -> EffortPeaks:
     """Return the largest effort of every joint during a motion, and when.
 
-    A motion is looked at in 600 places or more, at both ends of every segment and wherever a joint turns back among
-    them; around the largest looks the peak is sought ever closer. A peak that is narrower than the space between two
-    looks may be missed.
+    A motion is sampled at 600 points or more, at both ends of every segment and wherever a joint reverses among
+    them; around the largest samples the peak is sought ever closer. A peak that is narrower than the space between two
+    samples may be missed.
 
     Args:
         arm: the arm, or a compiled one, which is faster where there are many segments.
@@ -114,7 +114,7 @@ def effort_peaks(arm: AnyArm, trajectory: Trajectory) -> EffortPeaks:
 def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
     """Return how many times slower a motion must run to keep the effort limits: as little as it can be.
 
-    It holds at all places that ``effort_peaks`` looks at. Use ``trajectory.slowed(found.factor)``.
+    It holds at all samples of ``effort_peaks``. Use ``trajectory.slowed(found.factor)``.
 
     Args:
         arm: the arm, or a compiled one.
@@ -138,7 +138,7 @@ def slowing_for_efforts(arm: AnyArm, trajectory: Trajectory) -> EffortSlowing:
         part, binding = _largest_part(solver.arm, shares, limits)
         if binding is not None and part < u:
             u, joint, time = part, binding[1], float(samples.times(trajectory)[binding[0]])
-        # What lies between the looks is looked at as well, where the efforts are largest: places stay when slowed.
+        # What lies between the samples is sampled as well, where the efforts are largest: positions stay when slowed.
         peaks, near = _peaks(solver, trajectory.slowed(1 / u), samples, shares.at(u))
         if (peaks <= limits * (1 + _ROUNDING)).all():
             break
@@ -161,7 +161,7 @@ def checked(arm: Arm, trajectory: Trajectory, what: str = "trajectory") -> None:
 
 
 def refuse_lasting(arm: Arm, joint: int, effort: float, location: str) -> IncapableArmError:
-    """Return the error for a place where holding the arm takes more than a joint, from 0, may give."""
+    """Return the error for a position where holding the arm takes more than a joint, from 0, may give."""
     unit = "N m" if arm.joints[joint].revolute else "N"
     return IncapableArmError(
         f"{location} gravity and dry friction alone ask {arm.called(joint)} for {abs(effort):.4g} {unit}, "
@@ -183,9 +183,9 @@ def dry_frictions(arm: Arm, qd: Array) -> Array:
 
 
 def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
-    """Return looks at all segments, at both ends of each among them, and where joints turn back.
+    """Return samples of all segments, at both ends of each among them, and where joints reverse.
 
-    There their dry friction jumps, so that they are looked at just before and just after.
+    There their dry friction jumps, so that they are sampled just before and just after.
     """
     m, each = len(trajectory.coefficients), _each(trajectory)
     parts = np.linspace(_INSIDE, 1 - _INSIDE, each)
@@ -203,12 +203,12 @@ def _spread(arm: Arm, trajectory: Trajectory) -> _Samples:
 
 
 def _each(trajectory: Trajectory) -> int:
-    """Return how often a segment is looked at."""
+    """Return how often a segment is sampled."""
     return max(_LOOKS_OF_SEGMENT, -(-_SAMPLES // len(trajectory.coefficients)) + 1)
 
 
 def _states(trajectory: Trajectory, samples: _Samples) -> tuple[Array, Array, Array]:
-    """Return positions, speeds and accelerations (k, n) at looks: of the segment looked at, at its ends too."""
+    """Return positions, speeds and accelerations (k, n) at samples: of the sampled segment, at its ends too."""
     terms = trajectory.coefficients[samples.segments]
     local = (samples.parts * np.diff(trajectory.times)[samples.segments])[:, None]
     q, qd, qdd = (evaluate(derivative(terms, order), local) for order in range(3))
@@ -230,7 +230,7 @@ def _shares(solver: Solver, trajectory: Trajectory, samples: _Samples) -> _Share
 
 
 def _peaks(solver: Solver, trajectory: Trajectory, samples: _Samples, tau: Array) -> tuple[Array, _Samples]:
-    """Return the largest efforts (n,), and where, from the efforts (k, n) at looks."""
+    """Return the largest efforts (n,), and where, from the efforts (k, n) at samples."""
     n = tau.shape[1]
     size = np.abs(tau)
     edge = np.full((1, n), -1.0)
@@ -263,7 +263,7 @@ def _check_lasting(arm: Arm, lasting: Array, times: Array) -> None:
 
 
 def _largest_part(arm: Arm, shares: _Shares, limits: Array) -> tuple[float, tuple[int, int] | None]:
-    """Return at which part of its speed, 1 at most, a motion keeps the limits, and which look and joint decide."""
+    """Return at which part of its speed, 1 at most, a motion keeps the limits, and which sample and joint decide."""
     u, binding = 1.0, None
     while True:
         tau = shares.at(u)

@@ -1,4 +1,4 @@
-"""Whether the poses of a path can be taken at all, asked before anything between them is looked at."""
+"""Whether the poses of a path can be taken at all, asked before anything between them is sampled."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armwright.motion.solver import Solver
 
 
 def check_ends(solver: Solver, path: Path, q_start: Array) -> None:
-    """Refuse a path to a pose that no joint configuration reaches, with ``fraction`` 1 of the way that leads there.
+    """Refuse a path to a pose that no joint configuration reaches, with ``fraction`` 1 of the path that leads there.
 
     Raises:
         PathError: a pose is out of reach, or has no configuration inside the joint limits.

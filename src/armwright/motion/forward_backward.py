@@ -1,7 +1,7 @@
 """The largest x = s'² along a path under bounds |a u + b x + c| <= 1 with u = s'' constant on every interval.
 
 Two passes: backward, from the end, the largest x from which the end can still be reached; forward, from the start, the
-largest u that stays below them. Standing still, x = u = 0, keeps all bounds, so there is always a way.
+largest u that stays below them. Standing still, x = u = 0, keeps all bounds, so there is always a path.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from armwright.arrays import Array
 from armwright.errors import ArmwrightError, MissingExtraError
 
-# The largest x there is, where nothing binds. The solver of toppra loses its way among numbers so far apart.
+# The largest x there is, where nothing binds. The solver of toppra loses its path among numbers so far apart.
 MOST = 1e12
 _MOST_OF_TOPPRA = 1e3
 # A coefficient of u this much smaller than the largest is 0.
@@ -130,7 +130,7 @@ def by_toppra(bounds: Bounds, lengths: Array, rests: tuple[bool, bool]) -> Array
         raise MissingExtraError(
             "method='toppra' needs toppra; install it by: pip install 'armwright[optimal]'"
         ) from error
-    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what goes wrong is told by errors
+    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what goes wrong is reported by errors
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     rows = bounds.a.shape[1]
     params = (

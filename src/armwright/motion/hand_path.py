@@ -1,4 +1,4 @@
-"""Where the hand is planned to be: places and orientations through poses, straight with blends, over time."""
+"""Where the tool is planned to be: positions and orientations through poses, straight with blends, over time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from armwright.spatial.euler import from_zyz, next_zyz, to_zyz
 from armwright.spatial.poses import homogeneous
 from armwright.spatial.rotations import rotation_from_vector, rotation_vector
 
-# Knots to begin with in each blend and on each straight way, at most.
+# Knots to begin with in each blend and on each straight segment, at most.
 _ENOUGH = 500
 
 Orientation: TypeAlias = Literal["geodesic", "zyz"]
@@ -33,12 +33,12 @@ Orientation: TypeAlias = Literal["geodesic", "zyz"]
 
 @attrs.frozen(kw_only=True, eq=False)
 class HandPath:
-    """Poses of the hand as a function of time.
+    """Poses of the tool as a function of time.
 
     Attributes:
         place: (x, y, z) [m].
         times: (k,) when the poses are passed that it was planned through [s].
-        turns: the orientation by turns about one fixed axis from pose to pose; None where it is by ``angles``.
+        turns: the orientation by rotations about one fixed axis from pose to pose; None where it is by ``angles``.
         angles: the orientation by ZYZ angles [rad]; None where it is by ``turns``.
     """
 
@@ -61,7 +61,7 @@ class HandPath:
         return homogeneous(self.turns(t), self.place(t))
 
     def first_knots(self, step: float, fewest: int) -> Array:
-        """Return times to begin with: so far apart [s], and so many at least in each blend and on each straight way."""
+        """Return the first times: so far apart [s], and so many at least in each blend and on each straight segment."""
         parts = np.clip(np.ceil(np.diff(self.knots) / step), fewest, _ENOUGH).astype(np.intp)
         return divided(self.knots, parts)
 
@@ -75,20 +75,20 @@ class HandPath:
         )
 
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
-        """Return bounds of the error on the intervals between times: those of hand and path together."""
+        """Return bounds of the error on the intervals between times: those of tool and path together."""
         middles = (times[1:] + times[:-1]) / 2
         piece = np.clip(np.searchsorted(self.knots, middles, side="right") - 1, 0, len(self.knots) - 2)
         rate, change = (bound[piece] for bound in self.spin())
         return ErrorBounds(hand.pull + self.acceleration()[piece], spin_bound(hand, change, rate))
 
     def error(self, samples: HandSamples) -> TrackingError:
-        """Return how far a sampled hand is from where it should be at the time."""
+        """Return how far a sampled tool is from where it should be at the time."""
         planned = self(samples.times)
         distances = np.linalg.norm(samples.poses[..., :3, 3] - planned[..., :3, 3], axis=-1)
         return error_of(samples, distances, half_sines(planned[..., :3, :3], samples.poses[..., :3, :3]).max(axis=1))
 
     def where(self, t: float) -> tuple[int, float, str]:
-        """Return on which way between poses a time is, at which fraction of it, and that in words."""
+        """Return on which segment between poses a time is, at which fraction of it, and that in words."""
         x, y, z = self(t)[:3, 3] * 1e3
         i = int(np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2))
         fraction = float(np.clip((t - self.times[i]) / (self.times[i + 1] - self.times[i]), 0.0, 1.0))
@@ -96,7 +96,7 @@ class HandPath:
         return i, fraction, f"{between}, ({x:.1f}, {y:.1f}, {z:.1f}) mm from the base,"
 
     def acceleration(self) -> Array:
-        """Return upper bounds (m,) of the acceleration of the place on each interval between ``knots`` [m/s²]."""
+        """Return upper bounds (m,) of the acceleration of the position on each interval between ``knots`` [m/s²]."""
         return np.asarray(np.linalg.norm(self.place.segment_peaks(2), axis=-1))
 
     def spin(self) -> tuple[Array, Array]:
@@ -105,7 +105,7 @@ class HandPath:
             return self.turns.spin((self.knots[1:] + self.knots[:-1]) / 2)
         assert self.angles is not None  # noqa: S101 - one of the two is there
         phi, theta, psi = self.angles.segment_peaks(1).T
-        # Each angle turns about an axis of length 1 that the angles before it carry round.
+        # Each angle rotates about an axis of length 1 that the angles before it carry round.
         change = self.angles.segment_peaks(2).sum(axis=-1) + phi * theta + phi * psi + theta * psi
         return phi + theta + psi, np.asarray(change)
 
@@ -114,8 +114,8 @@ class HandPath:
 class Turns:
     """Orientations through k poses: about one fixed axis from pose to pose, with a blend around each pose.
 
-    Around each pose the rotation vector of the turn from it is blended, so that rate and its change are continuous.
-    Between the blends of two poses, on one and the same fixed axis either way, the next pose takes over.
+    Around each pose the rotation vector of the rotation from it is blended, so that rate and its change are continuous.
+    Between the blends of two poses, on one and the same fixed axis in either direction, the next pose takes over.
 
     Attributes:
         R: (k, 3, 3) orientations of the poses.
@@ -126,7 +126,7 @@ class Turns:
     plan: BlendPlan
 
     def _nearest(self, t: Array) -> npt.NDArray[np.intp]:
-        """Return the numbers (...) of the poses whose blends, and the ways beside them, times (...) belong to."""
+        """Return the numbers (...) of the poses whose blends, and the segments beside them, times (...) belong to."""
         c, b = self.plan.centres, self.plan.blend
         handed_over = (c[:-1] + b[:-1] + c[1:] - b[1:]) / 2
         return np.asarray(np.searchsorted(handed_over, t), dtype=np.intp)
@@ -145,7 +145,7 @@ class Turns:
         return np.asarray(self.R[i] @ rotation_from_vector(turn))
 
     def slowed(self, factor: float) -> Turns:
-        """Return the same turns run ``factor`` times slower."""
+        """Return the same rotations run ``factor`` times slower."""
         p = self.plan
         slow = BlendPlan(
             p.centres * factor, p.blend * factor, p.points, p.before / factor, p.after / factor, p.end * factor
@@ -155,7 +155,7 @@ class Turns:
     def spin(self, t: Array) -> tuple[Array, Array]:
         """Return upper bounds (m,) of angular speed [rad/s] and acceleration [rad/s²] around times (m,).
 
-        They hold in all of the blend that a time is in; between two blends, in all of the way.
+        They hold in all of the blend that a time is in; between two blends, in all of the segment.
         """
         plan, i = self.plan, self._nearest(t)
         since, width = t - plan.centres[i], plan.blend[i]
@@ -169,14 +169,14 @@ class Turns:
 
 
 def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, orientation: Orientation) -> HandPath:
-    """Plan places and orientations through poses.
+    """Plan positions and orientations through poses.
 
     Args:
         poses: (k, 4, 4) with exact rotations.
         times: as for ``blended``.
         blend: as for ``blended``.
         ends: as for ``blended``.
-        orientation: ``geodesic`` turns about one fixed axis from pose to pose, ``zyz`` blends the ZYZ Euler angles.
+        orientation: ``geodesic`` rotates about one fixed axis from pose to pose, ``zyz`` blends the ZYZ Euler angles.
 
     Raises:
         ArmwrightError: as for ``blended``.
@@ -189,7 +189,7 @@ def hand_path(poses: Array, times: ArrayLike, blend: ArrayLike, *, ends: Ends, o
     if orientation == "zyz":
         return HandPath(place=position, turns=None, angles=blended(times, zyz_angles(R), blend, ends=ends), times=t)
     plan = blend_plan(times, poses[:, :3, 3], blend, ends)
-    # A turn is the same vector in the axes of the pose before it and of that after it.
+    # A rotation is the same vector in the axes of the pose before it and of that after it.
     ways = rotation_vector(np.swapaxes(R[:-1], -1, -2) @ R[1:]) / np.diff(plan.centres)[:, None]
     still = np.zeros((1, 3))
     first, last = (still, still) if ends == "rest" else (ways[:1], ways[-1:])

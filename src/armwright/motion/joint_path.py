@@ -1,6 +1,6 @@
 """Where the joints go, whatever the time: paths as pieces without corners, and grids on them.
 
-A path is a trajectory of which only the places count; its time is a mere parameter s.
+A path is a trajectory of which only the positions count; its time is a mere parameter s.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from armwright.motion.xspline_path import xspline
 _SAME = 1e-8
 # A path is in one piece if nothing jumps farther than this [rad] or [m].
 _JUMP = 1e-9
-# Samples of a segment to measure its way with; this part of the mean rate is added, for places where the path stands.
+# Samples of a segment to measure its path with; this part of the mean rate is added, for positions where the path
+# stands.
 _SAMPLES = 129
 _EVEN = 0.1
-# The first interval out of a place where the joints stand, and the last one into it, are cut at these parts.
+# The first interval out of a position where the joints stand, and the last one into it, are cut at these parts.
 _STEEP = 2.0 ** -np.arange(5, 0, -1)
 
 
@@ -32,7 +33,7 @@ class Piece(NamedTuple):
 
     Attributes:
         path: of the joints; what it calls time is the parameter s, scaled so that at s' = 1 it is just run at full
-            speed in its fastest place.
+            speed in its fastest position.
         origins: (m,) where its segments begin, in the parameter that was given.
         scale: parameters s for one parameter that was given.
         rests: whether the joints stand at its start and at its end whatever s' is.
@@ -66,11 +67,11 @@ def through_knots(arm: Arm, knots: Array) -> Trajectory:
     """Return the X-spline through knots (k, n), which runs on at both ends as the parabola of three knots does.
 
     Raises:
-        InvalidValueError: two neighbouring knots are the same place.
+        InvalidValueError: two neighbouring knots are the same point.
     """
     steps = np.abs(np.diff(knots, axis=0) / natural_speeds(arm, knots)).max(axis=1)
     for i in np.flatnonzero(steps <= _JUMP):
-        raise InvalidValueError(f"path: knots {i + 1} and {i + 2} are the same place; leave one of them out")
+        raise InvalidValueError(f"path: knots {i + 1} and {i + 2} are the same point; leave one of them out")
     times = np.concatenate([[0.0], np.cumsum(steps)])
     slopes = np.diff(knots, axis=0) / steps[:, None]
     if len(knots) == 2:
@@ -80,7 +81,7 @@ def through_knots(arm: Arm, knots: Array) -> Trajectory:
 
 
 def natural_speeds(arm: Arm, points: Array) -> Array:
-    """Return for every joint (n,) what is fast for it on a way through places (k, n), by its limits."""
+    """Return for every joint (n,) what is fast for it on a path through positions (k, n), by its limits."""
     with np.errstate(invalid="ignore"):
         by_acceleration = np.sqrt(arm.limit("acceleration") * np.ptp(points, axis=0))
     fast = np.fmin(arm.limit("speed"), np.where(by_acceleration > 0, by_acceleration, np.inf))
@@ -139,7 +140,7 @@ def gridded(arm: Arm, piece: Piece, intervals: int) -> Grid:
         of_segment = moments[k * (_SAMPLES - 1) : (k + 1) * (_SAMPLES - 1) + 1]
         count = max(2, round(intervals * (of_segment[-1] - of_segment[0])))
         cuts.append(np.interp(np.linspace(of_segment[0], of_segment[-1], count + 1), of_segment, parts))
-    # Out of a place where the joints stand whatever s' is, s' falls steeply at first.
+    # Out of a position where the joints stand whatever s' is, s' falls steeply at first.
     if piece.rests[0]:
         cuts[0] = np.concatenate([[0.0], cuts[0][1] * _STEEP, cuts[0][1:]])
     if piece.rests[1]:

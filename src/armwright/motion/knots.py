@@ -12,7 +12,7 @@ from armwright.errors import InvalidValueError, ShapeError
 SHORTEST = 1e-9
 # Nor would those of a time as long as this [s].
 _LONGEST = 1e50
-# A way of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
+# A path of no joint farther than this is rounding of the inverse kinematics [rad] or [m].
 NOWHERE = 1e-12
 
 
@@ -37,7 +37,7 @@ def timed_points(title: str, times: ArrayLike, points: ArrayLike, what: str = "p
 
 
 def two_ends(q_start: ArrayLike, q_goal: ArrayLike) -> tuple[Array, Array]:
-    """Return two postures (n,).
+    """Return two configurations (n,).
 
     Raises:
         KindError: one is something else than real numbers.

@@ -1,4 +1,4 @@
-"""Joint moves and Cartesian moves through poses, by straight ways with blends: of the joints, or of the hand."""
+"""Joint moves and Cartesian moves through poses, by straight segments with blends: of the joints, or of the tool."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from armwright.spatial.rotations import nearest_rotation
 
 # A matrix this far from a rotation is not worth a warning.
 _ROUNDING = 1e-9
-# Knots to begin with: so far apart [s], and so many in each blend and on each straight way; and at most.
+# Knots to begin with: so far apart [s], and so many in each blend and on each straight segment; and at most.
 _STEP, _FEWEST, _MOST = 0.02, 4, 500_000
 # Blends without a time of their own take this part of the shortest time between two poses.
 _BLEND = 0.2
@@ -48,13 +48,13 @@ class Move:
         poses: (k, 4, 4) poses of the tool, their rotations made exact.
         times: (k,) when they are passed [s].
         postures: (k, n) joint positions at the poses.
-        label: branch of the postures; several, joined by arrows, where it changes from pose to pose.
+        label: branch of the configurations; several, joined by arrows, where it changes from pose to pose.
         trajectory: of the joints.
-        misses: (k,) shortest distance at which the planned path passes each pose: of the hand [m] for a Cartesian move,
+        misses: (k,) shortest distance at which the planned path passes each pose: of the tool [m] for a Cartesian move,
             in joint space for a joint move; the ends are met, and so is every pose that is stopped at.
-        hand: where the hand is planned to be; None where no path of it is planned.
-        certificate: how near the hand keeps to that, and which part of the limits is used; None where none is planned.
-        detours: the ways from pose to pose of a move that stops at each of them; else none.
+        hand: where the tool is planned to be; None where no path of it is planned.
+        certificate: how near the tool keeps to that, and which part of the limits is used; None where none is planned.
+        detours: the segments from pose to pose of a move that stops at each of them; else none.
     """
 
     arm: Arm
@@ -99,21 +99,22 @@ def joint_move(
 ) -> Move:
     """Plan a move on which every joint goes straight from pose to pose, with blends.
 
-    One branch is kept through all poses where it is inside the limits there; otherwise the postures are those of the
-    shortest way.
+    One branch is kept through all poses where it is inside the limits there; otherwise the configurations are those of
+    the shortest path.
 
     Args:
         arm: the arm, or a compiled one.
         poses: (k, 4, 4) two or more tool poses; rotations typed with a few digits are made exact, with a warning.
         times: (k,) when they are passed, rising from 0 [s], whatever the limits say; as fast as the limits of speed,
             acceleration and effort allow when left out.
-        blend: how long before and after each pose the joints are off their straight ways [s], one number or (k,);
-            a fifth of the shortest time between two poses when left out. Only with ``times``.
-        near: (n,) present joint positions, for the choice of the first posture; the middle of the limits when left out.
+        blend: how long before and after each pose the joints are away from their straight segments [s], one number or
+            (k,); a fifth of the shortest time between two poses when left out. Only with ``times``.
+        near: (n,) present joint positions, for the choice of the first configuration; the middle of the limits when
+            left out.
         ends: ``rest`` starts and stops, ``running`` begins and ends at full speed.
 
     Raises:
-        PathError: a pose has no posture inside the limits.
+        PathError: a pose has no configuration inside the limits.
         ArmwrightError: poses, times or blends are none, or blends overlap.
 
     Source:
@@ -152,27 +153,28 @@ def cartesian_move(
     orientation: Orientation = "geodesic",
     deviation: float = 1e-4,
 ) -> Move:
-    """Plan a move on which the hand goes straight from pose to pose, with blends.
+    """Plan a move on which the tool goes straight from pose to pose, with blends.
 
-    Places and orientations are planned, the joints solved on them and joined by the X-spline whose acceleration is
-    continuous, with as many knots as the deviation asks for. The branch is chosen once and kept: of the postures inside
-    the limits at the first pose the nearest that carries through.
+    Positions and orientations are planned, the joints solved on them and joined by the X-spline whose acceleration is
+    continuous, with as many knots as the deviation asks for. The branch is chosen once and kept: of the configurations
+    inside the limits at the first pose the nearest that carries through.
 
     Args:
         arm: the arm, or a compiled one, which plans faster.
         poses: (k, 4, 4) two or more tool poses; rotations typed with a few digits are made exact, with a warning.
         times: (k,) when they are passed, rising from 0 [s], whatever the limits say; when left out, by the arm's speed
             of the tool, slower where the limits of speed, acceleration and effort ask for it.
-        blend: how long before and after each pose the hand is off its straight ways [s], one number or (k,); a fifth
-            of the shortest time between two poses when left out.
-        near: (n,) present joint positions, for the choice of the first posture; the middle of the limits when left out.
+        blend: how long before and after each pose the tool is away from its straight segments [s], one number or (k,);
+            a fifth of the shortest time between two poses when left out.
+        near: (n,) present joint positions, for the choice of the first configuration; the middle of the limits when
+            left out.
         ends: ``rest`` starts and stops, ``running`` begins and ends at full speed.
-        orientation: ``geodesic`` turns about one fixed axis from pose to pose, ``zyz`` blends the ZYZ Euler angles.
-        deviation: allowed distance of the hand from where it is planned to be [m]; the orientation may be off by 5
+        orientation: ``geodesic`` rotates about one fixed axis from pose to pose, ``zyz`` blends the ZYZ Euler angles.
+        deviation: allowed distance of the tool from where it is planned to be [m]; the orientation may deviate by 5
             mrad for each mm of it.
 
     Raises:
-        PathError: no branch carries through: what stops each of them, with the time, the place, and the joint.
+        PathError: no branch carries through: what stops each of them, with the time, the position, and the joint.
         ArmwrightError: poses, times or blends are none, or blends overlap.
 
     Source:
@@ -197,7 +199,7 @@ def along(
     ends: Ends = "rest",
     deviation: float = 1e-4,
 ) -> Move:
-    """Return the move along a path of the hand, with its certificate; arguments and errors as of ``cartesian_move``."""
+    """Return the move along a path of the tool, with its certificate; arguments and errors as of ``cartesian_move``."""
     solver, allowed = solver_of(arm), tolerance(deviation)
     label, tracked = _followed(solver, hand, _near(solver.arm, near), allowed, from_rest=ends == "rest")
     certificate = certificate_of(arm, tracked.trajectory, tracked.error, allowed)
@@ -223,26 +225,27 @@ def stopping_move(
     deviation: float = 1e-3,
     speed: float = 100.0,
 ) -> Move:
-    """Plan certified straight lines from pose to pose with a stop at each, and ways round what stops a line.
+    """Plan certified straight lines from pose to pose with a stop at each, and detours where an obstacle stops a line.
 
     Args:
         arm: the arm, or a compiled one, which plans faster.
         poses: (k, 4, 4) two or more tool poses; rotations typed with a few digits are made exact, with a warning.
         method: ``via`` or ``damped``, as for ``line_or_detour``.
-        near: (n,) present joint positions, for the choice of the first posture; the middle of the limits when left out.
-        deviation: allowed distance of the hand from a line [m].
+        near: (n,) present joint positions, for the choice of the first configuration; the middle of the limits when
+            left out.
+        deviation: allowed distance of the tool from a line [m].
         speed: 1 to 120, 100 is normal.
 
     Returns:
-        The move; its ``detours`` tell of every way how it is run, and at which price.
+        The move; its ``detours`` describe every segment how it is run, and at which price.
 
     Raises:
-        PathError: there is no way between two poses, from no posture at the first one: what stops the nearest.
+        PathError: there is no path between two poses, from no configuration at the first one: what stops the nearest.
         ArmwrightError: poses, ``by``, deviation or speed are none, or all poses are the same.
     """
     solver, X = solver_of(arm), exact_poses(poses)
     if Path(poses=X).lengths().max() <= NEGLIGIBLE:
-        raise InvalidValueError("poses: all of them are the same, so there is no way to go")
+        raise InvalidValueError("poses: all of them are the same, so there is no path to go")
     first: PathError | None = None
     for start in configurations_at(solver.arm, X[:1], _near(solver.arm, near))[0]:
         try:
@@ -315,7 +318,7 @@ def _tool_times(arm: Arm, X: Array) -> Array:
 
 def _refuse_blend(blend: ArrayLike | None) -> None:
     if blend is not None:
-        raise InvalidValueError("blend: only with times; without them the limits of acceleration tell the blends")
+        raise InvalidValueError("blend: only with times; without them the limits of acceleration determine the blends")
 
 
 def _inside_limits(arm: AnyArm, move: Move) -> Move:
@@ -334,10 +337,10 @@ def _inside_limits(arm: AnyArm, move: Move) -> Move:
 def _followed(
     solver: Solver, hand: HandPath, near: Array, allowed: Tolerance, *, from_rest: bool
 ) -> tuple[str, Tracking]:
-    """Return a branch, and the joints that follow a path of the hand on it.
+    """Return a branch, and the joints that follow a path of the tool on it.
 
-    The branch is chosen once and kept: of the postures inside the limits at the start the nearest that leads to the
-    end inside them.
+    The branch is chosen once and kept: of the configurations inside the limits at the start the nearest that leads to
+    the end inside them.
 
     Raises:
         PathError: no branch does: what stops each of them, where.
@@ -356,12 +359,12 @@ def _followed(
         errors[branch.label] = path_error(hand, tracked)
     first = next(iter(errors.values()))
     reasons = "; ".join(f"{label}: {error}" for label, error in errors.items())
-    message = f"no branch carries the hand to its last pose. {reasons}"
+    message = f"no branch carries the tool to its last pose. {reasons}"
     raise PathError(first.cause, first.segment, first.fraction, message, joint=first.joint, reason=first.reason)
 
 
 def _legs(arm: AnyArm, q: Array, X: Array, *, method: DetourMethod, deviation: float, speed: float) -> list[Detour]:
-    """Return a way from every pose to the next, from rest to rest."""
+    """Return a segment from every pose to the next, from rest to rest."""
     legs: list[Detour] = []
     for i, goal in enumerate(X[1:]):
         try:

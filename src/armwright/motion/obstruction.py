@@ -1,4 +1,4 @@
-"""What stops the arm on its way through poses, and how that is diagnosed."""
+"""What stops the arm along poses, and how that is diagnosed."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class PathError(ArmwrightError, ValueError):
 
     Attributes:
         cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` configuration.
-        segment: which way of the path, from 0.
-        fraction: how far along that way.
+        segment: which segment of the path, from 0.
+        fraction: how far along that segment.
         joint: number of the joint that stops it, from 1; None where it is no single one, or not known.
         reason: what happens there, without the position.
     """
@@ -64,7 +64,7 @@ class Obstruction(NamedTuple):
 
     Attributes:
         cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` configuration.
-        time: when, on the motion of the hand that is followed [s].
+        time: when, on the motion of the tool that is followed [s].
         joint: number of the joint, from 1; None where it is no single one.
         reason: what happens there, in words.
         velocity_ratio: how many times as fast as it may the joint would have to move; None where something else stops
@@ -92,7 +92,7 @@ class Obstruction(NamedTuple):
 
 
 class Diagnosis(NamedTuple):
-    """What is found on the way through poses, step by step.
+    """What is found along poses, step by step.
 
     Attributes:
         obstruction: what stops the arm; None where nothing does.
@@ -146,7 +146,7 @@ def unmet(arm: Arm, X: Array, before: Array, time: float, time_before: float) ->
     solution = inverse(arm, X, before)
     if not solution.allowed:
         return Obstruction(cause_of(solution), time, None, solution.explain())
-    reason = f"the posture would have to change: the arm is singular there ({nearest_singularity(arm, before)})"
+    reason = f"the configuration would have to change: the arm is singular there ({nearest_singularity(arm, before)})"
     return Obstruction("singular", time_before, _idlest(arm, before), reason)
 
 
@@ -175,7 +175,7 @@ def diagnose_obstruction(
         X: (k, 4, 4) poses, of which the first is that of ``q_start``.
         times: (k,) when they are passed [s].
         q_start: (n,) joint positions at the first pose.
-        allowed: how far the hand may be from the straight ways between the poses.
+        allowed: how far the tool may be from the straight segments between the poses.
         clock: when times are passed at the speed that is asked for [s]; None where nothing but a pose that is not met
             stops the arm, neither limits nor speeds.
 
@@ -213,7 +213,7 @@ def _on_step(
 
 
 def _idlest(arm: Arm, q: Array) -> int:
-    """Return the number, from 1, of the joint that is fastest in the motion that moves the hand least, by its limit."""
+    """Return the number, from 1, of the joint that is fastest in the motion that moves the tool least, by its limit."""
     speed = arm.limit("speed")
     idle = np.linalg.svd(jacobian(arm, q))[2][-1]
     return int((np.abs(idle) / np.where(np.isfinite(speed), speed, 1.0)).argmax()) + 1

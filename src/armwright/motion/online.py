@@ -1,7 +1,7 @@
 """A new goal for an arm that is moving: position, speed and acceleration go on without a jump.
 
 Ruckig finds the phases of constant jerk that lead from any state to the goal in the shortest time; here they become a
-trajectory like any other, so that limits are checked exactly and the motion can be joined, looked at and changed
+trajectory like any other, so that limits are checked exactly and the motion can be joined, sampled and changed
 again.
 """
 
@@ -30,10 +30,10 @@ _MOST_JERK = 1000.0
 # A joint does not have its full acceleration sooner than this: rounding would make steps of it [s].
 _SHORTEST_RISE = 1e-6
 _GAVE_UP = (
-    "Ruckig found no motion to the new goal: a way, a limit or a jerk is of quite another size than the others; check "
+    "Ruckig found no motion to the new goal: a path, a limit or a jerk is of quite another size than the others; check "
     "their units"
 )
-# A way of no joint farther than this, from rest, is none [rad] or [m].
+# A path of no joint farther than this, from rest, is none [rad] or [m].
 _NOWHERE = 1e-12
 
 
@@ -308,7 +308,7 @@ def _check_range(arm: Arm, task: _Task, phases: _Phases) -> None:
     lengths = np.diff(phases.starts, axis=1)
     q, qd, qdd, jerk = (array[:, :-1] for array in (phases.q, phases.qd, phases.qdd, phases.jerk))
     candidates = [phases.q]
-    # A joint turns back where its speed, a parabola in each phase, is 0.
+    # A joint reverses where its speed, a parabola in each phase, is 0.
     root = np.sqrt(np.maximum(qdd**2 - 2 * jerk * qd, 0.0))
     for side in (-1.0, 1.0):
         divisor = qdd + side * root
@@ -322,7 +322,7 @@ def _check_range(arm: Arm, task: _Task, phases: _Phases) -> None:
         for fault in violations(arm, extreme):
             j = fault.joint - 1
             if worse(fault.value, fault.limit) and worse(fault.value, task.q[j]):
-                raise OnlineError(f"on the way to its new goal {fault}: it moves too fast to turn back before")
+                raise OnlineError(f"on its motion to the new goal {fault}: it moves too fast to reverse before")
 
 
 def _trajectory(task: _Task, phases: _Phases) -> Trajectory:
@@ -343,7 +343,7 @@ def _trajectory(task: _Task, phases: _Phases) -> Trajectory:
 
 
 def _ruckig() -> Any:
-    """Import Ruckig, which only those need whose goals change on the way."""
+    """Import Ruckig, which only those need whose goals change on the path."""
     try:
         return import_module("ruckig")
     except ImportError as error:

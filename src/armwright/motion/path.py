@@ -1,4 +1,4 @@
-"""A path of the hand through poses, and the report's rule for how densely and how fast to run it."""
+"""A path of the tool through poses, and the report's rule for how densely and how fast to run it."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from armwright.motion.tolerance import tolerance
 from armwright.spatial.poses import between
 from armwright.spatial.rotations import angle_between
 
-# A turn on the spot has no length; it is timed as if a tool this long swept the way [m].
+# A rotation on the spot has no length; it is timed as if a tool this long swept the segment [m].
 TURN_RADIUS = 0.2
-# A way shorter than this is none: poses that should be equal differ by rounding [m].
+# A segment shorter than this is none: poses that should be equal differ by rounding [m].
 NEGLIGIBLE = 1e-9
 # The report's rule lets speed and step vanish for a line over the base axis; they stop falling at this part of the
 # reach, which for the arms of the catalogue lies inside the space that the arm cannot enter anyway.
@@ -35,7 +35,7 @@ def _poses(value: ArrayLike) -> Array:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Path:
-    """Straight ways from pose to pose.
+    """Straight segments from pose to pose.
 
     Attributes:
         poses: (k, 4, 4) tool poses in the base frame of the arm.
@@ -44,13 +44,13 @@ class Path:
     poses: Array = attrs.field(converter=_poses)
 
     def lengths(self) -> Array:
-        """Return the length of every way (k-1,) [m]; a turn counts with ``TURN_RADIUS``."""
+        """Return the length of every segment (k-1,) [m]; a rotation counts with ``TURN_RADIUS``."""
         shift = np.linalg.norm(np.diff(self.poses[:, :3, 3], axis=0), axis=-1)
         turn = angle_between(self.poses[:-1, :3, :3], self.poses[1:, :3, :3])
         return np.asarray(np.maximum(shift, TURN_RADIUS * turn))
 
     def at(self, segment: int, fraction: ArrayLike) -> Array:
-        """Return poses (..., 4, 4) at fractions (...) of one way."""
+        """Return poses (..., 4, 4) at fractions (...) of one segment."""
         return between(self.poses[segment], self.poses[segment + 1], fraction)
 
 
@@ -60,8 +60,8 @@ class Knots:
 
     Attributes:
         times: (m,) [s], from 0.
-        segments: (m,) which way of the path each knot is on.
-        fractions: (m,) how far along that way.
+        segments: (m,) which segment of the path each knot is on.
+        fractions: (m,) how far along that segment.
     """
 
     times: Array
@@ -78,7 +78,7 @@ class Knots:
 
 
 def closest_to_axis(A: ArrayLike, B: ArrayLike) -> float:
-    """Return the shortest distance from the base axis to the way between two places (3,) [m]."""
+    """Return the shortest distance from the base axis to the segment between two positions (3,) [m]."""
     a, b = np.asarray(A, dtype=np.float64)[:2], np.asarray(B, dtype=np.float64)[:2]
     way = b - a
     square = float(way @ way)
@@ -100,9 +100,9 @@ def report_step(arm: Arm, A: ArrayLike, B: ArrayLike, deviation: float) -> float
 
 
 def report_speed(arm: Arm, A: ArrayLike, B: ArrayLike, speed: float) -> float:
-    """Return the speed of the hand on a line that the report's rule gives [m/s].
+    """Return the speed of the tool on a line that the report's rule gives [m/s].
 
-    V = (speed / 120) (r_min / R_MAX) V_MAX: an arm held in moves its hand more slowly.
+    V = (speed / 120) (r_min / R_MAX) V_MAX: an arm held in moves its tool more slowly.
 
     Source:
         TR-83-008, "straight line motion", steps 2 and 3, with alpha = 100/120.
@@ -112,15 +112,15 @@ def report_speed(arm: Arm, A: ArrayLike, B: ArrayLike, speed: float) -> float:
 
 
 def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: int = 1) -> Knots:
-    """Place knots on a path by the report's rule.
+    """Choose knots on a path by the report's rule.
 
-    The first and the last step are half as long as the others and take as much time: so the hand gathers speed
-    and loses it. A way without length, between equal poses, gets no knots.
+    The first and the last step are half as long as the others and take as much time: so the tool gathers speed
+    and loses it. A segment without length, between equal poses, gets no knots.
 
     Args:
         arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
-        path: the way.
-        deviation: allowed distance of the hand from the path [m].
+        path: the segment.
+        deviation: allowed distance of the tool from the path [m].
         speed: 1 to 120, 100 is normal.
         finer: how many times more steps than the rule asks.
 
@@ -152,7 +152,7 @@ def place_knots(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
 
 
 def _steps(count: int, *, first: bool, last: bool) -> Sequence[float]:
-    """Return the relative lengths of the steps on one way."""
+    """Return the relative lengths of the steps on one segment."""
     count = max(count, 1)
     if first and last:
         return [0.5, *[1.0] * (count - 1), 0.5]

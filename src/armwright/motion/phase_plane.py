@@ -1,11 +1,11 @@
-"""The fastest run along a piece of a path: bounds on s'' and s'² place by place.
+"""The fastest run along a piece of a path: bounds on s'' and s'² point by point.
 
 With x = s'² and u = s'', speeds, accelerations and efforts of the joints are
 
     qd² = q'² x,    qdd = q' u + q'' x,    tau = M q' u + (M q'' + h(q, q')) x + gravity + friction
 
 linear in u and x but for the viscous friction, which goes with the root of x. On every interval of the grid u is
-constant, so x at a later place of it is x + 2 u (s - s_i), linear too: the bounds hold at its start, its middle and
+constant, so x at a later position of it is x + 2 u (s - s_i), linear too: the bounds hold at its start, its middle and
 its end.
 """
 
@@ -48,8 +48,8 @@ class _Rows(NamedTuple):
         a: of u.
         b: of x.
         c: constant.
-        viscous: of the root of x at the place of the row.
-        ahead: (N, rows) how far that place is from the start of the interval, twice: x there is x + ahead u.
+        viscous: of the root of x at the position of the row.
+        ahead: (N, rows) how far that position is from the start of the interval, twice: x there is x + ahead u.
     """
 
     a: Array
@@ -63,7 +63,7 @@ class _Rows(NamedTuple):
         return Bounds(self.a, self.b, self.c)
 
     def by_tangent(self, x: Array, lengths: Array) -> Bounds:
-        """Put a tangent in the place of the root of x: at a solution (N + 1,), or where standing still keeps it."""
+        """Put a tangent in the position of the root of x: at a solution (N + 1,), or where standing still keeps it."""
         u = np.diff(x) / (2 * lengths)
         there = np.sqrt(np.maximum(x[:-1, None] + self.ahead * u[:, None], _FLOOR * x.max()))
         weight = np.abs(self.viscous)
@@ -160,7 +160,7 @@ def _rows(solver: Solver, grid: Grid, locate: Callable[[float], str], *, efforts
             if use.max() > _ALL:
                 k, joint = (int(i) for i in np.unravel_index(int(use.argmax()), use.shape))
                 raise refuse_lasting(arm, joint, float(lasting[k, joint]), locate(float(grid.origins[k])))
-            # Where a joint turns back on an interval, its dry friction is either; so much less is left on both sides.
+            # Where a joint reverses on an interval, its dry friction is either; so much less is left on both sides.
             margin = effort - (most - least) / 2
             limits.append(_limited(margin, _Rows(a, b, gravity + (most + least) / 2, viscous * rate, ahead)))
     return _Rows(*(np.concatenate(arrays, axis=1) for arrays in zip(*limits, strict=True)))
@@ -177,7 +177,7 @@ def _limited(limits: Array, rows: _Rows) -> _Rows:
 
     Args:
         limits: (n,) or (N, n) of the joints.
-        rows: what is limited, (N, n) each, for x at the place of the row.
+        rows: what is limited, (N, n) each, for x at the position of the row.
     """
     has = np.isfinite(limits).reshape(-1, limits.shape[-1])[0]
     a, b, c, viscous = ((array / limits)[:, has] for array in rows[:4])

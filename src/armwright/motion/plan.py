@@ -28,7 +28,7 @@ from armwright.motion.trajectory import Trajectory, whole_ticks
 # No arm reaches a thousand kilometres; squares of much larger numbers would overflow [m].
 _FARTHEST = 1e6
 
-# Places of the hand along a smooth motion from which its length is summed.
+# Points of the tool along a smooth motion from which its length is summed.
 _LOOKS = 101
 
 StageKind: TypeAlias = Literal["PTP", "LINE", "SPLINE", "BLEND"]
@@ -43,7 +43,7 @@ class Manner:
         deviation: allowed distance from straight lines [m].
         period: of the servo [s]; stages last a whole number of it.
         around: how to go round what stops a straight line, see ``line_or_detour``; None to stop there. Only a LINE is
-            gone round: a way through several frames is run without a stop, which a way round one of its parts is not.
+            bypassed: a path through several frames is run without a stop, unlike a detour of one of its parts.
     """
 
     speed: float = 100.0
@@ -72,17 +72,17 @@ class StageGoal:
 
 @attrs.frozen(kw_only=True, eq=False)
 class Obstacle:
-    """What stops the arm on its way, and where.
+    """What stops the arm on its path, and where.
 
     Attributes:
-        cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` posture.
+        cause: out of ``reach``, beyond the joint ``limits``, or through a ``singular`` configuration.
         reason: the same in words, with the joint and the amount.
         joint: number of the joint that stops it, from 1; None where it is no single one.
-        pose: which pose of the stage the arm was on the way to, from 0.
-        fraction: how far along that way; 1 for the pose itself.
-        length: of that way [m]; None for point to point, which has no way in space.
+        pose: which pose of the stage the arm was moving to, from 0.
+        fraction: how far along that path; 1 for the pose itself.
+        length: of that path [m]; None for point to point, which has no path in space.
         place: (3,) where, seen from the base of the arm [m].
-        certain: whether the pose itself cannot be taken, whichever way leads to it.
+        certain: whether the pose itself cannot be taken, from any configuration.
     """
 
     cause: Cause
@@ -96,7 +96,7 @@ class Obstacle:
 
     @property
     def along(self) -> float | None:
-        """How far along that way [m]; None for point to point."""
+        """How far along that path [m]; None for point to point."""
         return None if self.length is None else self.fraction * self.length
 
 
@@ -107,13 +107,13 @@ class Stage:
     Attributes:
         kind: of the trajectory.
         trajectory: of the joints, at rest at both ends, a whole number of servo periods long.
-        length: of the way of the hand [m].
+        length: of the path of the tool [m].
         certificate: what the motion keeps; None for point to point, which has no path, and for damped rates.
-        deviation: upper bound of the distance of the hand from the path [m]; None for point to point.
+        deviation: upper bound of the distance of the tool from the path [m]; None for point to point.
         slowed: why it runs slower than asked, or empty.
         obstacle: what stopped the straight line; of a SPLINE what kept the arm from rounding its corners, so that it
             stops at every frame; None where there is nothing of the kind.
-        detour: the way round it, and its price; None where there is no obstacle, and of a SPLINE.
+        detour: the detour, and its price; None where there is no obstacle, and of a SPLINE.
     """
 
     kind: StageKind
@@ -135,7 +135,7 @@ class StageError(ArmwrightError, ValueError):
     """
 
     def __init__(self, stage: int, obstacle: Obstacle) -> None:
-        """Keep the place; the text is the reason."""
+        """Keep the obstacle; the text is its reason."""
         self.stage, self.obstacle = stage, obstacle
         super().__init__(obstacle.reason)
 
@@ -143,23 +143,23 @@ class StageError(ArmwrightError, ValueError):
 def plan(arm: AnyArm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Manner) -> list[Stage]:
     """Plan the stages of one move, each beginning where the last one ended.
 
-    A point-to-point stage has up to eight postures to end in. The nearest comes first; when no straight line
-    can go on from it, the next nearest is tried. What stops a line is gone round, where ``manner`` asks for that, only
-    when no posture has straight lines for the whole move.
+    A point-to-point stage has up to eight configurations to end in. The nearest comes first; when no straight line
+    can go on from it, the next nearest is tried. What stops a line is bypassed, where ``manner`` asks for that, only
+    when no configuration has straight lines for the whole move.
 
     Args:
-        arm: any arm, or a compiled one, which plans faster; with a closed-form inverse all its postures are known,
-            without one those that are found.
+        arm: any arm, or a compiled one, which plans faster; with a closed-form inverse all its configurations are
+            known, without one those that are found.
         q_start: (n,) present joint positions.
         goals: the stages.
-        manner: speed, deviation, servo period, ways round.
+        manner: speed, deviation, servo period, detours.
 
     Returns:
         One planned stage per goal.
 
     Raises:
-        StageError: a stage cannot be made from any posture; it names the first obstacle of the nearest one, on a
-            straight line also where a way round was looked for in vain.
+        StageError: a stage cannot be made from any configuration; it names the first obstacle of the nearest one, on a
+            straight line also where a detour was searched for in vain.
         InvalidValueError: speed or deviation are out of range.
         IncapableArmError: the arm cannot make such a motion, wherever it leads.
     """
@@ -177,7 +177,7 @@ def plan(arm: AnyArm, q_start: ArrayLike, goals: Sequence[StageGoal], manner: Ma
 
 
 def _worth_looking(arm: AnyArm, goals: Sequence[StageGoal]) -> bool:
-    """Whether there is a line that could be gone round, and every pose can be taken in some posture."""
+    """Whether there is a line that could be bypassed, and every pose can be taken in some configuration."""
     poses = [X for goal in goals for X in goal.poses]
     return any(goal.kind == "LINE" for goal in goals) and all(
         np.abs(X[:3, 3]).max() <= _FARTHEST and inverse(solver_of(arm).arm, X).allowed for X in poses
@@ -198,7 +198,7 @@ def _plan(arm: AnyArm, q: Array, goals: Sequence[StageGoal], manner: Manner, num
 
 
 def _ways(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, number: int) -> Iterator[Stage]:
-    """Give the ways to make one stage, best first: one per posture for point to point, else one."""
+    """Give the paths to make one stage, best first: one per configuration for point to point, else one."""
     poses = of_shape(goal.poses, (4, 4), "poses")
     far = np.abs(poses[:, :3, 3]).max(axis=-1)
     if far.max() > _FARTHEST:
@@ -249,7 +249,7 @@ def _along(arm: AnyArm, path: Path, q: Array, goal: StageGoal, manner: Manner) -
 
 
 def _on_the_way(arm: AnyArm, path: Path, error: PathError) -> Obstacle:
-    """Return what stops the arm on a path, with its place."""
+    """Return what stops the arm on a path, with its position."""
     ends = path.poses[error.segment : error.segment + 2]
     return Obstacle(
         cause=error.cause,
@@ -271,14 +271,14 @@ def _at_pose(cause: Cause, reason: str, pose: int, X: Array) -> Obstacle:
 
 
 def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle: Obstacle) -> Stage | None:
-    """Return the stage that goes round what stops a line; None where that is not asked for, or there is no way."""
+    """Return the stage that bypasses what stops a line; None where that is not asked for, or there is no path."""
     if manner.around is None or goal.kind != "LINE" or obstacle.certain:
         return None
     X, Y = solver_of(arm).forward(q), goal.poses[0]
     try:
         detour = line_or_detour(arm, q, Y, method=manner.around, deviation=manner.deviation, speed=manner.speed)
     except (PathError, IncapableArmError):
-        # No way was found, or none on which the joints could hold the arm up.
+        # No path was found, or none on which the joints could hold the arm up.
         return None
     legs = joined(detour.legs).on_ticks(manner.period) if detour.legs else None
     trajectory = whole_ticks(detour.trajectory, manner.period)
@@ -299,17 +299,17 @@ def _way_round(arm: AnyArm, q: Array, goal: StageGoal, manner: Manner, obstacle:
 
 
 def _length(poses: Array) -> float:
-    """Return the length of the straight ways from pose to pose (k, 4, 4) [m]."""
+    """Return the length of the straight segments from pose to pose (k, 4, 4) [m]."""
     return float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=-1).sum())
 
 
 def hand_length(arm: AnyArm, trajectory: Trajectory) -> float:
-    """Return the length of the way of the hand, looked at often enough for a smooth one [m]."""
+    """Return the length of the path of the tool, sampled often enough for a smooth one [m]."""
     return _length(solver_of(arm).forward(trajectory(np.linspace(0.0, trajectory.duration, _LOOKS))))
 
 
 def _configurations(arm: AnyArm, X: Array, q: Array, number: int) -> list[Array]:
-    """Return the postures inside the limits that reach a pose, whole turns included, nearest first."""
+    """Return the configurations inside the limits that reach a pose, revolutions included, nearest first."""
     model = solver_of(arm).arm
     solution = inverse(model, X, q)
     if not solution.allowed:

@@ -37,7 +37,7 @@ def derivative(terms: Array, order: int) -> Array:
 
 
 def shifted(terms: Array, shift: Array) -> Array:
-    """Return the coefficients of the same polynomials around places ``by`` (m,)."""
+    """Return the coefficients of the same polynomials around positions ``by`` (m,)."""
     count = terms.shape[1]
     moved = np.zeros_like(terms)
     for power in range(count):
@@ -105,10 +105,10 @@ def peaks(terms: Array, lengths: Array) -> Array:
 
 
 def turning_times(terms: Array, lengths: Array) -> list[Array]:
-    """Return times (m, n) inside the segments among which are all at which a polynomial turns back.
+    """Return times (m, n) inside the segments among which are all at which a polynomial reverses.
 
     A polynomial whose slope has no two Bernstein coefficients of opposite signs rises or falls all along, and is not
-    looked at further.
+    sampled further.
     """
     segments, count, joints = terms.shape
     if count < 3:
@@ -167,8 +167,8 @@ def _of_parabola(rows: Array) -> Array:
 def _eigenvalues(rows: Array) -> Array:
     """Return the real parts (r, d) of the roots, the eigenvalues of companion matrices.
 
-    Two roots that meet may come out as a pair of complex numbers around their place, so no imaginary part is too
-    large: whatever is found is only a place to look at.
+    Two roots that meet may come out as a pair of complex numbers around their position, so no imaginary part is too
+    large: whatever is found is only a position to sample.
     """
     degree = rows.shape[1] - 1
     companions = np.zeros((len(rows), degree, degree))

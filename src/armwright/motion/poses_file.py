@@ -1,4 +1,4 @@
-"""Poses in a file: where the hand should pass, and when."""
+"""Poses in a file: where the tool should pass, and when."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class PosesFile:
         names: of the poses.
         poses: (k, 4, 4), their rotations exact.
         times: (k,) when they are passed [s]; None where the file does not say.
-        blend: (k,) how long before and after each pose the way is bent [s]; None where the file does not say.
+        blend: (k,) how long before and after each pose the path is bent [s]; None where the file does not say.
         lines: (k) of the file, from 1, on which each pose begins.
         notes: what is worth a word: rotations that were typed with few digits.
     """
@@ -93,7 +93,7 @@ def read_poses(path: Path | str) -> PosesFile:
 
 
 def _time(table: Table, before: list[float | None], *, timed: bool) -> float | None:
-    """Read when a pose is passed: all of them tell it, from 0 and rising, or none."""
+    """Read when a pose is passed: all of them report it, from 0 and rising, or none."""
     if not timed:
         if "time_s" in table:
             raise table.error("time_s", "the first pose has none; give it to all poses or to none")

@@ -55,7 +55,7 @@ def shortest_duration(arm: Arm, way: ArrayLike) -> float:
 
 
 def point_to_point(arm: Arm, q_start: ArrayLike, q_goal: ArrayLike, speed: float = 100.0) -> Trajectory:
-    """Return the quintic from one posture to another, timed by the joint limits.
+    """Return the quintic from one configuration to another, timed by the joint limits.
 
     Args:
         arm: the arm, with n joints.

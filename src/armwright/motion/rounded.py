@@ -2,7 +2,7 @@
 
 Every corner is rounded by Paul's blend: where one leg is left and the next is met, the rates of position and of the
 rotation vector go over from those of the one to those of the other by 3 h² - 2 h³, h from 0 to 1. So the path has a
-continuous second derivative, stays in the triangle of its corner, bends there one way only, and is on the legs
+continuous second derivative, stays in the triangle of its corner, bends there in one direction only, and is on the legs
 themselves between the corners. It misses the pose by 3/16 of the half-width of the blend times the change of the rate,
 so a bound of that bounds the width. The joints are solved along this path, which has no time yet; ``timing_law`` gives
 it one.
@@ -40,12 +40,12 @@ from armwright.motion.trajectory import Trajectory
 from armwright.motion.trapezoidal_profile import shortest_trapezoid
 from armwright.spatial.rotations import rotation_vector
 
-# The joints keep the hand so many times nearer to the rounded path than to a single line: a line may be off by its
+# The joints keep the tool so many times nearer to the rounded path than to a single line: a line may deviate by its
 # deviation anywhere, a path with corners only at these.
 _CLOSER = 50.0
-# Nearer than this they are kept only where the corners ask for it [m]: no encoder tells so little.
+# Nearer than this they are kept only where the corners ask for it [m]: no encoder reports so little.
 _NEAREST = 1e-7
-# In the middle third of a leg the hand is no farther from it than this [m], and than this part of the corner.
+# In the middle third of a leg the tool is no farther from it than this [m], and than this part of the corner.
 _MIDDLE, _MIDDLE_PART = 5e-4, 0.1
 # Poses nearer to the one before than this part of what a corner may miss are passed with it.
 _TOGETHER = 0.0125
@@ -67,7 +67,7 @@ class Rounded:
 
     Attributes:
         motion: of the joints, at rest at both ends; position, speed and acceleration are continuous. Its certificate
-            tells how far the hand is from the straight legs, and from the orientations on them.
+            bounds how far the tool is from the straight legs, and from the orientations on them.
         stops: why it stops at every pose, where no run without a stop was as fast; else empty.
         stopped_by: what keeps the arm from following rounded corners, where it stops at every pose for that.
     """
@@ -94,7 +94,7 @@ class _Legs(NamedTuple):
         poses: (k, 4, 4).
         numbers: (k,) which of the poses that were given they are.
         lengths: (k - 1,) as ``Path.lengths`` counts them [m].
-        speeds: (k - 1,) of the hand on them, by the report's rule [m/s].
+        speeds: (k - 1,) of the tool on them, by the report's rule [m/s].
         bend: (k - 2,) change of the rate of position at the corners, per length.
         twist: (k - 2,) change of the rate of the rotation vector, per length [rad/m].
     """
@@ -123,9 +123,9 @@ class _Task(NamedTuple):
         q_start: (n,) present joint positions.
         deviation: of a single line [m].
         speed: 1 to 120.
-        closer: how near the joints keep the hand to its rounded path [m].
+        closer: how near the joints keep the tool to its rounded path [m].
         off: how far the path may be off besides what the corners ask for [m].
-        allowed: how far the hand may be from the straight legs; of a blend, what follows from its width.
+        allowed: how far the tool may be from the straight legs; of a blend, what follows from its width.
     """
 
     arm: AnyArm
@@ -157,12 +157,12 @@ def rounded_move(
 
     Args:
         arm: the arm, or a compiled one; its ``reach`` and ``tool_speed`` scale the speed.
-        path: begins where the hand is at ``q_start``; equal poses one after the other count once.
+        path: begins where the tool is at ``q_start``; equal poses one after the other count once.
         q_start: (n,) present joint positions.
-        deviation: what a single line may be off [m]; here the joints keep the hand 50 times nearer to its path. No
+        deviation: what a single line may be off [m]; here the joints keep the tool 50 times nearer to its path. No
             more than ``COARSE`` is used.
         speed: 1 to 120, 100 is normal.
-        corner: how far the hand may be from the straight legs, and pass a pose, at most [m]; the orientation may be
+        corner: how far the tool may be from the straight legs, and pass a pose, at most [m]; the orientation may be
             off by ``ROTATION_PER_METRE`` times as many radians. In the middle third of a leg it is within a tenth of
             that, and within 0.5 mm. Such a run is never slower than the legs one by one.
         blend: instead of it, how far from a pose its rounding may begin [m]; where a leg is short, at its middle.
@@ -212,7 +212,7 @@ def _without_stop(task: _Task) -> Rounded:
 def _never_slower(task: _Task) -> Rounded:
     """Return the run past the corners, or that with stops where it is faster or the only one.
 
-    Beside a singularity a joint may be too fast: the timing slows the hand there, no further than stops would.
+    Beside a singularity a joint may be too fast: the timing slows the tool there, no further than stops would.
     """
     stops = _Stops(task)
     try:
@@ -266,7 +266,7 @@ def _widths(legs: _Legs, half: Array, corner: float, line_deviation: float) -> A
     Args:
         legs: the legs.
         half: (k - 2,) of the shorter leg at each corner.
-        corner: how far the hand may be from the legs [m].
+        corner: how far the tool may be from the legs [m].
         line_deviation: which part of that is spent otherwise [m].
     """
     change = np.maximum(legs.bend, legs.twist / ROTATION_PER_METRE)
@@ -289,7 +289,7 @@ def _tightened(task: _Task, most: float) -> tuple[CertifiedMotion, float]:
 
     Args:
         task: what is to be planned.
-        most: how many times as fast as it may a joint may have to be at the full speed of the hand.
+        most: how many times as fast as it may a joint may have to be at the full speed of the tool.
     """
     for attempt in range(_TRIES):
         widths = task.widths / _TIGHTER**attempt

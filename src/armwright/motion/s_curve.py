@@ -1,4 +1,4 @@
-"""The fraction of a way over time: speed up and down by ramps whose acceleration is a trapezoid, even between."""
+"""The fraction of a path over time: speed up and down by ramps whose acceleration is a trapezoid, even between."""
 
 from __future__ import annotations
 

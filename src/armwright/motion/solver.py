@@ -25,7 +25,7 @@ class Solver(NamedTuple):
         arm: the arm.
         forward: tool poses (..., 4, 4) of q (..., n).
         inverse_dynamics: efforts (..., n) of q, qd, qdd (..., n).
-        inverse_branches: the eight postures of poses, see ``kinematics.inverse``; None without a closed form.
+        inverse_branches: the eight configurations of poses, see ``kinematics.inverse``; None without a closed form.
     """
 
     arm: Arm

@@ -22,7 +22,7 @@ from armwright.motion.straight_path import StraightPath, line
 from armwright.motion.tolerance import Tolerance, tolerance
 from armwright.motion.tracking import Task, check_velocities, path_error, track
 
-# Part of the time in which the hand gathers speed, and again in which it loses it, by the speed that is asked for.
+# Part of the time in which the tool gathers speed, and again in which it loses it, by the speed that is asked for.
 _RAMP = 0.25
 # Of an allowed deviation of a line in a program no more is used than the first of these that it allows and with which
 # the line can be run [m].
@@ -41,18 +41,18 @@ def straight_line(
     speed: float = 100.0,
     period: float | None = None,
 ) -> CertifiedMotion:
-    """Plan a straight line of the hand and certify it.
+    """Plan a straight line of the tool and certify it.
 
-    Knots are solved on the line and joined by an X-spline in joint space; where the hand strays too far between two of
+    Knots are solved on the line and joined by an X-spline in joint space; where the tool strays too far between two of
     them, more are put in. This path of the joints is run as fast as their limits of speed and acceleration and the
-    speed of the hand allow, and all of it slower where an effort would pass its limit.
+    speed of the tool allow, and all of it slower where an effort would pass its limit.
 
     Args:
         arm: an arm, or a compiled one, which plans some five times faster.
         q_start: (n,) present joint positions [rad] or [m].
         X_goal: (4, 4) pose at the end of the line.
-        deviation: allowed distance of the hand from the line [m].
-        turn: allowed angle from the orientation that belongs to the position of the hand on the line, and to its
+        deviation: allowed distance of the tool from the line [m].
+        turn: allowed angle from the orientation that belongs to the position of the tool on the line, and to its
             progress on it [rad]; 5 mrad for each mm of the deviation when left out. On a line shorter than the
             deviation the progress alone counts.
         speed: 1 to 120, 100 is normal: by the report's rule, as a LINE of the robot language has it.
@@ -62,8 +62,9 @@ def straight_line(
         The motion, at rest at both ends, and its certificate.
 
     Raises:
-        PathError: a pose of the line is out of reach, a joint passes a limit, the posture would have to change on the
-            way, or a singularity keeps the hand from staying within the deviation; with the place and the cause.
+        PathError: a pose of the line is out of reach, a joint passes a limit, the configuration would have to change
+            on the path, or a singularity keeps the tool from staying within the deviation; with the position and the
+            cause.
         InvalidValueError: deviation, turn or speed are out of range.
         IncapableArmError: gravity alone takes more than a joint may give, or the arm has no reach or tool speed.
     """
@@ -87,7 +88,7 @@ def certified_line(
         arm: as for ``straight_line``, as are the others that are not named here.
         q_start: the same.
         X_goal: the same.
-        allowed: how far the hand may be from the line.
+        allowed: how far the tool may be from the line.
         speed: the same.
         period: the same.
         diagnose: whether it is searched for what really stops a line: not for those who try many lines.
@@ -117,7 +118,7 @@ def coarse_line(
 ) -> CertifiedMotion:
     """Return the line of a program: kept closer than asked where that is no obstruction, run even by a weak arm.
 
-    More than a millimetre is not used but where a line can be run for it; more than 5 mm would only rotate the hand.
+    More than a millimetre is not used but where a line can be run for it; more than 5 mm would only rotate the tool.
 
     Raises:
         PathError: as for ``straight_line``.
@@ -147,7 +148,7 @@ def asked_line(arm: Arm, A: Array, B: Array, speed: float) -> StraightPath | Non
 
 
 def even_time(arm: Arm, A: Array, B: Array, speed: float) -> float | None:
-    """Return how long a line takes at its full speed all the way [s]; None where it has no length.
+    """Return how long a line takes at its full speed throughout [s]; None where it has no length.
 
     Raises:
         InvalidValueError: the speed is out of range.
@@ -172,7 +173,7 @@ def _knots(arm: Arm, motion: StraightPath, allowed: Tolerance) -> Array:
 
 
 def _asked_time(even: float, t: Array) -> Array:
-    """Return when times of a line at even speed are passed where the hand gathers speed first, and loses it, evenly.
+    """Return when times of a line at even speed are passed where the tool gathers speed first, and loses it, evenly.
 
     Args:
         even: the duration at even speed [s].

@@ -1,4 +1,4 @@
-"""Straight ways of the hand over time: one line at even speed, or several past frames as the report times them."""
+"""Straight segments of the tool over time: one line at even speed, or several past frames as the report times them."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ Ways: TypeAlias = npt.NDArray[np.intp]
 
 @attrs.frozen(kw_only=True, eq=False)
 class StraightPath:
-    """A motion of the hand along straight ways from pose to pose.
+    """A motion of the tool along straight segments from pose to pose.
 
-    The distance of a hand from it is that from its way, wherever on it the hand should be. The orientation is held
+    The distance of a tool from it is that from its segment, wherever on it the tool should be. The orientation is held
     against that which belongs to the time, and on a single line against that which belongs to the position nearest to
-    the hand as well: a hand that is late while it turns would otherwise be turned too far for where it is. On a line
+    the tool as well: a tool that is late while it rotates would otherwise be rotated too far for where it is. On a line
     shorter than ``near`` every position is near enough, and the time alone counts.
 
     Attributes:
-        poses: (k + 1, 4, 4) at which ways begin and end.
-        rotations: (k, 3) rotation vector of each way, in the axes at its start [rad].
+        poses: (k + 1, 4, 4) at which segments begin and end.
+        rotations: (k, 3) rotation vector of each segment, in the axes at its start [rad].
         corners: (k + 1,) when the poses are passed, from 0 [s].
-        progress: on which way, from 0, and at which fraction of it, as one number over time.
-        numbers: (k) which ways of the path that was asked for they are, without those of no length.
+        progress: on which segment, from 0, and at which fraction of it, as one number over time.
+        numbers: (k) which segments of the path that was asked for they are, without those of no length.
         near: positions on the line that are so near are all the same [m].
     """
 
@@ -62,7 +62,7 @@ class StraightPath:
 
     @property
     def shifts(self) -> Array:
-        """From the start to the end of each way, (k, 3) [m]."""
+        """From the start to the end of each segment, (k, 3) [m]."""
         return np.asarray(np.diff(self.poses[:, :3, 3], axis=0))
 
     def __call__(self, t: Array) -> Array:
@@ -71,7 +71,7 @@ class StraightPath:
         return self.at(way, fraction)
 
     def at(self, way: npt.ArrayLike, fraction: Array) -> Array:
-        """Return the poses (k, 4, 4) at fractions (k,) of ways (k,), or of one way."""
+        """Return the poses (k, 4, 4) at fractions (k,) of segments (k,), or of one segment."""
         way = np.broadcast_to(way, fraction.shape)
         X = np.zeros((len(fraction), 4, 4))
         X[:, :3, :3] = (self.poses[way, None, :3, :3] @ rotated(self.rotations[way], fraction[:, None]))[:, 0]
@@ -80,36 +80,36 @@ class StraightPath:
         return X
 
     def _way(self, t: Array) -> Ways:
-        """Return the numbers of the ways (...) at times (...)."""
+        """Return the numbers of the segments (...) at times (...)."""
         return np.asarray(np.clip(np.searchsorted(self.corners, t, side="right") - 1, 0, len(self.numbers) - 1))
 
     def _along(self, t: Array) -> tuple[Ways, Array]:
-        """Return the numbers of the ways (...) at times (...), and the fractions of them."""
+        """Return the numbers of the segments (...) at times (...), and the fractions of them."""
         way = self._way(t)
         return way, self.progress(t)[..., 0] - way
 
     def where(self, t: float) -> tuple[int, float, str]:
-        """Return on which way a time is, at which fraction of it, and that in words."""
+        """Return on which segment a time is, at which fraction of it, and that in words."""
         way, fraction = (each[0] for each in self._along(np.array([t])))
         return self.numbers[way], float(np.clip(fraction, 0.0, 1.0)), f"on the line near {self.position_text(t)}"
 
     def position_text(self, t: float) -> str:
-        """Return where the hand is at a time, in words, seen from the base of the arm."""
+        """Return where the tool is at a time, in words, seen from the base of the arm."""
         x, y, z = self(np.array([t]))[0, :3, 3] * 1e3
         return f"({x:.1f}, {y:.1f}, {z:.1f}) mm from the base"
 
     def bounds(self, times: Array, hand: HandBounds) -> ErrorBounds:
-        """Return bounds of the error on the intervals between times: the distance from a straight way is convex."""
+        """Return bounds of the error on the intervals between times: the distance from a straight segment is convex."""
         way, rate, change = self._rates(times)
         angle = np.linalg.norm(self.rotations[way], axis=-1)
         spin = spin_bound(hand, angle * change, angle * rate)
         if self._by_position:
-            # As an estimate the hand moves along the line as was planned; ``error`` does without.
+            # As an estimate the tool moves along the line as was planned; ``error`` does without.
             spin = np.maximum(spin, spin_bound(hand, angle * hand.pull / self._length, angle * rate))
         return ErrorBounds(hand.pull, spin)
 
     def error(self, samples: HandSamples) -> TrackingError:
-        """Return how far a sampled hand is from its ways."""
+        """Return how far a sampled tool is from its segments."""
         way, rate, change = self._rates(np.append(samples.times[:, 0], samples.times[-1, -1]))
         p_A, R_A, shift = self.poses[way, :3, 3], self.poses[way, None, :3, :3], self.shifts[way]
         come = samples.poses[..., :3, 3] - p_A[:, None]
@@ -147,7 +147,7 @@ class StraightPath:
         return len(self.numbers) == 1 and self._length > self.near
 
     def _rates(self, times: Array) -> tuple[Ways, Array, Array]:
-        """Return of intervals (m,) between times: the way, and upper bounds of the rate of progress and its change.
+        """Return of intervals (m,) between times: the segment, and upper bounds of the rate of progress and its change.
 
         Each lies within one cubic of the progress, whose second derivative is largest at an end of the interval.
         """
@@ -165,12 +165,12 @@ class StraightPath:
 
 
 def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> StraightPath:
-    """Return the straight line of the hand from A to B.
+    """Return the straight line of the tool from A to B.
 
     Args:
         A: (4, 4) pose at the start.
         B: (4, 4) pose at the end.
-        even: how long it takes at full speed all the way [s].
+        even: how long it takes at full speed throughout [s].
         near: as for ``StraightPath``.
         ramp: part of the duration that gathers speed, and that loses it again; at full speed from end to end if 0.
     """
@@ -187,12 +187,12 @@ def line(A: Array, B: Array, even: float, *, near: float, ramp: float = 0.0) -> 
 
 
 def report_path(arm: Arm, path: Path, *, deviation: float, speed: float, finer: int = 1) -> StraightPath:
-    """Return the straight ways of a path, run past its corners without a stop as the report's rule times them.
+    """Return the straight segments of a path, run past its corners without a stop as the report's rule times them.
 
     Args:
         arm: the arm; its ``reach`` and ``tool_speed`` scale the speed.
-        path: the ways; those without length are left out.
-        deviation: that the rule places knots for [m].
+        path: the segments; those without length are left out.
+        deviation: that the rule sets knots for [m].
         speed: 1 to 120.
         finer: how many times more knots than the rule asks for.
 
@@ -219,10 +219,10 @@ def report_path(arm: Arm, path: Path, *, deviation: float, speed: float, finer: 
 
 
 def _backward(along: Array, between: Array) -> float:
-    """Return how far a hand at most runs back along its line, from samples (m, k) [m] and what lies between (m,)."""
+    """Return how far a tool at most runs back along its line, from samples (m, k) [m] and what lies between (m,)."""
     farthest = np.maximum.accumulate(along.ravel()).reshape(along.shape)
     back = (farthest - along).max(axis=1)
-    # Between two samples the hand is off the chord by so much at most, before it turns back and after. Where the chord
-    # rises by four times that, the hand never turns back.
+    # Between two samples the tool is away from the chord by so much at most, before it reverses and after. Where the
+    # chord rises by four times that, the tool never reverses.
     rising = np.diff(along, axis=1).min(axis=1) > 4 * between
     return float(np.where(rising & (back <= 0), 0.0, back + 2 * between.max()).max())

@@ -1,4 +1,4 @@
-"""Through frames without a stop, as the report moves: knots on the straight ways, and an X-spline of the joints."""
+"""Through frames without a stop, as the report moves: knots on the straight segments, and an X-spline of the joints."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from armwright.motion.tolerance import tolerance
 from armwright.motion.tracking import Task, check_velocities, excess, path_error, too_far, track
 
 # The report's path through several frames turns its corners without a stop, so it must round them; and it is gross
-# motion. It may leave the straight ways between its frames by this many times what a line may leave its own.
+# motion. It may leave the straight segments between its frames by this many times what a line may leave its own.
 _CORNERS = 20.0
 # How often the steps of the report's rule are halved at most.
 _HALVINGS = 6
@@ -29,15 +29,15 @@ def through_frames(
 ) -> CertifiedMotion:
     """Return the joint motion of the tool through frames, from rest to rest, without a stop at those between.
 
-    Knots lie on the straight ways from frame to frame, as densely as the report's rule asks and the bound needs, and
-    one X-spline joins their joint positions. At each frame between it passes exactly, and swings about the straight
-    ways beside it: a MOVE with VIA of RLO-2 keeps to closer bounds.
+    Knots lie on the straight segments from frame to frame, as densely as the report's rule asks and the bound needs,
+    and one X-spline joins their joint positions. At each frame between it passes exactly, and swings about the straight
+    paths beside it: a MOVE with VIA of RLO-2 keeps to closer bounds.
 
     Args:
         arm: the arm, with n joints, or a compiled one, which plans faster.
         q_start: (n,) joint positions at the start [rad] or [m].
         frames: (k, 4, 4) tool poses in the base frame, two or more; a rotation typed with two digits is made exact.
-        deviation: allowed distance of the tool from a single straight way [m]; twenty times as much about corners.
+        deviation: allowed distance of the tool from a single straight segment [m]; twenty times as much about corners.
         speed: 1 to 120, 100 is normal.
 
     Returns:
@@ -47,7 +47,7 @@ def through_frames(
     Raises:
         KindError: ``arm`` is no arm, or an argument something else than real numbers.
         ShapeError: a shape does not fit, or there are fewer than two frames.
-        PathError: a frame is out of reach, a joint passes a limit, or a singularity is in the way.
+        PathError: a frame is out of reach, a joint passes a limit, or a singularity is in the path.
         InvalidValueError: a frame is no pose; deviation or speed are out of range.
 
     Source:

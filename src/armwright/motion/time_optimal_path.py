@@ -53,9 +53,10 @@ class TimeOptimal:
         arm: the arm.
         trajectory: on exactly the same path, from rest to rest; accelerations jump.
         duration_before: of the motion that gave the path [s]; None where knots did.
-        stops: number of places on the way at which the arm stands: corners of the path, and rests of a given motion.
+        stops: number of positions on the path at which the arm stands: corners of the path, and rests of a given
+            motion.
         peaks: of each limit the largest value of every joint, (n,): speeds and accelerations exactly, efforts at the
-            looks of ``effort_peaks``.
+            samples of ``effort_peaks``.
         bindings: which limit of which joint binds for which share of the time, largest share first.
         factor: how many times slower it is than the run on the grid, so that the limits hold in between as well.
     """
@@ -75,7 +76,7 @@ class TimeOptimal:
     def __str__(self) -> str:
         """Say it in a few lines."""
         before = "" if self.duration_before is None else f" instead of {self.duration_before:.3f} s"
-        stops = f", with {self.stops} stops on the way" if self.stops else ""
+        stops = f", with {self.stops} stops on the path" if self.stops else ""
         lines = [f"{self.trajectory.duration:.3f} s{before}{stops}"]
         lines += [
             f"{binding.share:.0%} of the time: {binding.limit} of {self.arm.called(binding.joint)}"
@@ -94,10 +95,10 @@ def time_optimal(
 ) -> TimeOptimal:
     """Return the fastest run along a path of the joints, from rest to rest, inside all limits.
 
-    Only the places of a given motion count, not its times. With s' the speed along the path, the largest s' is found
+    Only the points of a given motion count, not its times. With s' the speed along the path, the largest s' is found
     that keeps the limits on a grid, s'' constant between its points; q(s(t)) is then a polynomial of twice the degree
-    on every interval, on exactly the same path. By what the limits are still passed between the places that were
-    looked at, all of it is run slower. Accelerations jump: let the servo smooth them, or allow it less than it can.
+    on every interval, on exactly the same path. By what the limits are still passed between the positions that were
+    sampled, all of it is run slower. Accelerations jump: let the servo smooth them, or allow it less than it can.
 
     Args:
         arm: the arm, or a compiled one, which is faster on fine grids.

@@ -1,10 +1,10 @@
 """How fast to run along a path of the joints: as fast as limits allow, with continuous acceleration.
 
 The path is a trajectory q(s) whose second derivative is continuous; what it calls time is a mere parameter s. First
-the fastest run on a grid is found, whose s'' is constant from one place of the grid to the next. Then s(t) is averaged
-over a moving window of time, which leaves a cubic on each piece and makes s'' continuous, from rest to rest. Where
-averaging has carried the joints over a limit, the limit is drawn tighter there and the run is found again. The result
-q(s(t)) is a polynomial on each piece, of exactly the same path.
+the fastest run on a grid is found, whose s'' is constant from one position of the grid to the next. Then s(t) is
+averaged over a moving window of time, which leaves a cubic on each piece and makes s'' continuous, from rest to rest.
+Where averaging has carried the joints over a limit, the limit is drawn tighter there and the run is found again. The
+result q(s(t)) is a polynomial on each piece, of exactly the same path.
 
 What averaging costs grows with the window. The window is as long as a small part of the shortest time allows, and the
 run takes just that part more: so the duration depends on the path as the shortest one does, and not on how well a
@@ -37,12 +37,12 @@ _ROUNDS = 4
 # The grid has so many intervals for each one between two knots of the path, on which its curvature hardly changes: the
 # more, the fewer knots there are, so that there are some so many in all.
 _FINER, _ENOUGH = 4, 400
-# Parts of an interval where its bounds are kept, and parts of a piece where the limits are looked at.
+# Parts of an interval where its bounds are kept, and parts of a piece where the limits are sampled.
 _PARTS, _SEEN = (0.0, 0.5, 1.0), (0.0, 0.25, 0.5, 0.75, 1.0)
 # Two breaks nearer than this part of the duration are one; halvings to find where a knot is passed,
 # to this part of the piece.
 _SAME, _HALVINGS, _CONVERGED = 1e-10, 60, 1e-12
-# A place on the path is found in time to this part of a piece.
+# A position on the path is found in time to this part of a piece.
 _LOOKED_UP = 1001
 # So that rounding does not make a run too long that is just short enough.
 _HAIR = 1e-9
@@ -108,13 +108,13 @@ class _Grid(NamedTuple):
 
 
 class _Run(NamedTuple):
-    """A run of which the limits have been looked at.
+    """A run of which the limits have been sampled.
 
     Attributes:
         path: of the joints.
         times: (p + 1,) when its p pieces begin, and the last one ends [s].
         intervals: (p,) on which interval of the path each is.
-        law: (p, 4) coefficients of the way on that interval by the time since the piece began.
+        law: (p, 4) coefficients of the path on that interval by the time since the piece began.
         uses: (p, 1 + 2 n) the largest part of its limits that each piece uses: the speed on the path, the speeds and
             the roots of the accelerations of the joints.
     """
@@ -132,7 +132,7 @@ class _Run(NamedTuple):
 
     @property
     def slowing(self) -> float:
-        """How many times slower all must run to keep the limits where they were looked at."""
+        """How many times slower all must run to keep the limits where they were sampled."""
         return max(1.0, float(self.uses.max()))
 
     @property
@@ -195,7 +195,7 @@ def _bounds(arm: Arm, path: Trajectory, caps: Array) -> Bounds:
     for part in _PARTS:
         length = (part * lengths)[:, None]
         rate, bend = evaluate(rates, length), evaluate(bends, length)
-        # At this part of the segment x has grown by 2 u times the way.
+        # At this part of the segment x has grown by 2 u times the path.
         for on_u, on_x in (
             (0.0, 1 / caps[:, None] ** 2),
             (0.0, (rate / speed) ** 2),

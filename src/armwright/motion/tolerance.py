@@ -10,7 +10,7 @@ from armwright.errors import InvalidValueError
 
 # No bound closer than this can be certified: rounding and the solution of poses take up what is left [m], [rad].
 CLOSEST = 1e-9
-# Where the position may be off by a millimetre the orientation may be off by 5 mrad [rad/m].
+# Where the position may deviate by a millimetre the orientation may deviate by 5 mrad [rad/m].
 ROTATION_PER_METRE = 5.0
 
 

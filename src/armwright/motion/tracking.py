@@ -1,9 +1,9 @@
-"""Joints that follow a motion of the hand, with a bound on how far the hand leaves it.
+"""Joints that follow a motion of the tool, with a bound on how far the tool leaves it.
 
-The joints are solved at knots, each configuration next to the one before it, and joined by an X-spline. Where the hand
+The joints are solved at knots, each configuration next to the one before it, and joined by an X-spline. Where the tool
 is too far off between two knots, more are put: the error of a spline falls with the fourth power of the step. What
 stops the arm is returned and not raised, as whoever tries several branches goes on with the next; where there is doubt
-about it, the way is followed once more in small steps.
+about it, the path is followed once more in small steps.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ from armwright.motion.xspline_path import smooth_weight, xspline
 _ROUNDS, _CLOSER, _PARTS = 12, 1.1, 8
 # Where knots are this part of the duration apart and a joint is still too fast, more of them do not help.
 _SHORT = 64
-# Where the hand does stay on its path a joint may have to be this much faster yet: only there is the hand slowed.
+# Where the tool does stay on its path a joint may have to be this much faster yet: only there is the tool slowed.
 _TRACKED = 1.5
-# Whole turns; a limit passed by this part of one is not passed.
+# Revolutions; a limit passed by this part of one is not passed.
 _TURN, _NONE = 2 * np.pi, 1e-9
 
 
@@ -57,13 +57,13 @@ class Task(NamedTuple):
 
     Attributes:
         solver: the arm, with n joints.
-        motion: of the hand.
+        motion: of the tool.
         q_start: (n,) joint positions at its start.
-        tolerance: how far the hand may be from it.
+        tolerance: how far the tool may be from it.
         diagnosis: how far it may be off where it is searched for what stops the arm.
         rest: whether the joints rest at both ends; otherwise they run on as the motion does.
         smooth: whether their acceleration is continuous; otherwise the spline is the report's.
-        whole_turns: whether joints may start whole turns away, to be inside their limits later.
+        whole_turns: whether joints may start revolutions away, to be inside their limits later.
         clock: when times of the motion are passed at the speed that is asked for [s], where a motion is timed later;
             None where limits and speeds do not stop the arm when it is searched for what does.
         max_slowdown: how many times as fast as it may a joint may have to be, before more knots are put for it.
@@ -87,11 +87,11 @@ class Task(NamedTuple):
 
 
 class Tracking(NamedTuple):
-    """A motion of the joints that follows a motion of the hand.
+    """A motion of the joints that follows a motion of the tool.
 
     Attributes:
         trajectory: of the joints.
-        error: of the hand on each interval between two knots.
+        error: of the tool on each interval between two knots.
         speed: (m, n) the largest speeds of the joints on these intervals, exactly.
         acceleration: (m, n) the same of their accelerations.
     """
@@ -103,7 +103,7 @@ class Tracking(NamedTuple):
 
 
 def track(task: Task, knots: Array, *, diagnose: bool = True) -> Tracking | Obstruction:
-    """Follow a motion of the hand with the joints.
+    """Follow a motion of the tool with the joints.
 
     Args:
         task: what is to be followed.
@@ -142,7 +142,7 @@ def too_far(task: Task, tracking: Tracking) -> Obstruction:
     jump = np.abs(q_next - q) / np.where(np.isfinite(speed), speed, 1.0)
     joint, near = int(jump.argmax()) + 1, nearest_singularity(arm, q)
     reason = (
-        f"the hand cannot be kept within {task.tolerance.position * 1e3:.3g} mm of its path: the arm is singular "
+        f"the tool cannot be kept within {task.tolerance.position * 1e3:.3g} mm of its path: the arm is singular "
         f"there ({near}), {arm.called(joint - 1)} would have to move at once"
     )
     return Obstruction("singular", time, joint, reason)
@@ -183,7 +183,7 @@ def _velocity_ratios(task: Task, trajectory: Trajectory, speed: Array) -> Array:
 
 
 def _refined(task: Task, knots: Array, guide: Diagnosis | None) -> Tracking | Obstruction:
-    """Put knots until the hand stays within the tolerance everywhere, near the configurations of a diagnosis if any."""
+    """Put knots until the tool stays within the tolerance everywhere, near the configurations of a diagnosis if any."""
     arm, configurations = task.solver.arm, None if guide is None else guide.guide
     for _ in range(_ROUNDS):
         X = task.motion(knots)
@@ -235,14 +235,14 @@ def _rate(t: Array, q: Array) -> Array:
 
 
 def _diagnosed(task: Task, diagnosis: Diagnosis) -> Obstruction | None:
-    """Return what stops the arm on the way that a diagnosis found, whole turns allowed for."""
+    """Return what stops the arm on the path that a diagnosis found, revolutions allowed for."""
     q = _whole_turns(task.solver.arm, diagnosis.q, None) if task.whole_turns else diagnosis.q
     beyond = beyond_limits(task.solver.arm, q, diagnosis.times) if task.clock is None else None
     return beyond or diagnosis.obstruction
 
 
 def _whole_turns(arm: Arm, q: Array, failed: int | None) -> Array:
-    """Turn joints by as few whole turns as bring all of their way inside the limits, where any do."""
+    """Rotate joints by as few revolutions as bring all of their path inside the limits, where any do."""
     lowest, highest = q[:failed].min(axis=0), q[:failed].max(axis=0)
     least, most = (arm.limit("lower") - lowest) / _TURN, (arm.limit("upper") - highest) / _TURN
     turns = np.where(least > _NONE, np.ceil(least), np.where(most < -_NONE, np.floor(most), 0.0))

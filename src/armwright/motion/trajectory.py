@@ -184,7 +184,7 @@ class Trajectory:
         return Trajectory(times=times, coefficients=slow.coefficients)
 
     def reversed(self) -> Trajectory:
-        """Return the way back: at time t where this motion is at the time t before its end."""
+        """Return the reversed motion: at time t where this motion is at the time t before its end."""
         signs = (-1.0) ** np.arange(self.coefficients.shape[1])
         back = shifted(self.coefficients, np.diff(self.times))[::-1] * signs[:, None]
         return Trajectory(times=self.duration - self.times[::-1], coefficients=back)

@@ -19,7 +19,7 @@ _TRIANGLE = 1e-15
 
 
 class _Limits(NamedTuple):
-    """Limits of the part of the way that has been made, and the joints that set them, from 0."""
+    """Limits of the part of the path that has been made, and the joints that set them, from 0."""
 
     speed: float
     acceleration: float
@@ -32,7 +32,7 @@ def trapezoid(
     """Return the motion that speeds up evenly, runs at constant speed and slows down evenly, from rest to rest.
 
     All joints do so together, so that they move along a straight line of the joint space; the one that needs longest
-    is at its limit. Where the way is so short that no joint reaches its speed, the trapezoid is a triangle. Its
+    is at its limit. Where the path is so short that no joint reaches its speed, the trapezoid is a triangle. Its
     acceleration jumps: the quintic's does not.
 
     Args:
@@ -85,7 +85,7 @@ def shortest_trapezoid(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike
 
     Raises:
         KindError: an argument is something else than real numbers.
-        ShapeError: the limits do not fit the way.
+        ShapeError: the limits do not fit the path.
         InvalidValueError: a number is NaN, or a limit not above 0 or missing.
     """
     limits = _limits(one_way(way), speed, acceleration)
@@ -93,7 +93,7 @@ def shortest_trapezoid(way: ArrayLike, speed: ArrayLike, acceleration: ArrayLike
 
 
 def _limits(way: Array, speed: ArrayLike, acceleration: ArrayLike) -> _Limits | None:
-    """Return how fast the part of the way from 0 to 1 may change; None where there is no way."""
+    """Return how fast the part of the path from 0 to 1 may change; None where there is no path."""
     speeds = limit_per_joint(speed, len(way), "speed")
     accelerations = limit_per_joint(acceleration, len(way), "acceleration")
     if np.abs(way).max() <= NOWHERE:

@@ -8,7 +8,7 @@ the rate at the last knot, and the step between them. It is a value: what pushes
     state, segment = push(state, q3, h)       # from q1 to q2
     segment = finish(state)                   # the last one, to rest
 
-``xspline_kernel(n).one(state, knot, step, state, segment)`` does the same from compiled loops, in place.
+``xspline_kernel(n).single(state, knot, step, state, segment)`` does the same from compiled loops, in place.
 """
 
 from __future__ import annotations
