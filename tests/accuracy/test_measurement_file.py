@@ -34,19 +34,19 @@ def read(tmp_path: Path) -> Read:
     return reading
 
 
-def values(found: Assessment) -> dict[str, float]:
+def values(assessment: Assessment) -> dict[str, float]:
     """The measures by their symbols."""
-    return {one.symbol: one.value for one in found.measures}
+    return {measure.symbol: measure.value for measure in assessment.measures}
 
 
 def test_poses(read: Read) -> None:
-    """Two poses 1 and 3 mm off: AP 2 mm; both are 1 mm from their mean, so RP is 1 mm. The plane and n are told."""
-    found = assess(read(POSE), few=True)
+    """Two poses 1 and 3 mm off: AP 2 mm; both are 1 mm from their mean: RP 1 mm. The notes name the plane and n."""
+    assessment = assess(read(POSE), few=True)
 
-    assert values(found) == pytest.approx({"AP": 2e-3, "AP_x": 2e-3, "AP_y": 0, "RP": 1e-3}, abs=1e-12)
-    assert found.planar
-    assert found.few
-    assert {(one.cycles, one.asked, one.few) for one in found.measures} == {(2, 30, True)}
+    assert values(assessment) == pytest.approx({"AP": 2e-3, "AP_x": 2e-3, "AP_y": 0, "RP": 1e-3}, abs=1e-12)
+    assert assessment.planar
+    assert assessment.few
+    assert {(measure.cycles, measure.required, measure.few) for measure in assessment.measures} == {(2, 30, True)}
 
 
 @pytest.mark.parametrize(
@@ -54,9 +54,9 @@ def test_poses(read: Read) -> None:
 )
 @pytest.mark.parametrize("angles", ["c", "b", "ac", "abc"])
 def test_angles_have_the_names_of_their_columns(read: Read, test: str, angles: str) -> None:
-    """A planar arm turns about z alone: its file has c_deg, and its measures are AP_c and RP_c, never AP_a."""
+    """A planar arm rotates about z alone: its file has c_deg, and its measures are AP_c and RP_c, never AP_a."""
     goal, turn = (",".join(x for _ in angles) for x in ("0", "0.1"))
-    columns = ",".join(f"{one}_deg" for one in angles)
+    columns = ",".join(f"{angle}_deg" for angle in angles)
     if test in {"path", "reorientation"}:
         head = f"test,path,cycle,x_mm,y_mm,{columns}"
         rows = [f"{test},L,{cycle},{x},0,{goal}" for cycle in ("commanded", "1", "2") for x in (0, 100)]
@@ -72,14 +72,14 @@ def test_angles_have_the_names_of_their_columns(read: Read, test: str, angles: s
             for cycle in (1, 2)
         ]
 
-    found = assess(read("\n".join([head, *rows, ""])), few=True)
+    assessment = assess(read("\n".join([head, *rows, ""])), few=True)
 
-    turning = {one.symbol.partition("_")[2] for one in found.measures if one.unit == "rad"}
+    turning = {measure.symbol.partition("_")[2] for measure in assessment.measures if measure.unit == "rad"}
     assert turning == set(angles)
 
 
 def test_files_of_other_angles_are_not_mixed(read: Read) -> None:
-    """A turn about z is not compared with one about x because each is the only one of its file."""
+    """A rotation about z is not compared with one about x because each is the only one of its file."""
     with pytest.raises(FileFormatError, match="other coordinates or angles"):
         read(
             "test,pose,cycle,x_mm,y_mm,c_deg\npose,P,commanded,0,0,1\n",
@@ -95,13 +95,13 @@ def test_units(read: Read) -> None:
     (test,) = read(commanded, attained)
 
     assert isinstance(test, PoseTest)
-    np.testing.assert_allclose(test.clouds[0].places, [(0.4, 0.1, 0.3)], atol=1e-5)
+    np.testing.assert_allclose(test.clouds[0].positions, [(0.4, 0.1, 0.3)], atol=1e-5)
     np.testing.assert_allclose(test.clouds[0].angles, [[np.radians(90.5)]])
     np.testing.assert_allclose(test.clouds[0].commanded_angles, [np.pi / 2], atol=1e-7)
 
 
 def test_runs(read: Read) -> None:
-    """Two runs 1 and 2 mm beside a line: AT 1.5 mm, RT 0.5 mm; without a speed nothing is said of it."""
+    """Two runs 1 and 2 mm beside a line: AT 1.5 mm, RT 0.5 mm; without a speed nothing is message of it."""
     (test,) = tests = read(RUNS)
 
     assert isinstance(test, PathTest)
@@ -130,12 +130,17 @@ def test_all_pose_tests(read: Read) -> None:
         *(f"compliance,A,-x,,,{load},1,{-load / 100},0" for load in (0, 50, 100)),
     ]
 
-    found = assess(read(head + "\n".join(rows)), few=True)
+    assessment = assess(read(head + "\n".join(rows)), few=True)
 
     expected = {"AD": 0, "RD": 0, "vAP": 3e-3, "E": 4e-3, "dAP": 8e-3, "dRP": 0, "C": 1e-5, "C_x": -1e-5, "C_y": 0}
-    assert {key: value for key, value in values(found).items() if key in expected} == pytest.approx(expected, abs=1e-9)
-    assert next(one.note for one in found.measures if one.symbol == "vAP") == "between 1 and 4"
-    assert next(one.note for one in found.measures if one.symbol == "C") == "force along -x, up to 100 N, 2 of 10 loads"
+    assert {key: value for key, value in values(assessment).items() if key in expected} == pytest.approx(
+        expected, abs=1e-9
+    )
+    assert next(measure.note for measure in assessment.measures if measure.symbol == "vAP") == "between 1 and 4"
+    assert (
+        next(measure.note for measure in assessment.measures if measure.symbol == "C")
+        == "force along -x, up to 100 N, 2 of 10 loads"
+    )
 
 
 def test_band_from_repeatability(read: Read) -> None:
@@ -145,26 +150,26 @@ def test_band_from_repeatability(read: Read) -> None:
     )
     tests = read(POSE, "test,pose,cycle,t_s,x_mm,y_mm\n" + rows)
 
-    found = assess(tests, few=True)
+    assessment = assess(tests, few=True)
 
     # From 390 to 400 mm in the second second: 399 mm after 1.9 s.
-    assert next(one.note for one in found.measures if one.symbol == "t") == "within 1 mm"
-    result = found.results[1][0]
+    assert next(measure.note for measure in assessment.measures if measure.symbol == "t") == "within 1 mm"
+    result = assessment.results[1][0]
     assert result.entered == pytest.approx([1.9] * 3)  # type: ignore[union-attr]
     assert assess(tests, few=True, band=5e-3).results[1][0].entered == pytest.approx([1.5] * 3)  # type: ignore[union-attr]
-    with pytest.raises(InvalidValueError, match="settling P1: no band is given, and no test of pose P1 is there"):
+    with pytest.raises(InvalidValueError, match="settling P1: no band is specified, and pose P1 has no test"):
         assess(tests[1:], few=True)
 
 
 def test_too_few_directions(read: Read) -> None:
-    """Two directions of approach instead of three, with all 30 cycles, are an estimate too, and it is said."""
+    """Two directions of approach instead of three, with all 30 cycles, are an estimate too, and it is message."""
     head, rows = "test,pose,direction,cycle,x_mm,y_mm\n", [(d, c) for d in (1, 2) for c in range(1, 31)]
     tests = read(head + "".join(f"multidirectional,P1,{d},{c},{d},0\n" for d, c in rows))
 
-    (found,) = assess(tests, few=True).measures
+    (assessment,) = assess(tests, few=True).measures
 
-    assert found.few
-    assert (found.cycles, found.note) == (30, "between 1 and 2, 2 of 3 directions of approach")
+    assert assessment.few
+    assert (assessment.cycles, assessment.note) == (30, "between 1 and 2, 2 of 3 directions of approach")
     with pytest.raises(
         InvalidValueError, match="multidirectional P1: ISO 9283 asks for 3 directions of approach, got 2"
     ):
@@ -173,11 +178,16 @@ def test_too_few_directions(read: Read) -> None:
 
 def test_limits(read: Read) -> None:
     """A limit holds or not; one of what was not measured is a mistake."""
-    found = assess(read(POSE), few=True).within({"AP": 1e-3, "RP": 2e-3})
+    assessment = assess(read(POSE), few=True).within({"AP": 1e-3, "RP": 2e-3})
 
-    assert {one.symbol: one.holds for one in found.measures} == {"AP": False, "AP_x": None, "AP_y": None, "RP": True}
+    assert {measure.symbol: measure.holds for measure in assessment.measures} == {
+        "AP": False,
+        "AP_x": None,
+        "AP_y": None,
+        "RP": True,
+    }
     with pytest.raises(UnknownNameError, match="no measure 'PR'"):
-        found.within({"PR": 1.0})
+        assessment.within({"PR": 1.0})
 
 
 NOMINAL = """Pose;X nominal [mm];Y nominal [mm];X measured [mm];Y measured [mm]
@@ -190,9 +200,9 @@ P2;100,0;50,0;100,0;50,5
 
 def test_nominal_beside_measured(read: Read) -> None:
     """A tracker writes nominal beside measured poses: P1 is 1 and 3 mm off, so AP is 2 mm, RP 1 mm; P2 0.5 and 0 mm."""
-    found = assess(read(NOMINAL), few=True)
+    assessment = assess(read(NOMINAL), few=True)
 
-    of = {(one.symbol, one.name): one.value for one in found.measures}
+    of = {(measure.symbol, measure.name): measure.value for measure in assessment.measures}
     assert [of["AP", "P1"], of["RP", "P1"]] == pytest.approx([2e-3, 1e-3])
     assert [of["AP", "P2"], of["RP", "P2"]] == pytest.approx([0.5e-3, 0.0], abs=1e-12)
 
@@ -208,10 +218,10 @@ def test_nominal_columns_say_what_rows_say(read: Read) -> None:
             in_rows += [f"{test},{pose},{j},{row}" for j, row in enumerate(attained, 1)]
             in_columns += [f"{test},{pose},{j},{row},{goal}" for j, row in enumerate(attained, 1)]
 
-    one, other = (assess(read("\n".join(rows)), few=True).measures for rows in (in_rows, in_columns))
+    by_rows, by_columns = (assess(read("\n".join(rows)), few=True).measures for rows in (in_rows, in_columns))
 
-    assert one == other
-    assert {"AP", "AP_c", "RP", "AD", "AD_c", "RD"} <= {measure.symbol for measure in one}
+    assert by_rows == by_columns
+    assert {"AP", "AP_c", "RP", "AD", "AD_c", "RD"} <= {measure.symbol for measure in by_rows}
 
 
 def test_column_map_and_gaps(read: Read, tmp_path: Path) -> None:
@@ -222,9 +232,9 @@ def test_column_map_and_gaps(read: Read, tmp_path: Path) -> None:
     with pytest.warns(
         IncompleteRowsWarning, match=r"other\.csv: 1 row left out for empty cells, 3 read: Across as x_mm"
     ):
-        found = read_measurements(path, columns={"Across": "x_mm", "Along": "y_mm"}, skip_incomplete=True)
+        assessment = read_measurements(path, columns={"Across": "x_mm", "Along": "y_mm"}, skip_incomplete=True)
 
-    assert values(assess(found, few=True)) == values(assess(read(POSE), few=True))
+    assert values(assess(assessment, few=True)) == values(assess(read(POSE), few=True))
 
 
 MISTAKES = {
@@ -240,11 +250,11 @@ MISTAKES = {
     "twice": (POSE.replace("y_mm", "x_m"), "1: x_m: there twice, as x_mm too"),
     "no name": (
         POSE.replace("pose,", "note,", 1),
-        "1: pose: expected a column pose or a column path, and there are neither: test, cycle, x_mm, y_mm",
+        "1: pose: expected a column pose or a column path, and the file has neither: test, cycle, x_mm, y_mm",
     ),
     "two names": (
         POSE.replace("pose,", "path,pose,", 1),
-        "1: pose: expected a column pose or a column path, and there are both: test, path, pose, cycle, x_mm, y_mm",
+        "1: pose: expected a column pose or a column path, and the file has both: test, path, pose, cycle, x_mm, y_mm",
     ),
     "decimal comma": (POSE.replace("401", '"401,5"'), "3: x_mm: expected a number, got '401,5'; write a decimal point"),
     "too many": (
@@ -275,7 +285,7 @@ MISTAKES = {
     ),
     "nominal paths": (
         NOMINAL.replace("Pose", "Path"),
-        "1: X nominal [mm]: only poses have nominal columns; a path is given by rows of cycle commanded",
+        "1: X nominal [mm]: only poses have nominal columns; a path is commanded by rows of cycle commanded",
     ),
     "a strange test": (
         POSE.replace("pose,P1,1", "posse,P1,1"),
@@ -283,13 +293,13 @@ MISTAKES = {
     ),
     "cycle 0": (POSE.replace("P1,1", "P1,0"), "3: cycle: expected 1, 2, 3 ... or the word commanded, got '0'"),
     "no pose": (POSE.replace("P1,1", ",1"), "3: pose: empty; expected a word"),
-    "a cycle twice": (POSE.replace("P1,2", "P1,1"), "4: cycle: cycle 1 is there twice, first in line 3"),
-    "commanded twice": (POSE + "pose,P1,commanded,1,1\n", "5: cycle: commanded is given twice, first in line 2"),
-    "not commanded": (POSE.replace("commanded", "9"), "2: cycle: what was commanded for P1 is not there"),
-    "nothing attained": (f"{HEAD}pose,P1,commanded,0,0\n", "2: cycle: there is what was commanded, but nothing that"),
+    "a cycle twice": (POSE.replace("P1,2", "P1,1"), "4: cycle: a second row of cycle 1, after line 3"),
+    "commanded twice": (POSE + "pose,P1,commanded,1,1\n", "5: cycle: a second commanded pose, after that of line 2"),
+    "not commanded": (POSE.replace("commanded", "9"), "2: cycle: P1 has no commanded pose: expected a row with"),
+    "nothing attained": (f"{HEAD}pose,P1,commanded,0,0\n", "2: cycle: the test has commanded rows, but no attained"),
     "metres": (
         POSE.replace("400", "0.4"),
-        "2: cycle: the attained places are 1000 times as large as the others: metres and millimetres?",
+        "2: cycle: the attained positions are 1000 times as large as the others: metres and millimetres?",
     ),
     "radians": (
         "test,pose,cycle,x_mm,y_mm,c_deg\npose,P1,commanded,0,0,1.5708\npose,P1,1,0,0,90.02\n",
@@ -297,14 +307,14 @@ MISTAKES = {
     ),
     "path in metres": (
         RUNS.replace("commanded,,100", "commanded,,0.1"),
-        "4: cycle: the attained places are 1000 times as large as the others: metres and millimetres?",
+        "4: cycle: the attained positions are 1000 times as large as the others: metres and millimetres?",
     ),
-    "no direction": (f"{HEAD}multidirectional,P1,1,0,0\n", "2: direction: a test of multidirectional tells the direct"),
-    "no robot": (f"{HEAD}exchangeability,P1,1,0,0\n", "2: robot: a test of exchangeability tells the robot"),
-    "no time of drift": (f"{HEAD}drift,P1,1,0,0\n", "2: t_min: a test of drift tells when every row was measured"),
+    "no direction": (f"{HEAD}multidirectional,P1,1,0,0\n", "2: direction: empty; a test of multidirectional has a dir"),
+    "no robot": (f"{HEAD}exchangeability,P1,1,0,0\n", "2: robot: empty; a test of exchangeability has a robot in"),
+    "no time of drift": (f"{HEAD}drift,P1,1,0,0\n", "2: t_min: empty; a test of drift has the time of every row"),
     "no load": (
         "test,pose,direction,cycle,x_mm,y_mm\ncompliance,P1,+x,1,0,0\n",
-        "2: load_n: a test of compliance tells the load of every row",
+        "2: load_n: empty; a test of compliance has the load of every row",
     ),
     "three poses": (
         HEAD + "".join(f"distance,{p},{c},0,0\n" for p in "ABC" for c in ("commanded", 1)),
@@ -316,7 +326,7 @@ MISTAKES = {
     ),
     "no path": (
         "\n".join(line for line in RUNS.split("\n") if "commanded" not in line),
-        "2: cycle: the commanded path of L is not there: rows with cycle commanded",
+        "2: cycle: L has no commanded path: expected rows with cycle commanded",
     ),
     "time back": (RUNS.replace("L,1,1,", "L,1,0,"), "5: t_s: samples are in order of time, and 0 s does not follow 0"),
     "no time": (RUNS.replace("L,1,1,", "L,1,,"), "5: t_s: empty; expected a number, as in the rows before"),
@@ -326,29 +336,29 @@ MISTAKES = {
         f"{HEAD}settling,P1,commanded,0,0\nsettling,P1,1,0,0\n",
         "2: cycle: a test of settling has no commanded row",
     ),
-    "no speed": (RUNS.replace("path,L", "velocity,L"), "2: speed_mm_per_s: a test of velocity tells the commanded"),
+    "no speed": (RUNS.replace("path,L", "velocity,L"), "2: speed_mm_per_s: a test of velocity has the commanded"),
 }
 
 
 @pytest.mark.parametrize("name", MISTAKES)
 def test_mistakes(name: str, read: Read) -> None:
-    """A mistake in a file is told with file, line and column."""
-    text, said = MISTAKES[name]
+    """The message about a mistake in a file has file, line and column."""
+    text, message = MISTAKES[name]
 
     with pytest.raises(FileFormatError) as caught:
         read(text)
 
-    assert f"file0.csv{'' if said.startswith(':') else ':'}{said}" in str(caught.value)
+    assert f"file0.csv{'' if message.startswith(':') else ':'}{message}" in str(caught.value)
 
 
 def test_other_layout(read: Read) -> None:
-    """A test that is in a plane in one file and in space in another is refused, with both places."""
+    """A test that is in a plane in one file and in space in another is refused, with both positions."""
     with pytest.raises(FileFormatError, match=r"file1.csv:2: x_mm: .*file0.csv:2 has other coordinates or angles"):
         read(POSE, "test,pose,cycle,x_mm,y_mm,z_mm\npose,P1,3,1,2,3\n")
 
 
 def test_honest_offsets(read: Read) -> None:
-    """A place that is far off without a factor of units in it is measured, not questioned."""
+    """A position that is far off without a factor of units in it is measured, not questioned."""
     tests = read(POSE.replace("400", "250"))
 
     assert values(assess(tests, few=True))["AP"] == pytest.approx(0.152)
@@ -366,17 +376,17 @@ def test_too_few_cycles(read: Read) -> None:
 
 
 def test_examples() -> None:
-    """The example files are what their script writes, and tell what it put in: offset, noise, play, speed, rounding."""
+    """The example files are what their script writes; the measures are offset, noise, play, speed, rounding."""
     folder = Path(__file__).parents[2] / "examples"
     scope: dict[str, Any] = {"__file__": str(folder / "measurements.py"), "__name__": "measurements"}
     exec((folder / "measurements.py").read_text(encoding="utf-8"), scope)
     for name, text in scope["texts"]().items():
         assert (folder / name).read_text(encoding="utf-8") == text
 
-    found = assess(read_measurements([folder / "measured_poses.csv", folder / "measured_paths.csv"]))
+    assessment = assess(read_measurements([folder / "measured_poses.csv", folder / "measured_paths.csv"]))
 
     offset, noise = np.linalg.norm(scope["OFFSET"]) * 1e-3, scope["NOISE"] * 1e-3
-    of = {(one.symbol, one.name): one.value for one in found.measures}
+    of = {(measure.symbol, measure.name): measure.value for measure in assessment.measures}
     # The mean of 30 scatters by a fifth of sigma, RP by a tenth of itself; three times that is allowed.
     assert of["AP", "P1"] == pytest.approx(offset, abs=0.6 * noise)
     assert of["RP", "P2"] == pytest.approx(3.616 * noise, rel=0.3)
@@ -384,7 +394,7 @@ def test_examples() -> None:
     assert abs(of["AV", "line"]) < 3e-3
     assert of["AT", "line"] == pytest.approx(np.hypot(0.17, 0) * 1e-3 / np.sqrt(2), abs=0.03e-3)
     assert 0 < of["CR", "square"] < 20e-3 / np.sqrt(2)
-    assert not found.few
+    assert not assessment.few
 
 
 LONG = {

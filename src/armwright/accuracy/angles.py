@@ -1,4 +1,4 @@
-"""Small angles about a, b, c that may stand on either side of half a turn: 179.9 and -179.9 deg are 0.2 deg apart."""
+"""Small angles about a, b, c that may be on either side of 180 deg: 179.9 and -179.9 deg are 0.2 deg apart."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ def wrapped(angles: Array) -> Array:
 def mean_angles(angles: Array, what: str = "angles") -> Array:
     """Return the means of angles (n, k) [rad], (k,), each in [-pi, pi).
 
-    Deviations are taken from the mean direction, so that a turn more or less changes nothing.
+    Deviations are taken from the mean direction, so that whole revolutions change nothing.
 
     Raises:
-        InvalidValueError: those of one column scatter by more than a quarter of a turn about their mean.
+        InvalidValueError: those of one column scatter by more than 90 deg about their mean.
     """
     direction = np.arctan2(np.sin(angles).mean(axis=0), np.cos(angles).mean(axis=0))
     deviations = wrapped(angles - direction)
@@ -38,7 +38,7 @@ def angle_deviations(angles: Array, what: str = "angles") -> Array:
     """Return how far angles (n, k) are from their means [rad], (n, k).
 
     Raises:
-        InvalidValueError: those of one column scatter by more than a quarter of a turn about their mean.
+        InvalidValueError: those of one column scatter by more than 90 deg about their mean.
     """
     return wrapped(angles - mean_angles(angles, what))
 

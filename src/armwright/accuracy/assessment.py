@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
+from operator import attrgetter
 from typing import Any
 
 import attrs
@@ -91,7 +92,7 @@ class Assessment:
     def tables(self) -> Iterator[ResultTable]:
         """Give a table for each test, with a row for each measure; limits where any is stated."""
         bounded = any(measure.limit is not None for measure in self.measures)
-        for (test, name, condition), group in groupby(self.measures, lambda one: (one.test, one.name, one.condition)):
+        for (test, name, condition), group in groupby(self.measures, attrgetter("test", "name", "condition")):
             measures = list(group)
             yield ResultTable(
                 title=f"{test} {name}{f', {condition}' if condition else ''}",
@@ -124,7 +125,7 @@ class Assessment:
         """
         for symbol in limits:
             one_of("measure", symbol, {measure.symbol for measure in self.measures})
-        bounded = (attrs.evolve(one, limit=limits.get(one.symbol, one.limit)) for one in self.measures)
+        bounded = (attrs.evolve(measure, limit=limits.get(measure.symbol, measure.limit)) for measure in self.measures)
         return attrs.evolve(self, measures=tuple(bounded))
 
 
@@ -141,7 +142,7 @@ def assess(
         tests: as ``read_measurements`` returns them.
         few: take fewer cycles than the standard asks for.
         band: radius within which a pose counts as reached, and a leg after a corner as followed [m]; where it is None,
-            RP of the test ``pose`` of that name is taken for a pose, and no length of stabilisation is told for a leg.
+            RP of the test ``pose`` of that name is taken for a pose, and a leg gets no length of stabilisation.
         corners: how near to a corner AT and RT are not taken [m].
 
     Raises:
@@ -151,11 +152,11 @@ def assess(
     results: list[tuple[Result, ...]] = []
     for test in tests:
         try:
-            found = _results(test, tests, few=few, band=band, corners=corners)
+            test_results = _results(test, tests, few=few, band=band, corners=corners)
         except InvalidValueError as error:
             raise type(error)(f"{_title(test)}: {str(error).removeprefix(f'{test.kind}: ')}") from error
-        results.append(found)
-        for result in found:
+        results.append(test_results)
+        for result in test_results:
             measures.extend(characteristics_of(test, result))
     return Assessment(measures=tuple(measures), results=tuple(results), tests=tuple(tests))
 
@@ -177,51 +178,53 @@ def _results(
         return corner_deviations(test.commanded, test.runs, band=band, few=few)
     if test.kind == "weaving":
         return (weaving_deviation(test.commanded, test.runs, _speed(test), few=few),)
-    found: list[Result] = []
+    results: list[Result] = []
     if test.kind != "velocity":
-        found.append(path_deviation(test.commanded, test.runs, corners=corners, kind=test.kind, few=few))
+        results.append(path_deviation(test.commanded, test.runs, corners=corners, kind=test.kind, few=few))
     if test.speed is not None:
-        found.append(path_velocity(test.commanded, test.runs, test.speed, few=few))
-    return tuple(found)
+        results.append(path_velocity(test.commanded, test.runs, test.speed, few=few))
+    return tuple(results)
 
 
 def _of_poses(test: PoseTest, *, few: bool) -> tuple[Result, ...]:
     clouds = test.clouds
-    one = clouds[0]
-    places, angles = [cloud.places for cloud in clouds], [cloud.angles for cloud in clouds]
+    first = clouds[0]
+    positions, angles = [cloud.positions for cloud in clouds], [cloud.angles for cloud in clouds]
     if test.kind == "pose":
-        goal = {"angles": one.angles, "commanded_angles": one.commanded_angles}
+        goal = {"angles": first.angles, "commanded_angles": first.commanded_angles}
         return (
-            pose_accuracy(one.places, _goal(one), **goal, few=few),
-            pose_repeatability(one.places, angles=one.angles, few=few),
+            pose_accuracy(first.positions, _goal(first), **goal, few=few),
+            pose_repeatability(first.positions, angles=first.angles, few=few),
         )
     if test.kind == "distance":
         goals = [_goal(cloud) for cloud in clouds]
-        turned = (clouds[0].commanded_angles, clouds[1].commanded_angles)
+        commanded = (clouds[0].commanded_angles, clouds[1].commanded_angles)
         return (
-            distance_accuracy(*places, *goals, angles=(angles[0], angles[1]), commanded_angles=turned, few=few),
-            distance_repeatability(*places, angles=(angles[0], angles[1]), few=few),
+            distance_accuracy(*positions, *goals, angles=(angles[0], angles[1]), commanded_angles=commanded, few=few),
+            distance_repeatability(*positions, angles=(angles[0], angles[1]), few=few),
         )
     if test.kind == "drift":
         rising = sorted(clouds, key=lambda cloud: cloud.t or 0.0)
         times = [cloud.t or 0.0 for cloud in rising]
-        turns, asked = [cloud.angles for cloud in rising], one.commanded_angles
-        warming = [cloud.places for cloud in rising]
-        return (pose_drift(times, warming, _goal(one), angles=turns, commanded_angles=asked, few=few),)
+        angles = [cloud.angles for cloud in rising]
+        warming = [cloud.positions for cloud in rising]
+        return (
+            pose_drift(times, warming, _goal(first), angles=angles, commanded_angles=first.commanded_angles, few=few),
+        )
     if test.kind == "compliance":
         return tuple(_compliance(cloud, test.size, few=few) for cloud in clouds)
     vary = multidirectional_variation if test.kind == "multidirectional" else exchangeability
-    return (vary(places, angles=angles, few=few),)
+    return (vary(positions, angles=angles, few=few),)
 
 
 def _compliance(cloud: Cloud, size: int, *, few: bool) -> StaticCompliance:
     axis = cloud.label.lstrip("+-").lower()
     if len(axis) != 1 or axis not in _AXES[:size]:
-        told = ", ".join(f"+{one}, -{one}" for one in _AXES[:size])
-        raise InvalidValueError(f"no direction '{cloud.label}' of a force; expected one of {told}")
+        directions = ", ".join(f"+{axis}, -{axis}" for axis in _AXES[:size])
+        raise InvalidValueError(f"no direction '{cloud.label}' of a force; expected one of {directions}")
     direction = np.eye(size)[_AXES.index(axis)] * (-1 if cloud.label.startswith("-") else 1)
     assert cloud.loads is not None  # noqa: S101 - no test of compliance is read without
-    return static_compliance(cloud.loads, cloud.places, direction, few=few)
+    return static_compliance(cloud.loads, cloud.positions, direction, few=few)
 
 
 def _goal(cloud: Cloud) -> Array:
@@ -236,11 +239,9 @@ def _speed(test: PathTest) -> float:
 
 def _band_of(test: PathTest, tests: Sequence[AnyTest]) -> float:
     """Return RP of the pose at which a robot settles."""
-    same = [one for one in tests if isinstance(one, PoseTest) and one.kind == "pose" and one.name == test.name]
-    alike = [one for one in same if one.condition == test.condition] or same
-    if not alike:
-        raise InvalidValueError(
-            f"no band is given, and no test of pose {test.name} is there whose RP could be the band"
-        )
+    pose_tests = [t for t in tests if isinstance(t, PoseTest) and t.kind == "pose" and t.name == test.name]
+    pose_tests = [t for t in pose_tests if t.condition == test.condition] or pose_tests
+    if not pose_tests:
+        raise InvalidValueError(f"no band is specified, and pose {test.name} has no test whose RP could be the band")
     # The cycles of that test are counted where it is assessed itself.
-    return pose_repeatability(alike[0].clouds[0].places, few=True).radius
+    return pose_repeatability(pose_tests[0].clouds[0].positions, few=True).radius

@@ -10,7 +10,7 @@ import numpy as np
 
 from armwright.accuracy.compliance import StaticCompliance
 from armwright.accuracy.corner import CornerDeviation
-from armwright.accuracy.cycles import ASKED, DIRECTIONS, LOADS, ROBOTS, Kind
+from armwright.accuracy.cycles import DIRECTIONS, LOADS, REQUIRED_CYCLES, ROBOTS, Kind
 from armwright.accuracy.distance import DistanceAccuracy, DistanceRepeatability
 from armwright.accuracy.measurement_file import AnyTest, PoseTest
 from armwright.accuracy.path import PathDeviation, PathVelocity
@@ -61,7 +61,7 @@ class Characteristic:
         name: of the pose or path.
         condition: in free words; may be empty.
         cycles: of which it was made.
-        asked: cycles that the standard asks for.
+        required: cycles that the standard asks for.
         note: anything worth a word, such as where.
         lacking: whether the test has fewer parts than the standard asks for: directions of approach, robots or loads.
         limit: what it should not exceed, without sign; None where there is none.
@@ -76,7 +76,7 @@ class Characteristic:
     name: str
     condition: str
     cycles: int
-    asked: int
+    required: int
     note: str = ""
     lacking: bool = False
     limit: float | None = None
@@ -84,7 +84,7 @@ class Characteristic:
     @property
     def few(self) -> bool:
         """Whether it was made of fewer cycles or parts than the standard asks for."""
-        return self.lacking or self.cycles < self.asked
+        return self.lacking or self.cycles < self.required
 
     @property
     def holds(self) -> bool | None:
@@ -120,14 +120,14 @@ class Characteristic:
     @property
     def displayed_cycles(self) -> str:
         """The cycles, and, where those are too few, how many the standard asks for."""
-        return f"{self.cycles} of {self.asked}" if self.few else str(self.cycles)
+        return f"{self.cycles} of {self.required}" if self.few else str(self.cycles)
 
 
 def characteristics_of(test: AnyTest, result: Result) -> Iterator[Characteristic]:
     """Give the numbers of a result of a test."""
-    of = {"test": test.kind, "name": test.name, "condition": test.condition, "cycles": result.cycles}
-    for fields in _TELL[type(result)](test, result):
-        yield Characteristic(**{**of, "asked": ASKED[test.kind], **fields})
+    common = {"test": test.kind, "name": test.name, "condition": test.condition, "cycles": result.cycles}
+    for fields in _NUMBERS_OF[type(result)](test, result):
+        yield Characteristic(**{**common, "required": REQUIRED_CYCLES[test.kind], **fields})
 
 
 def _axes(symbol: str, what: str, values: Array, **more: Any) -> Iterator[dict[str, Any]]:
@@ -140,110 +140,111 @@ def _turns(test: AnyTest, symbol: str, what: str, values: Array, **more: Any) ->
         yield {"symbol": f"{symbol}_{angle}", "what": f"{what} about {angle}", "value": value, "unit": "rad", **more}
 
 
-def _pose_accuracy(test: AnyTest, one: PoseAccuracy) -> Iterator[dict[str, Any]]:
-    yield {"symbol": "AP", "what": "pose accuracy", "value": one.position, "unit": "m"}
-    yield from _axes("AP", "pose accuracy", one.components)
-    yield from _turns(test, "AP", "pose accuracy", one.angles)
+def _pose_accuracy(test: AnyTest, result: PoseAccuracy) -> Iterator[dict[str, Any]]:
+    yield {"symbol": "AP", "what": "pose accuracy", "value": result.position, "unit": "m"}
+    yield from _axes("AP", "pose accuracy", result.components)
+    yield from _turns(test, "AP", "pose accuracy", result.angles)
 
 
-def _pose_repeatability(test: AnyTest, one: PoseRepeatability) -> Iterator[dict[str, Any]]:
-    yield {"symbol": "RP", "what": "pose repeatability", "value": one.radius, "unit": "m"}
-    yield from _turns(test, "RP", "pose repeatability", one.angles, either_way=True)
+def _pose_repeatability(test: AnyTest, result: PoseRepeatability) -> Iterator[dict[str, Any]]:
+    yield {"symbol": "RP", "what": "pose repeatability", "value": result.radius, "unit": "m"}
+    yield from _turns(test, "RP", "pose repeatability", result.angles, either_way=True)
 
 
-def _variation(test: AnyTest, one: Variation) -> Iterator[dict[str, Any]]:
-    symbol, what, asked, parts = "vAP", "multi-directional variation", DIRECTIONS, "directions of approach"
+def _variation(test: AnyTest, result: Variation) -> Iterator[dict[str, Any]]:
+    symbol, what, required, parts = "vAP", "multi-directional variation", DIRECTIONS, "directions of approach"
     if test.kind == "exchangeability":
-        symbol, what, asked, parts = "E", "exchangeability", ROBOTS, "robots"
+        symbol, what, required, parts = "E", "exchangeability", ROBOTS, "robots"
     labels = [cloud.label for cloud in test.clouds] if isinstance(test, PoseTest) else []
-    few = _lacking(len(one.barycentres), asked, parts)
-    note = f"between {' and '.join(labels[i] for i in one.pair)}{few}"
-    yield {"symbol": symbol, "what": what, "value": one.position, "unit": "m", "note": note, "lacking": bool(few)}
-    yield from _turns(test, symbol, what, one.angles, lacking=bool(few))
+    few = _lacking(len(result.barycentres), required, parts)
+    note = f"between {' and '.join(labels[i] for i in result.pair)}{few}"
+    yield {"symbol": symbol, "what": what, "value": result.position, "unit": "m", "note": note, "lacking": bool(few)}
+    yield from _turns(test, symbol, what, result.angles, lacking=bool(few))
 
 
-def _lacking(count: int, asked: int, parts: str) -> str:
+def _lacking(count: int, required: int, parts: str) -> str:
     """Say how many parts of a test there are, if they are too few."""
-    return f", {count} of {asked} {parts}" if count < asked else ""
+    return f", {count} of {required} {parts}" if count < required else ""
 
 
-def _drift(test: AnyTest, one: PoseDrift) -> Iterator[dict[str, Any]]:
-    note = f"over {(one.times[-1] - one.times[0]) / 3600:.3g} h, {len(one.times)} measurements"
-    yield {"symbol": "dAP", "what": "drift of pose accuracy", "value": one.accuracy_change, "unit": "m", "note": note}
-    yield {"symbol": "dRP", "what": "drift of pose repeatability", "value": one.repeatability_change, "unit": "m"}
-    yield from _turns(test, "dAP", "drift of pose accuracy", one.accuracy_change_angles)
-    yield from _turns(test, "dRP", "drift of pose repeatability", one.repeatability_change_angles)
+def _drift(test: AnyTest, result: PoseDrift) -> Iterator[dict[str, Any]]:
+    note = f"over {(result.times[-1] - result.times[0]) / 3600:.3g} h, {len(result.times)} measurements"
+    what = "drift of pose accuracy"
+    yield {"symbol": "dAP", "what": what, "value": result.accuracy_change, "unit": "m", "note": note}
+    yield {"symbol": "dRP", "what": "drift of pose repeatability", "value": result.repeatability_change, "unit": "m"}
+    yield from _turns(test, "dAP", what, result.accuracy_change_angles)
+    yield from _turns(test, "dRP", "drift of pose repeatability", result.repeatability_change_angles)
 
 
-def _distance_accuracy(test: AnyTest, one: DistanceAccuracy) -> Iterator[dict[str, Any]]:
-    note = f"of {one.commanded * 1e3:.6g} mm"
-    yield {"symbol": "AD", "what": "distance accuracy", "value": one.distance, "unit": "m", "note": note}
-    yield from _axes("AD", "distance accuracy", one.components)
-    yield from _turns(test, "AD", "distance accuracy", one.angles)
+def _distance_accuracy(test: AnyTest, result: DistanceAccuracy) -> Iterator[dict[str, Any]]:
+    note = f"of {result.commanded * 1e3:.6g} mm"
+    yield {"symbol": "AD", "what": "distance accuracy", "value": result.distance, "unit": "m", "note": note}
+    yield from _axes("AD", "distance accuracy", result.components)
+    yield from _turns(test, "AD", "distance accuracy", result.angles)
 
 
-def _distance_repeatability(test: AnyTest, one: DistanceRepeatability) -> Iterator[dict[str, Any]]:
+def _distance_repeatability(test: AnyTest, result: DistanceRepeatability) -> Iterator[dict[str, Any]]:
     what = "distance repeatability"
-    yield {"symbol": "RD", "what": what, "value": one.distance, "unit": "m", "either_way": True}
-    yield from _axes("RD", what, one.components, either_way=True)
-    yield from _turns(test, "RD", what, one.angles, either_way=True)
+    yield {"symbol": "RD", "what": what, "value": result.distance, "unit": "m", "either_way": True}
+    yield from _axes("RD", what, result.components, either_way=True)
+    yield from _turns(test, "RD", what, result.angles, either_way=True)
 
 
-def _settling(_test: AnyTest, one: Settling) -> Iterator[dict[str, Any]]:
-    note = f"within {one.band * 1e3:.4g} mm"
-    yield {"symbol": "t", "what": "stabilisation time", "value": one.time, "unit": "s", "note": note}
-    yield {"symbol": "OV", "what": "pose overshoot", "value": one.overshoot, "unit": "m", "note": note}
+def _settling(_test: AnyTest, result: Settling) -> Iterator[dict[str, Any]]:
+    note = f"within {result.band * 1e3:.4g} mm"
+    yield {"symbol": "t", "what": "stabilisation time", "value": result.time, "unit": "s", "note": note}
+    yield {"symbol": "OV", "what": "pose overshoot", "value": result.overshoot, "unit": "m", "note": note}
 
 
-def _posing(_test: AnyTest, one: PosingTime) -> Iterator[dict[str, Any]]:
-    note = f"over {one.distance * 1e3:.4g} mm, within {one.band * 1e3:.4g} mm"
-    yield {"symbol": "TP", "what": "minimum posing time", "value": one.time, "unit": "s", "note": note}
+def _posing(_test: AnyTest, result: PosingTime) -> Iterator[dict[str, Any]]:
+    note = f"over {result.distance * 1e3:.4g} mm, within {result.band * 1e3:.4g} mm"
+    yield {"symbol": "TP", "what": "minimum posing time", "value": result.time, "unit": "s", "note": note}
 
 
-def _path(test: AnyTest, one: PathDeviation) -> Iterator[dict[str, Any]]:
-    for symbol, what, value, at, angles in (
-        ("AT", "path accuracy", one.accuracy, one.accuracy_at, one.accuracy_angles),
-        ("RT", "path repeatability", one.repeatability, one.repeatability_at, one.repeatability_angles),
+def _path(test: AnyTest, result: PathDeviation) -> Iterator[dict[str, Any]]:
+    for symbol, what, value, station, angles in (
+        ("AT", "path accuracy", result.accuracy, result.accuracy_at, result.accuracy_angles),
+        ("RT", "path repeatability", result.repeatability, result.repeatability_at, result.repeatability_angles),
     ):
-        note = f"at {at * 1e3:.4g} mm along"
+        note = f"at {station * 1e3:.4g} mm along"
         yield {"symbol": symbol, "what": what, "value": value, "unit": "m", "note": note}
         yield from _turns(test, symbol, what, angles, either_way=symbol == "RT")
 
 
-def _velocity(_test: AnyTest, one: PathVelocity) -> Iterator[dict[str, Any]]:
-    yield {"symbol": "AV", "what": "path velocity accuracy", "value": one.accuracy, "unit": ""}
+def _velocity(_test: AnyTest, result: PathVelocity) -> Iterator[dict[str, Any]]:
+    yield {"symbol": "AV", "what": "path velocity accuracy", "value": result.accuracy, "unit": ""}
     what = "path velocity repeatability"
-    yield {"symbol": "RV", "what": what, "value": one.repeatability, "unit": "", "either_way": True}
-    yield {"symbol": "FV", "what": "path velocity fluctuation", "value": one.fluctuation, "unit": "m/s"}
+    yield {"symbol": "RV", "what": what, "value": result.repeatability, "unit": "", "either_way": True}
+    yield {"symbol": "FV", "what": "path velocity fluctuation", "value": result.fluctuation, "unit": "m/s"}
 
 
-def _corner(_test: AnyTest, one: CornerDeviation) -> Iterator[dict[str, Any]]:
-    note = f"at ({', '.join(f'{x * 1e3:.4g}' for x in one.place)}) mm"
-    yield {"symbol": "CR", "what": "cornering round-off", "value": one.round_off, "unit": "m", "note": note}
-    yield {"symbol": "CO", "what": "cornering overshoot", "value": one.overshoot, "unit": "m", "note": note}
-    if one.settling_length is not None:
+def _corner(_test: AnyTest, result: CornerDeviation) -> Iterator[dict[str, Any]]:
+    note = f"at ({', '.join(f'{x * 1e3:.4g}' for x in result.position)}) mm"
+    yield {"symbol": "CR", "what": "cornering round-off", "value": result.round_off, "unit": "m", "note": note}
+    yield {"symbol": "CO", "what": "cornering overshoot", "value": result.overshoot, "unit": "m", "note": note}
+    if result.settling_length is not None:
         what = "stabilisation path length"
-        yield {"symbol": "SPL", "what": what, "value": one.settling_length, "unit": "m", "note": note}
+        yield {"symbol": "SPL", "what": what, "value": result.settling_length, "unit": "m", "note": note}
 
 
-def _weaving(_test: AnyTest, one: WeavingDeviation) -> Iterator[dict[str, Any]]:
-    note = f"of {one.commanded_stroke * 1e3:.4g} mm"
-    yield {"symbol": "WS", "what": "weaving stroke error", "value": one.stroke, "unit": "", "note": note}
-    note = f"of {one.commanded_frequency:.4g} Hz"
-    yield {"symbol": "WF", "what": "weaving frequency error", "value": one.frequency, "unit": "", "note": note}
+def _weaving(_test: AnyTest, result: WeavingDeviation) -> Iterator[dict[str, Any]]:
+    note = f"of {result.commanded_stroke * 1e3:.4g} mm"
+    yield {"symbol": "WS", "what": "weaving stroke error", "value": result.stroke, "unit": "", "note": note}
+    note = f"of {result.commanded_frequency:.4g} Hz"
+    yield {"symbol": "WF", "what": "weaving frequency error", "value": result.frequency, "unit": "", "note": note}
 
 
-def _compliance(_test: AnyTest, one: StaticCompliance) -> Iterator[dict[str, Any]]:
-    axis = int(np.argmax(np.abs(one.direction)))
-    few = _lacking(len(one.loads), LOADS, "loads")
-    note = f"force along {'-' if one.direction[axis] < 0 else '+'}{_AXES[axis]}, up to {one.loads[-1]:.4g} N{few}"
+def _compliance(_test: AnyTest, result: StaticCompliance) -> Iterator[dict[str, Any]]:
+    axis = int(np.argmax(np.abs(result.direction)))
+    few = _lacking(len(result.loads), LOADS, "loads")
+    note = f"force along {'-' if result.direction[axis] < 0 else '+'}{_AXES[axis]}, up to {result.loads[-1]:.4g} N{few}"
     more = {"unit": "m/N", "note": note, "lacking": bool(few)}
     what = "static compliance"
-    yield {"symbol": "C", "what": f"{what} along the force", "value": one.along, **more}
-    yield from _axes("C", what, one.components, **more)
+    yield {"symbol": "C", "what": f"{what} along the force", "value": result.along, **more}
+    yield from _axes("C", what, result.components, **more)
 
 
-_TELL: dict[type, Callable[[AnyTest, Any], Iterator[dict[str, Any]]]] = {
+_NUMBERS_OF: dict[type, Callable[[AnyTest, Any], Iterator[dict[str, Any]]]] = {
     PoseAccuracy: _pose_accuracy,
     PoseRepeatability: _pose_repeatability,
     Variation: _variation,

@@ -1,4 +1,4 @@
-"""Static compliance: how far a pose gives way under a force."""
+"""Static compliance: how far a pose is displaced by a force."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import LOADS, checked_cycles, checked_parts
-from armwright.accuracy.trace import frozen_array, place_of, places_of
+from armwright.accuracy.trace import frozen_array, position_of, positions_of
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
 
 @attrs.frozen(kw_only=True, eq=False)
 class StaticCompliance:
-    """How far a pose gives way under a force in one direction.
+    """How far a pose is displaced by a force in one direction.
 
     Attributes:
         along: in the direction of the force [m/N].
@@ -35,13 +35,13 @@ class StaticCompliance:
 
 
 def static_compliance(
-    loads: ArrayLike, places: ArrayLike, direction: ArrayLike, *, few: bool = False
+    loads: ArrayLike, positions: ArrayLike, direction: ArrayLike, *, few: bool = False
 ) -> StaticCompliance:
-    """Return the displacement per force, by a straight line of least squares through the unloaded place.
+    """Return the displacement per force, by a straight line of least squares through the unloaded position.
 
     Args:
         loads: (n,) size of the force at each measurement [N], 0 among them.
-        places: (n, 2) or (n, 3) measured places [m].
+        positions: (n, 2) or (n, 3) measured positions [m].
         direction: (2,) or (3,) of the force; its length does not matter.
         few: take fewer than 3 repetitions of each load, or fewer than 10 loads.
 
@@ -53,13 +53,13 @@ def static_compliance(
     Source:
         ISO 9283:1998, 10.
     """
-    P = places_of(places)
+    P = positions_of(positions)
     F = floats(loads, "compliance: loads", LARGEST)
     if F.shape != (len(P),):
-        raise ShapeError(f"compliance: loads: expected shape ({len(P)},), one per place, got {F.shape}")
+        raise ShapeError(f"compliance: loads: expected shape ({len(P)},), one per position, got {F.shape}")
     if (F < 0).any():
-        raise InvalidValueError("compliance: loads are sizes of forces, 0 or more; turn the direction round instead")
-    d = np.array(place_of(direction, P.shape[1], "compliance: direction"))
+        raise InvalidValueError("compliance: loads are sizes of forces, 0 or more; reverse the direction instead")
+    d = np.array(position_of(direction, P.shape[1], "compliance: direction"))
     if not np.linalg.norm(d) > 0:
         raise InvalidValueError("compliance: the direction is 0")
     d /= np.linalg.norm(d)
@@ -68,9 +68,9 @@ def static_compliance(
         raise InvalidValueError("compliance: no measurement is without load, so there is nothing to compare with")
     checked_parts("compliance", len(levels) - 1, LOADS, few=few, what="loads besides none")
     count = checked_cycles("compliance", repeats.tolist(), few=few, least=1)
-    rest = P[F == 0].mean(axis=0)
+    unloaded = P[F == 0].mean(axis=0)
     forces = levels[1:]
-    bent = np.array([P[force == F].mean(axis=0) - rest for force in forces])
+    bent = np.array([P[force == F].mean(axis=0) - unloaded for force in forces])
     slopes = forces @ bent / (forces @ forces)
     return StaticCompliance(
         along=float(slopes @ d), direction=d, components=slopes, loads=forces, deflections=bent, cycles=count

@@ -9,7 +9,7 @@ import numpy as np
 
 from armwright.accuracy.cycles import checked_cycles
 from armwright.accuracy.planes import Legs, legs_of
-from armwright.accuracy.trace import Trace, frozen_array, one_size
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
 from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError
 
@@ -29,7 +29,7 @@ class CornerDeviation:
             infinite where a run does not, None where no band is given.
         round_offs: (n,) of each cycle [m].
         overshoots: (n,) of each cycle [m].
-        place: (2,) or (3,) the corner [m].
+        position: (2,) or (3,) the corner [m].
         cycles: n.
     """
 
@@ -38,7 +38,7 @@ class CornerDeviation:
     settling_length: float | None
     round_offs: Array = attrs.field(converter=frozen_array)
     overshoots: Array = attrs.field(converter=frozen_array)
-    place: Array = attrs.field(converter=frozen_array)
+    position: Array = attrs.field(converter=frozen_array)
     cycles: int
 
     __reduce__ = reduce_by_fields
@@ -50,7 +50,7 @@ def corner_deviations(
     """Return CR, CO and the stabilisation path length at every corner of a path.
 
     Args:
-        commanded: its points, from start to end; where it turns by more than 20 deg there is a corner.
+        commanded: its points, from start to end; it has a corner where its direction changes by more than 20 deg.
         runs: what was measured, each from start to end.
         band: distance from the second leg that counts as being on it again, usually AT [m].
         few: take fewer than 3 cycles.
@@ -64,66 +64,66 @@ def corner_deviations(
         ISO 9283:1998, 8.5.
     """
     count = checked_cycles("cornering", [len(runs)], few=few, least=1)
-    one_size([commanded.places, *(run.places for run in runs)], "cornering")
+    refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], "cornering")
     if band is not None and not 0 < number(band, "cornering: band") < np.inf:
         raise InvalidValueError(f"cornering: the band must be above 0 m, got {band:g}")
     legs = legs_of(commanded)
     corners = np.flatnonzero(legs.corners)
     if not len(corners):
-        raise InvalidValueError("cornering: the commanded path has no corner, no turn of more than 20 deg")
-    found = []
+        raise InvalidValueError("cornering: the commanded path has no change of direction by more than 20 deg")
+    corner_results = []
     for corner in corners.tolist():
-        rows = [_one(legs, corner, run, band, f"cornering: run {j + 1}") for j, run in enumerate(runs)]
+        rows = [_corner_of_run(legs, corner, run, band, f"cornering: run {j + 1}") for j, run in enumerate(runs)]
         near, over, lengths = zip(*rows, strict=True)
-        found.append(
+        corner_results.append(
             CornerDeviation(
                 round_off=float(np.mean(near)),
                 overshoot=float(np.mean(over)),
                 settling_length=None if band is None else float(np.mean(lengths)),
                 round_offs=near,
                 overshoots=over,
-                place=legs.places[corner],
+                position=legs.positions[corner],
                 cycles=count,
             )
         )
-    return tuple(found)
+    return tuple(corner_results)
 
 
-def _one(legs: Legs, corner: int, run: Trace, band: float | None, name: str) -> tuple[float, float, float]:
+def _corner_of_run(legs: Legs, corner: int, run: Trace, band: float | None, name: str) -> tuple[float, float, float]:
     """Return nearest distance, overshoot and stabilisation path length of one run at one corner."""
-    place = legs.places[corner]
-    near, at = _nearest(run.places, place)
+    point = legs.positions[corner]
+    near, after = _nearest(run.positions, point)
     u1, u2 = legs.directions[corner - 1], legs.directions[corner]
     later = np.flatnonzero(legs.corners[corner + 1 :])
     end = legs.stations[corner + 1] - legs.stations[corner]
     if len(later):
         end *= _SHARE
-    relative = run.places[at:] - place
+    relative = run.positions[after:] - point
     along = relative @ u2
-    gone = np.flatnonzero(along > end)
-    relative = relative[: gone[0]] if len(gone) else relative
+    past_end = np.flatnonzero(along > end)
+    relative = relative[: past_end[0]] if len(past_end) else relative
     along = along[: len(relative)]
     on = along >= 0
     if not on.any():
         raise InvalidValueError(
             f"{name} has no sample on the leg after the corner at {legs.stations[corner] * 1e3:.4g} mm of the path"
         )
-    off = relative - along[:, None] * u2
+    offset = relative - along[:, None] * u2
     onward = u1 - (u1 @ u2) * u2
     size = np.linalg.norm(onward)
-    # Where the path turns back on itself there is no such side.
-    beyond = on & (off @ (onward / size) > 0) if size > 0 else np.zeros_like(on)
-    distances = np.linalg.norm(off, axis=1)
+    # Where the path reverses there is no such side.
+    beyond = on & (offset @ (onward / size) > 0) if size > 0 else np.zeros_like(on)
+    distances = np.linalg.norm(offset, axis=1)
     over = float(distances[beyond].max(initial=0.0))
     return near, over, _length(along[on], distances[on], band)
 
 
-def _nearest(places: Array, point: Array) -> tuple[float, int]:
+def _nearest(positions: Array, point: Array) -> tuple[float, int]:
     """Return the smallest distance of a run from a point, and the number of the first sample after it."""
-    starts, ways = places[:-1], np.diff(places, axis=0)
-    squares = np.sum(ways**2, axis=1)
-    part = np.sum((point - starts) * ways, axis=1) / np.where(squares > 0, squares, 1.0)
-    distances = np.linalg.norm(starts + np.clip(part, 0, 1)[:, None] * ways - point, axis=1)
+    starts, steps = positions[:-1], np.diff(positions, axis=0)
+    squares = np.sum(steps**2, axis=1)
+    part = np.sum((point - starts) * steps, axis=1) / np.where(squares > 0, squares, 1.0)
+    distances = np.linalg.norm(starts + np.clip(part, 0, 1)[:, None] * steps - point, axis=1)
     piece = int(np.argmin(distances))
     return float(distances[piece]), piece + 1
 

@@ -1,4 +1,4 @@
-"""How often the standard asks for each measure to be repeated, and what is done where that was not kept."""
+"""How often the standard asks for each measure to be repeated, and what happens where a test has fewer."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Kind: TypeAlias = Literal[
     "weaving",
 ]
 # Cycles that the standard asks for, by the name of the test.
-ASKED: dict[Kind, int] = {
+REQUIRED_CYCLES: dict[Kind, int] = {
     "pose": 30,
     "multidirectional": 30,
     "distance": 30,
@@ -58,12 +58,13 @@ def checked_cycles(kind: Kind, counts: Sequence[int], *, few: bool, least: int, 
     count = min(counts, default=0)
     if count < least:
         raise TooFewError(f"{kind}: needs {least} {what} at least, got {count}")
-    if count < ASKED[kind] and not few:
-        raise TooFewError(f"{kind}: ISO 9283 asks for {ASKED[kind]} {what}, got {count}; few=True takes fewer")
+    required = REQUIRED_CYCLES[kind]
+    if count < required and not few:
+        raise TooFewError(f"{kind}: ISO 9283 asks for {required} {what}, got {count}; few=True takes fewer")
     return count
 
 
-def checked_parts(kind: Kind, count: int, asked: int, *, few: bool, what: str) -> None:
+def checked_parts(kind: Kind, count: int, required: int, *, few: bool, what: str) -> None:
     """Refuse too few parts of a test: directions of approach, robots, or loads.
 
     Raises:
@@ -71,5 +72,5 @@ def checked_parts(kind: Kind, count: int, asked: int, *, few: bool, what: str) -
     """
     if count < 2:
         raise TooFewError(f"{kind}: needs 2 {what} at least, got {count}")
-    if count < asked and not few:
-        raise TooFewError(f"{kind}: ISO 9283 asks for {asked} {what}, got {count}; few=True takes fewer")
+    if count < required and not few:
+        raise TooFewError(f"{kind}: ISO 9283 asks for {required} {what}, got {count}; few=True takes fewer")

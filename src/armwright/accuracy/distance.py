@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.accuracy.angles import mean_angles, wrapped
 from armwright.accuracy.cycles import checked_cycles
-from armwright.accuracy.trace import angles_of, frozen_array, place_of, places_of
+from armwright.accuracy.trace import angles_of, frozen_array, position_of, positions_of
 from armwright.arrays import Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import ShapeError
 
@@ -65,7 +65,7 @@ def distance_accuracy(
     """Return AD between two poses.
 
     Args:
-        first: (n, 2) or (n, 3) attained places of the first pose, one per cycle [m].
+        first: (n, 2) or (n, 3) attained positions of the first pose, one per cycle [m].
         second: likewise of the second, of the same cycles [m].
         commanded_first: (2,) or (3,) [m].
         commanded_second: (2,) or (3,) [m].
@@ -81,18 +81,18 @@ def distance_accuracy(
     Source:
         ISO 9283:1998, 7.3.2.
     """
-    ways = _ways(first, second)
-    count = checked_cycles("distance", [len(ways)], few=few, least=1)
-    start, end = (place_of(one, ways.shape[1]) for one in (commanded_first, commanded_second))
-    asked = float(np.linalg.norm(end - start))
-    A, B = _angles(angles, len(ways))
-    goals = [_commanded(one, A.shape[1]) for one in commanded_angles or (None, None)]
-    turn = wrapped(goals[1] - goals[0])
+    differences = _differences(first, second)
+    count = checked_cycles("distance", [len(differences)], few=few, least=1)
+    start, end = (position_of(pose, differences.shape[1]) for pose in (commanded_first, commanded_second))
+    commanded = float(np.linalg.norm(end - start))
+    A, B = _angles(angles, len(differences))
+    goals = [_commanded(goal, A.shape[1]) for goal in commanded_angles or (None, None)]
+    rotation = wrapped(goals[1] - goals[0])
     return DistanceAccuracy(
-        distance=float(np.linalg.norm(ways, axis=1).mean()) - asked,
-        components=np.abs(ways).mean(axis=0) - np.abs(end - start),
-        angles=np.abs(_between(A, B, turn)).mean(axis=0) - np.abs(turn),
-        commanded=asked,
+        distance=float(np.linalg.norm(differences, axis=1).mean()) - commanded,
+        components=np.abs(differences).mean(axis=0) - np.abs(end - start),
+        angles=np.abs(_between(A, B, rotation)).mean(axis=0) - np.abs(rotation),
+        commanded=commanded,
         cycles=count,
     )
 
@@ -103,7 +103,7 @@ def distance_repeatability(
     """Return RD between two poses.
 
     Args:
-        first: (n, 2) or (n, 3) attained places of the first pose, one per cycle [m].
+        first: (n, 2) or (n, 3) attained positions of the first pose, one per cycle [m].
         second: likewise of the second, of the same cycles [m].
         angles: (n, k) attained angles about a, b, c of both poses [rad].
         few: take fewer than 30 cycles.
@@ -116,20 +116,20 @@ def distance_repeatability(
     Source:
         ISO 9283:1998, 7.3.3.
     """
-    ways = _ways(first, second)
-    count = checked_cycles("distance", [len(ways)], few=few, least=2)
-    A, B = _angles(angles, len(ways))
+    differences = _differences(first, second)
+    count = checked_cycles("distance", [len(differences)], few=few, least=2)
+    A, B = _angles(angles, len(differences))
     turns = _between(A, B, mean_angles(B - A, "angles between the two poses"))
     return DistanceRepeatability(
-        distance=3 * float(np.linalg.norm(ways, axis=1).std(ddof=1)),
-        components=3 * np.abs(ways).std(axis=0, ddof=1),
+        distance=3 * float(np.linalg.norm(differences, axis=1).std(ddof=1)),
+        components=3 * np.abs(differences).std(axis=0, ddof=1),
         angles=3 * np.abs(turns).std(axis=0, ddof=1),
         cycles=count,
     )
 
 
-def _ways(first: ArrayLike, second: ArrayLike) -> Array:
-    P, Q = places_of(first, "first pose"), places_of(second, "second pose")
+def _differences(first: ArrayLike, second: ArrayLike) -> Array:
+    P, Q = positions_of(first, "first pose"), positions_of(second, "second pose")
     if P.shape != Q.shape:
         raise ShapeError(f"distance: the two poses need the same cycles, got shapes {P.shape} and {Q.shape}")
     return np.asarray(Q - P)
@@ -153,8 +153,8 @@ def _commanded(angles: ArrayLike | None, size: int) -> Array:
 
 
 def _between(A: Array, B: Array, near: Array) -> Array:
-    """Return by how much the second pose is turned from the first (n, k), those of the circle nearest to (k,) [rad].
+    """Return the rotation angles from the first pose to the second (n, k), the equivalents nearest to (k,) [rad].
 
-    Half a turn more or less is not taken for half a turn the other way.
+    So rotations of about 180 deg have one sign.
     """
     return np.asarray(near + wrapped(B - A - near))

@@ -10,7 +10,7 @@ import numpy as np
 from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
 from armwright.accuracy.cycles import Kind, checked_cycles
 from armwright.accuracy.planes import ENDS, Legs, legs_of, middles, passages
-from armwright.accuracy.trace import Trace, frozen_array, one_size
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
 from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -34,7 +34,7 @@ class PathDeviation:
         stations: (m,) how far along the path the planes are [m].
         offsets: (m,) distance of the mean run from the path [m].
         radii: (m,) mean distance from the mean run and three deviations [m].
-        mean_places: (m, 2) or (m, 3) the mean run [m].
+        mean_positions: (m, 2) or (m, 3) the mean run [m].
         cycles: n.
     """
 
@@ -47,7 +47,7 @@ class PathDeviation:
     stations: Array = attrs.field(converter=frozen_array)
     offsets: Array = attrs.field(converter=frozen_array)
     radii: Array = attrs.field(converter=frozen_array)
-    mean_places: Array = attrs.field(converter=frozen_array)
+    mean_positions: Array = attrs.field(converter=frozen_array)
     cycles: int
 
     __reduce__ = reduce_by_fields
@@ -93,7 +93,7 @@ def path_deviation(
         planes: across the path, at even distances, the first half a distance from its start. In the first and the
             last 5 % of the path those are left out that a run does not go through.
         corners: planes nearer than this to a corner of the path are left out [m].
-        kind: ``path``, or ``reorientation`` where the orientation is turned to and fro along a straight line.
+        kind: ``path``, or ``reorientation`` where the orientation changes to and fro along a straight line.
         few: take fewer than 10 cycles.
 
     Raises:
@@ -108,25 +108,25 @@ def path_deviation(
     if planes < 1:
         raise InvalidValueError(f"{kind}: needs one plane at least, got {planes}")
     stations = _apart(legs, middles(legs.stations[-1], planes), corners)
-    across, found = passages(legs, stations, runs, what=kind, ends=ENDS)
-    P, A = np.array([one.places for one in found]), np.array([one.angles for one in found])
+    across, passed = passages(legs, stations, runs, what=kind, ends=ENDS)
+    P, A = np.array([run.positions for run in passed]), np.array([run.angles for run in passed])
     mean = P.mean(axis=0)
     distances = np.linalg.norm(P - mean, axis=2)
     offsets = np.linalg.norm(mean - across.points, axis=1)
     radii = distances.mean(axis=0) + 3 * distances.std(axis=0, ddof=1)
-    turns = [wrapped(mean_angles(A[:, i]) - across.angles[i]) for i in range(len(mean))]
+    rotations = [wrapped(mean_angles(A[:, i]) - across.angles[i]) for i in range(len(mean))]
     scatter = [three_sigma(angle_deviations(A[:, i])) for i in range(len(mean))]
     return PathDeviation(
         accuracy=float(offsets.max()),
         accuracy_at=float(across.stations[offsets.argmax()]),
-        accuracy_angles=np.abs(turns).max(axis=0),
+        accuracy_angles=np.abs(rotations).max(axis=0),
         repeatability=float(radii.max()),
         repeatability_at=float(across.stations[radii.argmax()]),
         repeatability_angles=np.max(scatter, axis=0),
         stations=across.stations,
         offsets=offsets,
         radii=radii,
-        mean_places=mean,
+        mean_positions=mean,
         cycles=count,
     )
 
@@ -172,12 +172,12 @@ def path_velocity(
     edges = legs.stations[-1] * np.linspace(start, end, stretches + 1)
     for run in runs:
         run.timed("velocity")
-    _, found = passages(legs, edges, runs, what="velocity")
-    lasted = np.diff([one.times for one in found], axis=1)
-    if not (lasted > 0).all():
-        wrong = int(np.argwhere(lasted <= 0)[0, 0]) + 1
+    _, passed = passages(legs, edges, runs, what="velocity")
+    durations = np.diff([run.times for run in passed], axis=1)
+    if not (durations > 0).all():
+        wrong = int(np.argwhere(durations <= 0)[0, 0]) + 1
         raise InvalidValueError(f"velocity: run {wrong} goes back along the path; take fewer, longer stretches")
-    V = np.diff(edges) / lasted
+    V = np.diff(edges) / durations
     return PathVelocity(
         accuracy=float(V.mean() / speed - 1),
         repeatability=float(3 * V.mean(axis=1).std(ddof=1) / speed),
@@ -190,8 +190,8 @@ def path_velocity(
 
 def _checked(kind: Kind, commanded: Trace, runs: Sequence[Trace], *, few: bool) -> int:
     count = checked_cycles(kind, [len(runs)], few=few, least=2)
-    one_size([commanded.places, *(run.places for run in runs)], kind)
-    columns = sorted({0 if one.angles is None else one.angles.shape[1] for one in (commanded, *runs)})
+    refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], kind)
+    columns = sorted({0 if trace.angles is None else trace.angles.shape[1] for trace in (commanded, *runs)})
     if len(columns) > 1 and kind != "velocity":
         raise ShapeError(f"{kind}: path and runs need the same angles, got {' and '.join(map(str, columns))} of them")
     return count

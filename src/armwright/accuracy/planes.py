@@ -3,7 +3,7 @@
 Runs are compared with the path where they are, not when they are there: a run may be slow, stop, or be sampled
 unevenly. A plane is often passed more than once, on another leg of the path or by noise. What counts is a passage from
 behind to the front, where no other part of the path is much nearer. Of all choices of passages, one per plane, the one
-with the least sum of squares of the distances from the path, and of the ways back from plane to plane, is taken.
+with the least sum of squares is taken: of the distances from the path, and of the lengths run backwards between planes.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from armwright.accuracy.trace import Trace, frozen_array, turned
+from armwright.accuracy.trace import Trace, frozen_array, unwrapped
 from armwright.arrays import Array, reduce_by_fields
 from armwright.errors import InvalidValueError
 
-# Where two legs meet at a larger turn than this [rad], there is a corner, and the planes do not turn gradually.
+# Where two legs meet at a larger angle than this [rad], there is a corner, and the planes do not turn gradually.
 CORNER = np.radians(20)
 # Passages of one plane that are looked at, the nearest ones.
 _NEAREST = 100
@@ -57,12 +57,12 @@ class Passages:
     """Where and when a run goes through the planes.
 
     Attributes:
-        places: (m, 2) or (m, 3) [m].
+        positions: (m, 2) or (m, 3) [m].
         times: (m,) [s]; None where the run has none.
         angles: (m, k) [rad], free of jumps.
     """
 
-    places: Array = attrs.field(converter=frozen_array)
+    positions: Array = attrs.field(converter=frozen_array)
     times: Array | None
     angles: Array = attrs.field(converter=frozen_array)
 
@@ -72,14 +72,14 @@ class Legs:
     """A commanded path without its repeated points.
 
     Attributes:
-        places: (c, 2) or (c, 3) its points [m].
+        positions: (c, 2) or (c, 3) its points [m].
         angles: (c, k) [rad], free of jumps.
         stations: (c,) distance along the path [m].
         directions: (c-1, 2) or (c-1, 3) unit vectors from point to point.
-        corners: (c,) whether it turns sharply there.
+        corners: (c,) whether its direction changes sharply there.
     """
 
-    places: Array
+    positions: Array
     angles: Array
     stations: Array
     directions: Array
@@ -92,18 +92,18 @@ def legs_of(commanded: Trace) -> Legs:
     Raises:
         InvalidValueError: it has no length.
     """
-    steps = np.linalg.norm(np.diff(commanded.places, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(commanded.positions, axis=0), axis=1)
     if not steps.sum() > 0:
         raise InvalidValueError("commanded path: all of its points are the same")
-    kept = np.append(True, steps > _SAME * steps.sum())
-    places = commanded.places[kept]
-    ways = np.diff(places, axis=0)
-    lengths = np.linalg.norm(ways, axis=1)
-    directions = ways / lengths[:, None]
+    distinct = np.append(True, steps > _SAME * steps.sum())
+    positions = commanded.positions[distinct]
+    legs = np.diff(positions, axis=0)
+    lengths = np.linalg.norm(legs, axis=1)
+    directions = legs / lengths[:, None]
     cosines = np.sum(directions[:-1] * directions[1:], axis=1)
     return Legs(
-        places=places,
-        angles=turned(commanded.angles, len(kept))[kept],
+        positions=positions,
+        angles=unwrapped(commanded.angles, len(distinct))[distinct],
         stations=np.append(0.0, np.cumsum(lengths)),
         directions=directions,
         corners=np.concatenate([[False], cosines < np.cos(CORNER), [False]]),
@@ -131,7 +131,7 @@ def planes_at(legs: Legs, stations: Array) -> Planes:
     normals = (1 - part) * start + part * end
     return Planes(
         stations=stations,
-        points=(1 - part) * legs.places[leg] + part * legs.places[leg + 1],
+        points=(1 - part) * legs.positions[leg] + part * legs.positions[leg + 1],
         normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
         angles=(1 - part) * legs.angles[leg] + part * legs.angles[leg + 1],
         length=float(s[-1]),
@@ -157,20 +157,22 @@ def passages(
         InvalidValueError: a run does not go through one of the planes.
     """
     planes = planes_at(legs, stations)
-    found = [_candidates(legs, planes, run) for run in runs]
-    passed = np.array([[len(at) > 0 for at, _ in one] for one in found])
+    candidates = [_candidates(legs, planes, run) for run in runs]
+    passed = np.array([[len(samples) > 0 for samples, _ in by_plane] for by_plane in candidates])
     away = np.minimum(stations, planes.length - stations) > ends * planes.length
-    missed = np.argwhere(~passed & away)
-    if len(missed) or not passed.all(axis=0).any():
-        run, i = missed[0] if len(missed) else np.argwhere(~passed)[0]
+    not_passed = np.argwhere(~passed & away)
+    if len(not_passed) or not passed.all(axis=0).any():
+        run, i = not_passed[0] if len(not_passed) else np.argwhere(~passed)[0]
         raise InvalidValueError(
             f"{what}: run {run + 1} does not go through the plane at {stations[i] * 1e3:.4g} of "
             f"{planes.length * 1e3:.4g} mm of the commanded path: it begins too late, ends too early, "
             f"or cuts a corner{_corner_hint(legs, stations[i])}"
         )
-    kept = np.flatnonzero(passed.all(axis=0))
-    chosen = [_in_order([one[i] for i in kept], _along(run)) for one, run in zip(found, runs, strict=True)]
-    return planes_at(legs, stations[kept]), [_passages(run, at) for run, at in zip(runs, chosen, strict=True)]
+    common = np.flatnonzero(passed.all(axis=0))
+    return planes_at(legs, stations[common]), [
+        _passages(run, _in_order([by_plane[i] for i in common], _along(run)))
+        for by_plane, run in zip(candidates, runs, strict=True)
+    ]
 
 
 def _corner_hint(legs: Legs, station: float) -> str:
@@ -178,76 +180,76 @@ def _corner_hint(legs: Legs, station: float) -> str:
     sharp = legs.stations[legs.corners]
     if not len(sharp):
         return ""
-    return f"; the nearest corner is {np.abs(sharp - station).min() * 1e3:.4g} mm off: leave out what is near corners"
+    return f"; the nearest corner is {np.abs(sharp - station).min() * 1e3:.4g} mm away: leave out what is near corners"
 
 
-def _passages(run: Trace, at: Array) -> Passages:
+def _passages(run: Trace, samples: Array) -> Passages:
     return Passages(
-        places=_at(run.places, at),
-        times=None if run.times is None else _at(run.times, at),
-        angles=_at(turned(run.angles, len(run.places)), at),
+        positions=_interpolated(run.positions, samples),
+        times=None if run.times is None else _interpolated(run.times, samples),
+        angles=_interpolated(unwrapped(run.angles, len(run.positions)), samples),
     )
 
 
 def _along(run: Trace) -> Array:
-    """Return the way gone at every sample (n,) [m]."""
-    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.places, axis=0), axis=1)))
+    """Return the distance covered until every sample (n,) [m]."""
+    return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(run.positions, axis=0), axis=1)))
 
 
 def _candidates(legs: Legs, planes: Planes, run: Trace) -> list[tuple[Array, Array]]:
-    """Return for every plane where the run may go through it, as fractional numbers of samples, and how far off²."""
-    found = []
+    """Return for every plane the fractional samples at which the run may go through it, and the squared distances."""
+    candidates = []
     for point, normal in zip(planes.points, planes.normals, strict=True):
-        at = _crossings(run.places, point, normal)
-        off = np.sum((_at(run.places, at) - point) ** 2, axis=1)
-        nearest = np.sort(np.argsort(off, kind="stable")[:_NEAREST])
-        found.append((at[nearest], off[nearest]))
-    every = np.concatenate([at for at, _ in found])
-    clear = _clearances(legs, _at(run.places, every))
-    own = np.sqrt(np.concatenate([off for _, off in found])) <= _NEARER * clear + _ROUNDING * planes.length
-    pieces = np.split(own, np.cumsum([len(at) for at, _ in found])[:-1])
-    return [(at[mine], off[mine]) for (at, off), mine in zip(found, pieces, strict=True)]
+        samples = _crossings(run.positions, point, normal)
+        squares = np.sum((_interpolated(run.positions, samples) - point) ** 2, axis=1)
+        nearest = np.sort(np.argsort(squares, kind="stable")[:_NEAREST])
+        candidates.append((samples[nearest], squares[nearest]))
+    every = np.concatenate([samples for samples, _ in candidates])
+    clear = _clearances(legs, _interpolated(run.positions, every))
+    own = np.sqrt(np.concatenate([squares for _, squares in candidates])) <= _NEARER * clear + _ROUNDING * planes.length
+    pieces = np.split(own, np.cumsum([len(samples) for samples, _ in candidates])[:-1])
+    return [(samples[mine], squares[mine]) for (samples, squares), mine in zip(candidates, pieces, strict=True)]
 
 
-def _clearances(legs: Legs, places: Array) -> Array:
-    """Return the distances of places (k, d) from a path, (k,) [m]."""
-    starts, u = legs.places[:-1], legs.directions
+def _clearances(legs: Legs, positions: Array) -> Array:
+    """Return the distances of positions (k, d) from a path, (k,) [m]."""
+    starts, u = legs.positions[:-1], legs.directions
     lengths = np.diff(legs.stations)
-    found = np.empty(len(places))
-    for first in range(0, len(places), _AT_ONCE):
-        some = places[first : first + _AT_ONCE]
+    clearances = np.empty(len(positions))
+    for first in range(0, len(positions), _AT_ONCE):
+        some = positions[first : first + _AT_ONCE]
         relative = some[:, None, :] - starts
         part = np.clip(np.einsum("ksd,sd->ks", relative, u), 0.0, lengths)
-        found[first : first + _AT_ONCE] = np.linalg.norm(relative - part[..., None] * u, axis=2).min(axis=1)
-    return found
+        clearances[first : first + _AT_ONCE] = np.linalg.norm(relative - part[..., None] * u, axis=2).min(axis=1)
+    return clearances
 
 
-def _crossings(places: Array, point: Array, normal: Array) -> Array:
+def _crossings(positions: Array, point: Array, normal: Array) -> Array:
     """Return where a run goes through a plane from behind to the front, as fractional numbers of samples."""
-    ahead = (places - point) @ normal
-    at = np.flatnonzero((ahead[:-1] < 0) & (ahead[1:] >= 0))
-    crossings = at + ahead[at] / (ahead[at] - ahead[at + 1])
+    ahead = (positions - point) @ normal
+    before = np.flatnonzero((ahead[:-1] < 0) & (ahead[1:] >= 0))
+    crossings = before + ahead[before] / (ahead[before] - ahead[before + 1])
     return np.asarray(np.append(0.0, crossings) if ahead[0] == 0 else crossings)
 
 
-def _at(values: Array, at: Array) -> Array:
+def _interpolated(values: Array, samples: Array) -> Array:
     """Return values at fractional numbers of samples (m,)."""
-    before = np.minimum(at.astype(np.int64), len(values) - 2)
-    part = (at - before).reshape(-1, *[1] * (values.ndim - 1))
+    before = np.minimum(samples.astype(np.int64), len(values) - 2)
+    part = (samples - before).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray((1 - part) * values[before] + part * values[before + 1])
 
 
-def _in_order(found: list[tuple[Array, Array]], along: Array) -> Array:
+def _in_order(candidates: list[tuple[Array, Array]], along: Array) -> Array:
     """Choose one passage per plane, the sum of squares being the least."""
     best, last, origins = np.zeros(1), np.zeros(1), []
-    for at, off in found:
-        way = _at(along, at)
-        costs = best[:, None] + np.maximum(last[:, None] - way[None, :], 0.0) ** 2
+    for samples, squares in candidates:
+        s = _interpolated(along, samples)
+        costs = best[:, None] + np.maximum(last[:, None] - s[None, :], 0.0) ** 2
         origins.append(np.argmin(costs, axis=0))
-        best, last = costs.min(axis=0) + off, way
-    chosen = np.empty(len(found))
+        best, last = costs.min(axis=0) + squares, s
+    chosen = np.empty(len(candidates))
     k = int(np.argmin(best))
-    for i in range(len(found) - 1, -1, -1):
-        chosen[i] = found[i][0][k]
+    for i in range(len(candidates) - 1, -1, -1):
+        chosen[i] = candidates[i][0][k]
         k = int(origins[i][k])
     return chosen

@@ -7,7 +7,7 @@ import numpy as np
 
 from armwright.accuracy.angles import angle_deviations, mean_angles, three_sigma, wrapped
 from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.trace import angles_of, frozen_array, place_of, places_of
+from armwright.accuracy.trace import angles_of, frozen_array, position_of, positions_of
 from armwright.arrays import Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import ShapeError
 
@@ -17,10 +17,10 @@ class PoseAccuracy:
     """How far the mean of what was attained is from what was commanded.
 
     Attributes:
-        position: AP_P, distance of the barycentre from the commanded place [m].
-        components: (2,) or (3,) AP_x, AP_y, AP_z: barycentre less commanded place [m].
+        position: AP_P, distance of the barycentre from the commanded position [m].
+        components: (2,) or (3,) AP_x, AP_y, AP_z: barycentre less commanded position [m].
         angles: (k,) AP_a, AP_b, AP_c: mean less commanded angle [rad].
-        barycentre: (2,) or (3,) mean of the attained places [m].
+        barycentre: (2,) or (3,) mean of the attained positions [m].
         cycles: n.
     """
 
@@ -57,7 +57,7 @@ class PoseRepeatability:
 
 
 def pose_accuracy(
-    places: ArrayLike,
+    positions: ArrayLike,
     commanded: ArrayLike,
     *,
     angles: ArrayLike | None = None,
@@ -67,9 +67,9 @@ def pose_accuracy(
     """Return AP of one pose.
 
     Args:
-        places: (n, 2) or (n, 3) attained places, one per cycle [m].
-        commanded: (2,) or (3,) the commanded place [m].
-        angles: (n, k) attained angles about a, b, c [rad]; turns more or less do not matter.
+        positions: (n, 2) or (n, 3) attained positions, one per cycle [m].
+        commanded: (2,) or (3,) the commanded position [m].
+        angles: (n, k) attained angles about a, b, c [rad]; whole revolutions do not matter.
         commanded_angles: (k,) the commanded ones [rad].
         few: take fewer than 30 cycles.
 
@@ -81,9 +81,9 @@ def pose_accuracy(
     Source:
         ISO 9283:1998, 7.2.1.
     """
-    P, A = _cloud(places, angles)
+    P, A = _cloud(positions, angles)
     count = checked_cycles("pose", [len(P)], few=few, least=1)
-    goal = place_of(commanded, P.shape[1])
+    goal = position_of(commanded, P.shape[1])
     barycentre = P.mean(axis=0)
     return PoseAccuracy(
         position=float(np.linalg.norm(barycentre - goal)),
@@ -94,12 +94,14 @@ def pose_accuracy(
     )
 
 
-def pose_repeatability(places: ArrayLike, *, angles: ArrayLike | None = None, few: bool = False) -> PoseRepeatability:
+def pose_repeatability(
+    positions: ArrayLike, *, angles: ArrayLike | None = None, few: bool = False
+) -> PoseRepeatability:
     """Return RP of one pose.
 
     Args:
-        places: (n, 2) or (n, 3) attained places, one per cycle [m].
-        angles: (n, k) attained angles about a, b, c [rad]; turns more or less do not matter.
+        positions: (n, 2) or (n, 3) attained positions, one per cycle [m].
+        angles: (n, k) attained angles about a, b, c [rad]; whole revolutions do not matter.
         few: take fewer than 30 cycles.
 
     Raises:
@@ -110,7 +112,7 @@ def pose_repeatability(places: ArrayLike, *, angles: ArrayLike | None = None, fe
     Source:
         ISO 9283:1998, 7.2.2: the radius is the mean distance *plus* three deviations.
     """
-    P, A = _cloud(places, angles)
+    P, A = _cloud(positions, angles)
     return repeatability("pose", P, A, few=few)
 
 
@@ -130,8 +132,8 @@ def repeatability(kind: Kind, P: Array, A: Array, *, few: bool) -> PoseRepeatabi
     )
 
 
-def _cloud(places: ArrayLike, angles: ArrayLike | None) -> tuple[Array, Array]:
-    P = places_of(places)
+def _cloud(positions: ArrayLike, angles: ArrayLike | None) -> tuple[Array, Array]:
+    P = positions_of(positions)
     return P, angles_of(angles, len(P))
 
 

@@ -1,4 +1,4 @@
-"""Commanded and attained values that look as if they were in different units."""
+"""Commanded and attained values that are probably in different units."""
 
 from __future__ import annotations
 
@@ -23,41 +23,45 @@ _FAR = 0.05
 _LARGE_ANGLE = np.radians(10)
 
 
-def lengths_question(commanded: Array, attained: Array) -> str:
-    """Ask whether commanded and attained places are in different units; empty where nothing looks like it.
+def length_unit_question(commanded: Array, attained: Array) -> str:
+    """Ask whether commanded and attained positions are in different units; empty where nothing suggests it.
 
     Args:
-        commanded: (c, d) commanded path, told by its extent, or (1, d) pose, told by its distance from the origin [m].
+        commanded: (c, d) commanded path, of which the extent is compared, or (1, d) pose, of which the distance from
+            the origin is [m].
         attained: (n, d) attained ones [m].
 
     Returns:
         What is odd, and a question.
     """
     if len(commanded) > 1:
-        asked, got = float(np.linalg.norm(np.ptp(commanded, axis=0))), float(np.linalg.norm(np.ptp(attained, axis=0)))
+        commanded_norm, attained_norm = (float(np.linalg.norm(np.ptp(P, axis=0))) for P in (commanded, attained))
     else:
-        asked, got = _outward(commanded[0], attained.mean(axis=0))
-    if min(asked, got) > 0 and max(asked, got) > _FAR:
+        commanded_norm, attained_norm = _outward(commanded[0], attained.mean(axis=0))
+    if min(commanded_norm, attained_norm) > 0 and max(commanded_norm, attained_norm) > _FAR:
         for units, factor in _LENGTHS.items():
-            for larger, ratio in (("attained", got / asked), ("commanded", asked / got)):
+            for larger, ratio in (
+                ("attained", attained_norm / commanded_norm),
+                ("commanded", commanded_norm / attained_norm),
+            ):
                 if abs(ratio / factor - 1) < _FIT:
-                    return f"the {larger} places are {factor:.4g} times as large as the others: {units}?"
+                    return f"the {larger} positions are {factor:.4g} times as large as the others: {units}?"
     return ""
 
 
-def angles_question(commanded: Array, attained: Array) -> str:
+def angle_unit_question(commanded: Array, attained: Array) -> str:
     """Ask whether commanded angles (k,) and attained ones (n, k) are in different units; empty where not [rad]."""
-    for asked, got in zip(np.abs(commanded), np.abs(attained.mean(axis=0)), strict=True):
-        small, large = sorted((float(asked), float(got)))
+    for commanded_norm, attained_norm in zip(np.abs(commanded), np.abs(attained.mean(axis=0)), strict=True):
+        small, large = sorted((float(commanded_norm), float(attained_norm)))
         if small > 0 and large > _LARGE_ANGLE and abs(large / small / _DEGREES - 1) < _FIT:
-            larger = "attained" if got > asked else "commanded"
+            larger = "attained" if attained_norm > commanded_norm else "commanded"
             return f"the {larger} angles are {_DEGREES:.3g} times as large as the others: radians and degrees?"
     return ""
 
 
 def _outward(commanded: Array, attained: Array) -> tuple[float, float]:
-    """Return the distances from the origin of two places in one direction from it; nothing of others."""
-    asked, got = float(np.linalg.norm(commanded)), float(np.linalg.norm(attained))
-    if not commanded @ attained > _ALIGNED * asked * got:
+    """Return the distances from the origin of two positions in one direction from it; nothing of others."""
+    commanded_norm, attained_norm = float(np.linalg.norm(commanded)), float(np.linalg.norm(attained))
+    if not commanded @ attained > _ALIGNED * commanded_norm * attained_norm:
         return 0.0, 0.0
-    return asked, got
+    return commanded_norm, attained_norm

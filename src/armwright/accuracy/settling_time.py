@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import Kind, checked_cycles
-from armwright.accuracy.trace import Trace, frozen_array, one_size
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
 from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError
 
@@ -85,8 +85,8 @@ def settling(runs: Sequence[Trace], band: float, *, few: bool = False) -> Settli
         ISO 9283:1998, 7.4 and 7.5.
     """
     band = _checked("settling", runs, band, few=few)
-    found = [_arrival(run, band, j) for j, run in enumerate(runs)]
-    entered, settled, overshoots = (np.array(column) for column in zip(*found, strict=True))
+    arrivals = [_arrival(run, band, j) for j, run in enumerate(runs)]
+    entered, settled, overshoots = (np.array(column) for column in zip(*arrivals, strict=True))
     return Settling(
         time=float((settled - entered).mean()),
         overshoot=float(overshoots.max()),
@@ -102,7 +102,7 @@ def settling(runs: Sequence[Trace], band: float, *, few: bool = False) -> Settli
 def posing_time(runs: Sequence[Trace], band: float, *, few: bool = False) -> PosingTime:
     """Return the time from departure to rest, beside the distance of the two poses.
 
-    Departure is when the place of the first sample is left by more than the band.
+    Departure is when the position of the first sample is more than the band away.
 
     Args:
         runs: records with times, from rest at one pose until long after rest at the other.
@@ -122,21 +122,21 @@ def posing_time(runs: Sequence[Trace], band: float, *, few: bool = False) -> Pos
     for j, run in enumerate(runs):
         _, settled, _ = _arrival(run, band, j)
         times.append(settled - _leaving(run, band))
-        distances.append(float(np.linalg.norm(attained_place(run) - run.places[0])))
+        distances.append(float(np.linalg.norm(attained_position(run) - run.positions[0])))
     return PosingTime(
         time=float(np.mean(times)), distance=float(np.mean(distances)), times=times, band=band, cycles=len(runs)
     )
 
 
-def attained_place(run: Trace) -> Array:
-    """Return where a record comes to rest: the mean place of its last tenth (2,) or (3,) [m]."""
+def attained_position(run: Trace) -> Array:
+    """Return where a record comes to rest: the mean position of its last tenth (2,) or (3,) [m]."""
     t = run.timed("settling")
-    return np.asarray(run.places[t >= t[-1] - TAIL * (t[-1] - t[0])].mean(axis=0))
+    return np.asarray(run.positions[t >= t[-1] - TAIL * (t[-1] - t[0])].mean(axis=0))
 
 
 def _checked(kind: Kind, runs: Sequence[Trace], band: float, *, few: bool) -> float:
     checked_cycles(kind, [len(runs)], few=few, least=1)
-    one_size([run.places for run in runs], kind)
+    refuse_mixed_dimensions([run.positions for run in runs], kind)
     band = number(band, f"{kind}: band")
     if not 0 < band < np.inf:
         raise InvalidValueError(f"{kind}: the band must be above 0 m, got {band:g}")
@@ -146,7 +146,7 @@ def _checked(kind: Kind, runs: Sequence[Trace], band: float, *, few: bool) -> fl
 def _arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:
     """Return when a run enters the band, when it does so for good, and how far it swings out between the two."""
     t = run.timed("settling")
-    relative = run.places - attained_place(run)
+    relative = run.positions - attained_position(run)
     distances = np.linalg.norm(relative, axis=1)
     outside = np.flatnonzero(distances > band)
     if not len(outside) or outside[0] != 0:
@@ -156,7 +156,7 @@ def _arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:
         )
     if t[outside[-1]] >= t[-1] - TAIL * (t[-1] - t[0]):
         raise InvalidValueError(
-            f"settling: run {cycle + 1} is still more than {band * 1e3:g} mm off in the last tenth of its record; "
+            f"settling: run {cycle + 1} is still more than {band * 1e3:g} mm away in the last tenth of its record; "
             "record longer, or take a wider band"
         )
     entries = _entries(t, relative, band)
@@ -166,13 +166,13 @@ def _arrival(run: Trace, band: float, cycle: int) -> tuple[float, float, float]:
 
 
 def _entries(t: Array, relative: Array, band: float) -> Array:
-    """Return when a run goes into the ball of the band on each way from sample to sample (n-1,), NaN where it does not.
+    """Return when a run goes into the ball of the band between each sample and the next (n-1,), NaN where it does not.
 
     A fast run may be through the ball between two samples, which counts.
     """
-    start, way = relative[:-1], np.diff(relative, axis=0)
-    # |start + part * way| = band
-    a, b, c = np.sum(way**2, axis=1), np.sum(start * way, axis=1), np.sum(start**2, axis=1) - band**2
+    start, step = relative[:-1], np.diff(relative, axis=0)
+    # |start + part * step| = band
+    a, b, c = np.sum(step**2, axis=1), np.sum(start * step, axis=1), np.sum(start**2, axis=1) - band**2
     root = b**2 - a * c
     enters = (c > 0) & (b < 0) & (root >= 0)
     part = np.where(enters, c, np.nan) / np.where(enters, -b + np.sqrt(np.maximum(root, 0.0)), 1.0)
@@ -180,8 +180,8 @@ def _entries(t: Array, relative: Array, band: float) -> Array:
 
 
 def _leaving(run: Trace, band: float) -> float:
-    """Return when a run leaves the band about its first place."""
-    t, distances = run.timed("posing"), np.linalg.norm(run.places - run.places[0], axis=1)
+    """Return when a run leaves the band about its first position."""
+    t, distances = run.timed("posing"), np.linalg.norm(run.positions - run.positions[0], axis=1)
     after = int(np.argmax(distances > band))
     part = (band - distances[after - 1]) / (distances[after] - distances[after - 1])
     return float(t[after - 1] + part * (t[after] - t[after - 1]))

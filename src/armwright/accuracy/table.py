@@ -8,7 +8,7 @@ from pathlib import Path
 
 import attrs
 
-from armwright.accuracy.cycles import ASKED, Kind
+from armwright.accuracy.cycles import REQUIRED_CYCLES, Kind
 from armwright.accuracy.trace import ANGLES
 from armwright.errors import FileFormatError, shown
 from armwright.files.column_names import ANGLE, FORCE, LENGTH, TIME, VELOCITY, Column, Schema
@@ -16,7 +16,7 @@ from armwright.files.unit_table import Header, UnitTable, read_headers
 
 COMMANDED = "commanded"
 _COORDINATES = ("x", "y", "z")
-_KINDS: dict[str, Kind] = {kind: kind for kind in ASKED}
+_KINDS: dict[str, Kind] = {kind: kind for kind in REQUIRED_CYCLES}
 # The number of a cycle has fewer.
 _CYCLE_DIGITS = 10
 _SCHEMA = Schema(
@@ -39,7 +39,7 @@ class Row:
     __slots__ = ("_nominal", "_row", "_table")
 
     def __init__(self, table: Table, row: int, *, nominal: bool = False) -> None:
-        """Look at a row of a table, counted from 0, or at the pose that its nominal columns ask for."""
+        """Refer to a row of a table, counted from 0, or to the pose of its nominal columns."""
         self._table, self._row, self._nominal = table, row, nominal
 
     def error(self, name: str, message: str) -> FileFormatError:
@@ -102,7 +102,7 @@ class Row:
         return self._table.columns.number("speed", self._row)
 
     @property
-    def place(self) -> tuple[float, ...]:
+    def position(self) -> tuple[float, ...]:
         """Two or three coordinates [m]."""
         return self._numbers(self._table.coordinates)
 
@@ -113,7 +113,7 @@ class Row:
 
     @property
     def angle_names(self) -> tuple[str, ...]:
-        """About which of a, b, c each of the angles turns."""
+        """The axes a, b, c that the angles are about."""
         return self._table.angles
 
     def _word(self, name: str) -> str:
@@ -157,7 +157,7 @@ class Table:
                 first = commanded.setdefault((row.test, row.name, row.condition), goal)
                 if first is goal:
                     yield goal
-                elif (goal.place, goal.angles) != (first.place, first.angles):
+                elif (goal.position, goal.angles) != (first.position, first.angles):
                     raise row.error("x_nominal", f"{row.name} has other nominal coordinates in line {first.line}")
             yield row
 
@@ -182,13 +182,13 @@ def read_tables(
 
 def _table(header: Header, *, skip_incomplete: bool) -> Table:
     name, nominal = _name(header), header.present(f"{name}_nominal" for name in (*_COORDINATES, *ANGLES))
-    given = header.present(("test", "cycle"))
+    identifiers = header.present(("test", "cycle"))
     header.require(("x", "y") if nominal else ("test", "cycle", "x", "y"))
     measured = header.present((*_COORDINATES, *ANGLES))
     if nominal:
         header.require((f"{name}_nominal" for name in measured), "all that is measured is nominal too, or nothing")
         header.require((name.removesuffix("_nominal") for name in nominal), "it is nominal")
-    columns = header.rows(filled=(*given, name, *measured, *nominal), skip_incomplete=skip_incomplete)
+    columns = header.rows(filled=(*identifiers, name, *measured, *nominal), skip_incomplete=skip_incomplete)
     for row in range(len(columns)) if "test" in columns else ():
         columns.choice("test", row, tuple(_KINDS))
     return Table(
@@ -209,10 +209,14 @@ def _name(header: Header) -> str:
     names = header.present(("pose", "path"))
     if len(names) != 1:
         there = "both" if names else "neither"
-        raise header.error("pose", f"expected a column pose or a column path, and there are {there}: {header.listing}")
+        raise header.error(
+            "pose", f"expected a column pose or a column path, and the file has {there}: {header.listing}"
+        )
     nominal = header.present(f"{name}_nominal" for name in _COORDINATES)
     if names[0] == "path" and nominal:
-        raise header.error(nominal[0], f"only poses have nominal columns; a path is given by rows of cycle {COMMANDED}")
+        raise header.error(
+            nominal[0], f"only poses have nominal columns; a path is commanded by rows of cycle {COMMANDED}"
+        )
     return names[0]
 
 

@@ -1,4 +1,4 @@
-"""Measured places and traces at the door: shapes checked, copied, read-only."""
+"""Measured positions and traces: checked, copied and read-only."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from armwright.errors import InvalidValueError, ShapeError
 ANGLES = ("a", "b", "c")
 
 
-def places_of(value: ArrayLike, what: str = "places") -> Array:
-    """Return measured places as read-only float64.
+def positions_of(value: ArrayLike, what: str = "positions") -> Array:
+    """Return measured positions as read-only float64.
 
     Args:
         value: (n, 2) in a plane or (n, 3) in space [m].
@@ -33,15 +33,15 @@ def places_of(value: ArrayLike, what: str = "places") -> Array:
     return array
 
 
-def place_of(value: ArrayLike, size: int, what: str = "commanded place") -> Array:
-    """Return one place of ``size`` numbers [m].
+def position_of(value: ArrayLike, size: int, what: str = "commanded position") -> Array:
+    """Return one position of ``size`` numbers [m].
 
     Raises:
         ShapeError: it has another shape.
     """
     array = floats(value, what, LARGEST)
     if array.shape != (size,):
-        raise ShapeError(f"{what}: expected {size} numbers, as the measured places have, got shape {array.shape}")
+        raise ShapeError(f"{what}: expected {size} numbers, as the measured positions have, got shape {array.shape}")
     array.setflags(write=False)
     return array
 
@@ -50,16 +50,16 @@ def angles_of(value: ArrayLike | None, rows: int, what: str = "angles") -> Array
     """Return measured angles as read-only float64 (n, k) [rad], k from 0 to 3; none where there is nothing.
 
     Raises:
-        ShapeError: they are not one row per place, or more than three.
+        ShapeError: they are not one row per position, or more than three.
     """
     array = np.empty((rows, 0)) if value is None else floats(value, what, LARGEST)
     if array.ndim != 2 or len(array) != rows or array.shape[1] > len(ANGLES):
-        raise ShapeError(f"{what}: expected shape ({rows}, k) with k up to 3, one row per place, got {array.shape}")
+        raise ShapeError(f"{what}: expected shape ({rows}, k) with k up to 3, one row per position, got {array.shape}")
     array.setflags(write=False)
     return array
 
 
-def one_size(parts: Sequence[Array], what: str) -> None:
+def refuse_mixed_dimensions(parts: Sequence[Array], what: str) -> None:
     """Refuse parts of a test that have different numbers of columns.
 
     Raises:
@@ -70,8 +70,8 @@ def one_size(parts: Sequence[Array], what: str) -> None:
         raise ShapeError(f"{what}: all parts of a test have the same columns, got {' and '.join(map(str, sizes))}")
 
 
-def _trace_places(value: ArrayLike) -> Array:
-    return places_of(value, "trace: places")
+def _trace_positions(value: ArrayLike) -> Array:
+    return positions_of(value, "trace: positions")
 
 
 def _trace_angles(value: ArrayLike | None) -> Array | None:
@@ -102,22 +102,22 @@ class Trace:
     """One measured run, sample by sample, or a commanded path, corner by corner.
 
     Attributes:
-        places: (n, 2) or (n, 3) [m], two of them at least.
+        positions: (n, 2) or (n, 3) [m], two of them at least.
         times: (n,) rising [s]; None where the measure needs none.
         angles: (n, k) about a, b, c [rad], k from 1 to 3; None where none were measured.
     """
 
-    places: Array = attrs.field(converter=_trace_places)
+    positions: Array = attrs.field(converter=_trace_positions)
     times: Array | None = attrs.field(default=None, converter=_trace_times)
     angles: Array | None = attrs.field(default=None, converter=_trace_angles)
 
     def __attrs_post_init__(self) -> None:
-        """Refuse what has not one row per sample."""
-        rows = len(self.places)
+        """Refuse times and angles that do not have one row per sample."""
+        rows = len(self.positions)
         if rows < 2:
             raise ShapeError(f"trace: expected two samples at least, got {rows}")
         if self.times is not None and len(self.times) != rows:
-            raise ShapeError(f"trace: {rows} places but {len(self.times)} times")
+            raise ShapeError(f"trace: {rows} positions but {len(self.times)} times")
         angles_of(self.angles, rows, "trace: angles")
 
     __reduce__ = reduce_by_fields
@@ -125,7 +125,7 @@ class Trace:
     @property
     def size(self) -> int:
         """2 in a plane, 3 in space."""
-        return int(self.places.shape[1])
+        return int(self.positions.shape[1])
 
     def timed(self, what: str) -> Array:
         """Return the times (n,) [s].
@@ -138,8 +138,8 @@ class Trace:
         return self.times
 
 
-def turned(angles: Array | None, rows: int) -> Array:
-    """Return angles (n, k) along a trace without jumps of a turn, so that they can be interpolated."""
+def unwrapped(angles: Array | None, rows: int) -> Array:
+    """Return angles (n, k) along a trace without jumps of a revolution, so that they can be interpolated."""
     return np.empty((rows, 0)) if angles is None else np.asarray(np.unwrap(angles, axis=0))
 
 

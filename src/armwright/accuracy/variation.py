@@ -11,7 +11,7 @@ import numpy as np
 from armwright.accuracy.angles import mean_angles, wrapped
 from armwright.accuracy.cycles import DIRECTIONS, ROBOTS, Kind, checked_cycles, checked_parts
 from armwright.accuracy.pose import from_commanded, repeatability
-from armwright.accuracy.trace import angles_of, frozen_array, one_size, place_of, places_of
+from armwright.accuracy.trace import angles_of, frozen_array, position_of, positions_of, refuse_mixed_dimensions
 from armwright.arrays import LARGEST, Array, ArrayLike, floats, reduce_by_fields
 from armwright.errors import InvalidValueError, ShapeError
 
@@ -65,12 +65,12 @@ class PoseDrift:
 
 
 def multidirectional_variation(
-    places: Sequence[ArrayLike], *, angles: Sequence[ArrayLike] | None = None, few: bool = False
+    positions: Sequence[ArrayLike], *, angles: Sequence[ArrayLike] | None = None, few: bool = False
 ) -> Variation:
     """Return vAP: how far apart a pose is attained when it is approached from different directions.
 
     Args:
-        places: (n, 2) or (n, 3) attained places for each of 3 directions of approach [m].
+        positions: (n, 2) or (n, 3) attained positions for each of 3 directions of approach [m].
         angles: (n, k) attained angles about a, b, c for each [rad].
         few: take fewer than 3 directions, or fewer than 30 cycles of each.
 
@@ -82,17 +82,17 @@ def multidirectional_variation(
     Source:
         ISO 9283:1998, 7.2.3.
     """
-    checked_parts("multidirectional", len(places), DIRECTIONS, few=few, what="directions of approach")
-    return _variation("multidirectional", places, angles, few=few)
+    checked_parts("multidirectional", len(positions), DIRECTIONS, few=few, what="directions of approach")
+    return _variation("multidirectional", positions, angles, few=few)
 
 
 def exchangeability(
-    places: Sequence[ArrayLike], *, angles: Sequence[ArrayLike] | None = None, few: bool = False
+    positions: Sequence[ArrayLike], *, angles: Sequence[ArrayLike] | None = None, few: bool = False
 ) -> Variation:
     """Return E: how far apart robots of one type attain the same commanded pose.
 
     Args:
-        places: (n, 2) or (n, 3) attained places of each of 5 robots, in the same base frame [m].
+        positions: (n, 2) or (n, 3) attained positions of each of 5 robots, in the same base frame [m].
         angles: (n, k) attained angles about a, b, c of each [rad].
         few: take fewer than 5 robots, or fewer than 30 cycles of each.
 
@@ -104,13 +104,13 @@ def exchangeability(
     Source:
         ISO 9283:1998, 7.7.
     """
-    checked_parts("exchangeability", len(places), ROBOTS, few=few, what="robots")
-    return _variation("exchangeability", places, angles, few=few)
+    checked_parts("exchangeability", len(positions), ROBOTS, few=few, what="robots")
+    return _variation("exchangeability", positions, angles, few=few)
 
 
 def pose_drift(
     times: ArrayLike,
-    places: Sequence[ArrayLike],
+    positions: Sequence[ArrayLike],
     commanded: ArrayLike,
     *,
     angles: Sequence[ArrayLike] | None = None,
@@ -121,8 +121,8 @@ def pose_drift(
 
     Args:
         times: (m,) when each measurement was made, rising [s].
-        places: (n, 2) or (n, 3) attained places of each measurement [m].
-        commanded: (2,) or (3,) the commanded place [m].
+        positions: (n, 2) or (n, 3) attained positions of each measurement [m].
+        commanded: (2,) or (3,) the commanded position [m].
         angles: (n, k) attained angles of each measurement [rad].
         commanded_angles: (k,) the commanded ones [rad].
         few: take fewer than 10 cycles per measurement.
@@ -136,37 +136,39 @@ def pose_drift(
         ISO 9283:1998, 7.6.
     """
     t = floats(times, "times", LARGEST)
-    clouds = [places_of(one) for one in places]
+    clouds = [positions_of(cloud) for cloud in positions]
     if t.shape != (len(clouds),):
         raise ShapeError(f"times: expected one per measurement, {len(clouds)}, got shape {t.shape}")
     if len(t) < 2 or not (np.diff(t) > 0).all():
         raise InvalidValueError("drift: needs two measurements at least, each later than the one before")
-    one_size(clouds, "drift")
-    goal = place_of(commanded, clouds[0].shape[1])
-    turns = _angles_of_all("drift", clouds, angles)
-    found = [repeatability("drift", P, A, few=few) for P, A in zip(clouds, turns, strict=True)]
-    accuracy = np.array([np.linalg.norm(one.barycentre - goal) for one in found])
-    radius = np.array([one.radius for one in found])
-    off = [from_commanded(A, commanded_angles) for A in (turns[0], turns[-1])]
+    refuse_mixed_dimensions(clouds, "drift")
+    goal = position_of(commanded, clouds[0].shape[1])
+    angle_clouds = _angles_of_all("drift", clouds, angles)
+    results = [repeatability("drift", P, A, few=few) for P, A in zip(clouds, angle_clouds, strict=True)]
+    accuracy = np.array([np.linalg.norm(result.barycentre - goal) for result in results])
+    radius = np.array([result.radius for result in results])
+    deviations = [from_commanded(A, commanded_angles) for A in (angle_clouds[0], angle_clouds[-1])]
     return PoseDrift(
         accuracy_change=float(abs(accuracy[-1] - accuracy[0])),
         repeatability_change=float(abs(radius[-1] - radius[0])),
-        accuracy_change_angles=np.abs(wrapped(off[1] - off[0])),
-        repeatability_change_angles=np.abs(found[-1].angles - found[0].angles),
+        accuracy_change_angles=np.abs(wrapped(deviations[1] - deviations[0])),
+        repeatability_change_angles=np.abs(results[-1].angles - results[0].angles),
         times=t,
         accuracy=accuracy,
         repeatability=radius,
-        cycles=min(one.cycles for one in found),
+        cycles=min(result.cycles for result in results),
     )
 
 
-def _variation(kind: Kind, places: Sequence[ArrayLike], angles: Sequence[ArrayLike] | None, *, few: bool) -> Variation:
-    clouds = [places_of(one) for one in places]
-    turns = _angles_of_all(kind, clouds, angles)
-    one_size(clouds, kind)
+def _variation(
+    kind: Kind, positions: Sequence[ArrayLike], angles: Sequence[ArrayLike] | None, *, few: bool
+) -> Variation:
+    clouds = [positions_of(cloud) for cloud in positions]
+    angle_clouds = _angles_of_all(kind, clouds, angles)
+    refuse_mixed_dimensions(clouds, kind)
     count = checked_cycles(kind, [len(P) for P in clouds], few=few, least=1)
     centres = np.array([P.mean(axis=0) for P in clouds])
-    means = np.array([mean_angles(A) for A in turns])
+    means = np.array([mean_angles(A) for A in angle_clouds])
     pairs = list(combinations(range(len(clouds)), 2))
     distances = [float(np.linalg.norm(centres[h] - centres[k])) for h, k in pairs]
     most = int(np.argmax(distances))
@@ -180,9 +182,9 @@ def _variation(kind: Kind, places: Sequence[ArrayLike], angles: Sequence[ArrayLi
 
 
 def _angles_of_all(kind: Kind, clouds: Sequence[Array], angles: Sequence[ArrayLike] | None) -> list[Array]:
-    """Return the angles (n, k) of each cloud of places; none where none were measured."""
+    """Return the angles (n, k) of each cloud of positions; none where none were measured."""
     if angles is not None and len(angles) != len(clouds):
-        raise ShapeError(f"{kind}: {len(clouds)} clouds of places but {len(angles)} of angles")
-    turns = [angles_of(None if angles is None else angles[h], len(P)) for h, P in enumerate(clouds)]
-    one_size(turns, f"{kind}, angles")
-    return turns
+        raise ShapeError(f"{kind}: {len(clouds)} clouds of positions but {len(angles)} of angles")
+    angle_clouds = [angles_of(None if angles is None else angles[h], len(P)) for h, P in enumerate(clouds)]
+    refuse_mixed_dimensions(angle_clouds, f"{kind}, angles")
+    return angle_clouds

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from armwright.accuracy.cycles import checked_cycles
-from armwright.accuracy.trace import Trace, frozen_array, one_size
+from armwright.accuracy.trace import Trace, frozen_array, refuse_mixed_dimensions
 from armwright.arrays import Array, number, reduce_by_fields
 from armwright.errors import InvalidValueError
 
@@ -62,26 +62,26 @@ def weaving_deviation(commanded: Trace, runs: Sequence[Trace], speed: float, *, 
         ISO 9283:1998, 11.
     """
     count = checked_cycles("weaving", [len(runs)], few=few, least=1)
-    one_size([commanded.places, *(run.places for run in runs)], "weaving")
+    refuse_mixed_dimensions([commanded.positions, *(run.positions for run in runs)], "weaving")
     speed = number(speed, "weaving: commanded speed")
     if not 0 < speed < np.inf:
         raise InvalidValueError(f"weaving: the commanded speed must be above 0 m/s, got {speed:g}")
-    line = commanded.places[-1] - commanded.places[0]
+    line = commanded.positions[-1] - commanded.positions[0]
     if not np.linalg.norm(line) > 0:
         raise InvalidValueError("weaving: the commanded weave ends where it begins, so it has no middle line")
     forward = line / np.linalg.norm(line)
-    sideways = _sideways(commanded.places - commanded.places[0], forward)
-    swings, turns = _swings(commanded.places @ sideways, "the commanded path")
-    stations = (commanded.places @ forward)[turns]
-    pitch = 2 * (stations[-1] - stations[0]) / (len(turns) - 1)
+    sideways = _sideways(commanded.positions - commanded.positions[0], forward)
+    swings, reversals = _swings(commanded.positions @ sideways, "the commanded path")
+    stations = (commanded.positions @ forward)[reversals]
+    pitch = 2 * (stations[-1] - stations[0]) / (len(reversals) - 1)
     if not pitch > 0:
         raise InvalidValueError("weaving: the commanded weave does not go along its middle line")
     strokes, frequencies = [], []
     for j, run in enumerate(runs):
-        widths, at = _swings(run.places @ sideways, f"run {j + 1}")
-        t = run.timed(f"weaving: run {j + 1}")[at]
+        widths, extremes = _swings(run.positions @ sideways, f"run {j + 1}")
+        t = run.timed(f"weaving: run {j + 1}")[extremes]
         strokes.append(float(widths.mean()))
-        frequencies.append(float((len(at) - 1) / (2 * (t[-1] - t[0]))))
+        frequencies.append(float((len(extremes) - 1) / (2 * (t[-1] - t[0]))))
     stroke, frequency = float(swings.mean()), float(speed / pitch)
     return WeavingDeviation(
         stroke=float(np.mean(strokes)) / stroke - 1,
@@ -104,25 +104,25 @@ def _sideways(relative: Array, forward: Array) -> Array:
 
 
 def _swings(side: Array, name: str) -> tuple[Array, Array]:
-    """Return the widths from side to side and the samples at which a run turns round.
+    """Return the widths from side to side and the samples at which a run reverses.
 
     Raises:
-        InvalidValueError: there are fewer than three turns.
+        InvalidValueError: there are fewer than three reversals.
     """
     back = _BACK * np.ptp(side)
-    turns: list[int] = []
+    reversals: list[int] = []
     low = high = 0
     rising: bool | None = None
     for i, value in enumerate(side.tolist()):
         low = i if value < side[low] else low
         high = i if value > side[high] else high
         if rising is not False and value < side[high] - back:
-            turns.append(high)
+            reversals.append(high)
             rising, low = False, i
         elif rising is not True and value > side[low] + back:
-            turns.append(low)
+            reversals.append(low)
             rising, high = True, i
-    if len(turns) < 3:
-        raise InvalidValueError(f"weaving: {name} turns round {len(turns)} times; a weave takes three at least")
-    at = np.array(turns)
-    return np.abs(np.diff(side[at])), at
+    if len(reversals) < 3:
+        raise InvalidValueError(f"weaving: {name} reverses {len(reversals)} times; a weave takes three at least")
+    extremes = np.array(reversals)
+    return np.abs(np.diff(side[extremes])), extremes

@@ -11,7 +11,7 @@ from armwright.accuracy.corner import CornerDeviation
 from armwright.accuracy.measurement_file import PathTest, PoseTest
 from armwright.accuracy.path import PathDeviation, PathVelocity
 from armwright.accuracy.pose import PoseRepeatability
-from armwright.accuracy.settling_time import PosingTime, Settling, attained_place
+from armwright.accuracy.settling_time import PosingTime, Settling, attained_position
 from armwright.accuracy.variation import PoseDrift, Variation
 from armwright.accuracy.weaving import WeavingDeviation
 from armwright.arrays import Array
@@ -60,7 +60,7 @@ def _cloud(figure: "Figure", test: PoseTest, result: PoseRepeatability) -> None:
 
     cloud = test.clouds[0]
     assert cloud.commanded is not None  # noqa: S101 - every test of a pose has it
-    points, centre = (cloud.places - cloud.commanded) * 1e3, (result.barycentre - cloud.commanded) * 1e3
+    points, centre = (cloud.positions - cloud.commanded) * 1e3, (result.barycentre - cloud.commanded) * 1e3
     for axis, i, j in _views(figure, test.size):
         axis.plot(points[:, i], points[:, j], "o", markersize=3.5, color="C0", label="attained")
         axis.plot(centre[i], centre[j], "s", markersize=6, color="C1", label="barycentre")
@@ -74,7 +74,7 @@ def _clouds(figure: "Figure", test: PoseTest, result: Variation) -> None:
     origin = result.barycentres.mean(axis=0)
     for axis, i, j in _views(figure, test.size):
         for number, (cloud, centre) in enumerate(zip(test.clouds, result.barycentres, strict=True)):
-            points, middle = (cloud.places - origin) * 1e3, (centre - origin) * 1e3
+            points, middle = (cloud.positions - origin) * 1e3, (centre - origin) * 1e3
             marker, colour = _MARKS[number % len(_MARKS)], f"C{number % 10}"
             style: dict[str, Any] = {"marker": marker, "color": colour, "linestyle": ""}
             axis.plot(points[:, i], points[:, j], **style, markersize=3.5, fillstyle="none", alpha=0.7)
@@ -95,7 +95,7 @@ def _settling(figure: "Figure", test: PathTest, result: Settling | PosingTime) -
     for j, run in enumerate(test.runs):
         t = run.timed("settling")
         some = spread(len(t), _DRAWN)
-        distances = np.linalg.norm(run.places - attained_place(run), axis=1)[some] * 1e3
+        distances = np.linalg.norm(run.positions - attained_position(run), axis=1)[some] * 1e3
         axis.plot(t[some], np.maximum(distances, result.band * 1e1), linewidth=1.1, label=f"cycle {j + 1}")
         if isinstance(result, Settling):
             for moment, style in ((result.entered[j], ":"), (result.settled[j], "-")):
@@ -128,13 +128,13 @@ def _speeds(figure: "Figure", test: PathTest, result: PathVelocity) -> None:
 
 def _corner(figure: "Figure", test: PathTest, result: CornerDeviation) -> None:
     assert test.commanded is not None  # noqa: S101 - every test of a corner has it
-    path = test.commanded.places
-    near = np.linalg.norm(path - result.place, axis=1)
+    path = test.commanded.positions
+    near = np.linalg.norm(path - result.position, axis=1)
     reach = max(_AROUND * max(result.round_off, result.overshoot), 1e-6)
     reach = min(reach, near[near > 0].min()) if result.round_off + result.overshoot > 0 else _OF_LEG * near.max()
     for axis, i, j in _views(figure, test.size):
-        _lines(axis, [(run.places - result.place)[:, [i, j]] * 1e3 for run in test.runs])
-        axis.plot(*((path - result.place)[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
+        _lines(axis, [(run.positions - result.position)[:, [i, j]] * 1e3 for run in test.runs])
+        axis.plot(*((path - result.position)[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
         axis.set_aspect("equal", adjustable="box")
         axis.set(xlim=(-reach * 1e3, reach * 1e3), ylim=(-reach * 1e3, reach * 1e3))
 
@@ -142,8 +142,8 @@ def _corner(figure: "Figure", test: PathTest, result: CornerDeviation) -> None:
 def _weave(figure: "Figure", test: PathTest, _result: WeavingDeviation) -> None:
     assert test.commanded is not None  # noqa: S101 - every test of weaving has it
     for axis, i, j in _views(figure, test.size):
-        _lines(axis, [run.places[:, [i, j]] * 1e3 for run in test.runs])
-        axis.plot(*(test.commanded.places[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
+        _lines(axis, [run.positions[:, [i, j]] * 1e3 for run in test.runs])
+        axis.plot(*(test.commanded.positions[:, [i, j]].T * 1e3), "k--", linewidth=1.2)
         axis.set_aspect("auto")
 
 
