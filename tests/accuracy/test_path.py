@@ -164,7 +164,7 @@ def test_rounded_corner() -> None:
 
 
 def test_overshot_corner() -> None:
-    """A run that goes 30 mm beyond the corner before it follows the second leg has CO of 30 mm; only one side counts."""
+    """A run going 30 mm beyond the corner before it follows the second leg has CO of 30 mm; only one side counts."""
     run = Trace(positions=((0, 0), (1, 0), (1.03, 0.02), (1.0, 0.1), (0.95, 0.2), (1.0, 0.3), (1, 1)))
 
     (result,) = corner_deviations(BEND, [run] * 3, band=1e-3)
