@@ -82,7 +82,7 @@ def test_name_of_an_arm(name: str) -> None:
     plain = load_arm("puma560")
     for quantity in ("forward", "inverse_branches"):
         told, expected = (emit_quantity(arm, quantity) for arm in (attrs.evolve(plain, name=name, title=name), plain))
-        assert (told.one, told.rows) == (expected.one, expected.rows)
+        assert (told.single, told.rows) == (expected.single, expected.rows)
         assert told.title == f"{quantity} of {name}"
 
 
@@ -100,7 +100,7 @@ def test_random_names(sample: Sample, five_bar: Linkage) -> None:
     for rng in sample.cases(400):
         name = random_name(rng)
         told = emit_quantity(attrs.evolve(plain, name=name, title=name, source=name), "forward")
-        assert (told.one, told.rows) == (expected.one, expected.rows), name
+        assert (told.single, told.rows) == (expected.single, expected.rows), name
         if tried % 10 == 0:
             assert source_of(renamed(five_bar, name)) == of_linkage, name
         tried += 1

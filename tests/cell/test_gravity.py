@@ -208,7 +208,7 @@ def test_kernels_by_direction() -> None:
     stands, turns, hangs = (cell_of(arm, base).arms["ARM_1"].arm for base in (np.eye(4), turned, HANGING))
     weigh = {"inverse_dynamics", "inverse_dynamics_with_wrench", "forward_dynamics", "mass_and_bias"}
     for name in ("forward", "jacobian", "mass_matrix", *sorted(weigh)):
-        sources = [emit_quantity(one, name).one for one in (arm, stands, turns, hangs)]
+        sources = [emit_quantity(arm, name).single for arm in (arm, stands, turns, hangs)]
         assert sources[0] == sources[1] == sources[2]
         assert (sources[0] != sources[3]) == (name in weigh)
 
