@@ -60,7 +60,7 @@ def test_every_word_is_explained() -> None:
     ("statement", "form"),
     [
         ("AFFIX f |TO ARM_1", "AFFIX frame"),
-        ("MOVE f |TO g", "MOVE moved"),
+        ("MOVE f |TO g", "MOVE frame"),
         ("OPEN ARM_1 |TO 5", "OPEN arm"),
         ("FOR n = 1 |TO 5 DO HALT", "FOR variable"),
         ("OPERATE lamp |ON", "OPERATE device"),

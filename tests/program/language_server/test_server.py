@@ -222,7 +222,7 @@ async def test_hover(editor: Editor) -> None:
     assert "n : SCALAR\n```\n\nvariable of `put`" in await editor.hover("n = pace")
     assert "PROCEDURE put (thing, place : FRAME, pace : SCALAR)" in await editor.hover("put (part")
     assert "10cm = 100 mm" in await editor.hover("10cm")
-    assert "WITH APPROACH = place" in await editor.hover("APPROACH")
+    assert "WITH APPROACH = pose" in await editor.hover("APPROACH")
     assert "XYZ (x, y, z) : TRANS" in await editor.hover("XYZ")
     assert await editor.hover(";") == ""
 

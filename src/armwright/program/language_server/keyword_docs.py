@@ -20,12 +20,12 @@ class Word:
     text: str
 
 
-_MOVE = "MOVE moved TO place [DIRECTLY | STRAIGHTLY] [VIA (places)] [WITH ... = ...] [ON condition DO action]"
+_MOVE = "MOVE frame TO goal [DIRECTLY | STRAIGHTLY] [VIA (poses)] [WITH ... = ...] [ON condition DO action]"
 _IF = "IF condition THEN statement [ELSE statement]"
 _FOR = "FOR variable = first TO last [STEP step] DO statement"
 _COBEGIN = "COBEGIN [PRIORITY number :] BEGIN ... END ; BEGIN ... END COEND"
 _TRY = "TRY statements RECOVER statements END"
-_AFFIX = "AFFIX frame TO frame [AT step] [RIGIDLY | NONRIGIDLY]"
+_AFFIX = "AFFIX frame TO frame [AT transformation] [RIGIDLY | NONRIGIDLY]"
 _ARRAY = "name : ARRAY [sizes] OF type"
 
 WORDS: Mapping[str, Word] = {
@@ -40,18 +40,24 @@ WORDS: Mapping[str, Word] = {
     "BEGIN": Word("BEGIN statements END", "Opens the statements of the program, of a procedure, or a block."),
     "END": Word("BEGIN statements END", "Closes what BEGIN or TRY opened; the END of the program has a point."),
     "SCALAR": Word("name : SCALAR", "A number."),
-    "TRANS": Word("name : TRANS", "A step from one frame to another: a turn and a shift."),
-    "FRAME": Word("name : FRAME", "A place with an orientation; it may hang on another frame and follow it."),
+    "TRANS": Word("name : TRANS", "A transformation from one frame to another: a rotation and a translation."),
+    "FRAME": Word(
+        "name : FRAME", "A position and an orientation; a frame may be affixed to another frame and follows it then."
+    ),
     "EVENT": Word("name : EVENT", "Counts SIGNALs; WAIT waits for one and takes it."),
-    "ARRAY": Word(_ARRAY, "Declares elements that are told apart by indices from 1."),
+    "ARRAY": Word(_ARRAY, "Declares elements that are numbered by indices from 1."),
     "OF": Word(_ARRAY, "Stands in front of the type of the elements."),
     # frames
-    "AFFIX": Word(_AFFIX, "Hangs the first frame on the second: it follows from now on, where it stands or AT a step."),
-    "AT": Word(_AFFIX, "The step (a TRANS) from the frame below to the one that hangs on it."),
-    "RIGIDLY": Word(_AFFIX, "The frame below comes along when the hanging one is given another place."),
-    "NONRIGIDLY": Word(_AFFIX, "The frame below stays when the hanging one is given another place; so without a word."),
-    "UNFIX": Word("UNFIX frame [FROM frame]", "Cuts a frame loose; it keeps its place."),
-    "FROM": Word("UNFIX frame FROM frame", "Names the frame that the other hangs on."),
+    "AFFIX": Word(
+        _AFFIX, "Affixes the first frame to the second and lets it follow: at its present pose, or AT a transformation."
+    ),
+    "AT": Word(_AFFIX, "The transformation (a TRANS) from the parent frame to the affixed frame."),
+    "RIGIDLY": Word(_AFFIX, "The parent frame moves along when the affixed frame is assigned another pose."),
+    "NONRIGIDLY": Word(
+        _AFFIX, "The parent frame stays when the affixed frame is assigned another pose; this is the default."
+    ),
+    "UNFIX": Word("UNFIX frame [FROM frame]", "Detaches a frame from its parent; its pose does not change."),
+    "FROM": Word("UNFIX frame FROM frame", "Names the parent frame."),
     # tools and sensors
     "OPEN": Word("OPEN arm [TO width]", "Opens the fingers of an arm."),
     "GRASP": Word("GRASP [arm]", "Closes the fingers; without an arm, those of the arm that was named or moved last."),
@@ -59,20 +65,23 @@ WORDS: Mapping[str, Word] = {
     "OFF": Word("OPERATE device OFF", "Switches a device off."),
     "READ": Word(
         "READ VISIONS (frames) | READ SYSTEM (arm)",
-        "Asks the camera where frames are, or the joint sensors where the hand is.",
+        "Measures the poses of frames with the camera, or the pose of the gripper with the joint sensors.",
     ),
-    "VISIONS": Word("READ VISIONS (frames)", "Asks the camera; what it sees is where the frames are."),
-    "SYSTEM": Word("READ SYSTEM (arm)", "Reads the joint sensors of an arm; what hangs on its hand follows."),
+    "VISIONS": Word("READ VISIONS (frames)", "Assigns the poses that the camera measures to the frames."),
+    "SYSTEM": Word(
+        "READ SYSTEM (arm)", "Reads the joint sensors of an arm; frames that are affixed to its gripper follow."
+    ),
     # motion
-    "MOVE": Word(_MOVE, "Moves an arm, or a frame that hangs on one, until it stands at the place."),
-    "DIRECTLY": Word(_MOVE, "The shortest way for the joints, all at once; so without a word too."),
-    "STRAIGHTLY": Word(_MOVE, "In one straight line."),
-    "VIA": Word("MOVE moved TO place VIA (places)", "Passes through places without a stop."),
+    "MOVE": Word(_MOVE, "Moves an arm, or a frame that is affixed to an arm, to the pose of the goal."),
+    "DIRECTLY": Word(_MOVE, "Moves all joints at once, without a straight path of the tool; this is the default."),
+    "STRAIGHTLY": Word(_MOVE, "Moves the tool in a straight line."),
+    "VIA": Word("MOVE frame TO goal VIA (poses)", "Passes through poses without a stop."),
     "WITH": Word(
-        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION = value", "Says more about the way or the time."
+        "WITH APPROACH | DEPARTURE | SPEED | BLEND | DURATION = value",
+        "Specifies approach, departure, speed, rounding of corners or duration.",
     ),
-    "APPROACH": Word("WITH APPROACH = place", "Comes to the goal in a straight line from this place."),
-    "DEPARTURE": Word("WITH DEPARTURE = place", "Leaves the start in a straight line to this place."),
+    "APPROACH": Word("WITH APPROACH = pose", "Approaches the goal in a straight line from this pose."),
+    "DEPARTURE": Word("WITH DEPARTURE = pose", "Leaves the start in a straight line to this pose."),
     "SPEED": Word(
         "WITH SPEED = number",
         f"From {LOWEST_SPEED:g} to {HIGHEST_SPEED:g}: {NORMAL_SPEED:g} is the normal speed, "
@@ -82,8 +91,8 @@ WORDS: Mapping[str, Word] = {
     "DURATION": Word("WITH DURATION = seconds", "How long the motion takes, instead of a speed."),
     # control
     "IF": Word(_IF, "Chooses between two statements."),
-    "THEN": Word(_IF, "In front of what is done when the condition holds."),
-    "ELSE": Word(_IF, "In front of what is done when the condition does not hold."),
+    "THEN": Word(_IF, "Precedes the statement that runs when the condition holds."),
+    "ELSE": Word(_IF, "Precedes the statement that runs when the condition does not hold."),
     "WHILE": Word("WHILE condition DO statement", "Repeats a statement as long as the condition holds."),
     "REPEAT": Word(
         "REPEAT statements UNTIL condition", "Repeats statements, at least once, until the condition holds."
@@ -91,7 +100,7 @@ WORDS: Mapping[str, Word] = {
     "UNTIL": Word("REPEAT statements UNTIL condition", "Ends the loop when the condition holds."),
     "FOR": Word(_FOR, "Repeats a statement while a SCALAR counts."),
     "STEP": Word(_FOR, "What the variable grows by each time; 1 without it."),
-    "DO": Word("WHILE ... DO | FOR ... DO | LOCK ... DO | ON ... DO", "In front of the statement that is meant."),
+    "DO": Word("WHILE ... DO | FOR ... DO | LOCK ... DO | ON ... DO", "Precedes the statement that it governs."),
     "AND": Word("condition AND condition", "Holds when both hold."),
     "OR": Word("condition OR condition", "Holds when one of them holds, or both."),
     "NOT": Word("NOT condition", "Holds when the condition does not."),
@@ -109,28 +118,30 @@ WORDS: Mapping[str, Word] = {
     ),
     # recovery
     "TRY": Word(_TRY, "Runs statements; when one of them fails, those behind RECOVER run instead of the rest."),
-    "RECOVER": Word(_TRY, "In front of what is done when something behind TRY fails."),
+    "RECOVER": Word(_TRY, "Precedes the statements that run when a statement behind TRY fails."),
     "RETRY": Word("RETRY", "Inside RECOVER: runs the statements behind TRY again."),
     # functions
-    "XYZ": Word("XYZ (x, y, z)", "A TRANS: a shift without a turn, in the lengths of the program."),
-    "ROTX": Word("ROTX (angle)", "A TRANS: a turn about x."),
-    "ROTY": Word("ROTY (angle)", "A TRANS: a turn about y."),
-    "ROTZ": Word("ROTZ (angle)", "A TRANS: a turn about z."),
-    "INV": Word("INV (step)", "The step back; INV(f) * g is the step from frame f to frame g."),
-    "DIST": Word("DIST (frame, frame)", "How far two frames are apart, in the lengths of the program."),
-    "FORCE": Word("FORCE (X | Y | Z)", "The force at the moving hand along an axis of the world, in newtons."),
+    "XYZ": Word("XYZ (x, y, z)", "A TRANS: a translation without a rotation, in the length unit of the program."),
+    "ROTX": Word("ROTX (angle)", "A TRANS: a rotation about x."),
+    "ROTY": Word("ROTY (angle)", "A TRANS: a rotation about y."),
+    "ROTZ": Word("ROTZ (angle)", "A TRANS: a rotation about z."),
+    "INV": Word("INV (transformation)", "The inverse; INV(f) * g is the transformation from frame f to frame g."),
+    "DIST": Word("DIST (frame, frame)", "The distance between two frames, in the length unit of the program."),
+    "FORCE": Word(
+        "FORCE (X | Y | Z)", "The force on the gripper of the moving arm along an axis of the world, in newtons."
+    ),
 }
 
 # Words with another meaning behind another one that starts the statement.
 _HERE: Mapping[tuple[str, str], Word] = {
-    ("AFFIX", "TO"): Word(_AFFIX, "In front of the frame to hang on."),
-    ("OPEN", "TO"): Word("OPEN arm TO width", "How far to open the fingers, in the lengths of the program."),
-    ("FOR", "TO"): Word(_FOR, "In front of the last value; bounds are worked out once, before the loop."),
-    ("MOVE", "TO"): Word(_MOVE, "In front of the place to come to."),
-    ("OPERATE", "ON"): Word("OPERATE device ON", "Switches a device on; so without a word too."),
+    ("AFFIX", "TO"): Word(_AFFIX, "Precedes the parent frame."),
+    ("OPEN", "TO"): Word("OPEN arm TO width", "The width to open the fingers to, in the length unit of the program."),
+    ("FOR", "TO"): Word(_FOR, "Precedes the last value; both bounds are evaluated once, before the loop."),
+    ("MOVE", "TO"): Word(_MOVE, "Precedes the goal."),
+    ("OPERATE", "ON"): Word("OPERATE device ON", "Switches a device on; this is the default."),
     ("MOVE", "ON"): Word(
         "ON condition DO action",
-        "Looks at the condition at every tick of the motion; acts once, when it first holds. HALT ends the motion.",
+        "Checks the condition at every tick of the motion; acts once, when it first holds. HALT ends the motion.",
     ),
 }
 
