@@ -9,8 +9,8 @@ from armwright.arm.model import Arm, Joint
 from armwright.arrays import Array
 from armwright.errors import InvalidValueError, ShapeError, UnknownNameError, UnsupportedArmError
 from armwright.kinematics.differential import (
+    Method,
     SingularConfigurationError,
-    Way,
     differential_inverse,
     rates_by_blocks,
     rates_by_derivative,
@@ -26,7 +26,7 @@ from oracles.arms import random_configurations, random_pose
 
 # Agreement with a solver that loses digits with the condition of the Jacobian, at most 1e3 in these tests.
 SOLVED = 1e-9
-WAYS: tuple[Way, Way] = ("blocks", "derivative")
+METHODS: tuple[Method, Method] = ("blocks", "derivative")
 ELBOW = np.arctan2(0.433, -0.02)  # the PUMA's elbow is straight where tan q3 = d4 / a3
 
 
@@ -41,15 +41,15 @@ def _regular(arm: Arm, q: Array) -> Array:
     return q[np.linalg.cond(J) < 1e3]
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("frame", ["base", "tool"])
-def test_against_the_numerical_jacobian(way: Way, frame: str, puma: Arm, rng: np.random.Generator) -> None:
+def test_against_the_numerical_jacobian(method: Method, frame: str, puma: Arm, rng: np.random.Generator) -> None:
     """At well-conditioned configurations both methods yield what solving the Jacobian yields, in base and tool axes."""
     arm = attrs.evolve(puma, base=random_pose(rng), tool=random_pose(rng))
     q = _regular(arm, random_configurations(arm, rng, 3000))
     twist = rng.normal(size=(len(q), 6))
 
-    rates = differential_inverse(arm, q, twist, way=way, frame=frame).checked()  # type: ignore[arg-type]
+    rates = differential_inverse(arm, q, twist, method=method, frame=frame).checked()  # type: ignore[arg-type]
 
     expected = np.linalg.solve(jacobian(arm, q, frame), twist[..., None])[..., 0]  # type: ignore[arg-type]
     assert len(q) > 2000
@@ -63,7 +63,7 @@ def test_both_ways_agree(puma: Arm, rng: np.random.Generator) -> None:
     q = q[np.linalg.svd(jacobian(puma, q), compute_uv=False)[:, -1] > 1e-6]
     twist = rng.normal(size=(len(q), 6))
 
-    blocks, derivative = (differential_inverse(puma, q, twist, way=way).checked() for way in WAYS)
+    blocks, derivative = (differential_inverse(puma, q, twist, method=method).checked() for method in METHODS)
 
     np.testing.assert_allclose(blocks, derivative, rtol=1e-9, atol=1e-9 * np.abs(blocks).max())
     regular = np.linalg.cond(jacobian(puma, q)) < 1e3
@@ -87,15 +87,15 @@ def test_turning_the_waist(puma: Arm) -> None:
     q = [0.3, -0.4, 0.5, 0.6, 0.7, 0.8]
     x, y, _ = forward(puma, q)[:3, 3]
 
-    for way in WAYS:
-        rates = differential_inverse(puma, q, [-y, x, 0, 0, 0, 1], way=way).checked()
+    for method in METHODS:
+        rates = differential_inverse(puma, q, [-y, x, 0, 0, 0, 1], method=method).checked()
 
         np.testing.assert_allclose(rates, (1, 0, 0, 0, 0, 0), atol=1e-12)
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("number", range(6))
-def test_arms_built_like_the_puma(way: Way, number: int) -> None:
+def test_arms_built_like_the_puma(method: Method, number: int) -> None:
     """Other signs, offsets, a shoulder ahead of its axis, base and tool: the same two ways."""
     rng = np.random.default_rng(number)
     right = (np.pi / 2, -np.pi / 2)
@@ -112,38 +112,38 @@ def test_arms_built_like_the_puma(way: Way, number: int) -> None:
     q = _regular(arm, rng.uniform(-np.pi, np.pi, size=(300, 6)))
     twist = rng.normal(size=(len(q), 6))
 
-    rates = differential_inverse(arm, q, twist, way=way).checked()
+    rates = differential_inverse(arm, q, twist, method=method).checked()
 
     assert len(q) > 100
     np.testing.assert_allclose((jacobian(arm, q) @ rates[..., None])[..., 0], twist, atol=SOLVED)
 
 
-@pytest.mark.parametrize("way", [rates_by_blocks, rates_by_derivative])
-def test_plain_numbers_and_arrays(way: object, puma: Arm, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("method", [rates_by_blocks, rates_by_derivative])
+def test_plain_numbers_and_arrays(method: object, puma: Arm, rng: np.random.Generator) -> None:
     """The equations give for floats what they give for arrays."""
     q, twist = random_configurations(puma, rng, 20), rng.normal(size=(20, 6))
     geometry = find_geometry(puma)
     assert geometry is not None
-    name = "blocks" if way is rates_by_blocks else "derivative"
+    name = "blocks" if method is rates_by_blocks else "derivative"
 
-    many = differential_inverse(puma, q, twist, way=name).rates  # type: ignore[arg-type]
+    many = differential_inverse(puma, q, twist, method=name).rates  # type: ignore[arg-type]
 
     for row, configuration, asked in zip(many, q.tolist(), twist.tolist(), strict=True):
         motion = wrist_motion(puma, geometry, configuration, asked, "base")
-        one = way(geometry, geometry.angles(configuration), motion)  # type: ignore[operator]
+        one = method(geometry, geometry.angles(configuration), motion)  # type: ignore[operator]
         assert all(isinstance(rate, float) for rate in one)
         np.testing.assert_allclose(np.array(geometry.signs) * one, row, rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize("way", [rates_by_blocks, rates_by_derivative])
-def test_the_equations_can_be_traced(way: object, puma: Arm, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("method", [rates_by_blocks, rates_by_derivative])
+def test_the_equations_can_be_traced(method: object, puma: Arm, rng: np.random.Generator) -> None:
     """Run on traced scalars both ways leave a graph that gives what they give for floats."""
     geometry = find_geometry(puma)
     assert geometry is not None
 
     def rates(q: list[Scalar], twist: list[Scalar]) -> list[Scalar]:
         motion = wrist_motion(puma, geometry, q, twist, "base")
-        return way(geometry, geometry.angles(q), motion)  # type: ignore[operator]
+        return method(geometry, geometry.angles(q), motion)  # type: ignore[operator]
 
     inputs = Graph().inputs(12)
     outputs = [rate.node for rate in rates(inputs[:6], inputs[6:])]
@@ -152,7 +152,7 @@ def test_the_equations_can_be_traced(way: object, puma: Arm, rng: np.random.Gene
     np.testing.assert_allclose(evaluate(inputs[0].graph, outputs, [*q, *twist]), rates(q, twist), rtol=SOLVED)
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
     ("q", "factor"),
     [
@@ -161,11 +161,11 @@ def test_the_equations_can_be_traced(way: object, puma: Arm, rng: np.random.Gene
         ((0.3, np.arctan2(0.432 + 0.433, -0.02), np.pi / 2, 0.6, 0.5, 0.7), "shoulder"),
     ],
 )
-def test_singular_configurations_are_named(way: Way, q: tuple[float, ...], factor: str, puma: Arm) -> None:
+def test_singular_configurations_are_named(method: Method, q: tuple[float, ...], factor: str, puma: Arm) -> None:
     """At a singularity there are no rates: they are NaN, never numbers that look right; the factor is named."""
     place = ("shoulder", "elbow", "wrist").index(factor)
 
-    found = differential_inverse(puma, q, np.ones(6), way=way)
+    found = differential_inverse(puma, q, np.ones(6), method=method)
 
     assert np.isnan(found.rates).all()
     np.testing.assert_array_equal(np.flatnonzero(found.singular), [place])
@@ -189,14 +189,14 @@ def test_one_singular_configuration_among_many(puma: Arm) -> None:
         found.checked()
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("distance", [1e-3, 1e-5, 1e-7])
-def test_near_the_wrist_singularity(way: Way, distance: float, puma: Arm) -> None:
+def test_near_the_wrist_singularity(method: Method, distance: float, puma: Arm) -> None:
     """The nearer joint 5 is to 0 the faster joints 4 and 6 must turn, against each other; the twist is made."""
     q = np.array((0.3, 0.4, 0.5, 0.6, distance, 0.7))
     twist = np.array((0.1, 0.2, -0.1, 0.3, 0.2, 0.1))
 
-    rates = differential_inverse(puma, q, twist, way=way).checked()
+    rates = differential_inverse(puma, q, twist, method=method).checked()
 
     np.testing.assert_allclose(jacobian(puma, q) @ rates, twist, atol=1e-15 / distance + 1e-12)
     assert abs(rates[3]) > 0.005 / distance
@@ -207,8 +207,8 @@ def test_refusals(puma: Arm) -> None:
     """Other arms, ways, axes and shapes are refused with what there is."""
     with pytest.raises(UnsupportedArmError, match=r"'stanford': no differential .* built like puma560"):
         differential_inverse(load_arm("stanford"), np.zeros(6), np.zeros(6))
-    with pytest.raises(UnknownNameError, match=r"no way 'block'. Did you mean 'blocks'"):
-        differential_inverse(puma, np.zeros(6), np.zeros(6), way="block")  # type: ignore[arg-type]
+    with pytest.raises(UnknownNameError, match=r"no method 'block'. Did you mean 'blocks'"):
+        differential_inverse(puma, np.zeros(6), np.zeros(6), method="block")  # type: ignore[arg-type]
     with pytest.raises(InvalidValueError, match="'base' or 'tool', got 'hand'"):
         differential_inverse(puma, np.zeros(6), np.zeros(6), frame="hand")  # type: ignore[arg-type]
     with pytest.raises(ShapeError, match=r"q, twist: leading axes must fit together"):

@@ -37,13 +37,13 @@ def damped_rates(
 ) -> DampedRates:
     """Return joint rates that make a twist of the tool, or come near it where the configuration is nearly singular.
 
-    Along a direction in which the arm moves the hand well, with a singular value s of ``damping`` or more, the twist
+    Along a direction in which the arm moves the tool well, with a singular value s of ``damping`` or more, the twist
     is met exactly. Below that the gain is 2 s / (s² + damping²) instead of 1 / s: it goes on from 1 / damping
     without a jump and falls to 0 with s. So no gain passes 1 / damping and
 
         |rates| ≤ |twist| / damping,
 
-    the twist measured with its turn in metres (times ``length``). The part (damping² - s²) / (damping² + s²) of the
+    the twist measured with its rotation in metres (times ``length``). The part (damping² - s²) / (damping² + s²) of the
     twist along that direction is left undone.
 
     Args:
@@ -51,7 +51,7 @@ def damped_rates(
         q: (..., n) joint positions [rad] or [m].
         twist: (..., 6) speed of the tool point [m/s], then angular speed [rad/s].
         damping: singular value at which damping begins [m].
-        length: what a turn by one radian is worth [m].
+        length: what a rotation by one radian is worth [m].
         frame: whose axes the twist is seen along, ``base`` or ``tool``.
 
     Returns:

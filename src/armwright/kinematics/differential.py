@@ -1,4 +1,4 @@
-"""Joint rates of the PUMA for a twist of its tool, in closed form, two ways: no matrix is inverted.
+"""Joint rates of the PUMA for a twist of its tool, in closed form, by two methods: no matrix is inverted.
 
 Both work at the wrist centre, with the angles of the build (see ``ClosedFormGeometry``) and the letters of the book: p
 the wrist centre in the shoulder frame, n, o, a the axes of the last wrist frame, and a d before a letter for its rate.
@@ -25,7 +25,7 @@ from armwright.kinematics.singularity_analysis import determinant_factors
 from armwright.tracing.scalar import Scalar, cos, select, sin
 from armwright.tracing.vectors import Matrix, Vector, add, apply, cross, dot, product, subtract, transpose
 
-Way: TypeAlias = Literal["blocks", "derivative"]
+Method: TypeAlias = Literal["blocks", "derivative"]
 
 # A factor of the determinant below this, in metres or as a sine, is taken for zero: of what is divided by it no more
 # than some six digits would be left.
@@ -53,10 +53,10 @@ class SingularConfigurationError(ArmwrightError, ValueError):
         factor: ``shoulder``, ``elbow`` or ``wrist``.
     """
 
-    def __init__(self, factor: str, value: float, place: tuple[int, ...]) -> None:
+    def __init__(self, factor: str, value: float, index: tuple[int, ...]) -> None:
         """Name the factor, its value and which of many configurations it is."""
         self.factor = factor
-        which = f"configuration {', '.join(str(i) for i in place)}" if place else "the configuration"
+        which = f"configuration {', '.join(str(i) for i in index)}" if index else "the configuration"
         super().__init__(
             f"{which} is singular at the {factor}: its factor of the determinant is {value:.3g}, expected at least "
             f"{SINGULAR_FACTOR:g}; damped_rates gives bounded rates there"
@@ -86,13 +86,13 @@ class DifferentialInverse:
             SingularConfigurationError: one does not; the text names the factor that vanishes.
         """
         if self.singular.any():
-            *place, factor = (int(i) for i in np.argwhere(self.singular)[0])
-            raise SingularConfigurationError(_FACTORS[factor], float(self.factors[*place, factor]), tuple(place))
+            *index, factor = (int(i) for i in np.argwhere(self.singular)[0])
+            raise SingularConfigurationError(_FACTORS[factor], float(self.factors[*index, factor]), tuple(index))
         return self.rates
 
 
 def differential_inverse(
-    arm: Arm, q: ArrayLike, twist: ArrayLike, *, way: Way = "blocks", frame: Axes = "base"
+    arm: Arm, q: ArrayLike, twist: ArrayLike, *, method: Method = "blocks", frame: Axes = "base"
 ) -> DifferentialInverse:
     """Return the joint rates that make a twist of the tool.
 
@@ -100,8 +100,8 @@ def differential_inverse(
         arm: an arm built like the PUMA: its axis of joint 4 in the plane of the arm.
         q: (..., 6) joint positions [rad].
         twist: (..., 6) speed of the tool point [m/s], then angular speed [rad/s].
-        way: ``blocks`` solves the wrist-partitioned Jacobian block by block; ``derivative`` differentiates the closed
-            form of the inverse. They agree.
+        method: ``blocks`` solves the wrist-partitioned Jacobian block by block; ``derivative`` differentiates the
+            closed form of the inverse. They agree.
         frame: whose axes the twist is seen along, ``base`` or ``tool``.
 
     Returns:
@@ -111,7 +111,7 @@ def differential_inverse(
     Raises:
         KindError: ``arm`` is no arm, or an argument something else than real numbers.
         UnsupportedArmError: the arm is not built like the PUMA.
-        UnknownNameError: there is no such way.
+        UnknownNameError: there is no such method.
         ShapeError: a shape does not fit.
         InvalidValueError: a number is NaN or infinite, or ``frame`` is neither ``base`` nor ``tool``.
 
@@ -124,14 +124,14 @@ def differential_inverse(
             f"arm '{arm.name}': no differential inverse in closed form; expected an arm built like puma560 "
             "(damped_rates takes any arm)"
         )
-    one_of("way", way, get_args(Way))
+    one_of("method", method, get_args(Method))
     known_axes(frame)
     q, twist = together(positions(arm, q), of_shape(twist, (6,), "twist", LARGEST), "q", "twist")
     lead = q.shape[:-1]
-    joints, asked = per_joint(q), per_joint(twist)
+    joints, twists = per_joint(q), per_joint(twist)
     angles = geometry.angles(joints)
-    solve = rates_by_blocks if way == "blocks" else rates_by_derivative
-    rates = solve(geometry, angles, wrist_motion(arm, geometry, joints, asked, frame))
+    solve = rates_by_blocks if method == "blocks" else rates_by_derivative
+    rates = solve(geometry, angles, wrist_motion(arm, geometry, joints, twists, frame))
     factors = stack(determinant_factors(geometry, angles), lead)
     singular = np.abs(factors) < SINGULAR_FACTOR
     joint_rates = stack([sign * rate for sign, rate in zip(geometry.signs, rates, strict=True)], lead)
@@ -164,7 +164,7 @@ def rates_by_blocks(geometry: ClosedFormGeometry, angles: Sequence[Scalar], moti
     """Solve the wrist-partitioned Jacobian block by block, over abstract scalars.
 
     Seen along the axes of frame 3 at the wrist centre, joint 1 alone moves the wrist centre out of the plane of the
-    arm, joints 2 and 3 move it in the plane, and joints 4 to 6 turn the hand by what is then left:
+    arm, joints 2 and 3 move it in the plane, and joints 4 to 6 make the rotation of the tool that then remains:
 
         v = [J11 J12 J13]        w = [J41 0 0  0  J45 J46]
             [J21  0   0 ]            [ 0  1 1  0  J55 J56]
@@ -179,7 +179,7 @@ def rates_by_blocks(geometry: ClosedFormGeometry, angles: Sequence[Scalar], moti
         Rates of the six angles; without meaning, but finite, where a factor of the determinant vanishes.
 
     Source:
-        The seed on the differential kinematics of the PUMA, way (b); its J21 has the shoulder's offset added here.
+        The seed on the differential kinematics of the PUMA, method (b); its J21 has the shoulder's offset added here.
     """
     a2, (a3, d4) = geometry.upper_arm, geometry.forearm
     _, t2, t3, t4, t5, _ = angles
@@ -218,7 +218,7 @@ def rates_by_derivative(geometry: ClosedFormGeometry, angles: Sequence[Scalar], 
         Rates of the six angles; without meaning, but finite, where a factor of the determinant vanishes.
 
     Source:
-        The seed on the differential kinematics of the PUMA, way (a); joint 2 by its atan2 of Paul (1981).
+        The seed on the differential kinematics of the PUMA, method (a); joint 2 by its atan2 of Paul (1981).
     """
     a2, (a3, d4) = geometry.upper_arm, geometry.forearm
     t1, _, t3, t4, t5, _ = angles
@@ -243,7 +243,7 @@ def rates_by_derivative(geometry: ClosedFormGeometry, angles: Sequence[Scalar], 
 def _wrist_rates(
     angles: Sequence[Scalar], first: Sequence[Scalar], motion: Motion, s5: Scalar, fourth: tuple[Scalar, Scalar]
 ) -> Vector:
-    """Differentiate the quotients of joints 4 to 6, seen from the forearm that turns with ``first``."""
+    """Differentiate the quotients of joints 4 to 6, seen from the forearm that rotates with ``first``."""
     d1, d23 = first
     c4, s4 = fourth
     c5 = cos(angles[4])
@@ -267,7 +267,7 @@ def _wrist_rates(
 
 
 def _forearm(angles: Sequence[Scalar]) -> Matrix:
-    """Return frame 3 seen from the shoulder frame: turned by angle 1 about z, then by angles 2 and 3 about y."""
+    """Return frame 3 seen from the shoulder frame: rotated by angle 1 about z, then by angles 2 and 3 about y."""
     c1, s1 = cos(angles[0]), sin(angles[0])
     c23, s23 = cos(angles[1] + angles[2]), sin(angles[1] + angles[2])
     return [[c1 * c23, -s1, c1 * s23], [s1 * c23, c1, s1 * s23], [-s23, 0.0, c23]]

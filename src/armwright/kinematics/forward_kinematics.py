@@ -15,7 +15,7 @@ from armwright.tracing.vectors import Matrix, Vector, add, apply, product
 
 
 def link_transform(joint: Joint, q: Scalar) -> tuple[Matrix, Vector]:
-    """Return rotation and place of frame i seen from frame i-1, over abstract scalars.
+    """Return rotation and position of frame i seen from frame i-1, over abstract scalars.
 
     Source:
         Denavit & Hartenberg (1955); TR-83-008 eq. (3), whose fourth column strayed into the rotation.
@@ -38,7 +38,7 @@ def link_transform(joint: Joint, q: Scalar) -> tuple[Matrix, Vector]:
 
 
 def link_frames(arm: Arm, q: Sequence[Scalar]) -> list[tuple[Matrix, Vector]]:
-    """Return rotation and place of frames 0 to n seen from the base, over abstract scalars.
+    """Return rotation and position of frames 0 to n seen from the base, over abstract scalars.
 
     Args:
         arm: the arm, with n joints.
@@ -56,7 +56,7 @@ def link_frames(arm: Arm, q: Sequence[Scalar]) -> list[tuple[Matrix, Vector]]:
 
 
 def tool_frame(arm: Arm, frame: tuple[Matrix, Vector]) -> tuple[Matrix, Vector]:
-    """Return rotation and place of the tool, given those of the last link, over abstract scalars."""
+    """Return rotation and position of the tool, given those of the last link, over abstract scalars."""
     R, p = frame
     return product(R, arm.tool[:3, :3].tolist()), add(p, apply(R, arm.tool[:3, 3].tolist()))
 

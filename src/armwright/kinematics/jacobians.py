@@ -1,4 +1,4 @@
-"""The Jacobian: how fast the tool moves and turns for given joint speeds, and how that changes on the way."""
+"""The Jacobian: the linear and angular velocity of the tool for joint speeds, and its derivative along a motion."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def frame_columns(arm: Arm, frames: Sequence[tuple[Matrix, Vector]], p_tool: Vec
 def jacobian_rate_columns(arm: Arm, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Vector]:
     """Return the time derivatives of the n columns of ``jacobian_columns``, over abstract scalars, base axes.
 
-    The axis of joint i is carried by link i-1, so it turns with that link; the lever from the joint to the tool
+    The axis of joint i is carried by link i-1, so it rotates with that link; the lever from the joint to the tool
     changes with the speeds of its two ends.
 
     Source:
@@ -145,7 +145,7 @@ def jacobian_rate(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -
 
 
 def tool_twist(arm: Arm, q: ArrayLike, qd: ArrayLike, frame: Axes = "base") -> Array:
-    """Return how the tool moves and turns.
+    """Return the linear and angular velocity of the tool.
 
     Args:
         arm: the arm, with n joints.

@@ -1,4 +1,4 @@
-"""How well a configuration can move the hand: measures of the Jacobian that are 0 where a direction is lost."""
+"""How well a configuration can move the tool: measures of the Jacobian that are 0 where a direction is lost."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def manipulability(
     """Return how well the tool can be moved.
 
     Metres and radians are compared through ``length``: the angular rows of the Jacobian are multiplied by it, so that
-    a turn counts as the way of a point that far from the axis. The measures are taken of min(rows, n) singular
-    values, so an arm with fewer joints than rows is measured within what it can do at all; with as many joints as
+    a rotation counts as the displacement of a point that far from the axis. The measures are taken of min(rows, n)
+    singular values, so an arm with fewer joints than rows is measured within what it can do at all; with as many joints as
     rows or more the first is Yoshikawa's sqrt(det(J Jᵀ)).
 
     Args:
@@ -35,7 +35,7 @@ def manipulability(
             the tool in its worst direction for joint speeds of length 1; ``inverse-condition``, the smallest over the
             largest, 0 to 1.
         motion: ``all`` six rows, the ``linear`` three or the ``angular`` three.
-        length: what a turn by one radian is worth [m].
+        length: what a rotation by one radian is worth [m].
 
     Returns:
         (...) the measure, 0 or more.
@@ -70,5 +70,7 @@ def scaled_rows(J: Array, length: float) -> Array:
     """
     length = number(length, "length")
     if not 0 < length <= LARGEST:
-        raise InvalidValueError(f"length: expected a length above 0 that a turn is worth, got {length}")
+        raise InvalidValueError(
+            f"length: expected a length above 0 that a rotation by one radian is worth, got {length}"
+        )
     return np.asarray(J * np.repeat((1.0, length), 3)[:, None])

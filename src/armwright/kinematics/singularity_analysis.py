@@ -44,9 +44,9 @@ class Singularities:
     Attributes:
         factors: the factors of the determinant, or the singular values, largest first.
         singular_values: (min(6, n)) of the Jacobian with its angular rows in metres, largest first [m].
-        lost: (k, 6) twists, base axes, that the hand cannot make: at a right angle to all it can, and to each other.
+        lost: (k, 6) twists, base axes, that the tool cannot make: at a right angle to all it can, and to each other.
             At least one where the configuration is singular; with fewer than six joints also those never possible.
-        idle: (k, n) joint motions that leave the hand where it is, each of length 1, at right angles to each other.
+        idle: (k, n) joint motions that do not move the tool, each of length 1, at right angles to each other.
             At least one where the configuration is singular; with more than six joints also the self-motions.
     """
 
@@ -139,7 +139,7 @@ def singularities(arm: Arm, q: ArrayLike, *, threshold: float = 1e-3, length: fl
         threshold: a factor is near zero below this part of its scale: of the farthest reach of the wrist for the
             shoulder (1 m for a slide), of the length of the forearm for the elbow, of 1 m for the slide, of 1 for the
             wrist; a singular value below this part of the largest.
-        length: what a turn by one radian is worth [m], where lengths and turns are compared.
+        length: what a rotation by one radian is worth [m], where lengths and rotations are compared.
 
     Returns:
         Factors, singular values, lost and idle directions.

@@ -42,7 +42,7 @@ def wrist_partitioned_jacobian(arm: Arm, q: ArrayLike) -> Array:
         InvalidValueError: a number is NaN or infinite.
 
     Source:
-        The seed on the differential kinematics of the PUMA, way (b); its J21 has the shoulder's offset added here.
+        The seed on the differential kinematics of the PUMA, method (b); its J21 has the shoulder's offset added here.
     """
     geometry = _puma(arm)
     return np.asarray(_blocks(geometry, positions(arm, q)) * np.array(geometry.signs))
@@ -59,7 +59,7 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
         q: (..., 6) joint positions [rad].
 
     Returns:
-        (..., 6, 6): joint velocities per velocity of the wrist centre and angular velocity of the hand, both along
+        (..., 6, 6): joint velocities per velocity of the wrist centre and angular velocity of the tool, both along
         the axes of the forearm.
 
     Raises:
@@ -70,7 +70,7 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
         InvalidValueError: a number is NaN or infinite.
 
     Source:
-        The seed on the differential kinematics of the PUMA, way (b); its inverse is partly illegible and derived anew.
+        The seed on the differential kinematics of the PUMA, method (b); its inverse, partly illegible, is derived anew.
     """
     geometry = _puma(arm)
     q = positions(arm, q)
@@ -87,7 +87,7 @@ def wrist_partitioned_inverse(arm: Arm, q: ArrayLike) -> Array:
     inverse[..., 2, 0], inverse[..., 2, 2] = -J[..., 2, 1] / plane, J[..., 0, 1] / plane
     in_plane = inverse[..., 1:3, 0:3:2] @ J[..., 0:3:2, :1]
     inverse[..., 1:3, 1:2] = -in_plane / out[..., None, None]
-    # Joint 4 turns the hand about z, and joints 5 and 6 about what is left.
+    # Joint 4 rotates the tool about z, and joints 5 and 6 about the other axes.
     inverse[..., 4, 3], inverse[..., 4, 4] = J[..., 3, 4], J[..., 4, 4]
     inverse[..., 5, 3], inverse[..., 5, 4] = J[..., 4, 4] / bend, -J[..., 3, 4] / bend
     inverse[..., 3, 3:5] = -J[..., 5, 5, None] * inverse[..., 5, 3:5]

@@ -49,7 +49,7 @@ def to_zyz(R: ArrayLike) -> Array:
 
 
 def next_zyz(R: ArrayLike, near: ArrayLike) -> Array:
-    """Return the ZYZ angles (3,) of one rotation (3, 3) that are neatilted to others (3,).
+    """Return the ZYZ angles (3,) of one rotation (3, 3) that are nearest to others (3,).
 
     Both solutions, theta and -theta, and revolutions are considered; where theta is 0 or pi, phi stays as it is near.
     """

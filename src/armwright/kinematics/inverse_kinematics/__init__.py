@@ -1,1 +1,1 @@
-"""Inverse kinematics: configurations that put the hand at a pose, labelled and judged; closed forms where there are."""
+"""Inverse kinematics: labelled configurations that bring the tool to a pose, in closed form where there is one."""

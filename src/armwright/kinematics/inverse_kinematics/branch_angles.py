@@ -1,4 +1,4 @@
-"""One branch of one arm: all six angles that put the hand at a pose, over abstract scalars."""
+"""One branch of one arm: all six angles that bring the tool to a pose, over abstract scalars."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def branch_angles(
         geometry: of the arm.
         p: wrist centre in the shoulder frame [m].
         R: orientation of the last wrist frame (``R_T6`` from the tool), seen from the shoulder frame.
-        signs: which arm, which elbow (or way of the slide), which wrist.
+        signs: which arm, which elbow (or direction of the slide), which wrist.
         near: six angles; a free one takes its value from here.
     """
     arm, elbow, flip = signs
@@ -63,10 +63,10 @@ def branch_angles(
 def _parallel(
     geometry: ClosedFormGeometry, p: Vector, R: Matrix, signs: tuple[Sign, Sign, Sign], near: Vector
 ) -> BranchAngles:
-    """Solve three parallel axes: joint 1 by the side, joints 5 and 6 and the sum of 2 to 4 by the turn, 2 by the place.
+    """Solve three parallel axes: joint 1 by the side, 5, 6 and the sum of 2 to 4 by the orientation, 2 by the position.
 
-    The turn beyond joint 1 is about y, z and y: the parallel joints together, joint 5, joint 6. With joint 5 straight
-    only the sum of the outer two is given; joint 6 then stays near, or where the arm still reaches.
+    The rotation after joint 1 is about y, z and y: the parallel joints together, joint 5, joint 6. With joint 5
+    straight only the sum of the outer two is determined; joint 6 then stays near, or where the arm still reaches.
 
     Source:
         Hawkins (2013), "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", in other frames.
@@ -90,9 +90,9 @@ def _parallel(
 
 
 def _into_reach(geometry: ClosedFormGeometry, X: Scalar, Z: Scalar, raised: Scalar) -> Scalar:
-    """Return by how much the wrist link must be turned on for the two links before it to reach its foot; 0 if they do.
+    """Return the further rotation of the wrist link that lets the two links before it reach its foot; 0 if they do.
 
-    The foot of the wrist link is as far from joint 2 as the cosine rule says; turned towards (X, Z) it is nearest.
+    The foot of the wrist link is as far from joint 2 as the cosine rule says; rotated towards (X, Z) it is nearest.
     """
     length = math.hypot(*geometry.wrist_link)
     if not length:

@@ -25,10 +25,10 @@ class Branches(NamedTuple):
     """Eight joint configurations of one pose, in the order of ``BRANCHES``.
 
     Attributes:
-        q: joint positions of each, within half a turn of where the arm is.
-        free: of each, which of three choices the pose leaves open: the turn of joint 1, the raising of joint 2, the
+        q: joint positions of each, within 180 deg of where the arm is.
+        free: of each, which of three choices the pose leaves open: the side of joint 1, the raising of joint 2, the
             wrist.
-        reach_error: how far each keeps the hand from a position out of reach [m].
+        reach_error: distance of the tool of each from a position out of reach [m].
     """
 
     q: list[Vector]
@@ -106,7 +106,7 @@ def merged(solutions: Branches) -> tuple[list[Vector], list[Scalar]]:
 
 
 def _near(arm: Arm, q: Vector, near: Sequence[Scalar]) -> Vector:
-    """Turn angles by whole turns to within half a turn of ``near``, whatever the limits."""
+    """Shift angles by whole revolutions to within 180 deg of ``near``, whatever the limits."""
     return [
         x + _TURN * round_half_even((x_near - x) * (1 / _TURN)) if joint.revolute else x
         for joint, x, x_near in zip(arm.joints, q, near, strict=True)

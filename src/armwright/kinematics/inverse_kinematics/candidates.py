@@ -70,16 +70,16 @@ def typed_poses(X_BT: ArrayLike) -> Array:
     worst = float(np.max(error, initial=0.0))
     if worst > _TYPED_ROTATION:
         R = X.reshape(-1, 4, 4)[error.argmax(), :3, :3]
-        hint = "; it is a mirror image: one axis points the other way" if np.linalg.det(R) < 0 else ""
+        hint = "; it is a mirror image: one axis is reversed" if np.linalg.det(R) < 0 else ""
         raise InvalidValueError(
-            f"pose: expected a rotation, orthonormal to {_TYPED_ROTATION}, got one that is off by {worst:.3g}: "
+            f"pose: expected a rotation, orthonormal to {_TYPED_ROTATION}, got one with an error of {worst:.3g}: "
             f"{R.tolist()}{hint}"
         )
     return X
 
 
 def pose_errors(arm: Arm, q: Array, X: Array) -> tuple[Array, Array]:
-    """Return how far from a pose configurations put the hand: distances (...) [m] and angles (...) [rad]."""
+    """Return the errors of configurations against a pose: distances (...) [m] and angles (...) [rad]."""
     X_q = forward(arm, q)
     return np.linalg.norm(X_q[..., :3, 3] - X[..., :3, 3], axis=-1), angle_between(X[..., :3, :3], X_q[..., :3, :3])
 

@@ -1,6 +1,6 @@
 """The first three joints: where they must stand to put the wrist centre at a point, over abstract scalars.
 
-The builds solved here all turn about a first axis and carry the arm in a plane at a fixed distance beside it. So all
+The builds solved here all rotate about a first axis and carry the arm in a plane at a fixed distance beside it. So all
 begin with the same question, which angle of joint 1 puts the point at that distance from the axis, and go on in the
 plane of the arm, with an elbow or with a slide.
 
@@ -48,10 +48,10 @@ class ClosedFormGeometry:
         upper_arm: length of the upper arm [m]; 0 with a slide.
         forearm: (along, across) of the forearm, from joint 3 to the wrist centre or to joint 4: the a3 and d4 of the
             PUMA; with a slide, how far the wrist centre lies beside the line through joint 2 [m].
-        wrist_link: (x, z) from joint 4 to the point where the axes 5 and 6 meet, all turns at 0 (``parallel``) [m].
-        tilt: turn about y of the axis of joint 5 from z, all turns at 0 (``parallel``) [rad].
-        R_3W: (3, 3) the fixed turn from the forearm to the frame in which joints 4 to 6 are z, y, z angles.
-        R_T6: (3, 3) the fixed turn from the tool to the last of those.
+        wrist_link: (x, z) from joint 4 to the point where the axes 5 and 6 meet, all joints at 0 (``parallel``) [m].
+        tilt: rotation about y of the axis of joint 5 from z, all joints at 0 (``parallel``) [rad].
+        R_3W: (3, 3) the fixed rotation from the forearm to the frame in which joints 4 to 6 are z, y, z angles.
+        R_T6: (3, 3) the fixed rotation from the tool to the last of those.
         p_TW: (3,) the wrist centre seen from the tool [m].
     """
 
@@ -96,7 +96,7 @@ class ClosedFormGeometry:
 
 
 def rotated_about_y(angle: Scalar, x: Scalar, z: Scalar) -> tuple[Scalar, Scalar]:
-    """Turn the point (x, z) about y, over abstract scalars: from x towards -z."""
+    """Rotate the point (x, z) about y, over abstract scalars: from x towards -z."""
     c, s = cos(angle), sin(angle)
     return c * x + s * z, c * z - s * x
 

@@ -29,7 +29,7 @@ _STILL = 1e-9
 _DAMPING, _FAILED, _SUCCEEDED = 1.0, 8.0, 0.25
 # Configurations closer than this are one: at the edge of the reach half of the digits are gone [rad] or [m].
 _SAME_CONFIGURATION = 1e-5
-# A joint motion is taken for free where the hand is not moved by it to first order (singular values below this part
+# A joint motion is taken for free where the tool is not moved by it to first order (singular values below this part
 # of the largest), nor by so long a motion along it once the other joints have made up for its curvature [rad] or [m].
 _IDLE = 1e-6
 _FREE_WAY = 0.05
@@ -37,7 +37,7 @@ _FREE_WAY = 0.05
 
 @attrs.frozen(kw_only=True, eq=False)
 class _Task:
-    """Bring the hand of an arm to a pose, joints kept between bounds.
+    """Bring the tool of an arm to a pose, joints kept between bounds.
 
     Attributes:
         arm: the arm.
@@ -45,7 +45,7 @@ class _Task:
         lower: (n,) lower bounds, may be infinite.
         upper: (n,) upper bounds.
         size: how long the arm is, for what is small [m].
-        length: what a turn by one radian is worth [m].
+        length: what a rotation by one radian is worth [m].
     """
 
     arm: Arm
@@ -60,9 +60,9 @@ def numeric_inverse(arm: Arm, X: Array, near: Array) -> InverseSolution:
     """Return configurations that put the tool at one pose, found by damped least squares from many starts.
 
     The starts are the present configuration and points spread evenly over the joint limits, always the same ones. The
-    limits are kept on the way. When no start leads to the pose the search is made again without limits, to tell a
-    pose that only the limits keep from one that is out of reach; then the configuration with the least error comes
-    back, in which a rotation by one radian counts as much as a quarter of the arm's length.
+    limits hold during the search. When no start leads to the pose the search is made again without limits, to
+    distinguish a pose that only the limits exclude from one that is out of reach; then the configuration with the least
+    error is returned, in which a rotation by one radian counts as much as a quarter of the arm's length.
 
     An arm of six joints or fewer has a finite number of solutions: those that were found are given, most often all.
     With more joints they are endless, and those that were found are examples, nearest first.
@@ -150,10 +150,10 @@ def _same(arm: Arm, q: Array, other: Candidate) -> bool:
 
 
 def _free_joints(task: _Task, q: Array) -> tuple[int, ...]:
-    """Return the numbers of the joints that can move, together, without moving the hand; none of a redundant arm.
+    """Return the numbers of the joints that can move, together, without moving the tool; none of a redundant arm.
 
-    An idle motion of the Jacobian alone does not say so: a stretched arm has one as well, and cannot move. So a way
-    along it is gone and the rest made up for.
+    An idle motion of the Jacobian alone is no proof: a stretched arm has one as well, and cannot move. So a step along
+    it is made and the error that remains corrected.
     """
     if task.arm.n > 6:
         return ()

@@ -1,4 +1,4 @@
-"""The nearest place in reach, for a hand that keeps its orientation."""
+"""The nearest position in reach, for a tool that keeps its orientation."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _FINER = 20
 
 
 def nearest_wrist_centre(geometry: ClosedFormGeometry, p: Array, R: Array) -> Array:
-    """Return the point nearest to ``p`` where the wrist centre can be while the hand is turned by ``R``.
+    """Return the point nearest to ``p`` where the wrist centre can be while the tool has the orientation ``R``.
 
     Args:
         geometry: the build.
         p: (3,) wrist centre asked for, in the shoulder frame [m].
-        R: (3, 3) turn of the last wrist frame, seen from the shoulder frame.
+        R: (3, 3) orientation of the last wrist frame, seen from the shoulder frame.
     """
     if geometry.family == "parallel" or geometry.shoulder_offset:
         return _nearest_by_turning(geometry, p, R)
@@ -59,7 +59,7 @@ def _nearest_in_ring(geometry: ClosedFormGeometry, p: Array) -> Array:
 
 
 def _nearest_by_turning(geometry: ClosedFormGeometry, p: Array, R: Array) -> Array:
-    """Look through the angles of joint 1: at each the nearest place is that of a ring in the plane of the arm."""
+    """Search the angles of joint 1: at each the nearest position is that of a ring in the plane of the arm."""
     rows: list[list[float]] = R.tolist()
     flips: tuple[Sign, ...] = (1, -1) if geometry.family == "parallel" else (1,)
     best: tuple[float, Array] | None = None

@@ -25,7 +25,7 @@ _SWAP = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]])
 def find_geometry(arm: Arm) -> ClosedFormGeometry | None:
     """Return the build of an arm that has a closed-form inverse, or None.
 
-    Six joints, the first a turn at a right angle to the axis of the second, and then one of
+    Six joints, the first a revolute joint at a right angle to the axis of the second, and then one of
 
     - ``puma``: joint 3 parallel to joint 2; joints 4 to 6 a spherical wrist;
     - ``stanford``: joint 3 a slide at a right angle to the axis of joint 2; joints 4 to 6 a spherical wrist;
@@ -202,9 +202,9 @@ def _with_parallel_axes(axes: Axes, crossing: Array) -> ClosedFormGeometry | Non
 
 
 def _wrist(view: _ShoulderView, raised: float, aligned: bool) -> tuple[Array, float, float, Array]:  # noqa: FBT001
-    """Return the turn from forearm to wrist, the offsets of joints 4 and 5, and the last wrist frame at zero.
+    """Return the rotation from forearm to wrist, the offsets of joints 4 and 5, and the last wrist frame at zero.
 
-    ``raised`` is the turn of the forearm from x, all joints at 0; ``aligned``: whether its z is the axis of joint 4.
+    ``raised`` is the angle of the forearm from x, all joints at 0; ``aligned``: whether its z is the axis of joint 4.
     """
     axis_4, axis_5, axis_6 = view.directions[3:]
     forearm = _about_y(raised)
@@ -219,7 +219,7 @@ def _wrist(view: _ShoulderView, raised: float, aligned: bool) -> tuple[Array, fl
 
 
 def _heading(x: float, z: float) -> float:
-    """Return the turn about y that brings the x axis onto (x, z)."""
+    """Return the rotation about y that brings the x axis onto (x, z)."""
     return math.atan2(-z, x)
 
 

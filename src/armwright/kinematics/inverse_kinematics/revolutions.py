@@ -40,7 +40,7 @@ def nearest_equivalent(arm: Arm, q: ArrayLike, near: ArrayLike) -> Array:
 
 
 def equivalent_configurations(arm: Arm, q: ArrayLike) -> Array:
-    """Return the equivalents of one configuration by whole turns inside the limits, (k, n); k is 0 if none is.
+    """Return the equivalents of one configuration by whole revolutions inside the limits, (k, n); k is 0 if none is.
 
     A joint without limits has endless equivalents; it stays where it is. Where limits leave room for very many, those
     nearest to the configuration are returned, some thousand.
@@ -52,13 +52,13 @@ def equivalent_configurations(arm: Arm, q: ArrayLike) -> Array:
 
 
 def wrapped_near(arm: Arm, q: Array, near: Array) -> Array:
-    """Turn angles (..., n) by whole turns to within half a turn of ``near``, whatever the limits."""
+    """Shift angles (..., n) by whole revolutions to within 180 deg of ``near``, whatever the limits."""
     revolute = np.array([joint.revolute for joint in arm.joints])
     return np.asarray(np.where(revolute, q + _TURN * np.round((near - q) / _TURN), q))
 
 
 def same_configuration(arm: Arm, a: Array, b: Array, tolerance: float) -> bool:
-    """Whether two configurations (n,) are one but for whole turns."""
+    """Whether two configurations (n,) differ by whole revolutions only."""
     return float(np.abs(wrapped_near(arm, a, b) - b).max()) < tolerance
 
 

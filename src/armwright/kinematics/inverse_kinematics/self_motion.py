@@ -70,10 +70,10 @@ def _search(
 def counter_rotate_within_limits(
     arm: Arm, q: Array, near: Array, members: Callable[[Array], Array], *, joint: int, other: int
 ) -> Array:
-    """Turn two joints whose axes lie on one line, against each other, until both are inside their limits.
+    """Rotate two joints whose axes lie on one line, against each other, until both are inside their limits.
 
-    The members of such a family are known: what one joint turns, the other turns back. So the least turn that brings
-    both inside lies at a limit of one of them.
+    The members of such a family are known: what one joint rotates, the other rotates back. So the least rotation that
+    brings both inside lies at a limit of one of them.
 
     Args:
         arm: the arm.
@@ -81,7 +81,7 @@ def counter_rotate_within_limits(
         near: (n,) where the arm is.
         members: returns the members (k, n) of the family that joint positions (k, n) to stay near lead to.
         joint: number of the free joint, from 1.
-        other: number of the joint that turns with it.
+        other: number of the joint that rotates with it.
     """
     lower, upper = _interval(arm, near, joint, _TURN)
     if lower > upper:
@@ -109,7 +109,7 @@ def _with_joint(near: Array, joint: int, values: Array) -> Array:
 def _interval(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, float]:
     """Return from where to where a free joint may move: inside its limits, by so much at most [rad].
 
-    One that is outside of them is moved inside before it is turned by a whole turn.
+    One that is outside of them is moved inside before it is shifted by a whole revolution.
     """
     limits, start = arm.joints[joint - 1].limits, near[joint - 1]
     if turn == _TURN:
@@ -118,7 +118,7 @@ def _interval(arm: Arm, near: Array, joint: int, turn: float) -> tuple[float, fl
 
 
 def _excess(arm: Arm, q: Array) -> Array:
-    """Return the sums (k,) of how far the joints of configurations (k, n) are outside limits, whole turns aside."""
+    """Return the sums (k,) by which joints of configurations (k, n) exceed limits, after shifts by revolutions."""
     total = np.zeros(len(q))
     for joint, values in zip(arm.joints, q.T, strict=True):
         lower, upper = joint.limits.lower, joint.limits.upper

@@ -73,9 +73,9 @@ class Branch:
         q: (n,) joint positions [rad] or [m].
         label: such as ``right, up, no-flip``.
         violations: joints outside their limits; empty when the configuration can be taken.
-        free: numbers of the joints that may turn together without moving the hand, from 1; empty unless singular.
-        position_error: distance of the hand from the asked place [m].
-        rotation_error: angle of the hand from the asked orientation [rad].
+        free: numbers of the joints that may rotate together without moving the tool, from 1; empty unless singular.
+        position_error: distance of the tool from the goal [m].
+        rotation_error: angle of the tool from the orientation of the goal [rad].
     """
 
     q: Array = attrs.field(converter=read_only, eq=array_key)
@@ -100,9 +100,9 @@ class InverseSolution:
     Attributes:
         arm: the arm.
         outcome: one word on the whole.
-        branches: the solutions, those inside the limits first, each nearest to the asked starting point first.
+        branches: the solutions, those inside the limits first, each nearest to the start that was passed first.
         distance: how far the pose is out of reach [m]; 0 where it is in reach.
-        nearest_pose: (4, 4) the pose in reach nearest to the asked one: with a closed form of the same orientation,
+        nearest_pose: (4, 4) the pose in reach nearest to the goal: with a closed form of the same orientation,
             else the best that was found.
         rotation_error: angle between the orientations of the nearest and the requested pose [rad].
     """
@@ -159,7 +159,7 @@ class InverseSolution:
 
 
 class NoSolutionError(ArmwrightError, ValueError):
-    """No configuration inside the limits puts the hand at the pose; ``solution`` holds what was found."""
+    """No configuration inside the limits brings the tool to the pose; ``solution`` has the nearest results."""
 
     def __init__(self, solution: InverseSolution) -> None:
         """Keep the solution; its explanation is the text."""

@@ -39,7 +39,7 @@ def inverse_branches(arm: Arm, X_BT: ArrayLike, near: ArrayLike | None = None) -
     Args:
         arm: an arm of 6 joints with a closed form: see ``find_geometry``.
         X_BT: (..., 4, 4) tool poses in the base frame.
-        near: (..., 6) joint positions; angles come back within half a turn of it, and a free joint takes its
+        near: (..., 6) joint positions; angles come back within 180 deg of it, and a free joint takes its
             value from it; the middle of the limits when left out.
 
     Returns:
@@ -168,7 +168,7 @@ def _members(arm: Arm, geometry: ClosedFormGeometry, X_BT: Array, branch: int, n
 
 
 def _nearest_pose(geometry: ClosedFormGeometry, X_BT: Array) -> Array:
-    """Return X_BT moved, not turned, so that the wrist centre comes into reach."""
+    """Return X_BT translated, not rotated, so that the wrist centre comes into reach."""
     R_BS, p_BS = geometry.X_BS[:3, :3], geometry.X_BS[:3, 3]
     R_ST = R_BS.T @ X_BT[:3, :3]
     p = R_BS.T @ (X_BT[:3, 3] - p_BS) + R_ST @ geometry.p_TW

@@ -1,4 +1,4 @@
-"""The last three joints: a spherical wrist turns the hand as the ZYZ Euler angles do, over abstract scalars."""
+"""The last three joints: a spherical wrist orients the tool as the ZYZ Euler angles do, over abstract scalars."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ SINGULAR_SINE = 1e-10
 
 
 def last_three(R_36: Matrix, flip: Sign, theta_4_free: Scalar) -> tuple[Vector, Scalar]:
-    """Return joint angles 4 to 6 for a turn ``R_36`` of the hand against the forearm, and whether joint 4 is free.
+    """Return joint angles 4 to 6 for a rotation ``R_36`` of the tool against the forearm, and whether joint 4 is free.
 
-    Joint 6 is solved with joint 4 put back in, so the three always reproduce the turn, at and near the
+    Joint 6 is solved with joint 4 put back in, so the three always reproduce the rotation, at and near the
     singularity as elsewhere.
 
     Args:
