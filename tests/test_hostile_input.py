@@ -287,7 +287,7 @@ def test_numbers_without_a_meaning(door: str, value: float) -> None:
         (lambda: tool_twist(PUMA, Q, Q, np.ones(2)), InvalidValueError, "frame: expected 'base' or 'tool'"),
         (lambda: manipulability(PUMA, Q, "yoshikava"), UnknownNameError, "Did you mean 'yoshikawa'?"),
         (lambda: manipulability(PUMA, Q, motion=["all"]), UnknownNameError, "no motion '['all']'."),
-        (lambda: differential_inverse(PUMA, Q, Q, way=np.ones(2)), UnknownNameError, "no way '[1. 1.]'."),
+        (lambda: differential_inverse(PUMA, Q, Q, method=np.ones(2)), UnknownNameError, "no method '[1. 1.]'."),
         (lambda: Adaptive(method="RK4"), UnknownNameError, "no method 'RK4'"),
         (lambda: armwright.dynamics.terms(PUMA, Q, Q, Q, load=2.0), KindError, "load: expected a Link, got 2.0"),
         (lambda: armwright.dynamics.payload(PUMA, -1.0), InvalidValueError, "mass must be 0 or more, got -1"),

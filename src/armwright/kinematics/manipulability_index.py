@@ -25,8 +25,8 @@ def manipulability(
 
     Metres and radians are compared through ``length``: the angular rows of the Jacobian are multiplied by it, so that
     a rotation counts as the displacement of a point that far from the axis. The measures are taken of min(rows, n)
-    singular values, so an arm with fewer joints than rows is measured within what it can do at all; with as many joints as
-    rows or more the first is Yoshikawa's sqrt(det(J Jᵀ)).
+    singular values, so an arm with fewer joints than rows is measured within what it can do at all; with as many joints
+    as rows or more the first is Yoshikawa's sqrt(det(J Jᵀ)).
 
     Args:
         arm: the arm, with n joints.
