@@ -208,8 +208,8 @@ POSES: dict[str, tuple[Any, type[ArmwrightError], str]] = {
     "transposed": (X.T, InvalidValueError, "; is it transposed?"),
     "another last row": (np.diag((1.0, 1, 1, 2)), InvalidValueError, "as the last row, got [0.0, 0.0, 0.0, 2.0]"),
     "a last row of zeros": (np.diag((1.0, 1, 1, 0)), InvalidValueError, "as the last row, got [0.0, 0.0, 0.0, 0.0]"),
-    "a mirror image": (X @ MIRROR, InvalidValueError, "it is a mirror image: one axis points the other way"),
-    "twice the size": (np.diag((2.0, 2, 2, 1)), InvalidValueError, "orthonormal to 0.02, got one that is off by 3: "),
+    "a mirror image": (X @ MIRROR, InvalidValueError, "it is a mirror image: one axis is reversed"),
+    "twice the size": (np.diag((2.0, 2, 2, 1)), InvalidValueError, "orthonormal to 0.02, got one with an error of 3: "),
     "sheared": (X + 0.1 * np.eye(4, k=1) * [[1], [1], [0], [0]], InvalidValueError, "expected a rotation, orthonormal"),
     "no rotation": (np.diag((0.0, 0, 0, 1)), InvalidValueError, "expected a rotation, orthonormal to 0.02"),
 }
