@@ -14,7 +14,7 @@ from armwright.kinematics.damped_least_squares import damped_rates
 from armwright.kinematics.differential import differential_inverse
 from doors import OTHER, PUMA, Q
 
-RUN = armwright.accuracy.Trace(places=((0, 0), (1, 0)), times=(0, 1), angles=((0,), (1,)))
+RUN = armwright.accuracy.Trace(positions=((0, 0), (1, 0)), times=(0, 1), angles=((0,), (1,)))
 RESULTS: dict[str, Callable[[], Any]] = {
     "inverse": lambda: armwright.kinematics.inverse(PUMA, armwright.kinematics.forward(PUMA, Q)),
     "inverse out of reach": lambda: armwright.kinematics.inverse(PUMA, np.eye(4) + 9 * np.eye(4, k=3)),

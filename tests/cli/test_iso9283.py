@@ -114,7 +114,7 @@ def test_mistakes_of_the_page(slip: int, tmp_path: Path) -> None:
         ((POSES, "--limit", "RP"), 2, "expected a symbol and a number with its unit, RP=0.05mm, got RP"),
         ((POSES, "--limit", "RQ=1mm"), 2, "no measure 'RQ'"),
         ((POSES, "--band-mm", "0"), 2, "expected a number above 0, got 0"),
-        ((PATHS,), 2, "settling P1: no band is given, and no test of pose P1 is there"),
+        ((PATHS,), 2, "settling P1: no band is specified, and pose P1 has no test whose RP"),
         ((), 2, "Missing argument"),
     ],
 )
